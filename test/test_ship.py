@@ -217,7 +217,7 @@ def test_the_chain_from_power_up_to_autotrack(told):
     progress = [(log / 1e9, status.level, status.message, {value.key for value in status.values})
                 for _, log, _, array in told.bag.messages('diagnostics')
                 for status in array.status if status.name == 'ins']
-    assert progress[0][2] == 'aligning: heading not known yet, navigates from 0.69 deg on'
+    assert progress[0][2] == 'aligning: heading unknown, navigation begins at 0.69 deg'
     for t, level, message, keys in progress[1:]:
         assert (level == 1 and message.startswith('aligning: heading known to ')) == (t < aligned)
         assert ('velocity_east' in keys) == (t >= aligned)

@@ -1,18 +1,18 @@
-"""How a ship moves on a seaway, what its IMU measures and what its INS reports.
+"""Motion of a ship on a seaway, measurements of its IMU and outputs of its INS.
 
-recording       a recorded motion as piecewise polynomials, where motion.step is not to make waves
-motion.step     time -> the ship's truth (stateless: the same seed and time give the same bits in any order)
-imu.step        truth -> specific force and angular rate by REP 145
-strapdown.step  increments of angle and velocity -> attitude and velocity in a computed frame
-ins.step        stamp of an IMU message -> attitude and deck rate of an INS with stated errors and latency
+recording           recorded motion as piecewise polynomials, instead of waves
+motion.truth        time -> truth of the ship (stateless: the same seed and time give the same bits in any order)
+imu.step            truth -> specific force and angular rate by REP 145
+strapdown.step      increments of angle and velocity -> attitude and velocity in a computed frame
+ins.step            stamp of an IMU message -> attitude and deck rate of an INS with stated errors and latency
 aligning_ins.step   stamp and data of an IMU message -> attitude and deck rate of an INS that aligns and navigates
 
 Frames
-    earth   ENU tangent plane at the place where the ship is at t = 0.
+    earth   ENU tangent plane at the position of the ship at t = 0.
     deck    FLU: x to the bow, y to port, z up. roll about x (port side up), pitch about y (bow down), yaw
-            about z (to port) as fixed axes of REP 103; yaw 0 is east. A compass heading counts the other way:
-            yaw = 90 deg - heading, converted where the parameter is read.
-    mu      where a wave travels to, seen from the bow, clockwise: 0 following, 90 from port to starboard,
+            about z (to port) as fixed axes of REP 103; yaw 0 is east. A compass heading is clockwise:
+            yaw = 90 deg - heading, converted when the parameter is read.
+    mu      direction to which a wave travels, clockwise from the bow: 0 following, 90 from port to starboard,
             180 head sea.
 
 Units are SI and radians; a name that ends in _deg is in degrees.

@@ -4,21 +4,23 @@ import math
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry.geodesy import EARTH_FLATTENING, EARTH_RATE
 
-WGS84_EARTH_RATE_RAD_S = round(EARTH_RATE, 11)    # [rad/s], to the digits that WGS-84 prints
-EQUATOR_GRAVITY_M_S2 = 9.7803253359  # [m/s2]
-POLE_GRAVITY_M_S2 = 9.8321849378     # [m/s2]
+WGS84_EARTH_RATE_RAD_S = round(EARTH_RATE, 11)
+"""Rotation rate of the earth with the printed digits of WGS-84 [rad/s]."""
+EQUATOR_GRAVITY_M_S2, POLE_GRAVITY_M_S2 = 9.7803253359, 9.8321849378
+"""Normal gravity at the equator and at the poles [m/s2]."""
 ECCENTRICITY_SQUARED = EARTH_FLATTENING * (2.0 - EARTH_FLATTENING)
 _SOMIGLIANA = (1.0 - EARTH_FLATTENING) * POLE_GRAVITY_M_S2 / EQUATOR_GRAVITY_M_S2 - 1.0
 
 
 @compiled
 def gravity(latitude):
-    """Normal gravity on the ellipsoid [m/s2] at a geodetic latitude [rad] (Somigliana, TR8350.2 equation 4-1)."""
+    """Return normal gravity on the ellipsoid [m/s2] at a geodetic latitude [rad] (Somigliana, TR8350.2 equation
+    4-1)."""
     s2 = math.sin(latitude) ** 2
     return EQUATOR_GRAVITY_M_S2 * (1.0 + _SOMIGLIANA * s2) / math.sqrt(1.0 - ECCENTRICITY_SQUARED * s2)
 
 
 @compiled
 def rate(latitude):
-    """Rotation of the earth in ENU [rad/s]: (east, north, up)."""
+    """Return the rotation of the earth in ENU [rad/s]: (east, north, up); latitude [rad]."""
     return 0.0, WGS84_EARTH_RATE_RAD_S * math.cos(latitude), WGS84_EARTH_RATE_RAD_S * math.sin(latitude)

@@ -1,10 +1,10 @@
-"""What a strapdown IMU at the deck's origin reports: specific force and angular rate by REP 145.
+"""A strapdown IMU at the origin of the deck: specific force and angular rate by REP 145.
 
     inputs['t'], inputs['dt'] = time, step [s]; step(state, constants, ship, inputs, truth, outputs, normals)
 
 output 'sample'      the rates at the stamp
-output 'increment'   the mean rates since the last sample: what an integrating IMU gives, divided by the interval.
-                     Exact: three-point Gauss quadrature of the analytic rates, whose error goes with dt^7.
+output 'increment'   the mean rates since the last sample: increments of an integrating IMU, divided by the interval.
+                     Three-point Gauss quadrature of the analytic rates, whose error is proportional to dt^7.
 """
 import math
 
@@ -16,19 +16,20 @@ from ship_motion_sim import earth
 from ship_motion_sim.params import ShipMotionParameters
 from ship_motion_sim.sea import motion
 
-IMU_NORMALS_PER_STEP = 6     # standard normals a step takes: three gyros, three accelerometers
+IMU_NORMALS_PER_STEP = 6
+"""Number of standard normals of a step: three gyros, three accelerometers."""
 IMU_STATUS_TEXTS = ('ok', 'step is not positive', 'truth is not valid')
 IMU_OK, IMU_BAD_STEP, IMU_BAD_TRUTH = range(len(IMU_STATUS_TEXTS))
 
-# the outer nodes of the three-point rule, from the middle, for an interval of 1
 _GAUSS_NODE_OFFSET = math.sqrt(0.15)
+"""Distance of the outer nodes of the three-point rule from the middle, for an interval of 1."""
 
-SENSOR_ERRORS_DTYPE = np.dtype([                             # of three gyros or three accelerometers
+SENSOR_ERRORS_DTYPE = np.dtype([                # errors of three gyros or three accelerometers
     ('bias', 'f8', (3,)),                       # [rad/s] or [m/s2]
     ('noise', 'f8'),                            # density of the white noise [rad/sqrt(s)] or [m/s/sqrt(s)]
     ('scale', 'f8'),                            # error of the scale factor [-]
     ('misalignment', 'f8'),                     # sensing axis x is turned towards y, y towards z, z towards x [rad]
-    ('quantum', 'f8'),                          # of an increment [rad] or [m/s]; 0: none
+    ('quantum', 'f8'),                          # smallest increment [rad] or [m/s]; 0: no quantisation
 ], align=True)
 
 CONSTANTS_DTYPE = np.dtype([
@@ -39,24 +40,24 @@ CONSTANTS_DTYPE = np.dtype([
 ], align=True)
 
 STATE_DTYPE = np.dtype([
-    ('truth', motion.OUTPUTS_DTYPE),                  # at a node of the quadrature
-    ('angle_left', 'f8', (3,)), ('force_left', 'f8', (3,)),     # what quantisation kept back [rad, m/s]
+    ('truth', motion.OUTPUTS_DTYPE),            # at a node of the quadrature
+    ('angle_left', 'f8', (3,)), ('force_left', 'f8', (3,)),     # remainder of the quantisation [rad, m/s]
 ], align=True)
 
 INPUTS_DTYPE = np.dtype([
-    ('t', 'f8'),                                # of the sample [s]
-    ('dt', 'f8'),                               # since the last sample; in the first step, the period [s]
+    ('t', 'f8'),                                # time of the sample [s]
+    ('dt', 'f8'),                               # time since the last sample; in the first step, the period [s]
 ], align=True)
 
 OUTPUTS_DTYPE = np.dtype([
-    ('status', 'i8'),                           # index into IMU_STATUS_TEXTS; not OK: the rest is NaN
+    ('status', 'i8'),                           # index into IMU_STATUS_TEXTS; unless IMU_OK, the rest is NaN
     ('angular_velocity', 'f8', (3,)),           # against inertial space, FLU [rad/s]
     ('linear_acceleration', 'f8', (3,)),        # specific force, FLU [m/s2]: at rest +g along z
 ], align=True)
 
 
 def constants(params: ShipMotionParameters) -> np.ndarray:
-    """The record (1,) of CONSTANTS_DTYPE."""
+    """Return the record (1,) of CONSTANTS_DTYPE."""
     imu, latitude = params.imu, math.radians(params.ship.latitude_deg)
     record = np.zeros(1, CONSTANTS_DTYPE)
     record['earth_rate'] = earth.rate(latitude)
@@ -71,13 +72,13 @@ def constants(params: ShipMotionParameters) -> np.ndarray:
 
 
 def initial_state() -> np.ndarray:
-    """The record (1,) of STATE_DTYPE before the first sample."""
+    """Return the record (1,) of STATE_DTYPE before the first sample."""
     return np.zeros(1, STATE_DTYPE)
 
 
 @compiled
 def inertial_rate(truth, earth_rate):
-    """Angular rate of the deck against inertial space (x, y, z), FLU [rad/s]; earth_rate (3,) in ENU."""
+    """Return the angular rate of the deck against inertial space (x, y, z), FLU [rad/s]; earth_rate (3,) in ENU."""
     ex, ey, ez = to_deck(truth.mat_ed, earth_rate[0], earth_rate[1], earth_rate[2])
     w = truth.angular_velocity
     return w[0] + ex, w[1] + ey, w[2] + ez
@@ -85,10 +86,10 @@ def inertial_rate(truth, earth_rate):
 
 @compiled
 def specific_force(truth, earth_rate, gravity):
-    """mat_ed^T (a + 2 w_ie x v - g), FLU [m/s2]; earth_rate (3,) = w_ie in ENU.
+    """Return the specific force mat_ed^T (a + 2 w_ie x v - g), FLU [m/s2]; earth_rate (3,) = w_ie in ENU.
 
-    The earth is the rotating tangent plane in which the truth is given, with g constant along -z: gravity does not
-    turn with the ship's place (v/R = 1e-6 rad/s at 7 m/s), and `inertial_rate` has no transport rate either.
+    The earth is the rotating tangent plane of the truth, with g constant along -z: gravity does not turn with the
+    position of the ship (v/R = 1e-6 rad/s at 7 m/s). For the same reason `inertial_rate` has no transport rate.
     """
     a, v, e = truth.acceleration, truth.velocity, earth_rate
     return to_deck(truth.mat_ed,
@@ -100,7 +101,7 @@ def specific_force(truth, earth_rate, gravity):
 @compiled
 def mean_rates(s, c, ship, t, dt, rate, force):
     """Fill rate (3,) [rad/s] and force (3,) [m/s2] with their means over [t - dt, t] [s]; ship: record of
-    motion.CONSTANTS."""
+    motion.CONSTANTS_DTYPE."""
     for i in range(3):
         rate[i] = force[i] = 0.0
     for node in range(3):
@@ -120,8 +121,8 @@ def mean_rates(s, c, ship, t, dt, rate, force):
 def add_sensor_errors(errors, dt, values, normals, first, left):
     """Add the errors of three gyros or accelerometers to their true rates (3,), measured over dt [s].
 
-    White noise is given as a density, so a sample carries density / sqrt(dt). left (3,): the part of the increment
-    that was no whole quantum, kept for the next.
+    White noise is given as a density, so a sample has the noise density / sqrt(dt). left (3,): remainder of the
+    increment after quantisation, kept for the next sample.
     """
     x, y, z = values[0], values[1], values[2]
     per_sample = 1.0 / math.sqrt(dt)
@@ -138,9 +139,11 @@ def add_sensor_errors(errors, dt, values, normals, first, left):
 
 @compiled
 def step(s, c, ship, u, truth, out, normals):
-    """Take one sample. Records STATE_DTYPE, CONSTANTS_DTYPE, motion.CONSTANTS, INPUTS_DTYPE, motion.OUTPUTS at its
-    instant, OUTPUTS_DTYPE;
-    normals (IMU_NORMALS_PER_STEP,) standard normals."""
+    """Take one sample.
+
+    s, c, u, out: records STATE_DTYPE, CONSTANTS_DTYPE, INPUTS_DTYPE, OUTPUTS_DTYPE; ship, truth: records
+    motion.CONSTANTS_DTYPE, motion.OUTPUTS_DTYPE at the time of the sample; normals: (IMU_NORMALS_PER_STEP,).
+    """
     rate, force = out.angular_velocity, out.linear_acceleration
     if truth.status != motion.MOTION_OK:
         out.status = IMU_BAD_TRUTH

@@ -1,4 +1,4 @@
-"""The faults that can be injected into IMU and INS: what each of them breaks."""
+"""Effects of the faults that can be injected into IMU and INS."""
 import numpy as np
 
 from pedestal_common.compiled import compiled
@@ -10,23 +10,29 @@ from pedestal_common.wire.records import NO_STAMP
 
 IMU_MESSAGE_FAULT_CODES, INS_MESSAGE_FAULT_CODES = message_faults.codes('ship_motion'), message_faults.codes('ins')
 IMU_BIAS_CODE = table.code('ship_motion', 'bias')
-(INS_DELAY_CODE, INS_BIAS_CODE, INS_JUMP_CODE, INS_CLOCK_STEP_CODE) = (table.code('ins', name) for name in ('delay', 'bias', 'ins_jump', 'clock_step'))
+INS_DELAY_CODE, INS_BIAS_CODE, INS_JUMP_CODE, INS_CLOCK_STEP_CODE = (
+    table.code('ins', name) for name in ('delay', 'bias', 'ins_jump', 'clock_step'))
 
 IMU_INJECTED_DTYPE = np.dtype([('rate', 'f8', (3,)), ('force', 'f8', (3,)),
-                               ('said', message_faults.MESSAGE_FAULT_DTYPE)],
-                              align=True)
-"""rate [rad/s], force [m/s2]: added to what it feels, FLU; said: what spoils it."""
+                               ('message_fault', message_faults.MESSAGE_FAULT_DTYPE)], align=True)
+"""Faults of the IMU. rate [rad/s], force [m/s2]: offsets of its data, FLU; message_fault: faults of its messages."""
 
 INS_INJECTED_DTYPE = np.dtype([('latency_ns', 'i8'), ('clock_ns', 'i8'), ('rate', 'f8', (3,)), ('turn', 'f8', (3,)),
-                               ('said', message_faults.MESSAGE_FAULT_DTYPE)], align=True)
-"""latency_ns: of the INS when nothing is broken; clock_ns: added to its stamps; rate:
-added to the deck rate, FLU [rad/s]; turn: roll, pitch and yaw added to its attitude [rad]; said: what spoils it."""
+                               ('message_fault', message_faults.MESSAGE_FAULT_DTYPE)], align=True)
+"""Faults of the INS.
+
+    latency_ns      latency without a fault
+    clock_ns        offset of the stamps
+    rate            offset of the deck rate, FLU [rad/s]
+    turn            roll, pitch and yaw added to the attitude [rad]
+    message_fault   faults of the messages
+"""
 
 IMU_RAW_TOPIC, ATTITUDE_TOPIC, INS_ERROR_TOPIC = 'ship/imu/data_raw', 'ship/imu/data', 'ins/error'
 
 
 def initial(latency_ns) -> np.ndarray:
-    """INS (1,) of a latency [ns]: nothing is broken."""
+    """Return INS_INJECTED_DTYPE (1,) without a fault, for a latency [ns]."""
     e = np.zeros(1, INS_INJECTED_DTYPE)
     e['latency_ns'] = latency_ns
     return e
@@ -34,18 +40,18 @@ def initial(latency_ns) -> np.ndarray:
 
 @compiled
 def turned(q, roll, pitch, yaw):
-    """Quaternion (x, y, z, w) of a deck of attitude q (4,) that is turned by roll and pitch about its own axes and by
-    yaw about the vertical [rad]."""
+    """Return the quaternion (x, y, z, w) of a deck of attitude q (4,), turned by roll and pitch about the deck axes
+    and by yaw about the vertical [rad]."""
     return product(quaternion(0.0, 0.0, yaw), product(q, quaternion(roll, pitch, 0.0)))
 
 
 @compiled
 def apply_due_imu_faults(m, stamp):
-    """Mend the IMU, then break what is broken in the step of a stamp [ns]; m: ship_unit.RECORD."""
+    """Clear all faults of the IMU, then apply those in force at a stamp [ns]; m: record of ship_unit.RECORD_DTYPE."""
     e = m.injected
     for i in range(3):
         e.rate[i] = e.force[i] = 0.0
-    message_faults.clear(e.said)
+    message_faults.clear(e.message_fault)
     schedule.begin(m.schedule)
     for i in range(schedule.MAX_ACTIVE_FAULTS):
         row = m.schedule.row[i]
@@ -55,7 +61,7 @@ def apply_due_imu_faults(m, stamp):
 
 @compiled
 def _apply_imu_fault(e, fault, values):
-    message_faults.apply(e.said, IMU_MESSAGE_FAULT_CODES, fault, values)
+    message_faults.apply(e.message_fault, IMU_MESSAGE_FAULT_CODES, fault, values)
     if fault == IMU_BIAS_CODE:
         e.rate[int(values[0])] += values[1]
         e.force[int(values[0])] += values[2]
@@ -63,28 +69,28 @@ def _apply_imu_fault(e, fault, values):
 
 @compiled
 def corrupt_imu(e, stamp, outputs):
-    """What the IMU says of a step, spoilt."""
+    """Corrupt the IMU message of a step, according to the record e of IMU_INJECTED_DTYPE."""
     raw = outputs[IMU_RAW_TOPIC]
     for i in range(3):
         raw.angular_velocity[i] += e.rate[i]
         raw.linear_acceleration[i] += e.force[i]
-        if e.said.sigma > 0.0:
-            raw.angular_velocity[i] += message_faults.noise(e.said, stamp, i)
-    message_faults.numbers(e.said, raw.angular_velocity, 0)
-    message_faults.numbers(e.said, raw.linear_acceleration, 3)
-    if e.said.drop != 0:
+        if e.message_fault.sigma > 0.0:
+            raw.angular_velocity[i] += message_faults.noise(e.message_fault, stamp, i)
+    message_faults.numbers(e.message_fault, raw.angular_velocity, 0)
+    message_faults.numbers(e.message_fault, raw.linear_acceleration, 3)
+    if e.message_fault.drop != 0:
         raw.stamp = NO_STAMP
 
 
 @compiled
 def apply_due_ins_faults(m, stamp):
-    """Mend the INS, then break what is broken in the step of a stamp [ns]; m: record of ins_unit."""
+    """Clear all faults of the INS, then apply those in force at a stamp [ns]; m: record of ins_unit."""
     e = m.injected
     m.constants.latency_ns = e.latency_ns
     e.clock_ns = 0
     for i in range(3):
         e.rate[i] = e.turn[i] = 0.0
-    message_faults.clear(e.said)
+    message_faults.clear(e.message_fault)
     schedule.begin(m.schedule)
     for i in range(schedule.MAX_ACTIVE_FAULTS):
         row = m.schedule.row[i]
@@ -94,7 +100,7 @@ def apply_due_ins_faults(m, stamp):
 
 @compiled
 def _apply_ins_fault(c, e, fault, values):
-    message_faults.apply(e.said, INS_MESSAGE_FAULT_CODES, fault, values)
+    message_faults.apply(e.message_fault, INS_MESSAGE_FAULT_CODES, fault, values)
     if fault == INS_DELAY_CODE:
         c.latency_ns += round(values[0] * NS_PER_SECOND)
     elif fault == INS_BIAS_CODE:
@@ -102,28 +108,28 @@ def _apply_ins_fault(c, e, fault, values):
     elif fault == INS_JUMP_CODE:
         e.turn[0] += values[0]
         e.turn[1] += values[1]
-        e.turn[2] -= values[2]      # heading grows clockwise
+        e.turn[2] -= values[2]      # A heading grows clockwise, yaw counterclockwise.
     elif fault == INS_CLOCK_STEP_CODE:
         e.clock_ns += round(values[0] * NS_PER_SECOND)
 
 
 @compiled
 def corrupt_ins(e, stamp, outputs):
-    """What the INS says of a step, spoilt."""
+    """Corrupt the messages of the INS of a step, according to the record e of INS_INJECTED_DTYPE."""
     data = outputs[ATTITUDE_TOPIC]
     roll, pitch, yaw = e.turn[0], e.turn[1], e.turn[2]
-    if e.said.sigma > 0.0:
-        roll += message_faults.noise(e.said, stamp, 0)
-        pitch += message_faults.noise(e.said, stamp, 1)
-        yaw += message_faults.noise(e.said, stamp, 2)
+    if e.message_fault.sigma > 0.0:
+        roll += message_faults.noise(e.message_fault, stamp, 0)
+        pitch += message_faults.noise(e.message_fault, stamp, 1)
+        yaw += message_faults.noise(e.message_fault, stamp, 2)
     q = turned(data.orientation, roll, pitch, yaw)
     for i in range(4):
         data.orientation[i] = q[i]
     for i in range(3):
         data.angular_velocity[i] += e.rate[i]
-    message_faults.numbers(e.said, data.orientation, 0)
-    message_faults.numbers(e.said, data.angular_velocity, 4)
+    message_faults.numbers(e.message_fault, data.orientation, 0)
+    message_faults.numbers(e.message_fault, data.angular_velocity, 4)
     if data.stamp != NO_STAMP:
-        data.stamp = NO_STAMP if e.said.drop != 0 else data.stamp + e.clock_ns
+        data.stamp = NO_STAMP if e.message_fault.drop != 0 else data.stamp + e.clock_ns
     if outputs[INS_ERROR_TOPIC].stamp != NO_STAMP:
         outputs[INS_ERROR_TOPIC].stamp = data.stamp

@@ -8,7 +8,7 @@ from pedestal_common.node import unit_node
 
 
 def main(args=None):
-    """Run the node until it is stopped; args: of the command line, None for sys.argv."""
+    """Run the node to its end; args: command line, None for sys.argv."""
     return unit_node.main('ship_motion_sim.ins_node', args)
 
 

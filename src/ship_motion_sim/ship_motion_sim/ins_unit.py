@@ -1,6 +1,6 @@
-"""The unit of the INS: IMU data in; attitude, deck rate and the state of the alignment out.
+"""The unit of the INS: from IMU data to attitude, deck rate and the state of the alignment.
 
-Method `model` has the true attitude with stated errors and never publishes a state; the others align by themselves.
+Method `model` has the true attitude with stated errors and publishes no state; the other methods align by themselves.
 """
 import math
 import typing
@@ -16,17 +16,16 @@ from pedestal_common.wire.records import NO_STAMP
 from ship_motion_sim import injected
 from ship_motion_sim.navigation import aligning_ins, ins, navigator
 
-(IMU_RAW_TOPIC, ATTITUDE_TOPIC, INS_STATE_TOPIC, INS_ERROR_TOPIC) = ('ship/imu/data_raw', 'ship/imu/data', 'ins/state',
-                                                                     'ins/error')
+IMU_RAW_TOPIC, ATTITUDE_TOPIC = 'ship/imu/data_raw', 'ship/imu/data'
+INS_STATE_TOPIC, INS_ERROR_TOPIC = 'ins/state', 'ins/error'
 
 
 def _record_of(state, constants):
-    """The record of an INS. error_told: whether it says how its error changes; row: of the noise that the next step
-    takes; worst: the highest status since the last diagnosis."""
+    """Return the dtype of the record of an INS. error_published: 1 if the INS publishes ins/error; row: index of the
+    noise of the next step; worst: highest status since the last diagnosis."""
     return np.dtype([('state', state), ('constants', constants), ('inputs', ins.INPUTS_DTYPE),
-                     ('outputs', ins.OUTPUTS_DTYPE),
-                     ('error_told', 'i8'), ('row', 'i8'), ('worst', 'i8'), ('schedule', schedule.SCHEDULE_DTYPE),
-                     ('injected', injected.INS_INJECTED_DTYPE)], align=True)
+                     ('outputs', ins.OUTPUTS_DTYPE), ('error_published', 'i8'), ('row', 'i8'), ('worst', 'i8'),
+                     ('schedule', schedule.SCHEDULE_DTYPE), ('injected', injected.INS_INJECTED_DTYPE)], align=True)
 
 
 MODEL_RECORD_DTYPE = _record_of(ins.STATE_DTYPE, ins.CONSTANTS_DTYPE)
@@ -34,28 +33,28 @@ ALIGNING_RECORD_DTYPE = _record_of(aligning_ins.STATE_DTYPE, aligning_ins.CONSTA
 
 
 class ModelMemory(typing.NamedTuple):
-    """All the INS of method `model` works on: the noise of the next steps."""
+    """All data of the INS of method `model`. normals: noise of the next steps."""
     record: np.ndarray
     normals: np.ndarray
 
 
 class AligningMemory(typing.NamedTuple):
-    """All an aligning INS works on; a type of its own, so that a run with the model does not compile its law."""
+    """All data of an aligning INS. This separate type avoids the compilation of its law in a run with the model."""
     record: np.ndarray
     normals: np.ndarray
 
 
 @compiled
 def decode(u, raw):
-    """Record of an IMU message -> inputs of the INS."""
+    """Set the inputs of the INS from the record of an IMU message."""
     u.stamp_ns = raw.stamp
     for i in range(3):
         u.angular_velocity[i], u.linear_acceleration[i] = raw.angular_velocity[i], raw.linear_acceleration[i]
 
 
 @compiled
-def encode(o, error_told, outputs):
-    """Outputs of the INS -> records of its messages; error_told: whether it says how its error changes."""
+def encode(o, error_published, outputs):
+    """Set the records of the messages from the outputs of the INS; error_published: 1 if it publishes ins/error."""
     data, changes = outputs[ATTITUDE_TOPIC], outputs[INS_ERROR_TOPIC]
     data.stamp = o.stamp_ns if o.due == 1 else NO_STAMP
     for i in range(4):
@@ -64,13 +63,13 @@ def encode(o, error_told, outputs):
         data.angular_velocity[i], data.linear_acceleration[i] = o.angular_velocity[i], o.linear_acceleration[i]
         data.orientation_variance[i] = o.variance[i]
         changes.position[i], changes.velocity[i] = o.noise[i], o.walk[i]
-    changes.stamp = data.stamp if error_told else NO_STAMP
+    changes.stamp = data.stamp if error_published else NO_STAMP
     outputs[INS_STATE_TOPIC] = o.stage
 
 
 @compiled
 def begin(m, stamp, raw):
-    """Before a step: break what is broken in it, and read its inputs; m: record of either INS."""
+    """Prepare a step: apply the injected faults and read the inputs; m: record of either INS."""
     if schedule.pending(m.schedule, stamp):
         injected.apply_due_ins_faults(m, stamp)
     decode(m.inputs, raw)
@@ -78,17 +77,17 @@ def begin(m, stamp, raw):
 
 @compiled
 def end(m, stamp, outputs):
-    """After a step: publish its outputs."""
+    """Finish a step: set its messages; m: record of either INS."""
     m.row += 1
     m.worst = max(m.worst, m.outputs.status)
-    encode(m.outputs, m.error_told, outputs)
+    encode(m.outputs, m.error_published, outputs)
     if m.schedule.pending != 0:
         injected.corrupt_ins(m.injected, stamp, outputs)
 
 
 @compiled
 def model_law(memory, stamp, inputs, outputs):
-    """Step k of method `model`."""
+    """Execute one step of method `model` at a stamp [ns]."""
     m = memory.record[0]
     begin(m, stamp, inputs[IMU_RAW_TOPIC])
     ins.step(m.state, m.constants, m.inputs, m.outputs, memory.normals[m.row])
@@ -97,7 +96,7 @@ def model_law(memory, stamp, inputs, outputs):
 
 @compiled
 def aligning_law(memory, stamp, inputs, outputs):
-    """Step k of an INS that aligns."""
+    """Execute one step of an INS that aligns at a stamp [ns]."""
     m = memory.record[0]
     begin(m, stamp, inputs[IMU_RAW_TOPIC])
     aligning_ins.step(m.state, m.constants, m.inputs, m.outputs, memory.normals[m.row])
@@ -106,14 +105,14 @@ def aligning_law(memory, stamp, inputs, outputs):
 
 @compiled
 def model_laws(memory, stamps, inputs, outputs):
-    """`model_law` over arrays."""
+    """Execute `model_law` for each row of arrays."""
     for k in range(len(stamps)):
         model_law(memory, stamps[k], inputs[k], outputs[k])
 
 
 @compiled
 def aligning_laws(memory, stamps, inputs, outputs):
-    """`aligning_law` over arrays."""
+    """Execute `aligning_law` for each row of arrays."""
     for k in range(len(stamps)):
         aligning_law(memory, stamps[k], inputs[k], outputs[k])
 
@@ -130,26 +129,26 @@ class Ins(Simulated):
         normals = np.zeros((1, ins.INS_NORMALS_PER_STEP))
         model = parameters.method == 'model'
         constants = ins.constants(parameters) if model else aligning_ins.constants(parameters)
-        faults = {'schedule': schedule.empty(),
-                  'injected': injected.initial(constants['latency_ns'])}
+        faults = {'schedule': schedule.empty(), 'injected': injected.initial(constants['latency_ns'])}
         if model:
-            self.memory = ModelMemory(joined(MODEL_RECORD_DTYPE, state=ins.initial_state(), constants=constants,
-                                             **faults),
-                                      normals)
+            record = joined(MODEL_RECORD_DTYPE, state=ins.initial_state(), constants=constants, **faults)
+            self.memory = ModelMemory(record, normals)
         else:
-            self.memory = AligningMemory(joined(ALIGNING_RECORD_DTYPE, state=aligning_ins.initial_state(constants),
-                                                constants=constants, **faults), normals)
-        self.parts['error_told'] = parameters.error_told
-        rate_noise = parameters.rate_noise if model else 0.0     # zeros: unknown
+            record = joined(ALIGNING_RECORD_DTYPE, state=aligning_ins.initial_state(constants), constants=constants,
+                            **faults)
+            self.memory = AligningMemory(record, normals)
+        self.parts['error_published'] = parameters.error_told
+        rate_noise = parameters.rate_noise if model else 0.0     # In a message, a covariance of zeros means unknown.
         self.messages[ATTITUDE_TOPIC].angular_velocity_covariance = (np.eye(3) * rate_noise**2).ravel()
 
     def block(self, steps):
-        """The memory with noise (steps, NORMALS) drawn for the next steps."""
+        """Return the memory with noise (steps, INS_NORMALS_PER_STEP) drawn for the next steps."""
         self.parts['row'] = 0
         return self.memory._replace(normals=self._noise.standard_normal((steps, ins.INS_NORMALS_PER_STEP)))
 
     def diagnose(self):
-        """ERROR with the worst status since the last diagnosis, WARN while it aligns; values: its own 1 sigmas."""
+        """Return ERROR with the worst status since the last diagnosis, or WARN while the INS aligns; values: its
+        estimated 1 sigmas."""
         outputs, status = self.parts['outputs'], int(self.parts['worst'])
         self.parts['worst'] = 0
         stage, sigma, p = int(outputs['stage']), outputs['variance']**0.5, self.parameters
@@ -167,14 +166,13 @@ class Ins(Simulated):
         if status:
             return Diagnosis(LEVEL_ERROR, ins.INS_STATUS_TEXTS[status], values)
         if stage == navigator.STAGE_ALIGNING:
-            heading, wanted = (math.degrees(x) for x in (sigma[2], p.alignment.aligned_sigma))
-            so_far = f'heading known to {heading:.2g} deg (1 sigma)' if known else 'heading not known yet'
-            return Diagnosis(LEVEL_WARN, f'aligning: {so_far}, navigates from {wanted:.2g} deg on', values)
+            heading, aligned = (math.degrees(x) for x in (sigma[2], p.alignment.aligned_sigma))
+            progress = f'heading known to {heading:.2g} deg (1 sigma)' if known else 'heading unknown'
+            return Diagnosis(LEVEL_WARN, f'aligning: {progress}, navigation begins at {aligned:.2g} deg', values)
         return Diagnosis(LEVEL_OK, 'navigating', values)
 
     @staticmethod
     def idle(numbers):
-        """Not exercised where the attitude never changed."""
-        moved = (ATTITUDE_TOPIC in numbers and len(numbers[ATTITUDE_TOPIC]) and np.ptp(numbers[ATTITUDE_TOPIC],
-                                                                                       axis=0).any())
-        return '' if moved else 'the ship never moved'
+        """Return a reason if the attitude never changed: such a recording does not exercise the INS."""
+        attitude = numbers.get(ATTITUDE_TOPIC, ())
+        return '' if len(attitude) and np.ptp(attitude, axis=0).any() else 'the ship never moved'

@@ -1,7 +1,7 @@
 """Attitude as NMEA 0183 sentences for third-party equipment: HEHDT (heading) and PASHR (attitude).
 
-Signs of PASHR: roll positive with the port side up, pitch positive with the bow up, heave positive upwards. In FLU a
-positive pitch has the bow down, so it changes its sign.
+Signs of PASHR: roll positive with the port side up, pitch positive with the bow up, heave positive upwards. Because a
+positive pitch in FLU has the bow down, its sign changes.
 """
 import math
 
@@ -9,7 +9,7 @@ from pedestal_common.graph.steps import SECONDS_PER_DAY
 
 
 def sentence(body):
-    """The sentence of a body, between $ and checksum, with CR LF: ASCII bytes."""
+    """Return the sentence of a body, between $ and checksum, with CR LF: ASCII bytes."""
     checksum = 0
     for byte in body.encode('ascii'):
         checksum ^= byte
@@ -17,18 +17,19 @@ def sentence(body):
 
 
 def time_of_day(stamp):
-    """hhmmss.sss of a stamp [ns]: whole numbers, for 0.57 s as a float is 569.99 ms."""
+    """Return hhmmss.sss of a stamp [ns]. The integers avoid rounding: 0.57 s as a float is 569.99 ms."""
     seconds, milliseconds = divmod(stamp // 1_000_000 % (1000 * SECONDS_PER_DAY), 1000)
     return f'{seconds // 3600:02d}{seconds // 60 % 60:02d}{seconds % 60:02d}.{milliseconds:03d}'
 
 
 def heading(yaw):
-    """Heading [deg], 0 to 359.999, of a REP 103 yaw [rad], to the three digits that are sent."""
+    """Return the heading [deg], 0 to 359.999, of a REP 103 yaw [rad], rounded to three decimal places."""
     return round(math.degrees(0.5 * math.pi - yaw), 3) % 360.0
 
 
 def attitude(stamp, roll, pitch, yaw, heave):
-    """HEHDT and PASHR at a stamp [ns], one datagram, of roll, pitch, yaw [rad] (REP 103: FLU in ENU) and heave [m]."""
+    """Return HEHDT and PASHR in one datagram at a stamp [ns], for roll, pitch, yaw [rad] (REP 103: FLU in ENU) and
+    heave [m]."""
     psi = heading(yaw)
     return sentence(f'HEHDT,{psi:.3f},T') + sentence(
         f'PASHR,{time_of_day(stamp)},{psi:.3f},T,{math.degrees(roll):+.3f},{-math.degrees(pitch):+.3f},{heave:+.3f},'

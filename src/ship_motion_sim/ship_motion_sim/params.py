@@ -1,5 +1,7 @@
-"""Parameters of ship, IMU and INS. `ship_motion_node` takes ShipMotionParameters, `ins_node` InsParameters;
-both hold the group `ship`, which must be the same in both (ins.step says when it is not)."""
+"""Parameters of ship, IMU and INS: ShipMotionParameters of `ship_motion_node`, InsParameters of `ins_node`.
+
+Both hold the group `ship`, which must be the same in both nodes; the status of ins.step reports a difference.
+"""
 import dataclasses
 
 from pedestal_common.injection import table
@@ -13,7 +15,7 @@ VELOCITY_AIDS = ('none', 'log', 'gnss')
 
 @dataclasses.dataclass(frozen=True)
 class HullParameters(Parameters):
-    """A ship of about 10 000 t. Its gains are plausible, not identified (reference/nav.md section 3.1)."""
+    """A ship of about 10 000 t. The gains are plausible, not identified (reference/nav.md section 3.1)."""
     length: float = parameter(145.0, 5.0, 500.0, 'm', 'length on the waterline')
     beam: float = parameter(20.6, 1.0, 100.0, 'm', 'beam on the waterline')
     draught: float = parameter(7.2, 0.2, 40.0, 'm', 'draught')
@@ -24,14 +26,14 @@ class HullParameters(Parameters):
     pitch_damping: float = parameter(0.35, 0.005, 2.0, '-', 'damping ratio of pitch')
     heave_period: float = parameter(7.2, 1.0, 60.0, 's', 'natural period of heave')
     heave_damping: float = parameter(0.30, 0.005, 2.0, '-', 'damping ratio of heave')
-    yaw_gain: float = parameter(0.9, 0.0, 2.0, '-', 'yaw per turn of the orbital flow along the hull, static')
+    yaw_gain: float = parameter(0.9, 0.0, 2.0, '-', 'yaw per rotation of the orbital flow along the hull, static')
     yaw_period: float = parameter(12.0, 1.0, 120.0, 's', 'natural period of yaw')
     yaw_damping: float = parameter(0.7, 0.005, 2.0, '-', 'damping ratio of yaw')
 
 
 @dataclasses.dataclass(frozen=True)
 class PlainParameters(Parameters):
-    """A sine per degree of freedom, amplitude sin(2 pi t / period); the rest stands still."""
+    """One sine for each degree of freedom, amplitude sin(2 pi t / period); no surge and no sway."""
     roll_amplitude_deg: float = parameter(10.0, 0.0, 60.0, 'deg', 'amplitude of roll')
     roll_period: float = parameter(8.0, 0.5, 1000.0, 's', 'period of roll')
     pitch_amplitude_deg: float = parameter(0.0, 0.0, 60.0, 'deg', 'amplitude of pitch')
@@ -44,37 +46,40 @@ class PlainParameters(Parameters):
 
 @dataclasses.dataclass(frozen=True)
 class RecordedParameters(Parameters):
-    """A recorded motion; columns and signs in recording.py."""
+    """A recorded motion; recording.py describes columns and signs."""
     path: str = text('', 'CSV with columns time_s, roll_deg, pitch_deg, heading_deg (surge_m, sway_m, heave_m)')
-    start: float = parameter(0.0, 0.0, 1e7, 's', 'stamp 0 is this long after the first row')
+    start: float = parameter(0.0, 0.0, 1e7, 's', 'time from the first row to stamp 0')
     max_gap: float = parameter(2.0, 0.001, 60.0, 's', 'largest time between two rows')
 
 
 @dataclasses.dataclass(frozen=True)
 class ShipParameters(Parameters):
-    """Sea, course and hull: everything the ship's truth depends on."""
-    motion: str = choice('waves', ('waves', 'plain', 'recorded'), 'waves from a spectrum, plain sines, or a CSV')
-    sea_state: int = parameter(5, 0, 6, '-', '3 to 6 take height and period from the table; 0: as given below')
-    significant_height: float = parameter(0.0, 0.0, 20.0, 'm', 'Hs, with sea_state 0 only')
-    peak_period: float = parameter(0.0, 0.0, 25.0, 's', 'Tp, with sea_state 0 only')
-    spectrum: str = choice('jonswap', ('jonswap', 'file'), 'of the waves; file: as measured, instead of a sea state')
+    """Sea, course and hull: the parameters that the truth of the ship depends on."""
+    motion: str = choice('waves', ('waves', 'plain', 'recorded'), 'source of the motion: waves of a spectrum, plain '
+                         'sines, or a CSV file')
+    sea_state: int = parameter(5, 0, 6, '-', 'sea state 3 to 6, which sets height and period; 0: significant_height '
+                               'and peak_period')
+    significant_height: float = parameter(0.0, 0.0, 20.0, 'm', 'significant wave height Hs, only with sea_state 0')
+    peak_period: float = parameter(0.0, 0.0, 25.0, 's', 'peak period Tp, only with sea_state 0')
+    spectrum: str = choice('jonswap', ('jonswap', 'file'), 'spectrum of the waves; file: a measured spectrum instead '
+                           'of a sea state')
     gamma: float = parameter(3.3, 1.0, 10.0, '-', 'peak enhancement of JONSWAP; 1 is Bretschneider')
-    spectrum_file: str = text('', 'CSV with columns frequency_hz, density_m2_per_hz')
-    wave_angle_deg: float = parameter(45.0, 0.0, 360.0, 'deg',
-                                      'where the waves travel to, clockwise from the bow: 0 following, 180 head')
+    spectrum_file: str = text('', 'CSV of a measured spectrum with columns frequency_hz, density_m2_per_hz')
+    wave_angle_deg: float = parameter(45.0, 0.0, 360.0, 'deg', 'direction to which the waves travel, clockwise from '
+                                      'the bow; 0: following sea, 180: head sea')
     spread_deg: float = parameter(15.0, 0.0, 60.0, 'deg', 'standard deviation of the direction of single waves')
-    heading_deg: float = parameter(0.0, 0.0, 360.0, 'deg', 'mean heading, clockwise from north; recorded: 0, it is '
-                                   "the record's")
-    speed: float = parameter(7.0, 0.0, 25.0, 'm/s', 'along the mean heading')
-    latitude_deg: float = parameter(47.0, -89.0, 89.0, 'deg', 'geodetic latitude: gravity and earth rate')
+    heading_deg: float = parameter(0.0, 0.0, 360.0, 'deg', 'mean heading, clockwise from north; 0 with motion '
+                                   'recorded, whose file holds the heading')
+    speed: float = parameter(7.0, 0.0, 25.0, 'm/s', 'speed along the mean heading')
+    latitude_deg: float = parameter(47.0, -89.0, 89.0, 'deg', 'geodetic latitude, for gravity and earth rate')
     seed: int = parameter(1, 0, MAX_SEED, '-', 'seed of the seaway')
     hull: HullParameters = group(HullParameters)
     plain: PlainParameters = group(PlainParameters)
     recorded: RecordedParameters = group(RecordedParameters)
 
     def check(self):
-        """Raise ParameterError where `motion`, `spectrum` or `sea_state` lacks a file or a wave height that it needs,
-        or does not use one that is given."""
+        """Raise ParameterError if `motion`, `spectrum` or `sea_state` lacks a file or a wave height that it needs, or
+        does not use a given one."""
         if (self.motion == 'recorded') != bool(self.recorded.path):
             raise ParameterError(f"recorded.path = '{self.recorded.path}': must name a CSV file with motion = "
                                  'recorded, and be empty otherwise')
@@ -107,84 +112,90 @@ class ImuParameters(Parameters):
     accelerometer_bias_z: float = parameter(3e-4, -1.0, 1.0, 'm/s2', 'accelerometer bias along z')
     accelerometer_noise: float = parameter(1e-4, 0.0, 1.0, 'm/s/sqrt(s)', 'velocity random walk')
     gyro_scale: float = parameter(0.0, -0.1, 0.1, '-', "error of the gyros' scale factor")
-    gyro_misalignment: float = parameter(0.0, -0.1, 0.1, 'rad', 'each gyro axis is turned towards the next')
+    gyro_misalignment: float = parameter(0.0, -0.1, 0.1, 'rad', 'rotation of each gyro axis towards the next axis')
     gyro_quantum: float = parameter(0.0, 0.0, 0.01, 'rad', 'smallest angle increment; 0: no quantisation')
     accelerometer_scale: float = parameter(0.0, -0.1, 0.1, '-', "error of the accelerometers' scale factor")
-    accelerometer_misalignment: float = parameter(0.0, -0.1, 0.1, 'rad', 'each axis is turned towards the next')
+    accelerometer_misalignment: float = parameter(0.0, -0.1, 0.1, 'rad', 'rotation of each accelerometer axis towards '
+                                                  'the next axis')
     accelerometer_quantum: float = parameter(0.0, 0.0, 0.1, 'm/s', 'smallest velocity increment; 0: no quantisation')
-    output: str = choice('sample', IMU_OUTPUTS, 'rates at the stamp, or their means since the last sample')
+    output: str = choice('sample', IMU_OUTPUTS, 'rates at the stamp (sample), or their means since the last sample '
+                         '(increment)')
     seed: int = parameter(2, 0, MAX_SEED, '-', 'seed of the noise')
 
 
 @dataclasses.dataclass(frozen=True)
 class NmeaParameters(Parameters):
     """The true attitude as NMEA 0183 (HEHDT, PASHR) over UDP, for third-party equipment."""
-    port: int = parameter(0, 0, 65535, '-', 'UDP port the datagrams are sent to; 0: none are sent')
-    host: str = text('127.0.0.1', 'address they are sent to')
-    rate: float = parameter(10.0, 0.1, 100.0, 'Hz', "datagrams per second of the drive's time")
+    port: int = parameter(0, 0, 65535, '-', 'UDP port of the receiver of the datagrams; 0: off')
+    host: str = text('127.0.0.1', 'host name or IPv4 address of the receiver of the datagrams')
+    rate: float = parameter(10.0, 0.1, 100.0, 'Hz', 'datagrams per second of simulated time')
 
 
 @dataclasses.dataclass(frozen=True)
 class ShipMotionParameters(Parameters):
-    """ship_motion_node."""
+    """Parameters of ship_motion_node."""
     ship: ShipParameters = group(ShipParameters)
     imu: ImuParameters = group(ImuParameters)
     nmea: NmeaParameters = group(NmeaParameters)
     inject: str = text('', table.INJECT_DOC)
 
     def check(self):
-        """Raise ParameterError for faults that cannot be injected."""
+        """Raise ParameterError if `inject` is not a list of faults of ship_motion."""
         table.due('ship_motion', self.inject)
 
     def check_graph(self, beams, lockstep):
-        """Raises ParameterError for a fault that its pacing does not have."""
+        """Raise ParameterError if `inject` holds a fault that the pacing of the graph excludes."""
         super().check_graph(beams, lockstep)
         table.check_pacing('ship_motion', self.inject, lockstep)
 
 
 @dataclasses.dataclass(frozen=True)
 class AdrcParameters(Parameters):
-    """Method adrc: what reproduces paper 001's figure 4 (reference/nav.md section 1.2)."""
+    """Method adrc; the defaults reproduce figure 4 of paper 001 (reference/nav.md section 1.2)."""
     observer: float = parameter(0.3, 0.01, 20.0, 'rad/s', 'bandwidth of the extended state observer')
     control: float = parameter(1.0, 0.01, 20.0, 'rad/s', 'bandwidth of the level control')
-    start: float = parameter(60.0, 1.0, 3600.0, 's', 'the level commands count from here on')
+    start: float = parameter(60.0, 1.0, 3600.0, 's', 'time from power-up after which the azimuth uses the level '
+                             'commands')
 
 
 @dataclasses.dataclass(frozen=True)
 class AlignmentParameters(Parameters):
     """The alignment of an INS: its laws, and the sensors and sea that they assume."""
-    step: float = parameter(0.02, 0.001, 1.0, 's', 'of the alignment laws; at least the period of the IMU')
-    initial_heading_deg: float = parameter(0.0, 0.0, 360.0, 'deg', 'taken for true at power-up; may be any')
-    aligned_sigma: float = parameter(0.0035, 1e-5, 0.5, 'rad', 'it navigates once the 1-sigma of heading is below')
-    velocity_disturbance: float = parameter(0.05, 1e-4, 10.0, 'm/s',
-                                            'rms of the velocity of sea and aid per step and axis, taken for white')
-    gyro_noise: float = parameter(1.45e-6, 1e-9, 0.01, 'rad/sqrt(s)', 'angle random walk of the gyros')
-    gyro_bias: float = parameter(4.85e-8, 0.0, 0.1, 'rad/s', '1-sigma of what the bias of a level gyro may be')
-    accelerometer_bias: float = parameter(3e-4, 0.0, 1.0, 'm/s2', '1-sigma of the bias of an accelerometer')
-    classical_bandwidth: float = parameter(0.025, 0.005, 0.2, 'rad/s', 'method classical: s0 of its four poles')
+    step: float = parameter(0.02, 0.001, 1.0, 's', 'step of the alignment laws, at least the period of the IMU')
+    initial_heading_deg: float = parameter(0.0, 0.0, 360.0, 'deg', 'heading assumed at power-up; it may be wrong')
+    aligned_sigma: float = parameter(0.0035, 1e-5, 0.5, 'rad', '1-sigma of heading at which navigation begins')
+    velocity_disturbance: float = parameter(0.05, 1e-4, 10.0, 'm/s', 'rms of the velocity of sea and aid per step and '
+                                            'axis, assumed white')
+    gyro_noise: float = parameter(1.45e-6, 1e-9, 0.01, 'rad/sqrt(s)', 'assumed angle random walk of the gyros')
+    gyro_bias: float = parameter(4.85e-8, 0.0, 0.1, 'rad/s', 'assumed 1-sigma of the bias of a level gyro')
+    accelerometer_bias: float = parameter(3e-4, 0.0, 1.0, 'm/s2', 'assumed 1-sigma of the bias of an accelerometer')
+    classical_bandwidth: float = parameter(0.025, 0.005, 0.2, 'rad/s', 'bandwidth s0 of the four poles of method '
+                                           'classical')
     adrc: AdrcParameters = group(AdrcParameters)
 
     def check(self):
-        """Raise ParameterError where the level control of adrc would be unstable at this step."""
+        """Raise ParameterError if the level control of adrc would be unstable at this step."""
         if self.adrc.control * self.step > 1.0:
             raise ParameterError(f'adrc.control = {self.adrc.control:g} rad/s: must be at most 1 / step = '
-                                 f'{1.0 / self.step:g} rad/s, or the loop is unstable')
+                                 f'{1.0 / self.step:g} rad/s, for a stable loop')
 
 
 @dataclasses.dataclass(frozen=True)
 class AidParameters(Parameters):
-    """A velocity from outside, so that neither swell nor speed is taken for an error of the INS."""
-    source: str = choice('none', VELOCITY_AIDS,
-                         'log: in deck axes; gnss: in ENU, before alignment only with method oba')
-    noise: float = parameter(0.02, 0.0, 10.0, 'm/s', 'rms white noise of it, per axis and IMU sample')
+    """A measured velocity, with which the INS separates swell and speed from its errors."""
+    source: str = choice('none', VELOCITY_AIDS, 'source of the velocity; log: in deck axes; gnss: in ENU, before '
+                         'alignment only with method oba')
+    noise: float = parameter(0.02, 0.0, 10.0, 'm/s', 'rms white noise of the velocity, per axis and IMU sample')
 
 
 @dataclasses.dataclass(frozen=True)
 class InsParameters(Parameters):
-    """ins_node. Method `model`: the truth with parametrised errors (roll_bias ... imu_tolerance). The others integrate
-    the IMU and align by themselves. `ship` is the ship_motion node's: of it they take the latitude, and the velocity
-    that an aid measures."""
-    method: str = choice('model', INS_METHODS, 'parametrised errors, or how it aligns')
+    """Parameters of ins_node. Method `model` is the truth with parametrised errors (roll_bias ... imu_tolerance).
+
+    The other methods integrate the IMU and align by themselves. `ship` must be that of ship_motion_node: the other
+    methods use its latitude, and the velocity that an aid measures.
+    """
+    method: str = choice('model', INS_METHODS, 'model: truth with parametrised errors; otherwise the alignment method')
     roll_bias: float = parameter(0.0, -0.2, 0.2, 'rad', 'constant error of roll')
     pitch_bias: float = parameter(0.0, -0.2, 0.2, 'rad', 'constant error of pitch')
     heading_bias: float = parameter(0.0, -0.2, 0.2, 'rad', 'constant error of heading, clockwise')
@@ -194,26 +205,26 @@ class InsParameters(Parameters):
     tilt_noise: float = parameter(3e-5, 0.0, 0.1, 'rad', 'rms white noise of roll and pitch, per sample')
     heading_noise: float = parameter(3e-5, 0.0, 0.1, 'rad', 'rms white noise of heading, per sample')
     rate_noise: float = parameter(1.7e-4, 0.0, 0.1, 'rad/s', 'rms white noise of the deck rate, per axis and sample')
-    latency: float = parameter(0.005, 0.0, 0.25, 's', 'from measurement to release')
-    imu_tolerance: float = parameter(0.005, 1e-6, 1.0, 'rad/s',
-                                     'largest difference between the IMU and the ship as the INS knows it')
-    error_told: bool = flag(True, 'it tells how its error changes: ins/error')
+    latency: float = parameter(0.005, 0.0, 0.25, 's', 'time from measurement to release')
+    imu_tolerance: float = parameter(0.005, 1e-6, 1.0, 'rad/s', 'largest difference between the rate of the IMU and '
+                                     'that of the `ship` parameters of the INS')
+    error_told: bool = flag(True, 'publication of ins/error, the noise and random walk of the attitude error')
     seed: int = parameter(3, 0, MAX_SEED, '-', 'seed of the errors')
-    imu_output: str = choice('sample', IMU_OUTPUTS, "the IMU's `output`")
+    imu_output: str = choice('sample', IMU_OUTPUTS, 'parameter `output` of the IMU')
     alignment: AlignmentParameters = group(AlignmentParameters)
     aid: AidParameters = group(AidParameters)
     ship: ShipParameters = group(ShipParameters)
     inject: str = text('', table.INJECT_DOC)
 
     def check(self):
-        """Raise ParameterError for a GNSS velocity with a method that needs the heading before it can use one, and for
-        faults that cannot be injected."""
+        """Raise ParameterError if the method cannot use a GNSS velocity before it knows the heading, or if `inject` is
+        not a list of faults of the INS."""
         table.due('ins', self.inject)
         if self.aid.source == 'gnss' and self.method not in ('model', 'oba'):
-            raise ParameterError("aid.source = 'gnss': must be none or log unless method = oba, for its velocity is "
-                                 'of no use before the heading is known')
+            raise ParameterError(f"aid.source = 'gnss': must be none or log with method = {self.method}, because only "
+                                 'oba uses a velocity in ENU before the heading is known')
 
     def check_graph(self, beams, lockstep):
-        """Raises ParameterError for a fault that its pacing does not have."""
+        """Raise ParameterError if `inject` holds a fault that the pacing of the graph excludes."""
         super().check_graph(beams, lockstep)
         table.check_pacing('ins', self.inject, lockstep)

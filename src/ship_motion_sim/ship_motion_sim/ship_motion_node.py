@@ -1,4 +1,4 @@
-"""ROS node of the ship: its truth and what its IMU feels at every tick of the drive's clock; NMEA for equipment."""
+"""ROS node of the ship: its truth and the data of its IMU at every step of the drive; NMEA for other equipment."""
 import pedestal_common.entry  # noqa: F401
 
 # isort: split
@@ -12,10 +12,10 @@ from ship_motion_sim import nmea
 
 
 class ShipMotionNode(unit_node.UnitNode):
-    """The node of the ship's unit, which also sends NMEA datagrams where nmea.port is set."""
+    """The node of the unit of the ship, which also sends NMEA datagrams if nmea.port is set."""
 
     def begin(self):
-        """Open the socket, then begin as every unit does. Raises ParameterError for a host that cannot be reached."""
+        """Open the socket, then begin like every unit. Raises ParameterError for a host without an address."""
         self.unsent = ''
         self.next_datagram = 0
         if self.parameters.nmea.port:
@@ -25,7 +25,7 @@ class ShipMotionNode(unit_node.UnitNode):
         super().begin()
 
     def connect(self, equipment):
-        """Look the host of NmeaParameters up, once. Raises ParameterError where it is not the name of one host."""
+        """Resolve the host of NmeaParameters once. Raises ParameterError if it is not the name of one host."""
         try:
             self.socket.connect((equipment.host, equipment.port))
         except OSError as error:
@@ -33,16 +33,17 @@ class ShipMotionNode(unit_node.UnitNode):
                                  f'{error.strerror}') from None
 
     def answer(self, stamp, values):
-        """Publish the step at a stamp [ns]; then send the attitude, if the next datagram is due."""
+        """Publish the step at a stamp [ns]; then send the attitude if the next datagram is due."""
         super().answer(stamp, values)
         if self.parameters.nmea.port and stamp >= self.next_datagram:
             self.send_attitude(stamp)
 
     def send_attitude(self, stamp):
-        """Send one datagram; missing equipment costs nothing but a warning in the next diagnostics.
+        """Send one datagram; missing equipment only causes a warning in the next diagnostics.
 
-        The system reports a datagram that nobody received when the next one is sent, which then fails: every other
-        one succeeds."""
+        Linux reports a datagram without a receiver when the next one is sent, which then fails. So every second
+        datagram to missing equipment succeeds.
+        """
         period = round(1e9 / self.parameters.nmea.rate)
         self.next_datagram = stamp - stamp % period + period
         truth = self.unit.parts['truth']
@@ -52,15 +53,16 @@ class ShipMotionNode(unit_node.UnitNode):
             self.unsent = f'NMEA to {self.parameters.nmea.host}:{self.parameters.nmea.port}: {error.strerror}'
 
     def diagnose(self):
-        """The unit's diagnosis; WARN instead of OK where a datagram could not be sent."""
+        """Return the diagnosis of the unit, with WARN instead of OK if a datagram could not be sent."""
         diagnosis = super().diagnose()
         unsent, self.unsent = self.unsent, ''
-        return diagnosis._replace(level=LEVEL_WARN,
-                                  message=unsent) if unsent and diagnosis.level == LEVEL_OK else diagnosis
+        if unsent and diagnosis.level == LEVEL_OK:
+            return diagnosis._replace(level=LEVEL_WARN, message=unsent)
+        return diagnosis
 
 
 def main(args=None):
-    """Run the node until it is stopped; args: of the command line, None for sys.argv."""
+    """Run the node to its end; args: command line, None for sys.argv."""
     return shell.main(lambda: ShipMotionNode('ship_motion_sim.ship_motion_node'), args)
 
 

@@ -2,10 +2,12 @@
 
     step(state, angle, force, dt, earth_rate, command, gravity)
 
-C' = C [w_ib x] - [(w_ie + w_c) x] C (reference/nav.md section 1.1), v' = C f - (2 w_ie + w_c) x v - g u; w_c is the
-rate at which an alignment rotates n', and the velocity's components with it. Position is held, so there is no
-transport rate: the tangent plane in which the truth is given (see imu.specific_force) has none either. Coning and
-sculling from the increment before, as in Savage 1998, "Strapdown Inertial Navigation Integration Algorithm Design".
+    C' = C [w_ib x] - [(w_ie + w_c) x] C        (reference/nav.md section 1.1)
+    v' = C f - (2 w_ie + w_c) x v - g u
+
+w_c is the rate at which an alignment rotates n', and the components of the velocity with it. The position is fixed, so
+there is no transport rate, as in the tangent plane of the truth (see imu.specific_force). Coning and sculling use the
+previous increment, as in Savage 1998, "Strapdown Inertial Navigation Integration Algorithm Design".
 """
 import math
 
@@ -19,14 +21,14 @@ STATE_DTYPE = np.dtype([
     ('quaternion', 'f8', (4,)),         # x, y, z, w, deck -> n'
     ('mat', 'f8', (3, 3)),              # the same as a matrix
     ('velocity', 'f8', (3,)),           # in n' [m/s]
-    ('last_angle', 'f8', (3,)),         # the increments before, for coning and sculling
+    ('last_angle', 'f8', (3,)),         # previous increments, for coning and sculling
     ('last_force', 'f8', (3,)),
 ], align=True)
 
 
 @compiled
 def from_rotvec(x, y, z):
-    """Unit quaternion (x, y, z, w) of a rotation vector [rad]."""
+    """Return the unit quaternion (x, y, z, w) of a rotation vector [rad]."""
     square = x * x + y * y + z * z
     half = 0.5 * math.sqrt(square)
     scale = math.sin(half) / (2.0 * half) if square > 1e-8 else 0.5 - square / 48.0
@@ -44,17 +46,18 @@ def set_attitude(s, qx, qy, qz, qw):
 
 @compiled
 def coning(a, b):
-    """Rotation vector [rad] of an angle increment a (3,) [rad] that follows b (3,): a + b x a / 12."""
+    """Return the rotation vector [rad] of an angle increment a (3,) [rad] that follows b (3,): a + b x a / 12."""
     cx, cy, cz = cross(b[0], b[1], b[2], a[0], a[1], a[2])
     return a[0] + cx / 12.0, a[1] + cy / 12.0, a[2] + cz / 12.0
 
 
 @compiled
 def sculling(a, f, b, e):
-    """Velocity increment [m/s] in the deck axes at the start of an interval, of the increments of angle a [rad] and
-    force f [m/s], each (3,), that follow b and e.
+    """Return the velocity increment [m/s] in the deck axes at the start of an interval.
 
-    f + a x f / 2 + a x (a x f) / 6 for steady rates; the last term is worth 1 ug of the vertical under quick sway.
+    a [rad], f [m/s], each (3,): increments of angle and force in the interval; b, e: those of the previous interval.
+    For steady rates the result is f + a x f / 2 + a x (a x f) / 6. Under quick sway the last term is 1 ug of the
+    vertical.
     """
     rx, ry, rz = cross(a[0], a[1], a[2], f[0], f[1], f[2])
     ux, uy, uz = cross(a[0], a[1], a[2], rx, ry, rz)
@@ -68,14 +71,15 @@ def sculling(a, f, b, e):
 def step(s, angle, force, dt, earth_rate, command, gravity):
     """Integrate one IMU interval of dt [s]; s: record of STATE_DTYPE.
 
-    angle, force (3,): integrals of w_ib and f over it, FLU [rad, m/s]; earth_rate, command (3,): w_ie, w_c in n'.
+    angle, force (3,): integrals of w_ib and f over the interval, FLU [rad, m/s]; earth_rate, command (3,): w_ie, w_c
+    in n'.
     """
     v, q = s.velocity, s.quaternion
     dx, dy, dz = sculling(angle, force, s.last_angle, s.last_force)
     gx, gy, gz = to_earth(s.mat, dx, dy, dz)
     tx, ty, tz = (-dt * (earth_rate[0] + command[0]), -dt * (earth_rate[1] + command[1]),
                   -dt * (earth_rate[2] + command[2]))
-    hx, hy, hz = cross(0.5 * tx, 0.5 * ty, 0.5 * tz, gx, gy, gz)        # n' rotates meanwhile
+    hx, hy, hz = cross(0.5 * tx, 0.5 * ty, 0.5 * tz, gx, gy, gz)        # rotation of n' within the interval
     cx, cy, cz = cross(2.0 * earth_rate[0] + command[0], 2.0 * earth_rate[1] + command[1],
                        2.0 * earth_rate[2] + command[2], v[0], v[1], v[2])
     v[0] += gx + hx - dt * cx

@@ -100,12 +100,12 @@ def test_both_channels_push_their_tilt_out():
     o, command = np.zeros(1, extended_observer.STATE_DTYPE), np.zeros(3)
     o[0]['z'][:, 1] = 0.1       # both accelerate upwards of zero
     levelling.level(o[0], K, np.zeros(2), np.zeros(2), 1.0, command)
-    assert (o[0]['push'] < 0.0).all() and command[0] < 0.0 < command[1]
-    np.testing.assert_allclose(o[0]['push'], [-9.795 * command[1], 9.795 * command[0]], rtol=1e-3)
+    assert (o[0]['input'] < 0.0).all() and command[0] < 0.0 < command[1]
+    np.testing.assert_allclose(o[0]['input'], [-9.795 * command[1], 9.795 * command[0]], rtol=1e-3)
     o[0]['z'][:, 1] = 100.0
     levelling.level(o[0], K, np.zeros(2), np.zeros(2), 1.0, command)
     np.testing.assert_allclose(np.abs(command[:2]), levelling.MAX_LEVELLING_RATE_RAD_S)
-    np.testing.assert_allclose(np.abs(o[0]['push']), float(K['gravity']) * levelling.MAX_LEVELLING_RATE_RAD_S)
+    np.testing.assert_allclose(np.abs(o[0]['input']), float(K['gravity']) * levelling.MAX_LEVELLING_RATE_RAD_S)
 
 
 def test_the_differentiator_is_at_its_reference_after_two_steps():

@@ -86,8 +86,8 @@ def test_a_wrong_earth_rate_would_be_seen():
     state, start = np.zeros(1, strapdown.STATE_DTYPE), truth_at(SWAY, 0.0)
     strapdown.set_attitude(state[0], *start['quaternion'])
     integrate(state, angle, force, DT, np.zeros(3), np.zeros(3), earth.gravity(LATITUDE))
-    assert apart(state['quaternion'], truth_at(SWAY, 60.0)['quaternion']) == pytest.approx(60.0
-                                                                                           * earth.WGS84_EARTH_RATE_RAD_S, rel=0.01)
+    assert apart(state['quaternion'], truth_at(SWAY, 60.0)['quaternion']) == pytest.approx(
+        60.0 * earth.WGS84_EARTH_RATE_RAD_S, rel=0.01)
 
 
 def test_a_command_turns_the_computed_frame():

@@ -98,13 +98,13 @@ REFUSED = {
                 'line 1: INCLINATION = None: must be a number'),
     'epoch': (lambda: json.dumps([{**ISS, 'EPOCH': 'today'}]), '', "EPOCH = 'today': must be a time such as"),
     'number': (lambda: json.dumps({**ISS, 'NORAD_CAT_ID': 400_000}), '', 'NORAD_CAT_ID = 400000: must be 0 to 339999'),
-    'json': (lambda: json.dumps([ISS])[:-20], '', 'line 1, column [0-9]+: no JSON: '),
+    'json': (lambda: json.dumps([ISS])[:-20], '', 'line 1, column [0-9]+: not valid JSON: '),
     'json of numbers': (lambda: '[1, 2]', '', 'line 1, column 2: must be an object of an OMM'),
-    'json in depth': (lambda: '{"a": ' * 200_000, '', 'JSON too deep|no JSON'),
+    'json in depth': (lambda: '{"a": ' * 200_000, '', 'JSON nested too deeply|not valid JSON'),
     'xml': (lambda: xml(ALL)[:-200], '25544', 'line [0-9]+, column [0-9]+: not well-formed XML'),
     'entities': (lambda: '<!DOCTYPE x [<!ENTITY a "b">]><ndm>&a;</ndm>', '', 'a document type declaration'),
     'kvn': (lambda: kvn([ISS]) + 'nonsense\n', '', "line 26, column 1: 'nonsense': must be KEYWORD = value"),
-    'nothing': (lambda: '<ndm></ndm>', '', 'and no OMM'), 'csv': (lambda: 'EPOCH,x\n1,2\n', '', 'NORAD_CAT_ID')}
+    'nothing': (lambda: '<ndm></ndm>', '', 'or an OMM'), 'csv': (lambda: 'EPOCH,x\n1,2\n', '', 'NORAD_CAT_ID')}
 
 
 @pytest.mark.parametrize('case', REFUSED)

@@ -93,7 +93,7 @@ def test_a_tle_file(tmp_path, text, name, title):
 
 
 @pytest.mark.parametrize('text, name, message', [
-    ('', '', 'no line that begins with "1 "'), (LINE_1, '', 'no line'), ('<html></html>\n', '', 'no line'),
+    ('', '', 'must hold a TLE'), (LINE_1, '', 'must hold a TLE'), ('<html></html>\n', '', 'must hold a TLE'),
     (f'{LINE_1}\n{LINE_2}\nGEO\n{GEO_1}\n{GEO_2}\n', '', '2 found, 25544, GEO: name one with --satellite'),
     (f'{LINE_1}\n{LINE_2}\n', 'NOAA', "1 found, 25544: satellite 'NOAA' is in it 0 times")])
 def test_a_tle_file_that_does_not_do(tmp_path, text, name, message):

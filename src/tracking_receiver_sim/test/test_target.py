@@ -137,7 +137,7 @@ def test_broken_tle(line_1, line_2, message):
 
 @pytest.mark.parametrize('values, message', [
     ({'station__latitude_deg': 80.0}, r'no culmination between 30 and 70 deg within 3 days .* latitude 80'),
-    ({'station__latitude_deg': 89.0}, 'it never rises'),
+    ({'station__latitude_deg': 89.0}, 'the satellite does not rise'),
     ({'leo_pass__start_time': 'yesterday'}, "start_time = 'yesterday': must be UTC as ISO 8601"),
     ({'leo_pass__start_time': '2026-01-01T00:00:00'}, 'days from the TLE epoch 2019-12-09T16:38:29.363Z, must be'),
     ({'leo_pass__start_time': '2019-12-09T17:20:00'}, 'below the horizon from 2019-12-09T17:20:00.000Z for 120 s')])
@@ -194,8 +194,8 @@ GOOD = [(float(k), 47.4, 8.5, 600.0) for k in range(6)]
     (GOOD[:3] + [(3.0, 95.0, 8.5, 600.0)], r'line 5: latitude_deg = 95: must be -90 to 90'),
     (GOOD[:3] + [(3.0, 47.4, -200.0, 600.0)], r'line 5: longitude_deg = -200'),
     (GOOD[:3] + [(3.0, 47.4, 8.5, -9000.0)], r'line 5: altitude_m = -9000'),
-    (GOOD[:3], r'3 rows, must be at least 4'),
-    ([], r'0 rows')])
+    (GOOD[:3], r'3 fixes, must be at least 4'),
+    ([], r'0 fixes')])
 def test_broken_track(tmp_path, rows, message):
     path = write_track(tmp_path / 'broken.csv', rows)
     with pytest.raises(csv_table.TableError, match='broken.csv: ' + message) as raised:

@@ -1,11 +1,15 @@
 """Targets and the monopulse receiver that tracks them.
 
-receiver.py composes the column and owns `step`; below it target.py (where the target is) on geodesy.py and the
-room track (recorded flights), smoothing.py and monopulse.py (the voltages of the channels for an error); params.py
-holds every number.
+receiver.py holds the `step` of the receiver and uses these modules:
 
-Frames: the station's ENU frame for targets (axes fixed to the earth at the station), deck FLU and the
-beam's offsets as in pedestal_common. Time of a target runs from the start of the run (stamp 0).
+    target.py       position of the target: a satellite, a test motion, or a file (the rooms track and ephemeris)
+    path            refraction, light time, multipath, scintillation, polarisation
+    monopulse.py    voltages of the channels for an error
+    smoothing.py    smoothing of the errors
+    params.py       every parameter
+
+Frames: the ENU frame of the station for targets (axes fixed to the earth at the station), deck FLU and the offsets of
+the beam as in pedestal_common. The time of a target runs from the start of the run (stamp 0).
 
 Symbols
     theta3      half-power beamwidth of the sum pattern                             [rad]

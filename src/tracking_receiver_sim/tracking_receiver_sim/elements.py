@@ -1,7 +1,7 @@
 """Orbital elements of many satellites in one file: TLE, and CCSDS OMM (502.0-B) as KVN, XML, JSON or CSV.
 
-What a file is, its content says. Elements of an OMM become the two lines of a TLE, to the digits that these have: they
-are mean elements of SGP4 either way.
+The content of a file decides its format. Elements of an OMM become the two lines of a TLE, with the digits of a TLE:
+both are mean elements of SGP4.
 """
 import json
 import re
@@ -18,32 +18,34 @@ from pedestal_common.text_files import csv_table
 from tracking_receiver_sim.ephemeris import lines
 
 FORMAT_PROBE_BYTES = 4096
+"""Number of bytes at the beginning of a file that decide its format."""
 NUMBER_LIMITS = {'MEAN_MOTION': (0.05, 18.0), 'ECCENTRICITY': (0.0, 0.9999999), 'INCLINATION': (0.0, 180.0),
                  'RA_OF_ASC_NODE': (-360.0, 360.0), 'ARG_OF_PERICENTER': (-360.0, 360.0),
-                 'MEAN_ANOMALY': (-360.0, 360.0),
-                 'BSTAR': (-9.0, 9.0), 'MEAN_MOTION_DOT': (-9.0, 9.0), 'MEAN_MOTION_DDOT': (-9.0, 9.0),
+                 'MEAN_ANOMALY': (-360.0, 360.0), 'BSTAR': (-9.0, 9.0),
+                 'MEAN_MOTION_DOT': (-9.0, 9.0), 'MEAN_MOTION_DDOT': (-9.0, 9.0),
                  'NORAD_CAT_ID': (0, 339_999), 'ELEMENT_SET_NO': (0, 9999), 'REV_AT_EPOCH': (0, 99_999)}
-"""{keyword: its limits} [rev/day], [deg], [1/earth radii], [rev/day^2 / 2], [rev/day^3 / 6]."""
+"""{keyword: (lowest, highest)} [rev/day], [deg], [1/earth radii], [rev/day^2 / 2], [rev/day^3 / 6]."""
 ANGLE_KEYWORDS = ('RA_OF_ASC_NODE', 'ARG_OF_PERICENTER', 'MEAN_ANOMALY')
 INTEGER_KEYWORDS = ('NORAD_CAT_ID', 'ELEMENT_SET_NO', 'REV_AT_EPOCH')
 DEFAULT_FIELDS = {'MEAN_MOTION_DOT': '0', 'MEAN_MOTION_DDOT': '0', 'ELEMENT_SET_NO': '999', 'REV_AT_EPOCH': '0'}
-"""Of keywords that an OMM may leave out."""
+"""{keyword that an OMM may omit: default value}."""
 ALLOWED_VALUES = {'CENTER_NAME': ('EARTH',), 'REF_FRAME': ('TEME',), 'TIME_SYSTEM': ('UTC',),
                   'MEAN_ELEMENT_THEORY': ('SGP4', 'SGP/SGP4')}
+"""{keyword: allowed values}; the first one is the default."""
 OMM_KEYWORDS = ('OBJECT_NAME', 'OBJECT_ID', 'EPOCH', *ALLOWED_VALUES, *NUMBER_LIMITS)
 MAX_SATELLITES = 300_000
-"""Satellites in a file: all that are catalogued, some times over."""
+"""Largest number of satellites in a file, several times the number of catalogued ones."""
 MAX_COMPARED_NAMES = 40_000
-"""Names that are compared with one that is not there: more than are catalogued."""
+"""Largest number of names compared with an unknown one for a hint, more than the number of catalogued satellites."""
 MAX_XML_DEPTH, MAX_VALUE_CHARS = 100, 200
-"""Elements of XML within each other, and characters of a value."""
+"""Largest depth of nested XML elements, and the number of characters to which a value is cut."""
 PARSE_CHUNK_BYTES = 1 << 20
 DESIGNATOR_PATTERN = re.compile(r'\d{4}-\d{3}[A-Z]{1,3}')
 
 
 class Satellite(typing.NamedTuple):
-    """One of a file. line: where it begins; name, number, designator: what it is called; lines: of its TLE, None of an
-    OMM; fields: {keyword: text} of an OMM."""
+    """A satellite of a file. line: first line in the file; number: catalogue number; designator: international
+    designator; lines: those of its TLE, None for an OMM; fields: {keyword: text} of an OMM."""
     line: int
     name: str
     number: str
@@ -51,17 +53,16 @@ class Satellite(typing.NamedTuple):
     lines: tuple | None
     fields: dict
 
-    def is_called(self, name):
-        """Whether this is its name, its catalogue number or its international designator, in whatever case."""
+    def is_named(self, name):
+        """Return True for the name, catalogue number or international designator of the satellite, in any case."""
         number = self.number.lstrip('0') or '0'
         return name.strip().upper() in (self.name.upper(), number, self.number, self.designator)
 
 
 def read(path, name=''):
-    """(name, line 1, line 2) of a satellite in a file of elements, see the module.
+    """Return (name, line 1, line 2) of a satellite in a file of elements, see the module. Raises TargetError.
 
-    name: its name, catalogue number or international designator; only a file of one satellite goes without. Raises
-    TargetError.
+    name: name, catalogue number or international designator; it may be empty for a file of one satellite.
     """
     try:
         with csv_table.stream(path) as stream:
@@ -70,22 +71,23 @@ def read(path, name=''):
         for satellite in _reader(beginning)(path):
             names.append(satellite.name)
             if len(names) > MAX_SATELLITES:
-                raise csv_table.TableError(f'{path}: line {satellite.line}: must be at most {MAX_SATELLITES} satellites')
-            if not name or satellite.is_called(name):
+                raise csv_table.TableError(f'{path}: line {satellite.line}: must be at most {MAX_SATELLITES} '
+                                           'satellites')
+            if not name or satellite.is_named(name):
                 found.append(satellite if not found else None)
     except csv_table.TableError as error:
         raise TargetError(f'TLE file {error}') from None
     if not names:
-        raise TargetError(f'TLE file {path}: no line that begins with "1 " before one that begins with "2 ", and no '
-                          'OMM')
+        raise TargetError(f'TLE file {path}: must hold a TLE (a line that begins with "1 ", then one that begins with '
+                          '"2 ") or an OMM')
     if len(found) != 1:
         listed = ', '.join(names[:5]) + (', ...' if len(names) > 5 else '')
-        said = 'name one with --satellite'
+        remedy = 'name one with --satellite'
         if name:
-            said = f'satellite {name!r:.60} is in it {len(found)} times;'
-            near = did_you_mean(name.upper(), list(dict.fromkeys(names))[:MAX_COMPARED_NAMES])
-            said = f'{said}{near}' if not found else f'{said} name it by its number'
-        raise TargetError(f'TLE file {path}: satellites: {len(names)} found, {listed}: {said.removesuffix(";")}')
+            count = f'satellite {name!r:.60} is in it {len(found)} times'
+            hint = did_you_mean(name.upper(), list(dict.fromkeys(names))[:MAX_COMPARED_NAMES])
+            remedy = f'{count}; name it by its number' if found else f'{count};{hint}'.removesuffix(';')
+        raise TargetError(f'TLE file {path}: satellites: {len(names)} found, {listed}: {remedy}')
     satellite = found[0]
     return (satellite.name, *(satellite.lines or _tle(path, satellite)))
 
@@ -102,7 +104,7 @@ def _reader(beginning):
 
 
 def _tles(path):
-    """Satellites of TLEs, with or without a line of its name before each."""
+    """Yield the satellites of a file of TLEs, with or without a line of the name before each."""
     before, first = (0, ''), (0, '')
     for number, text in lines.read(path, 'UTF-8'):
         if first[1].startswith('1 ') and text.startswith('2 '):
@@ -113,7 +115,7 @@ def _tles(path):
 
 
 def _number(text):
-    """The catalogue number in a TLE, whose first digit may be a letter (Alpha-5)."""
+    """Return the catalogue number in a TLE, whose first digit may be a letter (Alpha-5)."""
     from sgp4.alpha5 import from_alpha5
     try:
         return str(from_alpha5(text.strip()))
@@ -133,7 +135,7 @@ def _omm(line, fields):
 
 
 def _kvn(path):
-    """Satellites of OMMs one after the other; each begins with its CCSDS_OMM_VERS."""
+    """Yield the satellites of OMMs in sequence; each begins with its CCSDS_OMM_VERS."""
     fields, begun = {}, 0
     for number, text in lines.read(path, 'UTF-8'):
         keyword, equals, value = text.partition('=')
@@ -159,13 +161,13 @@ def _csv(path):
 
 
 def _json(path):
-    """Satellites of a JSON array of objects, or of one object, decoded one by one."""
+    """Yield the satellites of a JSON array of objects, or of one object, decoded one by one."""
     with csv_table.stream(path) as stream:
         content = stream.read(csv_table.MAX_CSV_BYTES)
     try:
         text = content.decode('utf-8-sig')
     except UnicodeDecodeError as error:
-        raise csv_table.TableError(f'{path}: byte {error.start} is no UTF-8') from None
+        raise csv_table.TableError(f'{path}: byte {error.start}: must be UTF-8') from None
     decoder, between = json.JSONDecoder(parse_int=str, parse_float=str), re.compile(r'[\s,\[\]]*')
     at, line, counted = between.match(text).end(), 1, 0
     while at < len(text):
@@ -174,9 +176,9 @@ def _json(path):
         try:
             value, at = decoder.raw_decode(text, at)
         except json.JSONDecodeError as error:
-            raise lines.wrong(path, error.lineno, error.colno, f'no JSON: {error.msg}') from None
+            raise lines.wrong(path, error.lineno, error.colno, f'not valid JSON: {error.msg}') from None
         except RecursionError:
-            raise lines.wrong(path, line, begun - text.rfind('\n', 0, begun), 'JSON too deep') from None
+            raise lines.wrong(path, line, begun - text.rfind('\n', 0, begun), 'JSON nested too deeply') from None
         if not isinstance(value, dict):
             raise lines.wrong(path, line, begun - text.rfind('\n', 0, begun), 'must be an object of an OMM')
         yield _omm(line, {keyword: str(value[keyword]).strip()[:MAX_VALUE_CHARS] for keyword in OMM_KEYWORDS
@@ -185,8 +187,8 @@ def _json(path):
 
 
 def _xml(path):
-    """Satellites of the segments of an OMM or NDM as XML; expat keeps nothing of what it has read."""
-    made, open_elements, texts = [], [], {}
+    """Yield the satellites of the segments of an OMM or NDM as XML; expat keeps no parsed data in memory."""
+    satellites, open_elements, texts = [], [], {}
     parser = expat.ParserCreate('UTF-8')
     parser.buffer_text = True
 
@@ -196,8 +198,8 @@ def _xml(path):
 
     def start(name, _attributes):
         if len(open_elements) >= MAX_XML_DEPTH:
-            raise csv_table.TableError(f'{path}: line {parser.CurrentLineNumber}: more than {MAX_XML_DEPTH} elements within '
-                                       'each other')
+            raise csv_table.TableError(f'{path}: line {parser.CurrentLineNumber}: must be at most {MAX_XML_DEPTH} '
+                                       'nested elements')
         name = name.rpartition(':')[2][:MAX_VALUE_CHARS]
         open_elements.append(name)
         if name == 'segment':
@@ -211,7 +213,7 @@ def _xml(path):
     def end(_name):
         if open_elements.pop() == 'segment':
             line = texts.pop('line', 1)
-            made.append(_omm(line, {keyword: value.strip() for keyword, value in texts.items()}))
+            satellites.append(_omm(line, {keyword: value.strip() for keyword, value in texts.items()}))
 
     parser.StartDoctypeDeclHandler, parser.CharacterDataHandler = doctype, text
     parser.StartElementHandler, parser.EndElementHandler = start, end
@@ -219,8 +221,8 @@ def _xml(path):
         with csv_table.stream(path) as stream:
             while piece := stream.read(PARSE_CHUNK_BYTES):
                 parser.Parse(piece)
-                yield from made
-                made.clear()
+                yield from satellites
+                satellites.clear()
             parser.Parse(b'', True)
     except expat.ExpatError as error:
         raise lines.wrong(path, error.lineno, error.offset + 1, 'not well-formed XML: '
@@ -228,11 +230,11 @@ def _xml(path):
 
 
 def _tle(path, satellite):
-    """Two lines of a satellite of an OMM. Raises TargetError."""
-    where, fields = f'TLE file {path}: line {satellite.line}', {**DEFAULT_FIELDS, **satellite.fields}
+    """Return the two lines of a satellite of an OMM. Raises TargetError."""
+    place, fields = f'TLE file {path}: line {satellite.line}', {**DEFAULT_FIELDS, **satellite.fields}
     for keyword, allowed in ALLOWED_VALUES.items():
         if fields.get(keyword, allowed[0]).upper() not in allowed:
-            raise TargetError(f'{where}: {keyword} = {fields[keyword]!r:.60}: must be {" or ".join(allowed)}')
+            raise TargetError(f'{place}: {keyword} = {fields[keyword]!r:.60}: must be {" or ".join(allowed)}')
     try:
         for keyword, (low, high) in NUMBER_LIMITS.items():
             value = csv_table.number(path, satellite.line, keyword, fields.get(keyword), low, high)

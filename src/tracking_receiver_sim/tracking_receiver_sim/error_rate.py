@@ -1,14 +1,14 @@
-"""How fast the error of a beam on a moving deck changes: the true value of the receiver's rate channels."""
+"""Rate of the error of a beam on a moving deck: the true value of the rate channels of the receiver."""
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry.line_of_sight import offset_rates, to_deck
 
 
 @compiled
 def error_rate(i, position, velocity, target):
-    """(d dX/dt, d dE/dt) [rad/s] of a TargetState off the beam; i: record of receiver.INPUTS, the beam and the deck.
+    """Return (d dX/dt, d dE/dt) [rad/s] of a TargetState off the beam; i: record of receiver.INPUTS_DTYPE.
 
-    position (3,): of the antenna, ENU [m]; velocity (3,): of the antenna, FLU [m/s]. Exact: in the deck frame the
-    target is at r = M' (p - position), and r' = M' v - velocity - w x r.
+    position (3,): antenna, ENU [m]; velocity (3,): antenna, FLU [m/s]. Exact: in the deck frame the target is at
+    r = M' (p - position), and r' = M' v - velocity - w x r.
     """
     (e, n, u), (v_e, v_n, v_u) = target.position, target.velocity
     x, y, z = r = to_deck(i.mat_ed, e - position[0], n - position[1], u - position[2])

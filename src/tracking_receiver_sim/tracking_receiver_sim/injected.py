@@ -1,4 +1,4 @@
-"""The faults that can be injected into the receiver: what each of them breaks."""
+"""Effects of the faults that can be injected into the receiver."""
 import numpy as np
 
 from pedestal_common.codes import codes
@@ -11,20 +11,20 @@ MESSAGE_FAULT_CODES = message_faults.codes('tracking_receiver')
 Fault = codes([fault.name for fault in table.INJECTED_FAULTS['tracking_receiver']])
 
 SLOPE_BOTH, SLOPE_CROSS_ELEVATION, SLOPE_ELEVATION = range(3)
-"""Options of wrong_slope."""
+"""Options of the fault wrong_slope."""
 
 INJECTED_DTYPE = np.dtype([('power', 'f8'), ('cos_phi', 'f8'), ('sin_phi', 'f8'), ('latency_ns', 'i8'),
-                           ('clock_ns', 'i8'), ('bias', 'f8', (2,)), ('said', message_faults.MESSAGE_FAULT_DTYPE)],
-                          align=True)
-"""power ... latency_ns: constants of the receiver (receiver.CONSTANTS) when nothing is broken; clock_ns: added to the
-stamps; bias: added to the errors [rad]; said: what spoils the results."""
+                           ('clock_ns', 'i8'), ('bias', 'f8', (2,)),
+                           ('message_fault', message_faults.MESSAGE_FAULT_DTYPE)], align=True)
+"""Record of the faults. power ... latency_ns: values of receiver.CONSTANTS_DTYPE without a fault; clock_ns: offset of
+the stamps; bias: offset of the errors [rad]; message_fault: faults of the published results."""
 
-(ANGLE_ERROR_TOPIC, ANGLE_RATE_TOPIC, RANGE_TOPIC) = ('tracking_receiver/angle_error', 'tracking_receiver/angle_rate',
-                                                      'tracking_receiver/range')
+ANGLE_ERROR_TOPIC, ANGLE_RATE_TOPIC = 'tracking_receiver/angle_error', 'tracking_receiver/angle_rate'
+RANGE_TOPIC = 'tracking_receiver/range'
 
 
 def initial(constants) -> np.ndarray:
-    """INJECTED_DTYPE (1,) of receiver.CONSTANTS (1,): nothing is broken."""
+    """Return INJECTED_DTYPE (1,) without a fault, for receiver.CONSTANTS_DTYPE (1,)."""
     e = np.zeros(1, INJECTED_DTYPE)
     for name in ('power', 'cos_phi', 'sin_phi', 'latency_ns'):
         e[name] = constants[name]
@@ -33,18 +33,18 @@ def initial(constants) -> np.ndarray:
 
 @compiled
 def _clear_faults(c, e):
-    """Nothing is broken."""
+    """Restore the constants and results of the receiver to those without a fault."""
     c.power, c.cos_phi, c.sin_phi, c.latency_ns = e.power, e.cos_phi, e.sin_phi, e.latency_ns
     c.sign[0] = c.sign[1] = 1.0
     e.clock_ns = 0
     e.bias[0] = e.bias[1] = 0.0
-    message_faults.clear(e.said)
+    message_faults.clear(e.message_fault)
 
 
 @compiled
 def _apply_fault(c, e, fault, values):
-    """What a fault does to constants and results of the receiver."""
-    message_faults.apply(e.said, MESSAGE_FAULT_CODES, fault, values)
+    """Apply a fault to the constants and results of the receiver."""
+    message_faults.apply(e.message_fault, MESSAGE_FAULT_CODES, fault, values)
     if fault == Fault.DELAY:
         c.latency_ns += round(values[0] * NS_PER_SECOND)
     elif fault == Fault.BIAS:
@@ -64,7 +64,7 @@ def _apply_fault(c, e, fault, values):
 
 @compiled
 def apply_due_faults(m, stamp):
-    """Mend everything, then break what is broken in the step of a stamp [ns]; m: unit.RECORD."""
+    """Clear all faults, then apply the faults in force in the step of a stamp [ns]; m: record of unit.RECORD_DTYPE."""
     _clear_faults(m.constants, m.injected)
     schedule.begin(m.schedule)
     for i in range(schedule.MAX_ACTIVE_FAULTS):
@@ -75,17 +75,17 @@ def apply_due_faults(m, stamp):
 
 @compiled
 def corrupt_messages(e, stamp, outputs):
-    """The results of a step, spoilt."""
+    """Corrupt the results of a step, according to the record e of INJECTED_DTYPE."""
     error, rate, distance = outputs[ANGLE_ERROR_TOPIC], outputs[ANGLE_RATE_TOPIC], outputs[RANGE_TOPIC]
     for i in range(2):
         error.vector[i] += e.bias[i]
-        if e.said.sigma > 0.0:
-            error.vector[i] += message_faults.noise(e.said, stamp, i)
-    message_faults.numbers(e.said, error.vector, 0)
-    message_faults.numbers(e.said, rate.vector, 3)
-    message_faults.numbers(e.said, distance.range, 6)
+        if e.message_fault.sigma > 0.0:
+            error.vector[i] += message_faults.noise(e.message_fault, stamp, i)
+    message_faults.numbers(e.message_fault, error.vector, 0)
+    message_faults.numbers(e.message_fault, rate.vector, 3)
+    message_faults.numbers(e.message_fault, distance.range, 6)
     for message in (error, rate):
         if message.stamp != NO_STAMP:
-            message.stamp = NO_STAMP if e.said.drop != 0 else message.stamp + e.clock_ns
+            message.stamp = NO_STAMP if e.message_fault.drop != 0 else message.stamp + e.clock_ns
     if distance.stamp != NO_STAMP:
-        distance.stamp = NO_STAMP if e.said.drop != 0 else distance.stamp + e.clock_ns
+        distance.stamp = NO_STAMP if e.message_fault.drop != 0 else distance.stamp + e.clock_ns

@@ -1,11 +1,10 @@
 """Monopulse channels: the voltages that a target off the beam axis causes.
 
-Sum and differences have illuminations of their own, as a multimode feed gives them: a cosine taper for the
-sum, one period of a sine across the aperture for a difference. Both far fields are closed forms with their
-real sign in every sidelobe, and separable in the two axes:
-sum = S(x) S(e), cross-elevation difference = D(x) S(e), elevation difference = S(x) D(e).
-D/S is k_m v near the axis (5 % more at 0.33 beamwidths), D peaks at 0.71, the sense reverses past the first
-null of the sum at 1.26, and at 1.68, in its first sidelobe (-23 dB), there is a false stable null.
+Sum and differences have separate illuminations, as a multimode feed gives them: a cosine taper for the sum, one period
+of a sine across the aperture for a difference. Both far fields are closed forms with the right sign in every sidelobe.
+They are separable in the two axes: sum = S(x) S(e), cross-elevation difference = D(x) S(e), elevation difference =
+S(x) D(e). D/S is k_m v near the axis (5 % more at 0.33 beamwidths), and D peaks at 0.71. The sense reverses past the
+first null of the sum at 1.26. A false stable null lies at 1.68, in the first sidelobe (-23 dB).
 """
 import math
 
@@ -14,18 +13,18 @@ import numpy as np
 from pedestal_common.compiled import compiled
 
 U_PER_BEAMWIDTH = 2.0 * 1.8676215105779688
-"""u = pi D/lambda sin(theta) per half-power beamwidth of the cosine taper."""
+"""Value of u = pi D/lambda sin(theta) per half-power beamwidth of the cosine taper."""
 
 
 @compiled
 def sinc(x):
-    """sin(x) / x."""
+    """Return sin(x) / x."""
     return math.sin(x) / x if x != 0.0 else 1.0
 
 
 @compiled
 def sum_pattern(v):
-    """S at v beamwidths off the axis: cos(u) / (1 - (2u/pi)^2), written so that nothing cancels at u = pi/2.
+    """Return S at v beamwidths off the axis: cos(u) / (1 - (2u/pi)^2), written so that nothing cancels at u = pi/2.
 
     Balanis, Antenna Theory, 3rd ed., table 12.1 (cosine distribution).
     """
@@ -35,14 +34,14 @@ def sum_pattern(v):
 
 @compiled
 def difference_pattern(v, k_m):
-    """D at v beamwidths off the axis, slope k_m: sin(u) / (1 - (u/pi)^2) likewise, from one sine period."""
+    """Return D at v beamwidths off the axis, slope k_m: sin(u) / (1 - (u/pi)^2), the far field of one sine period."""
     u = U_PER_BEAMWIDTH * abs(v)
     return math.copysign(k_m / U_PER_BEAMWIDTH, v) * math.pi**2 * sinc(u - math.pi) / (u + math.pi)
 
 
 @compiled
 def channels(v_x, v_e, k_m, cos_beta, sin_beta):
-    """(sum, difference X, difference E) voltages of a unit carrier, v_x and v_e beamwidths off the axis.
+    """Return the (sum, difference X, difference E) voltages of a unit carrier, v_x and v_e beamwidths off the axis.
 
     Cross-coupling rotates the error axes by beta (anchors.md section 5).
     """
@@ -53,14 +52,16 @@ def channels(v_x, v_e, k_m, cos_beta, sin_beta):
 
 @compiled
 def detect(d_real, d_imag, s_real, s_imag, cos_phi, sin_phi, d_noise_real, d_noise_imag):
-    """Re(d conj(s)) of a difference voltage d that the receiver rotated by phi and added noise to; voltages with unit
-    noise power."""
+    """Return Re(d conj(s)) of a difference voltage d after the phase error phi and the noise of the channel.
+
+    The voltages have unit noise power.
+    """
     return ((d_real * cos_phi - d_imag * sin_phi + d_noise_real) * s_real
             + (d_real * sin_phi + d_imag * cos_phi + d_noise_imag) * s_imag)
 
 
 def thermal_noise(beamwidth, k_m, cn0, tau):
-    """1-sigma angle error on axis [rad] of one sample: theta3 / (k_m sqrt(2 C/N0 tau)) (Barton form).
+    """Return the 1-sigma angle error on axis [rad] of one sample: theta3 / (k_m sqrt(2 C/N0 tau)) (Barton form).
 
     beamwidth [rad], slope k_m, cn0 [Hz] (not dB), tau [s]: numbers or arrays.
     """

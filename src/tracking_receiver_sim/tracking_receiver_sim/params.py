@@ -26,14 +26,14 @@ class LeoPassParameters(Parameters):
     line_2: str = text('2 25544  51.6439 211.2001 0007417  17.6667  85.6398 15.50103472202482',
                        'second line of the TLE')
     start_time: str = text('', 'UTC of the start, ISO 8601; empty: the run is centred on a culmination')
-    culmination_low_deg: float = parameter(30.0, 0.0, 90.0, 'deg', 'lowest culmination the pass finder takes')
-    culmination_high_deg: float = parameter(70.0, 0.0, 90.0, 'deg', 'highest culmination the pass finder takes')
-    search_days: float = parameter(3.0, 0.1, 30.0, 'd', 'how far past the TLE epoch the pass finder looks')
-    ut1_offset: float = parameter(0.0, -0.9, 0.9, 's', 'UT1 - UTC, by which the earth has truly turned further; IERS '
-                                  'Bulletin A; a program track takes 0')
+    culmination_low_deg: float = parameter(30.0, 0.0, 90.0, 'deg', 'lowest culmination that the pass finder accepts')
+    culmination_high_deg: float = parameter(70.0, 0.0, 90.0, 'deg', 'highest culmination that the pass finder accepts')
+    search_days: float = parameter(3.0, 0.1, 30.0, 'd', 'length of the search for a pass, from the TLE epoch on')
+    ut1_offset: float = parameter(0.0, -0.9, 0.9, 's', 'UT1 - UTC (IERS Bulletin A), which turns the earth further; a '
+                                  'program track assumes 0')
 
     def check(self):
-        """Raise ParameterError where the limits of the culmination are not in order."""
+        """Raise ParameterError if the lower limit of the culmination is not below the upper limit."""
         if self.culmination_low_deg >= self.culmination_high_deg:
             raise ParameterError(f'culmination_low_deg = {self.culmination_low_deg:g} deg: must be below '
                                  f'culmination_high_deg = {self.culmination_high_deg:g} deg')
@@ -44,21 +44,23 @@ class TrackFileParameters(Parameters):
     """A track from a file: a recorded flight (CSV, ADS-B, GPX, NMEA), a predicted orbit (CCSDS OEM, STK) or a table of
     azimuth and elevation (CSV, program.txt), see docs/tracks.md."""
     path: str = text('', 'file: CSV, ADS-B as CSV, GPX, NMEA, OEM, STK .e, program.txt')
-    aircraft: str = text('', 'which one, where the file holds several: icao24, callsign, name of a GPX track, object '
-                         'of an OEM')
-    start: float = parameter(0.0, 0.0, 1e7, 's', 'stamp 0 is this long after the first fix, state or row')
+    aircraft: str = text('', 'name of the target if the file holds several: icao24, callsign, name of a GPX track, '
+                         'object of an OEM')
+    start: float = parameter(0.0, 0.0, 1e7, 's', 'time from the first fix, state or row to stamp 0')
     max_gap: float = parameter(10.0, 0.01, 600.0, 's', 'largest time between two fixes of a flight')
-    max_speed: float = parameter(400.0, 1.0, 12e3, 'm/s', 'a flight that is faster is refused')
-    max_acceleration: float = parameter(50.0, 0.1, 1000.0, 'm/s2', 'a track that needs more is refused')
+    max_speed: float = parameter(400.0, 1.0, 12e3, 'm/s', 'largest speed of a flight; a faster one is refused')
+    max_acceleration: float = parameter(50.0, 0.1, 1000.0, 'm/s2', 'largest acceleration; a track above it is refused')
     smooth: bool = flag(False, 'Rauch-Tung-Striebel smoother of a constant-velocity model on each axis')
-    sigma_horizontal: float = parameter(10.0, 1e-3, 1e4, 'm', 'smooth: 1-sigma of a fix east and north')
-    sigma_vertical: float = parameter(3.0, 1e-3, 1e4, 'm', 'smooth: 1-sigma of a fix up; 25 ft steps alone: 2.2')
-    acceleration_noise: float = parameter(1.0, 1e-3, 1e3, 'm/s2/sqrt(Hz)', 'smooth: white acceleration of the target')
+    sigma_horizontal: float = parameter(10.0, 1e-3, 1e4, 'm', '1-sigma of a fix east and north, for `smooth`')
+    sigma_vertical: float = parameter(3.0, 1e-3, 1e4, 'm', '1-sigma of a fix up, for `smooth`; steps of 25 ft alone '
+                                      'give 2.2')
+    acceleration_noise: float = parameter(1.0, 1e-3, 1e3, 'm/s2/sqrt(Hz)', 'white acceleration of the target, for '
+                                          '`smooth`')
 
 
 @dataclasses.dataclass(frozen=True)
 class FlybyParameters(Parameters):
-    """A straight, level, uniform pass; azimuth grows along it. Paper 000's UAV by default."""
+    """A straight, level, uniform pass with growing azimuth. The defaults are the UAV of paper 000."""
     closest_distance: float = parameter(500.0, 0.0, 1e6, 'm', 'closest distance over ground')
     height: float = parameter(100.0, -1000.0, 1e6, 'm', 'height above the station')
     speed: float = parameter(15.0, 0.0, 8000.0, 'm/s', 'ground speed')
@@ -69,21 +71,21 @@ class FlybyParameters(Parameters):
 @dataclasses.dataclass(frozen=True)
 class AngleParameters(Parameters):
     """Targets sine, step and ramp: earth angles about a centre, at a fixed range, moving from `start` on."""
-    azimuth: float = parameter(0.0, -2 * math.pi, 2 * math.pi, 'rad', 'centre, clockwise from north')
-    elevation: float = parameter(0.6, 0.0, math.pi / 2, 'rad', 'centre')
+    azimuth: float = parameter(0.0, -2 * math.pi, 2 * math.pi, 'rad', 'azimuth of the centre, clockwise from north')
+    elevation: float = parameter(0.6, 0.0, math.pi / 2, 'rad', 'elevation of the centre')
     range: float = parameter(10e3, 10.0, 1e9, 'm', 'distance of the target')
-    start: float = parameter(0.0, 0.0, 1e6, 's', 'when the motion starts')
-    azimuth_amplitude: float = parameter(0.01, -math.pi, math.pi, 'rad', 'sine and step: azimuth amplitude')
-    elevation_amplitude: float = parameter(0.01, -math.pi, math.pi, 'rad', 'sine and step: elevation amplitude')
-    frequency: float = parameter(0.1, 0.0, 50.0, 'Hz', 'sine: frequency')
-    azimuth_rate: float = parameter(0.01, -10.0, 10.0, 'rad/s', 'ramp: azimuth rate')
-    elevation_rate: float = parameter(0.0, -10.0, 10.0, 'rad/s', 'ramp: elevation rate')
+    start: float = parameter(0.0, 0.0, 1e6, 's', 'time at which the motion starts')
+    azimuth_amplitude: float = parameter(0.01, -math.pi, math.pi, 'rad', 'azimuth amplitude of sine and step')
+    elevation_amplitude: float = parameter(0.01, -math.pi, math.pi, 'rad', 'elevation amplitude of sine and step')
+    frequency: float = parameter(0.1, 0.0, 50.0, 'Hz', 'frequency of the sine')
+    azimuth_rate: float = parameter(0.01, -10.0, 10.0, 'rad/s', 'azimuth rate of the ramp')
+    elevation_rate: float = parameter(0.0, -10.0, 10.0, 'rad/s', 'elevation rate of the ramp')
 
 
 @dataclasses.dataclass(frozen=True)
 class TargetParameters(Parameters):
-    """What there is to track."""
-    kind: str = choice('leo_pass', TARGET_KINDS, 'which target')
+    """The target and the station."""
+    kind: str = choice('leo_pass', TARGET_KINDS, 'kind of target')
     station: StationParameters = group(StationParameters)
     leo_pass: LeoPassParameters = group(LeoPassParameters)
     track_file: TrackFileParameters = group(TrackFileParameters)
@@ -95,57 +97,65 @@ class TargetParameters(Parameters):
 @dataclasses.dataclass(frozen=True)
 class AntennaParameters(Parameters):
     """Sum and difference channels; the defaults are an X-band dish of 2.4 m."""
-    beamwidth: float = parameter(0.0175, 1e-4, 0.5, 'rad', 'theta3: half-power beamwidth of the sum pattern')
-    slope: float = parameter(1.6, 0.5, 1.867, '1', 'k_m: difference over sum per beamwidth; 1.867: lossless')
-    slope_factor: float = parameter(1.0, 0.1, 5.0, '1', 'true slope over the slope the receiver assumes')
-    cross_coupling: float = parameter(0.0, -math.pi, math.pi, 'rad', 'beta: rotation of the error axes')
-    phase_error: float = parameter(0.0, -math.pi, math.pi, 'rad', 'phi: post-comparator phase error')
-    boresight_cross_elevation: float = parameter(0.0, -0.1, 0.1, 'rad', 'null of the differences off the beam')
-    boresight_elevation: float = parameter(0.0, -0.1, 0.1, 'rad', 'null of the differences off the beam')
+    beamwidth: float = parameter(0.0175, 1e-4, 0.5, 'rad', 'half-power beamwidth theta3 of the sum pattern')
+    slope: float = parameter(1.6, 0.5, 1.867, '1', 'slope k_m: difference over sum per beamwidth; lossless: 1.867')
+    slope_factor: float = parameter(1.0, 0.1, 5.0, '1', 'true slope over the slope that the receiver assumes')
+    cross_coupling: float = parameter(0.0, -math.pi, math.pi, 'rad', 'rotation beta of the error axes')
+    phase_error: float = parameter(0.0, -math.pi, math.pi, 'rad', 'post-comparator phase error phi')
+    boresight_cross_elevation: float = parameter(0.0, -0.1, 0.1, 'rad', 'null of the difference channels off the '
+                                                 'beam, in cross-elevation')
+    boresight_elevation: float = parameter(0.0, -0.1, 0.1, 'rad', 'null of the difference channels off the beam, in '
+                                           'elevation')
     polarisation: PolarisationParameters = group(PolarisationParameters)
 
 
 @dataclasses.dataclass(frozen=True)
 class RateParameters(Parameters):
-    """The rate of the angle error, an independent measurement: tachometer of the antenna and receiver together."""
-    measured: bool = flag(False, 'measured and published on angle_rate')
-    sigma: float = parameter(1.745e-3, 1e-9, 10.0, 'rad/s', '1-sigma of each axis, tachometer and receiver together')
+    """Rate of the angle error, an independent measurement: tachometer of the antenna and receiver together."""
+    measured: bool = flag(False, 'measurement of the rate of the angle error, published on angle_rate')
+    sigma: float = parameter(1.745e-3, 1e-9, 10.0, 'rad/s', '1-sigma of the rate of each axis, tachometer and '
+                             'receiver together')
 
 
 @dataclasses.dataclass(frozen=True)
 class RangingParameters(Parameters):
-    """The distance of the target."""
-    measured: bool = flag(False, 'measured and published on range')
+    """Measurement of the distance of the target."""
+    measured: bool = flag(False, 'measurement of the range, published on range')
     sigma: float = parameter(1.0, 1e-6, 1e6, 'm', '1-sigma of the range')
 
 
 @dataclasses.dataclass(frozen=True)
 class ReceiverParameters(Parameters):
-    """Level, sampling, smoothing, lock, delay."""
+    """Level, sampling, smoothing, lock and latency of the receiver."""
     cn0_dbhz: float = parameter(46.4, 0.0, 120.0, 'dB-Hz', 'C/N0 on the beam axis at the reference range')
-    reference_range: float = parameter(500e3, 1.0, 1e10, 'm', 'range at which cn0_dbhz holds')
-    range_exponent: float = parameter(2.0, 0.0, 4.0, '1', 'C/N0 falls with this power of range; 0: constant')
-    horizon_mask: float = parameter(0.0, -math.pi / 2, math.pi / 2, 'rad', 'no signal from below this elevation')
+    reference_range: float = parameter(500e3, 1.0, 1e10, 'm', 'range at which the C/N0 is cn0_dbhz')
+    range_exponent: float = parameter(2.0, 0.0, 4.0, '1', 'power of the range with which C/N0 falls; 0: constant')
+    horizon_mask: float = parameter(0.0, -math.pi / 2, math.pi / 2, 'rad', 'elevation below which there is no signal')
     samples_per_step: int = parameter(5, 1, 100, '1', 'channel samples per drive step')
-    beam: str = choice('moving', BEAM_MOTIONS, 'between two steps; held: an electronic beam, which jumps at the steps')
-    smoothing: str = choice('none', SMOOTHING_KINDS,
-                            "none: mean over the step; recursion: paper 002's over the samples")
-    smoothing_samples: int = parameter(20, 1, 10000, '1', 'n of recursion and moving average')
-    full_scale: float = parameter(0.7, 0.1, 100.0, 'beamwidths', 'largest error the detector puts out')
-    agc_time_constant: float = parameter(0.05, 1e-3, 10.0, 's', 'smoothing of the sum power that normalises')
-    cn0_time_constant: float = parameter(0.1, 1e-3, 10.0, 's', 'smoothing of the published C/N0')
-    acquire_level_dbhz: float = parameter(39.0, 0.0, 120.0, 'dB-Hz', 'lock after acquire_time above this')
-    lose_level_dbhz: float = parameter(36.0, 0.0, 120.0, 'dB-Hz', 'unlock after lose_time below this')
+    beam: str = choice('moving', BEAM_MOTIONS, 'motion of the beam between two steps; held: an electronic beam, which '
+                       'jumps at the steps')
+    smoothing: str = choice('none', SMOOTHING_KINDS, 'smoothing of the errors; none: mean over a step; recursion: '
+                            'low-pass of paper 002 over the samples')
+    smoothing_samples: int = parameter(20, 1, 10000, '1', 'number of samples n of recursion and moving average')
+    full_scale: float = parameter(0.7, 0.1, 100.0, 'beamwidths', 'largest error that the detector puts out')
+    agc_time_constant: float = parameter(0.05, 1e-3, 10.0, 's', 'time constant of the sum power that normalises the '
+                                         'errors')
+    cn0_time_constant: float = parameter(0.1, 1e-3, 10.0, 's', 'time constant of the published C/N0')
+    acquire_level_dbhz: float = parameter(39.0, 0.0, 120.0, 'dB-Hz', 'C/N0 above which the receiver locks after '
+                                          'acquire_time')
+    lose_level_dbhz: float = parameter(36.0, 0.0, 120.0, 'dB-Hz', 'C/N0 below which the receiver loses lock after '
+                                       'lose_time')
     acquire_time: float = parameter(0.1, 0.0, 10.0, 's', 'time above the upper level before lock')
-    lose_time: float = parameter(0.05, 0.0, 10.0, 's', 'time below the lower level before loss')
-    latency: float = parameter(0.0, 0.0, 0.5, 's', 'from measurement to output')
+    lose_time: float = parameter(0.05, 0.0, 10.0, 's', 'time below the lower level before loss of lock')
+    latency: float = parameter(0.0, 0.0, 0.5, 's', 'time from measurement to output')
     rate: RateParameters = group(RateParameters)
     ranging: RangingParameters = group(RangingParameters)
 
     def check(self):
-        """Raise ParameterError for a moving average that is too long, or lock levels that are not in order."""
+        """Raise ParameterError if a moving average is too long, or if the lower lock level is above the upper one."""
         if self.smoothing == 'moving_average' and self.smoothing_samples > MAX_WINDOW_SAMPLES:
-            raise ParameterError(f'smoothing_samples = {self.smoothing_samples}: a moving average takes 1 to {MAX_WINDOW_SAMPLES}')
+            raise ParameterError(f'smoothing_samples = {self.smoothing_samples}: must be 1 to {MAX_WINDOW_SAMPLES} '
+                                 'with smoothing = moving_average')
         if self.lose_level_dbhz > self.acquire_level_dbhz:
             raise ParameterError(f'lose_level_dbhz = {self.lose_level_dbhz:g} dB-Hz: must not be above '
                                  f'acquire_level_dbhz = {self.acquire_level_dbhz:g} dB-Hz')
@@ -153,33 +163,33 @@ class ReceiverParameters(Parameters):
 
 @dataclasses.dataclass(frozen=True)
 class TrackingReceiverParameters(Parameters):
-    """Parameters of tracking_receiver_node."""
+    """Parameters of target, path and receiver."""
     lever_arm: LeverArm = group(LeverArm)
     blockage: str = text('', SECTORS_DOC)
     target: TargetParameters = group(TargetParameters)
     path: PathParameters = group(PathParameters)
     antenna: AntennaParameters = group(AntennaParameters)
     receiver: ReceiverParameters = group(ReceiverParameters)
-    seed: int = parameter(1, 0, 2**31 - 1, '1', 'of the receiver noise')
+    seed: int = parameter(1, 0, 2**31 - 1, '1', 'seed of the receiver noise')
 
     def check(self):
-        """Raise ParameterError for hidden sectors that cannot be read."""
+        """Raise ParameterError if `blockage` is not a list of hidden sectors."""
         sectors(self.blockage)
 
 
 @dataclasses.dataclass(frozen=True)
 class TrackingReceiverNodeParameters(TrackingReceiverParameters):
-    """Parameters of tracking_receiver_node: the receiver and the run it is built for."""
+    """Parameters of tracking_receiver_node: the receiver, and the step and length of the run."""
     period: float = parameter(5e-3, 1e-4, 1.0, 's', 'drive step T')
-    duration: float = parameter(3600.0, 0.1, 86400.0, 's', 'how long the target is laid out for')
+    duration: float = parameter(3600.0, 0.1, 86400.0, 's', 'duration of the run, covered by the target motion')
     inject: str = text('', table.INJECT_DOC)
 
     def check(self):
-        """Raises ParameterError for an `inject` that names no fault of the receiver."""
+        """Raise ParameterError if `inject` is not a list of faults of the receiver."""
         super().check()
         table.due('tracking_receiver', self.inject)
 
     def check_graph(self, beams, lockstep):
-        """Raises ParameterError for a fault that its pacing does not have."""
+        """Raise ParameterError if `inject` holds a fault that the pacing of the graph excludes."""
         super().check_graph(beams, lockstep)
         table.check_pacing('tracking_receiver', self.inject, lockstep)

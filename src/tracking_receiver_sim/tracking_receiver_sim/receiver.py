@@ -1,15 +1,16 @@
-"""The monopulse tracking receiver: where the target is, what the channels measure of it, what is published.
+"""The monopulse tracking receiver: position of the target, samples of the channels, published results.
 
-One `step` per drive step. Between the previous step and this one the true error runs in a straight line, along which
-`samples_per_step` samples of sum and difference voltages are taken, the last one at the stamp. Where the beam is held
-(an electronic beam jumps at the steps) the line begins at the offset of the previous target from the present beam.
-Each sample is converted to an angle error by Re(d conj(s)) over the smoothed sum power (AGC), limited to the
-detector's full scale, then smoothed.
+One `step` per drive step. Between the previous step and this one the true error runs in a straight line. Along it the
+receiver takes `samples_per_step` samples of sum and difference voltages, the last one at the stamp. If the beam is
+held (an electronic beam jumps at the steps), the line begins at the offset of the previous target from the present
+beam. Each sample is converted to an angle error by Re(d conj(s)) over the smoothed sum power (AGC), limited to the
+full scale of the detector, then smoothed.
 
-Where they are measured, the rate of the error at the stamp and the range come with each result, with white noise.
+If the parameters select them, each result also holds the rate of the error at the stamp and the range, with white
+noise.
 
-Voltages are scaled so that one channel's noise has unit power in one sample: the carrier power on axis is
-C/N0 tau, and the receiver, which knows its own noise floor, subtracts 1 from the sum power it measures.
+Voltages are scaled so that the noise of one channel has unit power in one sample: the carrier power on axis is
+C/N0 tau. The noise floor is a known constant of the receiver, which subtracts 1 from the measured sum power.
 """
 import math
 from collections import namedtuple
@@ -30,22 +31,23 @@ from tracking_receiver_sim.smoothing import SMOOTHING_KINDS
 
 STATUS_TEXTS = dict(
     LOCKED='locked', NO_LOCK='no lock', BELOW_HORIZON='target below the horizon', NO_TARGET='target outside its track',
-    NO_BEAM='direction of the beam not valid', STAMP_ORDER='stamp not after the one before',
+    NO_BEAM='direction of the beam not valid', STAMP_ORDER='stamp not after that of the last step',
     HIDDEN='target hidden by the superstructure')
 STATUS_TEXT_BY_CODE = tuple(STATUS_TEXTS.values())
 Status = codes(STATUS_TEXTS)
 
 NORMALS_PER_SAMPLE = 6
-"""Real and imaginary noise of the sum and of the two difference channels."""
+"""Standard normals of a sample: real and imaginary noise of the sum and of the two difference channels."""
 RESULT_RING_SIZE = 512
-"""Results that can be on their way to the output at once."""
+"""Largest number of results that wait for the latency to pass."""
 MIN_POWER_OVER_NOISE = 0.01
 """Least carrier power over noise power in one sample that the C/N0 estimate reports (-20 dB)."""
 
 Result = namedtuple('Result', 'error cn0_dbhz rates range')
-"""What is published of one step: error and rates (cross-elevation, elevation) [rad, rad/s], C/N0 [dB-Hz], range [m];
-NaN for what is not locked or not measured."""
+"""Published result of one step: error and rates (cross-elevation, elevation) [rad, rad/s], C/N0 [dB-Hz], range [m];
+NaN while not locked or if not measured."""
 NOT_MEASURED = (math.nan, math.nan)
+"""Pair of numbers that the receiver did not measure."""
 
 STATE_DTYPE = np.dtype([
     ('stamp_ns', 'i8'), ('error_known', 'i8'), ('cross_elevation', 'f8'), ('elevation', 'f8'), ('direction', 'f8', 3),
@@ -59,9 +61,15 @@ STATE_DTYPE = np.dtype([
     ('ring_rate', 'f8', (RESULT_RING_SIZE, 2)), ('ring_range', 'f8', RESULT_RING_SIZE),
     ('antenna', 'f8', 3), ('antenna_velocity', 'f8', 3), ('scintillation', 'f8', scintillation.NORMALS_PER_STEP)],
                        align=True)
-"""error_known: cross_elevation, elevation hold the true error at stamp_ns, direction the target in FLU [m];
-timer_ns: time past a lock level; written, released: results put into the ring and taken from it since the start;
-antenna: its ENU position against the station [m], antenna_velocity: FLU [m/s]."""
+"""State of the receiver.
+
+    error_known         1 if cross_elevation, elevation hold the true error at stamp_ns [rad], direction the target in
+                        FLU [m]
+    timer_ns            time past a lock level
+    written, released   number of results put into and released from the ring since the start
+    antenna             position of the antenna against the station, ENU [m]
+    antenna_velocity    velocity of the antenna, FLU [m/s]
+"""
 
 CONSTANTS_DTYPE = np.dtype([
     ('target', target.TARGET_DTYPE),
@@ -78,37 +86,50 @@ CONSTANTS_DTYPE = np.dtype([
     ('latency_ns', 'i8'),
     ('rate_measured', 'i8'), ('rate_sigma', 'f8'), ('range_measured', 'i8'), ('range_sigma', 'f8'),
     ('range_variance', 'f8'), ('lever_arm', 'f8', 3), ('sectors', 'f8', (blockage.MAX_SECTORS, 3))], align=True)
-"""slope: true k_m; angle_scale: theta3 over the k_m the receiver assumes; sign: 1 or -1 of either difference channel;
-boresight: null of the differences off the beam, cross-elevation and elevation [rad]; first_noise: index of the first
-normal of rate and range, and of the scintillation;
-powers: carrier power in one sample over noise power in one sample; range_variance: in single precision."""
+"""Constants of the receiver.
+
+    slope               true k_m
+    angle_scale         theta3 over the k_m that the receiver assumes
+    sign                1 or -1, of each difference channel
+    boresight           null of the differences off the beam, cross-elevation and elevation [rad]
+    first_noise         index of the first normal of rate and range, and of the scintillation
+    power, acquire_power, lose_power    carrier power over noise power in one sample
+    range_variance      variance of the range [m2], in single precision
+"""
 
 INPUTS_DTYPE = np.dtype([('stamp_ns', 'i8'), ('valid', 'i8'), ('azimuth', 'f8'), ('elevation', 'f8'),
                          ('mat_ed', 'f8', (3, 3)), ('position', 'f8', 3), ('azimuth_rate', 'f8'),
                          ('elevation_rate', 'f8'),
                          ('twist_linear', 'f8', 3), ('twist_angular', 'f8', 3)], align=True)
-"""Step's stamp [ns]; beam there and fresh (0 or 1); its true angles on the deck [rad]; true attitude deck -> earth;
-ENU position of base_link against the station [m]; rates of the beam on the deck [rad/s]; velocity of base_link [m/s]
-and rate of the deck [rad/s], FLU."""
+"""Inputs of a step.
+
+    valid                           1 if the beam is known and fresh
+    azimuth, elevation, .._rate     true beam on the deck [rad], [rad/s]
+    mat_ed                          true attitude deck -> earth
+    position                        base_link against the station, ENU [m]
+    twist_linear, twist_angular     velocity of base_link [m/s] and rate of the deck [rad/s], FLU
+"""
 
 OUTPUTS_DTYPE = np.dtype([
     ('due', 'i8'), ('stamp_ns', 'i8'), ('cross_elevation', 'f8'), ('elevation', 'f8'), ('cn0_dbhz', 'f8'),
     ('locked', 'i8'), ('status', 'i8'), ('rate', 'f8', 2), ('range', 'f8'),
     ('true_cross_elevation', 'f8'), ('true_elevation', 'f8'),
     ('target_valid', 'i8'), ('target_position', 'f8', 3), ('target_velocity', 'f8', 3)], align=True)
-"""due: 1 when a result comes out in this step; then stamp_ns (of its measurement), errors [rad] (NaN while not
-locked), C/N0, locked, rate of the errors [rad/s] and range [m] belong to it (NaN while not locked or not measured; the
-range is rounded to the single precision of its topic). The rest belongs to this step: status (index into
-STATUS_TEXT_BY_CODE),
-true error [rad], target ENU [m, m/s]; NaN where not known."""
+"""Outputs of a step. due: 1 if a result comes out in this step. The result consists of stamp_ns (of its measurement),
+errors [rad], C/N0, locked, rate of the errors [rad/s] and range [m], rounded to the single precision of its topic.
+Errors, rate and range are NaN while not locked, rate and range also if not measured. The rest belongs to this step:
+status (index into STATUS_TEXT_BY_CODE), true error [rad], target ENU [m, m/s], NaN if not known."""
 
 
 def constants(params, period, built) -> np.ndarray:
-    """The (1,) CONSTANTS_DTYPE of TrackingReceiverParameters, a drive step of `period` [s] and a target.Target."""
+    """Return CONSTANTS_DTYPE (1,) of TrackingReceiverParameters, a drive step `period` [s] and a target.Target.
+
+    Raises ParameterError for a latency that the ring of results does not cover.
+    """
     antenna, receiver = params.antenna, params.receiver
     if receiver.latency >= (RESULT_RING_SIZE - 1) * period:
-        raise ParameterError(f'receiver.latency = {receiver.latency:g} s: must be below {RESULT_RING_SIZE - 1} periods of '
-                             f'{period:g} s')
+        raise ParameterError(f'receiver.latency = {receiver.latency:g} s: must be below {RESULT_RING_SIZE - 1} '
+                             f'periods of {period:g} s')
     tau = period / receiver.samples_per_step
     c = np.zeros(1, CONSTANTS_DTYPE)
     c['target'], c['beamwidth'] = built.constants, antenna.beamwidth
@@ -145,24 +166,24 @@ def constants(params, period, built) -> np.ndarray:
 
 
 def initial_state() -> np.ndarray:
-    """The (1,) STATE_DTYPE before the first step: noise in the channels, not locked."""
+    """Return (1,) STATE_DTYPE before the first step: noise in the channels, not locked."""
     s = np.zeros(1, STATE_DTYPE)
     s['stamp_ns'], s['agc_power'], s['level_power'] = -1, 1.0, 1.0
     return s
 
 
 def _measured_normals(receiver) -> int:
-    """How many standard normals a step of ReceiverParameters takes for what it measures."""
+    """Return the number of standard normals per step that the channels, rate and range of ReceiverParameters take."""
     return NORMALS_PER_SAMPLE * receiver.samples_per_step + 2 * receiver.rate.measured + receiver.ranging.measured
 
 
 def normals_per_step(params) -> int:
-    """How many standard normals `step` takes of TrackingReceiverParameters."""
+    """Return the number of standard normals that `step` takes with TrackingReceiverParameters."""
     return _measured_normals(params.receiver) + scintillation.NORMALS_PER_STEP * params.path.scintillation.on
 
 
 def angle_noise(params, cn0_dbhz, period):
-    """Predicted 1-sigma of one published error on axis [rad] at a C/N0 [dB-Hz] and a drive step [s]."""
+    """Return the predicted 1-sigma of one published error on axis [rad] at a C/N0 [dB-Hz] and a drive step [s]."""
     antenna, receiver = params.antenna, params.receiver
     tau = period / receiver.samples_per_step
     one_sample = thermal_noise(antenna.beamwidth, antenna.slope, _hertz(cn0_dbhz), tau)
@@ -172,10 +193,11 @@ def angle_noise(params, cn0_dbhz, period):
 
 
 def age(params, period):
-    """Mean age [s] of an error at its stamp, of a beam that is held between two steps; 0 for one that moves, where the
-    mean over a step differs from the error at the stamp by no more than the error changes within the step.
+    """Return the mean age [s] of an error at its stamp if the beam is held between two steps, otherwise 0.
 
-    params: TrackingReceiverParameters; period: drive step [s]."""
+    With a moving beam, the mean over a step differs from the error at the stamp by no more than the change of the
+    error within the step. params: TrackingReceiverParameters; period: drive step [s].
+    """
     receiver = params.receiver
     if BEAM_MOTIONS.index(receiver.beam) != BEAM_HELD:
         return 0.0
@@ -184,10 +206,11 @@ def age(params, period):
 
 
 def beam_age(params, period):
-    """How long before the stamp of an error [s] the beam was stamped, in the mean, that it was measured off.
+    """Return the mean time [s] from the stamp of the measured beam to the stamp of an error.
 
-    A beam that is held through a step is told at the step's end. params: TrackingReceiverParameters;
-    period: drive step [s]."""
+    Because a held beam is published at the end of its step, only older steps in the smoothing count. 0 for a moving
+    beam. params: TrackingReceiverParameters; period: drive step [s].
+    """
     receiver = params.receiver
     if BEAM_MOTIONS.index(receiver.beam) != BEAM_HELD:
         return 0.0
@@ -200,7 +223,7 @@ def _hertz(cn0_dbhz):
 
 @compiled
 def inputs_known(i):
-    """Whether beam, attitude and position are there and finite."""
+    """Return True if beam, attitude and position are known and finite."""
     total = i.azimuth + i.elevation
     for row in range(3):
         total += i.position[row] + i.mat_ed[row, 0] + i.mat_ed[row, 1] + i.mat_ed[row, 2]
@@ -220,8 +243,8 @@ def place_antenna(s, c, i):
 
 
 @compiled
-def seen_from(s, c, true):
-    """The TargetState that the antenna sees of a true one: ENU of the station, bent and late."""
+def apparent_state(s, c, true):
+    """Return the apparent TargetState of a true one, ENU of the station: with refraction and delay of light."""
     if c.path.refractivity == 0.0 and c.path.light_time == 0:
         return true
     e, n, u = true.position
@@ -231,7 +254,8 @@ def seen_from(s, c, true):
 
 @compiled
 def carrier_amplitude(c, e, n, u, hidden):
-    """Sum voltage on axis from a target at an ENU vector [m] of the antenna; 0 below the horizon mask and hidden."""
+    """Return the sum voltage on axis from a target at an ENU vector [m] of the antenna; 0 below the horizon mask or
+    hidden."""
     _, elevation = earth_angles(e, n, u)
     if hidden or not elevation >= c.horizon_mask:
         return 0.0
@@ -241,9 +265,11 @@ def carrier_amplitude(c, e, n, u, hidden):
 
 @compiled
 def sample(s, c, amplitude, v_x, v_e, image, normals, first):
-    """Take one sample of the channels: (cross-elevation, elevation) error [rad]; updates the AGC and level filters.
+    """Return the (cross-elevation, elevation) error [rad] of one sample of the channels; updates the AGC and level
+    filters.
 
-    amplitude: of the carrier on axis [-]; v_x, v_e: offsets in beamwidths; normals: from index `first` on."""
+    amplitude: carrier on axis [-]; v_x, v_e: offsets in beamwidths; normals: used from index `first` on.
+    """
     half = math.sqrt(0.5)
     S, D_x, D_e = channels(v_x, v_e, c.slope, c.cos_beta, c.sin_beta)
     S_imag = D_x_imag = D_e_imag = 0.0
@@ -256,7 +282,7 @@ def sample(s, c, amplitude, v_x, v_e, image, normals, first):
     power = s_real * s_real + s_imag * s_imag
     s.agc_power += c.agc_gain * (power - s.agc_power)
     s.level_power += c.level_gain * (power - s.level_power)
-    # The AGC's range ends where the carrier is no stronger than the noise.
+    # The range of the AGC ends at a carrier as strong as the noise.
     gain = c.angle_scale / max(s.agc_power - 1.0, 1.0)
     x = gain * detect(c.sign[0] * amplitude * D_x, c.sign[0] * amplitude * D_x_imag, s_real, s_imag, c.cos_phi,
                       c.sin_phi, half * normals[first + 2], half * normals[first + 3])
@@ -267,8 +293,8 @@ def sample(s, c, amplitude, v_x, v_e, image, normals, first):
 
 @compiled
 def measure(s, c, amplitude, dX, dE, image, normals):
-    """(cross-elevation, elevation) [rad] measured in one step, while the true error goes from the state's to dX,
-    dE."""
+    """Return (cross-elevation, elevation) [rad] measured in one step, while the true error changes from that of the
+    state to dX, dE."""
     from_X, from_E = (s.cross_elevation, s.elevation) if s.error_known != 0 else (dX, dE)
     smooth_x, smooth_e = s.smooth_cross_elevation, s.smooth_elevation
     smoothing.begin(smooth_x)
@@ -286,8 +312,10 @@ def measure(s, c, amplitude, dX, dE, image, normals):
 
 @compiled
 def lock(s, c, elapsed_ns):
-    """Lock with two levels: gained after acquire_ns above the upper one, lost after lose_ns below the lower;
-    elapsed_ns since the last step."""
+    """Update the lock: gained after acquire_ns above the upper level, lost after lose_ns below the lower level.
+
+    elapsed_ns: time since the last step.
+    """
     power = s.level_power - 1.0
     if s.locked != 0:
         crossed, wait = power < c.lose_power, c.lose_ns
@@ -300,8 +328,8 @@ def lock(s, c, elapsed_ns):
 
 @compiled
 def rate_and_range(s, c, i, target_state, normals):
-    """((cross-elevation rate, elevation rate) [rad/s], range [m]) of a TargetState as measured; NaN for what is
-    not."""
+    """Return the measured ((cross-elevation rate, elevation rate) [rad/s], range [m]) of a TargetState; NaN if not
+    measured."""
     rates, distance = NOT_MEASURED, math.nan
     first = c.first_noise[0]
     if c.rate_measured != 0:
@@ -317,7 +345,7 @@ def rate_and_range(s, c, i, target_state, normals):
 
 @compiled
 def delay(s, c, o, stamp_ns, result):
-    """Put a Result into the ring and release the newest one measured at or before stamp_ns - latency."""
+    """Put a Result into the ring and release the newest result measured at or before stamp_ns - latency."""
     slot = s.written % RESULT_RING_SIZE
     s.ring_stamp_ns[slot], s.ring_locked[slot] = stamp_ns, s.locked
     s.ring_cross_elevation[slot], s.ring_elevation[slot] = result.error
@@ -348,9 +376,11 @@ def reset_outputs(o):
 
 @compiled
 def step(s, c, i, o, breaks, coefficients, normals):
-    """One drive step: records STATE_DTYPE, CONSTANTS_DTYPE, INPUTS_DTYPE, OUTPUTS_DTYPE, breaks and coefficients of
-    the Target, normals
-    (normals_per_step,). Never raises: the status in OUTPUTS_DTYPE names what is missing."""
+    """Execute one drive step. Never raises: the status of the outputs names a missing input.
+
+    s, c, i, o: records STATE_DTYPE, CONSTANTS_DTYPE, INPUTS_DTYPE, OUTPUTS_DTYPE; breaks, coefficients: of the Target;
+    normals: (normals_per_step,).
+    """
     reset_outputs(o)
     if i.stamp_ns <= s.stamp_ns:
         o.status = Status.STAMP_ORDER
@@ -370,7 +400,7 @@ def step(s, c, i, o, breaks, coefficients, normals):
         hidden = False
         if true.valid:
             place_antenna(s, c, i)
-            seen = seen_from(s, c, true)
+            seen = apparent_state(s, c, true)
             rates, distance = rate_and_range(s, c, i, seen, normals)
             e, n, u = seen.position
             e, n, u = e - s.antenna[0], n - s.antenna[1], u - s.antenna[2]

@@ -1,4 +1,4 @@
-"""Smoothing of the receiver's angle errors, in the readings of paper 002's eq. (1).
+"""Smoothing of the angle errors of the receiver, in the interpretations of eq. (1) of paper 002.
 
     none            the mean of the samples of one step
     recursion       eq. (1) as printed: a first-order low-pass, x = (n - 1) / n x + 1 / n y. Its bandwidth (eq. 2) is
@@ -13,22 +13,23 @@ SMOOTHING_KINDS = ('none', 'recursion', 'moving_average')
 SMOOTHING_NONE, SMOOTHING_RECURSION, SMOOTHING_MOVING_AVERAGE = range(len(SMOOTHING_KINDS))
 
 MAX_WINDOW_SAMPLES = 256
-"""Longest moving average in samples."""
+"""Length of the longest moving average [samples]."""
 
 SMOOTHER_DTYPE = np.dtype([('low_pass', 'f8'), ('sum', 'f8'), ('samples', 'f8', (MAX_WINDOW_SAMPLES,)),
                            ('count', 'i8')], align=True)
-"""Output of the recursion; sum of this step's samples; the last samples, how many there were since the start."""
+"""State of a smoother. low_pass: output of the recursion; sum: sum of the samples of this step; samples: the last
+samples; count: number of samples since the start."""
 
 
 @compiled
 def begin(s):
-    """Begin a drive step: its sum of samples starts at 0."""
+    """Begin a drive step: reset the sum of its samples."""
     s.sum = 0.0
 
 
 @compiled
 def put(s, y, gain):
-    """Take one sample y [rad]; gain: 1/n of the recursion [-]."""
+    """Add one sample y [rad]; gain: 1/n of the recursion [-]."""
     s.sum += y
     s.low_pass += gain * (y - s.low_pass)
     s.samples[s.count % MAX_WINDOW_SAMPLES] = y
@@ -37,7 +38,8 @@ def put(s, y, gain):
 
 @compiled
 def smoothed(s, kind, samples, n):
-    """The smoothed error [rad] at the end of a step of `samples`; n: of the moving average, shorter at the start."""
+    """Return the smoothed error [rad] at the end of a step of `samples`; n: length of the moving average, which is
+    shorter at the start."""
     if kind == SMOOTHING_RECURSION:
         return s.low_pass
     if kind == SMOOTHING_NONE:
@@ -50,12 +52,13 @@ def smoothed(s, kind, samples, n):
 
 
 def delay(kind, samples, n):
-    """Mean delay of a kind of SMOOTHING_KINDS, in samples before the newest."""
+    """Return the mean delay of a kind of SMOOTHING_KINDS, in samples before the newest."""
     return {'none': 0.5 * (samples - 1), 'recursion': n - 1.0, 'moving_average': 0.5 * (n - 1)}[kind]
 
 
 def steps_back(kind, samples, n):
-    """Mean age, in drive steps of `samples`, of the steps whose samples are in the result: 0 for the last step."""
+    """Return the mean age of the steps whose samples are in the result, in drive steps of `samples`; 0 for the last
+    step."""
     if kind == 'none':
         return 0.0
     if kind == 'recursion':

@@ -1,19 +1,18 @@
-"""Where the target is: every kind in one form that the compiled receiver evaluates at any time.
+"""Position and velocity of the target: every kind in one form that the compiled receiver evaluates at any time.
 
-Trajectories (leo_pass, track_file, flyby) become piecewise cubics in the station's ENU frame when they are
-built, so a step needs neither SGP4 nor a file; angle targets (sine, step, ramp) are closed forms. Before
-the first and past the last break a trajectory is not valid: no position, rather than an extrapolated one.
+Trajectories (leo_pass, track_file, flyby) become piecewise cubics in the ENU frame of the station when they are built.
+Because of this, a step needs neither SGP4 nor a file. Angle targets (sine, step, ramp) are closed forms. Before the
+first and past the last break a trajectory is not valid: it has no position, not an extrapolated one.
 
-leo_pass: SGP4 position and velocity at every SGP4_KNOT_SPACING_S, joined by cubic Hermite pieces: within 1 mm and
-15 mm/s of SGP4 itself, whose velocity is 10 mm/s off the derivative of its own position. Against skyfield:
-0.3 mdeg with UT1 = UTC, the default; the true UT1 - UTC (`ut1_offset`, up to 0.9 s of earth rotation) moves an ISS
-pass by up to 0.04 deg (7 mdeg on the default pass). SGP4's own error is kilometres within days.
+leo_pass: SGP4 position and velocity at every SGP4_KNOT_SPACING_S, joined by cubic Hermite pieces. They are within 1 mm
+and 15 mm/s of SGP4, whose velocity is 10 mm/s off the derivative of its position. Against skyfield: 0.3 mdeg with
+UT1 = UTC, the default. The true UT1 - UTC (`ut1_offset`, up to 0.9 s of earth rotation) moves an ISS pass by up to
+0.04 deg (7 mdeg on the default pass). The error of SGP4 itself is kilometres within days.
 
-track_file: an orbit or a table of directions that was predicted (the room `ephemeris`), or a cubic spline through the
-fixes of a log, or smoothed: the room `track`. Measured on a real 1 Hz
-helicopter flight it predicts left-out fixes as well as PCHIP or Akima pieces (9 m, the jitter of the fixes), with
-half their peak acceleration; in a 3 m/s^2 turn its velocity is right to 1e-4 m/s where PCHIP, flattening every
-extremum, is 1.3 m/s off.
+track_file: a predicted orbit or table of directions (the room `ephemeris`), or the fixes of a log joined by a cubic
+spline, with or without smoothing (the room `track`). On a real 1 Hz helicopter flight the spline predicts left-out
+fixes as well as PCHIP or Akima pieces (9 m, the jitter of the fixes), with half their peak acceleration. In a 3 m/s^2
+turn its velocity is right to 1e-4 m/s; PCHIP flattens every extremum and is 1.3 m/s off.
 """
 import functools
 import math
@@ -31,16 +30,17 @@ from pedestal_common.parameters import record, record_type
 from tracking_receiver_sim.params import TARGET_KINDS, TARGET_RAMP, TARGET_SINE, TARGET_STEP, AngleParameters
 
 SGP4_KNOT_SPACING_S = 1.0
-"""Between SGP4 knots [s]."""
+"""Time between two SGP4 knots [s]."""
 PASS_SEARCH_STEP_S = 20.0
-"""Between the pass finder's looks [s]; a LEO pass lasts minutes."""
+"""Step of the pass finder [s]; a LEO pass lasts minutes."""
 PEAK_SEARCH_POINTS = 41
-"""In a row between two of these to find a peak."""
+"""Number of points of each refinement in the search for a peak."""
 RUN_MARGIN_S = 5.0
-"""Time before and after the run [s] that every kind covers, for a program track; a track_file as far as it goes."""
+"""Time before and after the run [s] that a target covers, for a program track; a track_file only up to its ends."""
 
 TargetState = namedtuple('TargetState', 'valid position velocity')
-"""valid: 0 or 1; position: ENU of the station [m], velocity [m/s], three floats each, NaN where it is not valid."""
+"""State of a target. valid: 0 or 1; position: ENU of the station [m]; velocity [m/s]; three floats each, NaN if not
+valid."""
 
 TARGET_DTYPE = np.dtype([('kind', 'i8'), ('angle', record_type(AngleParameters))], align=True)
 
@@ -48,9 +48,11 @@ TARGET_DTYPE = np.dtype([('kind', 'i8'), ('angle', record_type(AngleParameters))
 class Target(typing.NamedTuple):
     """A target built for one run.
 
-    constants: (1,) TARGET_DTYPE record; breaks: (n + 1,) times [s]; coefficients: (4, n, 3), highest power first,
-    of (t - breaks[i]), ENU [m]; start_time: UTC of stamp 0 in ISO 8601, empty where the target has no date; summary:
-    lines on what a recorded flight is and asks of the antenna, none of any other target.
+        constants       (1,) record of TARGET_DTYPE
+        breaks          (n + 1,) times [s]
+        coefficients    (4, n, 3), highest power first, of (t - breaks[i]), ENU [m]
+        start_time      UTC of stamp 0 in ISO 8601, empty if the target has no date
+        summary         two lines about the file and the track of a track_file, empty for other kinds
     """
     constants: np.ndarray
     breaks: np.ndarray
@@ -61,8 +63,8 @@ class Target(typing.NamedTuple):
 
 @compiled
 def on_track(breaks, coefficients, t):
-    """TargetState of a piecewise cubic (breaks and coefficients as in Target) at t [s]; not valid outside its breaks.
-    """
+    """Return the TargetState of a piecewise cubic (breaks, coefficients as in Target) at t [s]; not valid outside its
+    breaks."""
     if not breaks[0] <= t <= breaks[-1]:
         return TargetState(0, (math.nan, math.nan, math.nan), (math.nan, math.nan, math.nan))
     i = interval(breaks, t)
@@ -77,7 +79,7 @@ def on_track(breaks, coefficients, t):
 
 @compiled
 def in_angles(kind, angle, t):
-    """TargetState at t [s] of a sine, step or ramp in earth azimuth and elevation; angle: record of
+    """Return the TargetState at t [s] of a sine, step or ramp in earth azimuth and elevation; angle: record of
     AngleParameters."""
     tau = t - angle.start
     A, E, A_dot, E_dot = angle.azimuth, angle.elevation, 0.0, 0.0
@@ -102,7 +104,7 @@ def in_angles(kind, angle, t):
 
 @compiled
 def state(target, breaks, coefficients, t):
-    """TargetState at t [s]; target: record of TARGET_DTYPE, breaks and coefficients as in Target."""
+    """Return the TargetState at t [s]; target: record of TARGET_DTYPE; breaks, coefficients: as in Target."""
     if target.kind == TARGET_SINE or target.kind == TARGET_STEP or target.kind == TARGET_RAMP:
         return in_angles(target.kind, target.angle, t)
     return on_track(breaks, coefficients, t)
@@ -117,9 +119,9 @@ def _look_angles(constants, breaks, coefficients, times, azimuth, elevation, dis
 
 
 def look_angles(built, times):
-    """(azimuth, elevation, range) [rad, rad, m] from the station at times [s], each (n,).
+    """Return (azimuth, elevation, range) [rad, rad, m] from the station at times [s], each (n,).
 
-    Azimuth clockwise from north in (-pi, pi]; NaN where the target is not valid.
+    Azimuth clockwise from north in (-pi, pi]; NaN at times outside the track of the target.
     """
     times = np.ascontiguousarray(times, float)
     azimuth, elevation, distance = np.empty((3, len(times)))
@@ -128,7 +130,7 @@ def look_angles(built, times):
 
 
 def build(params, duration) -> Target:
-    """A Target from TargetParameters for a run of `duration` [s] from stamp 0; raises TargetError."""
+    """Return a Target of TargetParameters for a run of `duration` [s] from stamp 0; raises TargetError."""
     builder = {'leo_pass': _leo_pass, 'track_file': _track_file, 'flyby': _flyby}.get(params.kind, _angles)
     breaks, coefficients, *known = builder(params, duration)
     constants = np.zeros(1, TARGET_DTYPE)
@@ -154,9 +156,9 @@ def _flyby(params, duration):
 # leo_pass
 
 def culmination(params, satrec):
-    """Time [s] past the TLE epoch of the first culmination between the two limits of LeoPassParameters.
+    """Return the time [s] past the TLE epoch of the first culmination between the two limits of LeoPassParameters.
 
-    params: TargetParameters; satrec: as of orbit.satellite. Raises TargetError where there is none within search_days.
+    params: TargetParameters; satrec: of orbit.satellite. Raises TargetError if there is none within search_days.
     """
     leo_pass, low, high = params.leo_pass, params.leo_pass.culmination_low_deg, params.leo_pass.culmination_high_deg
 
@@ -174,15 +176,18 @@ def culmination(params, satrec):
                 if low <= highest <= high:
                     return when
                 best = max(best, highest)
-    reached = f'highest outside is {best:.1f} deg' if math.isfinite(best) else 'it never rises'
+    reached = (f'the highest culmination is {best:.1f} deg' if math.isfinite(best) else
+               'the satellite does not rise')
     raise TargetError(f'satellite {satrec.satnum_str}: no culmination between {low:g} and {high:g} deg within '
                       f'{leo_pass.search_days:g} days of the TLE epoch ({reached}) at latitude '
                       f'{params.station.latitude_deg:g}, longitude {params.station.longitude_deg:g} deg')
 
 
 def _peak(elevations, begin, end):
-    """(time [s], elevation [deg]) of the one peak between begin and end, to a millisecond: looked for in ever narrower
-    rows of PEAK_SEARCH_POINTS."""
+    """Return (time [s], elevation [deg]) of the only peak between begin and end, to a millisecond.
+
+    The search refines the interval with PEAK_SEARCH_POINTS points again and again.
+    """
     while end - begin > 1e-3:
         times = np.linspace(begin, end, PEAK_SEARCH_POINTS)
         elevation = elevations(times)
@@ -192,7 +197,7 @@ def _peak(elevations, begin, end):
 
 
 def _start(params, satrec, duration):
-    """(Julian day, fraction) of stamp 0; the pass finder's is a whole second of UTC."""
+    """Return (Julian day, fraction) of stamp 0; the pass finder chooses a whole second of UTC."""
     if not params.leo_pass.start_time:
         start = culmination(params, satrec) - 0.5 * duration + 0.5
         when = orbit.calendar(satrec.jdsatepoch, satrec.jdsatepochF + start / 86400.0)
@@ -201,7 +206,8 @@ def _start(params, satrec, duration):
     age = julian - satrec.jdsatepoch + fraction - satrec.jdsatepochF
     if abs(age) > orbit.MAX_TLE_AGE_DAYS:
         raise TargetError(f'start_time = {params.leo_pass.start_time!r}: {age:.1f} days from the TLE epoch '
-                          f'{orbit.iso(satrec.jdsatepoch, satrec.jdsatepochF)}, must be within {orbit.MAX_TLE_AGE_DAYS:g}')
+                          f'{orbit.iso(satrec.jdsatepoch, satrec.jdsatepochF)}, must be within '
+                          f'{orbit.MAX_TLE_AGE_DAYS:g} days')
     return julian, fraction
 
 
@@ -219,8 +225,12 @@ def _leo_pass(params, duration):
 
 
 def _hermite(x, y, y_dot):
-    """Coefficients (4, n, columns), highest power first, of cubic pieces through y and y_dot (n + 1, columns) at x:
-    those of scipy's CubicHermiteSpline to the last bit, without the third of a second that its import takes."""
+    """Return coefficients (4, n, columns), highest power first, of cubic pieces through y and y_dot (n + 1, columns)
+    at x.
+
+    They equal those of CubicHermiteSpline of scipy to the last bit. This avoids the import of scipy, a third of a
+    second.
+    """
     h = np.diff(x)[:, None]
     slope = np.diff(y, axis=0) / h
     bend = (y_dot[:-1] + y_dot[1:] - 2.0 * slope) / h
@@ -230,6 +240,6 @@ def _hermite(x, y, y_dot):
 # track_file
 
 def _track_file(params, duration):
-    from tracking_receiver_sim import track_files  # with scipy, which only a flight needs
-    laid = track_files.lay_out(params, duration, RUN_MARGIN_S)
-    return laid.breaks, laid.coefficients, laid.start_time, laid.summary
+    from tracking_receiver_sim import track_files  # imports scipy, which only a track file needs
+    flight = track_files.lay_out(params, duration, RUN_MARGIN_S)
+    return flight.breaks, flight.coefficients, flight.start_time, flight.summary

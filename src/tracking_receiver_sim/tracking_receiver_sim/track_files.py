@@ -1,6 +1,6 @@
-"""What a track file is and what becomes of it: a table of forms, the first whose mark the file bears, and of kinds.
+"""Formats of track files and their kinds: a recorded log of fixes, a predicted orbit, a table of directions.
 
-A log of fixes was flown, an orbit or a table of directions is predicted; the target flies all of them.
+The first row of FILE_FORMATS that matches the beginning of a file gives its reader and its kind.
 """
 import typing
 
@@ -9,12 +9,12 @@ from tracking_receiver_sim.ephemeris import course, directions, oem, stk
 from tracking_receiver_sim.track import fixes, flight, gpx, nmea, place, tables
 
 FORMAT_PROBE_BYTES = 4096
-"""Bytes that say what a file is."""
+"""Number of bytes at the beginning of a file that decide its format."""
 
 
 class FileKind(typing.NamedTuple):
-    """lay_out(data, TargetParameters, duration, margin) -> flight.Flight; run(data, TargetParameters, given) -> the
-    parameters that follow where a scenario leaves them open."""
+    """Kind of track. lay_out(data, TargetParameters, duration, margin) -> flight.Flight; run(data, TargetParameters,
+    given) -> {parameter: value} for a scenario that does not set them."""
     lay_out: typing.Callable
     run: typing.Callable
 
@@ -26,54 +26,59 @@ DIRECTIONS_KIND = FileKind(course.of_directions, course.run_of_directions)
 
 
 class FileFormat(typing.NamedTuple):
-    """bears(beginning: bytes): whether a file is one; read(TrackFileParameters): its data."""
+    """Format of a file. matches(beginning: bytes): True if a file has this format; read(TrackFileParameters): its
+    data."""
     name: str
     kind: FileKind
-    bears: typing.Callable
+    matches: typing.Callable
     read: typing.Callable
 
 
-def _log(rows):
+def _read_log(rows):
     return lambda track: fixes.read(track, rows)
 
 
-def _of(read):
+def _read_object(read):
     return lambda track: read(track.path, track.aircraft)
 
 
 FILE_FORMATS = (
-    FileFormat('CCSDS OEM', ORBIT_KIND, lambda beginning: beginning.startswith(oem.FILE_SIGNATURE), _of(oem.read)),
-    FileFormat('STK ephemeris', ORBIT_KIND, stk.FILE_SIGNATURE_PATTERN.match, _of(stk.read)),
-    FileFormat('GPX', LOG_KIND, lambda beginning: beginning.startswith(b'<'), _log(gpx.rows)),
-    FileFormat('NMEA', LOG_KIND, lambda beginning: beginning.startswith((b'$', b'!')), _log(nmea.rows)),
-    FileFormat('sat-nms program', DIRECTIONS_KIND, directions.is_program, _of(directions.read_program)),
-    FileFormat('table of azimuth and elevation', DIRECTIONS_KIND, directions.is_table, _of(directions.read_table)),
-    FileFormat('CSV', LOG_KIND, lambda beginning: True, _log(tables.rows)))
+    FileFormat('CCSDS OEM', ORBIT_KIND, lambda beginning: beginning.startswith(oem.FILE_SIGNATURE),
+               _read_object(oem.read)),
+    FileFormat('STK ephemeris', ORBIT_KIND, stk.FILE_SIGNATURE_PATTERN.match, _read_object(stk.read)),
+    FileFormat('GPX', LOG_KIND, lambda beginning: beginning.startswith(b'<'), _read_log(gpx.rows)),
+    FileFormat('NMEA', LOG_KIND, lambda beginning: beginning.startswith((b'$', b'!')), _read_log(nmea.rows)),
+    FileFormat('sat-nms program', DIRECTIONS_KIND, directions.is_program, _read_object(directions.read_program)),
+    FileFormat('table of azimuth and elevation', DIRECTIONS_KIND, directions.is_table,
+               _read_object(directions.read_table)),
+    FileFormat('CSV', LOG_KIND, lambda beginning: True, _read_log(tables.rows)))
 
 DERIVED_PARAMETERS = (*place.STATION_FIELDS, 'receiver.reference_range', 'duration')
-"""What a scenario may leave open: parameters of the receiver, and the duration of the run."""
+"""Parameters that a track file gives if the scenario does not: of the receiver, and the duration of the run."""
 
 
 def read(track):
-    """(Kind, data) of the file of a TrackFileParameters. Raises csv_table.TableError."""
+    """Return (FileKind, data) of the file of a TrackFileParameters. Raises csv_table.TableError."""
     if not track.path:
-        raise csv_table.TableError('track_file.path is empty: must name a file: '
+        raise csv_table.TableError('track_file.path is empty: must name a file of one of the formats '
                                    + ', '.join(form.name for form in FILE_FORMATS))
     with csv_table.stream(track.path) as stream:
         beginning = stream.read(FORMAT_PROBE_BYTES).removeprefix(b'\xef\xbb\xbf').lstrip()
-    form = next(form for form in FILE_FORMATS if form.bears(beginning))
+    form = next(form for form in FILE_FORMATS if form.matches(beginning))
     return form.kind, form.read(track)
 
 
 def lay_out(target, duration, margin) -> flight.Flight:
-    """The Flight of a TargetParameters for a run of `duration` [s], with `margin` [s] at both ends where the file
-    tells it; raises csv_table.TableError."""
+    """Return the Flight of a TargetParameters for a run of `duration` [s], with `margin` [s] at both ends as far as
+    the file goes; raises csv_table.TableError."""
     kind, data = read(target.track_file)
     return kind.lay_out(data, target, duration, margin)
 
 
 def derived_parameters(target, given):
-    """{name: value} that follow from the file of a TargetParameters; given: the names that are, of which only those of
-    the station and the start matter here. Raises csv_table.TableError."""
+    """Return {name: value} of DERIVED_PARAMETERS from the file of a TargetParameters. Raises csv_table.TableError.
+
+    given: names of the parameters that the scenario sets; only those of the station and the start matter here.
+    """
     kind, data = read(target.track_file)
     return kind.run(data, target, given)

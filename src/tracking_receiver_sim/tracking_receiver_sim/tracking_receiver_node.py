@@ -1,4 +1,4 @@
-"""ROS node of the tracking receiver: answers every direction of the beam with the receiver's channels."""
+"""ROS node of the tracking receiver: publishes the channels of the receiver for each direction of the beam."""
 import pedestal_common.entry  # noqa: F401
 
 # isort: split
@@ -8,7 +8,7 @@ from pedestal_common.node import unit_node
 
 
 def main(args=None):
-    """Run the node until it is stopped; args: of the command line, None for sys.argv."""
+    """Run the node to its end; args: command line, None for sys.argv."""
     return unit_node.main('tracking_receiver_sim.tracking_receiver_node', args)
 
 

@@ -1,5 +1,5 @@
-"""The unit of the tracking receiver: the true direction of the beam and the ship's truth in, the receiver's channels
-out."""
+"""The unit of the tracking receiver: from the true direction of the beam and the truth of the ship to the channels of
+the receiver."""
 import math
 import typing
 
@@ -14,26 +14,23 @@ from pedestal_common.node.unit import LEVEL_ERROR, LEVEL_OK, LEVEL_WARN, Diagnos
 from pedestal_common.wire.records import NO_STAMP
 from tracking_receiver_sim import injected, receiver, target
 
-(DRIVE_TRUTH_TOPIC, SHIP_TRUTH_TOPIC, ANGLE_ERROR_TOPIC, TARGET_TRUTH_TOPIC) = ('adu/truth', 'ship/truth',
-                                                                                'tracking_receiver/angle_error',
-                                                                                'target/truth')
-ANGLE_RATE_TOPIC, RANGE_TOPIC = 'tracking_receiver/angle_rate', 'tracking_receiver/range'
+DRIVE_TRUTH_TOPIC, SHIP_TRUTH_TOPIC, TARGET_TRUTH_TOPIC = 'adu/truth', 'ship/truth', 'target/truth'
+ANGLE_ERROR_TOPIC, ANGLE_RATE_TOPIC = 'tracking_receiver/angle_error', 'tracking_receiver/angle_rate'
+RANGE_TOPIC = 'tracking_receiver/range'
 
 FAULT_STATUSES = (receiver.Status.NO_TARGET, receiver.Status.NO_BEAM, receiver.Status.STAMP_ORDER)
-"""Statuses that are kept for the next diagnosis."""
-
+"""Statuses that the receiver keeps for the next diagnosis."""
 
 RECORD_DTYPE = np.dtype([('state', receiver.STATE_DTYPE), ('constants', receiver.CONSTANTS_DTYPE),
-                         ('inputs', receiver.INPUTS_DTYPE),
-                         ('outputs', receiver.OUTPUTS_DTYPE), ('row', 'i8'), ('fault', 'i8'),
-                         ('schedule', schedule.SCHEDULE_DTYPE),
-                         ('injected', injected.INJECTED_DTYPE)], align=True)
-"""row: of the noise that the next step takes; fault: the last of FAULT_STATUSES since the last diagnosis, else
-LOCKED."""
+                         ('inputs', receiver.INPUTS_DTYPE), ('outputs', receiver.OUTPUTS_DTYPE),
+                         ('row', 'i8'), ('fault', 'i8'),
+                         ('schedule', schedule.SCHEDULE_DTYPE), ('injected', injected.INJECTED_DTYPE)], align=True)
+"""Record of the unit. row: index of the noise of the next step; fault: the last of FAULT_STATUSES since the last
+diagnosis, otherwise LOCKED."""
 
 
 class Memory(typing.NamedTuple):
-    """All the receiver works on: breaks and coefficients of the target's track, the noise of the next steps."""
+    """All data of the receiver. breaks, coefficients: track of the target; normals: noise of the next steps."""
     record: np.ndarray
     breaks: np.ndarray
     coefficients: np.ndarray
@@ -42,7 +39,7 @@ class Memory(typing.NamedTuple):
 
 @compiled
 def decode(u, stamp, beam, ship):
-    """Records of the messages of a step -> inputs of the receiver; the last ship/truth stands until the next."""
+    """Set the inputs of the receiver from the messages of a step; without a new ship/truth the last one stays."""
     u.stamp_ns = stamp
     u.azimuth, u.elevation = beam.position[0], beam.position[1]
     u.azimuth_rate, u.elevation_rate = beam.velocity[0], beam.velocity[1]
@@ -57,9 +54,9 @@ def decode(u, stamp, beam, ship):
 
 @compiled
 def encode(o, c, stamp, outputs):
-    """Outputs of the receiver -> records of its messages."""
-    (error, rate, distance, truth) = (outputs[ANGLE_ERROR_TOPIC], outputs[ANGLE_RATE_TOPIC], outputs[RANGE_TOPIC],
-                                      outputs[TARGET_TRUTH_TOPIC])
+    """Set the records of the messages from the outputs of the receiver."""
+    error, rate = outputs[ANGLE_ERROR_TOPIC], outputs[ANGLE_RATE_TOPIC]
+    distance, truth = outputs[RANGE_TOPIC], outputs[TARGET_TRUTH_TOPIC]
     error.stamp = o.stamp_ns if o.due == 1 else NO_STAMP
     error.vector[0], error.vector[1], error.vector[2] = o.cross_elevation, o.elevation, o.cn0_dbhz
     rate.stamp = error.stamp if c.rate_measured != 0 else NO_STAMP
@@ -74,7 +71,7 @@ def encode(o, c, stamp, outputs):
 
 @compiled
 def law(memory, stamp, inputs, outputs):
-    """Step k."""
+    """Execute one step at a stamp [ns]."""
     m = memory.record[0]
     if schedule.pending(m.schedule, stamp):
         injected.apply_due_faults(m, stamp)
@@ -91,7 +88,7 @@ def law(memory, stamp, inputs, outputs):
 
 @compiled
 def laws(memory, stamps, inputs, outputs):
-    """`law` over arrays."""
+    """Execute `law` for each row of arrays."""
     for k in range(len(stamps)):
         law(memory, stamps[k], inputs[k], outputs[k])
 
@@ -108,9 +105,7 @@ class TrackingReceiver(Simulated):
         self._air, = self._noise.spawn(1)
         constants = receiver.constants(parameters, parameters.period, self.target)
         record = joined(RECORD_DTYPE, state=receiver.initial_state(), constants=constants,
-                        fault=receiver.Status.LOCKED,
-                        schedule=schedule.empty(),
-                        injected=injected.initial(constants))
+                        fault=receiver.Status.LOCKED, schedule=schedule.empty(), injected=injected.initial(constants))
         record['inputs']['mat_ed'] = line_of_sight.ashore_matrix()
         self.memory = Memory(record, self.target.breaks, self.target.coefficients,
                              np.zeros((1, receiver.normals_per_step(parameters))))
@@ -118,18 +113,21 @@ class TrackingReceiver(Simulated):
             self.messages[RANGE_TOPIC].field_of_view = parameters.antenna.beamwidth
 
     def block(self, steps):
-        """The memory with noise (steps, normals_per_step) drawn for the next steps; the air has a stream of its own,
-        so that the receiver's noise is the same in still air."""
+        """Return the memory with noise (steps, normals_per_step) drawn for the next steps.
+
+        The scintillation of the air has a random stream of its own. Because of this, the noise of the receiver is the
+        same with and without scintillation.
+        """
         self.parts['row'] = 0
-        of_receiver, of_both = int(self.parts['constants']['first_noise'][1]), self.memory.normals.shape[1]
-        drawn = self._noise.standard_normal((steps, of_receiver))
-        if of_both > of_receiver:
-            drawn = np.hstack((drawn, self._air.standard_normal((steps, of_both - of_receiver))))
+        receiver_count, total_count = int(self.parts['constants']['first_noise'][1]), self.memory.normals.shape[1]
+        drawn = self._noise.standard_normal((steps, receiver_count))
+        if total_count > receiver_count:
+            drawn = np.hstack((drawn, self._air.standard_normal((steps, total_count - receiver_count))))
         return self.memory._replace(normals=drawn)
 
     def diagnose(self):
-        """ERROR with the last of FAULT_STATUSES since the last diagnosis, WARN while not locked; values: C/N0, angle
-        noise."""
+        """Return ERROR with the last of FAULT_STATUSES since the last diagnosis, or WARN while not locked; values:
+        C/N0, angle noise."""
         outputs, fault = self.parts['outputs'], int(self.parts['fault'])
         self.parts['fault'] = receiver.Status.LOCKED
         status, p = int(outputs['status']), self.parameters
@@ -146,5 +144,5 @@ class TrackingReceiver(Simulated):
 
     @staticmethod
     def idle(numbers):
-        """Not exercised where no error is finite."""
+        """Return a reason if no error is finite: such a recording does not exercise the receiver."""
         return '' if np.isfinite(numbers[ANGLE_ERROR_TOPIC][:, 0]).any() else 'the receiver never locked'

@@ -1,28 +1,28 @@
-"""How a strapdown INS finds level and north from its own gyros and accelerometers (gyrocompass alignment).
+"""Gyrocompass alignment: level and north of a strapdown INS from its gyros and accelerometers.
 
-classical           fourth-order gyrocompass: the azimuth loop is closed through the level error it makes
+classical           fourth-order gyrocompass: the level error that a wrong azimuth causes closes the azimuth loop
 adrc                paper 001, corrected: levelled by ADRC, azimuth from the least-squares slope of the level commands
-adrc_scheduled      adrc's observer with a bandwidth that falls as 6/t, azimuth from its z3
-riccati_eso         adrc's observer with the gains of a Kalman filter
+adrc_scheduled      observer of adrc with a bandwidth that falls as 6/t, azimuth from its z3
+riccati_eso         observer of adrc with the gains of a Kalman filter
 oba                 optimisation-based: the rotation that maps one set of vectors onto another, no feedback loop
 
-Each is a file with one `step` and its STATE; they share extended_observer, levelling, slope and steady_state, and
-get the same conditions; navigator runs the selected one. Sources: paper 001 (Zhou, Yang, Qin 2011) with the
+Each method is a module with one `step` and its STATE_DTYPE. The methods share extended_observer, levelling, slope,
+steady_state and the conditions; navigator runs the selected method. Sources: paper 001 (Zhou, Yang, Qin 2011) with the
 corrections of reference/nav.md section 1.1; Han 2009 (ADRC); Horn 1987 and Wu 2013 (optimisation-based alignment).
 
 Symbols
-    n, n'           ENU; the computer's frame for it, rotated by a_z about up and by a_x, a_y (small) about level
+    n, n'           ENU; its computed frame, rotated by a_z about up and by a_x, a_y (small) about the level axes
     az              azimuth misalignment a_z: C_b^n = R_z(az) C_b^n'                [rad]
     w_c             commanded rate of n' against the earth, in n' (E, N, U)         [rad/s]
     w_N, g          north part of the earth's rate, gravity                         [rad/s, m/s2]
     v_E, v_N        level velocity in n' less that of an aid: the error            [m/s]
-    x1, x2, x3      v, its rate, the rate of that without command; z1, z2, z3 as observed
+    x1, x2, x3      v, its rate, the rate of x2 without command; z1, z2, z3: their estimates
                     north: x2 = g a_x, x3 = g (-sin az w_N - eps_E), b0 = g
                     east: x2 = -g a_y, x3 = -g ((1 - cos az) w_N - eps_N), b0 = -g
-    b0 u            what a command does to x2: u = w_cE (north channel), w_cN (east)
-    v1, v2          reference of x1, x2 out of the tracking differentiator
+    b0 u            effect of a command on the rate of x2: u = w_cE (north channel), w_cN (east)
+    v1, v2          reference of x1, x2 from the tracking differentiator
     w_o, w_c (level)    bandwidth of observer and of level control                  [rad/s]
     l1, l2, l3      observer gains; p: covariance of z as p11, p12, p13, p22, p23, p33
     h               step of the laws                                                [s]
-    r, q            variance of the velocity disturbance per step [m2/s2]; variance x2 gains per second [(m/s2)2/s]
+    r, q            variance of the velocity disturbance per step [m2/s2]; growth of the variance of x2 [(m/s2)2/s]
 """

@@ -1,8 +1,8 @@
-"""Paper 001, corrected: level by ADRC (TD, ESO, NLC), azimuth from the commands that keep it level.
+"""Method of paper 001, corrected: level by ADRC (TD, ESO, NLC), azimuth from the commands that keep n' level.
 
-Once level, the commands only cancel the tilt by the earth's rotation, so (14), (15) at rest give (19):
-sin az = w_cE / w_N, cos az = 1 + w_cN / w_N. The commands are noisy; the least-squares slope of their integral since
-`start` removes the noise (a plain mean does not: reference/nav.md section 1.3).
+After levelling, the commands only cancel the tilt by the rotation of the earth, so (14), (15) at rest give (19):
+sin az = w_cE / w_N, cos az = 1 + w_cN / w_N. The commands are noisy. The least-squares slope of their integral since
+`start` removes the noise; a plain mean does not (reference/nav.md section 1.3).
 """
 import cmath
 import math
@@ -16,15 +16,15 @@ from ship_motion_sim.alignment.conditions import UNKNOWN_AZIMUTH_SIGMA_RAD
 
 CONSTANTS_DTYPE = np.dtype([
     ('w_o', 'f8'), ('w_c', 'f8'),           # bandwidth of observer and of level control [rad/s]
-    ('start', 'f8'),                        # the commands count from here on [s]
-    ('velocity_variance', 'f8'),            # of the settled loop [m2/s2]
-    ('innovation_variance', 'f8'),          # of its observer [m2/s2]
+    ('start', 'f8'),                        # time after which the azimuth uses the commands [s]
+    ('velocity_variance', 'f8'),            # velocity of the settled loop [m2/s2]
+    ('innovation_variance', 'f8'),          # innovations of the settled loop [m2/s2]
     ('swell', 'f8'),                        # variance of the velocity over that of the innovations, on swell [-]
-    ('level', 'f8'),                        # 1 sigma once settled [rad]
+    ('level', 'f8'),                        # 1 sigma of level of the settled loop [rad]
 ], align=True)
 
 STATE_DTYPE = np.dtype([
-    ('t', 'f8'),                            # since the start [s]
+    ('t', 'f8'),                            # time since power-up [s]
     ('observer', extended_observer.STATE_DTYPE),
     ('v1', 'f8', (2,)), ('v2', 'f8', (2,)),
     ('first', 'f8', (2,)), ('second', 'f8', (2,)), ('count', 'i8'),     # slope of w_cE, w_cN
@@ -33,20 +33,20 @@ STATE_DTYPE = np.dtype([
 
 
 def constants(k, p, h) -> np.ndarray:
-    """The record () of CONSTANTS_DTYPE of AdrcParameters for steps of h [s]; k: CONDITIONS."""
+    """Return the record () of CONSTANTS_DTYPE of AdrcParameters p for steps of h [s]; k: CONDITIONS_DTYPE."""
     record = np.zeros((), CONSTANTS_DTYPE)
     record['w_o'], record['w_c'], record['start'] = p.observer, p.control, p.start
     g, r = float(k['gravity']), float(k['velocity_density']) / h
-    # One channel, command in fhan's linear zone: v, x2, z1, z2, z3 under noise of the velocity and random walk.
+    # One channel, command in the linear zone of fhan: v, x2, z1, z2, z3 under noise of the velocity and random walk.
     F = np.array([[1.0, h, 0.5 * h * h], [0.0, 1.0, h], [0.0, 0.0, 1.0]])
-    push = np.array([0.5 * h * h, h, 0.0])
+    B = np.array([0.5 * h * h, h, 0.0])
     law = -np.array([p.control**2, 2.0 * levelling.DAMPING_COEFFICIENT * p.control, 1.0])
     gain = np.array(extended_observer.gains(p.observer, h))
-    before = np.zeros((5, 5))
-    before[:2, :2], before[:2, 2:] = F[:2, :2], np.outer(push[:2], law)
-    before[2:, 2:] = F + np.outer(push, law)
-    innovation = before[0] - before[2]
-    A = before.copy()
+    predicted = np.zeros((5, 5))
+    predicted[:2, :2], predicted[:2, 2:] = F[:2, :2], np.outer(B[:2], law)
+    predicted[2:, 2:] = F + np.outer(B, law)
+    innovation = predicted[0] - predicted[2]
+    A = predicted.copy()
     A[2:] += np.outer(gain, innovation)
     noise = np.concatenate(([0.0, 0.0], gain))
     Q = np.outer(noise, noise) * r
@@ -63,11 +63,11 @@ def constants(k, p, h) -> np.ndarray:
 
 @compiled
 def azimuth_sigma(c, k, o, window):
-    """1 sigma [rad] of the azimuth from the slope over a window [s]; o: STATE_DTYPE of the extended_observer.
+    """Return the 1 sigma [rad] of the azimuth from the slope over a window [s]; o: extended_observer.STATE_DTYPE.
 
-    The gyros' random walk has 1.2 / window under the parabola's weights. The commands' own noise is the second
-    derivative of the velocity's integral, so that only the ends of the window count: 2 x 6^2 / window^4 of the
-    velocity's variance. What the observer did not expect is taken for swell, which the loop makes larger.
+    The random walk of the gyros has 1.2 / window under the weights of the parabola. The noise of the commands is the
+    second derivative of the integral of the velocity. Because of this only the ends of the window count: 2 x 6^2 /
+    window^4 of the velocity variance. Innovations beyond the expected ones count as swell, which the loop enlarges.
     """
     g, w_north = k.gravity, k.earth_rate[1]
     variance = c.velocity_variance + c.swell * extended_observer.swell_variance(o, c.innovation_variance)
@@ -77,17 +77,24 @@ def azimuth_sigma(c, k, o, window):
 
 @compiled
 def level_sigma(c, k, o, t):
-    """1 sigma [rad] of level t [s] after power-up: that of the settled loop, widened where innovations are larger than
-    expected, or the observed tilt if that is more; and the initial tilt that the observer, all poles at w_o, has not
-    yet observed."""
+    """Return the 1 sigma [rad] of level t [s] after power-up.
+
+    The result is the root sum square of two parts. The first is the larger one of the observed tilt and the 1 sigma of
+    the settled loop, increased if innovations are larger than expected. The second is the part of the initial tilt
+    that the observer, all poles at w_o, has not observed yet.
+    """
     x = c.w_o * t
-    unseen = extended_observer.INITIAL_LEVEL_SIGMA_RAD * (1.0 + x + 0.5 * x * x) * math.exp(-x)
-    return math.hypot(max(math.sqrt(max(o.surprise, 1.0)) * c.level, extended_observer.tilt(o, k)), unseen)
+    unobserved = extended_observer.INITIAL_LEVEL_SIGMA_RAD * (1.0 + x + 0.5 * x * x) * math.exp(-x)
+    settled = math.sqrt(max(o.innovation_ratio, 1.0)) * c.level
+    return math.hypot(max(settled, extended_observer.tilt(o, k)), unobserved)
 
 
 @compiled
 def step(s, c, k, v_east, v_north, h):
-    """One step h [s] after the last, v_east, v_north [m/s] in n'; records STATE_DTYPE, CONSTANTS_DTYPE, CONDITIONS."""
+    """Execute one step h [s] after the last; v_east, v_north: velocity error in n' [m/s].
+
+    s, c, k: records STATE_DTYPE, CONSTANTS_DTYPE, CONDITIONS_DTYPE.
+    """
     s.t += h
     o = s.observer
     for i in range(2):

@@ -1,4 +1,4 @@
-"""Level by ADRC with an observer whose bandwidth falls as 6/t: quick at first, quiet later. Azimuth from z3."""
+"""Level by ADRC with an observer whose bandwidth falls as 6/t: fast at first, little noise later. Azimuth from z3."""
 import math
 
 import numpy as np
@@ -6,11 +6,13 @@ import numpy as np
 from pedestal_common.compiled import compiled
 from ship_motion_sim.alignment import extended_observer, levelling
 
-BANDWIDTH_TIME_PRODUCT = 6.0        # w_o t [-]
-MAX_OBSERVER_BANDWIDTH_RAD_S, MIN_CONTROL_BANDWIDTH_RAD_S = 1.0, 0.1     # [rad/s]
+BANDWIDTH_TIME_PRODUCT = 6.0
+"""Product of observer bandwidth and time, w_o t [-]."""
+MAX_OBSERVER_BANDWIDTH_RAD_S, MIN_CONTROL_BANDWIDTH_RAD_S = 1.0, 0.1
+"""Limits of the bandwidth of observer and of level control [rad/s]."""
 
 STATE_DTYPE = np.dtype([
-    ('t', 'f8'),                            # since the start [s]
+    ('t', 'f8'),                            # time since power-up [s]
     ('observer', extended_observer.STATE_DTYPE),
     ('v1', 'f8', (2,)), ('v2', 'f8', (2,)),
     ('command', 'f8', (3,)), ('azimuth', 'f8'), ('azimuth_sigma', 'f8'), ('level_sigma', 'f8'),
@@ -19,13 +21,16 @@ STATE_DTYPE = np.dtype([
 
 @compiled
 def bandwidth(t):
-    """w_o [rad/s] at t [s] > 0 since the start."""
+    """Return w_o [rad/s] at t [s] > 0 since power-up."""
     return min(MAX_OBSERVER_BANDWIDTH_RAD_S, BANDWIDTH_TIME_PRODUCT / t)
 
 
 @compiled
 def step(s, k, v_east, v_north, h):
-    """One step h [s] after the last, v_east, v_north [m/s] in n'; records STATE_DTYPE, CONDITIONS."""
+    """Execute one step h [s] after the last; v_east, v_north: velocity error in n' [m/s].
+
+    s, k: records STATE_DTYPE, CONDITIONS_DTYPE.
+    """
     o, r = s.observer, k.velocity_density / h
     s.t += h
     w_o = bandwidth(s.t)

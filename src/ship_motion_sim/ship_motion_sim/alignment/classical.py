@@ -1,9 +1,11 @@
 """The fourth-order gyrocompass: a wrong azimuth tilts the north channel, whose velocity corrects the azimuth.
 
-v' = f - K1 v, w_cE = -k2 v_N, w_cN = k2 v_E, w_cU = K3 / (w_N (s + K4)) v_N with K1 = K4 = 2 s0, k2 = 4 s0^2/g,
-K3 = 4 s0^4/g: all four poles at -s0 +- j s0 (reference/nav.md section 1.2). 180 deg of azimuth is an unstable
-equilibrium, which the transient of the first levelling leaves: the loop is closed from the start. Its velocities are
-those of a gyrocompass, the integrals of two accelerometers, without the term w_cU x v of the rotating axes.
+    v' = f - K1 v, w_cE = -k2 v_N, w_cN = k2 v_E, w_cU = K3 / (w_N (s + K4)) v_N
+    K1 = K4 = 2 s0, k2 = 4 s0^2/g, K3 = 4 s0^4/g
+
+All four poles are at -s0 +- j s0 (reference/nav.md section 1.2). An azimuth error of 180 deg is an unstable
+equilibrium. Because the loop is closed from power-up, the transient of the first levelling leaves it. The velocities
+are those of a gyrocompass, the integrals of two accelerometers, without the term w_cU x v of the rotating axes.
 """
 import math
 
@@ -14,30 +16,30 @@ from ship_motion_sim.alignment import steady_state
 from ship_motion_sim.alignment.conditions import UNKNOWN_AZIMUTH_SIGMA_RAD
 
 MAX_AZIMUTH_RATE_RAD_S = 0.1
-"""Of the command of the azimuth [rad/s], which the first levelling would drive to 0.2."""
+"""Limit of the azimuth command [rad/s]; without it the first levelling would reach 0.2 rad/s."""
 
 CONSTANTS_DTYPE = np.dtype([
-    ('s0', 'f8'),                                       # [rad/s]
+    ('s0', 'f8'),                                       # bandwidth [rad/s]
     ('K1', 'f8'), ('k2', 'f8'), ('K3', 'f8'), ('K4', 'f8'),
-    ('azimuth', 'f8'), ('level', 'f8'), ('residual', 'f8'),     # 1 sigma once settled [rad]
+    ('azimuth', 'f8'), ('level', 'f8'), ('residual', 'f8'),     # 1 sigma of the settled loop [rad]
 ], align=True)
 
 STATE_DTYPE = np.dtype([
-    ('t', 'f8'),                    # since the start [s]
+    ('t', 'f8'),                    # time since power-up [s]
     ('lagged', 'f8'),               # v_N / (s + K4) [m]
     ('residual', 'f8'),             # azimuth that the loop still corrects, smoothed [rad]
-    ('taken', 'f8', (2,)),          # subtracted from v_E, v_N in this step [m/s]
+    ('correction', 'f8', (2,)),     # to subtract from v_E, v_N in this step [m/s]
     ('command', 'f8', (3,)), ('azimuth', 'f8'), ('azimuth_sigma', 'f8'), ('level_sigma', 'f8'),
 ], align=True)
 
 
 def constants(k, s0, h) -> np.ndarray:
-    """The record () of CONSTANTS_DTYPE for the bandwidth s0 [rad/s] and steps of h [s]; k: CONDITIONS."""
+    """Return the record () of CONSTANTS_DTYPE for the bandwidth s0 [rad/s] and steps of h [s]; k: CONDITIONS_DTYPE."""
     record = np.zeros((), CONSTANTS_DTYPE)
     g, w_north = float(k['gravity']), float(k['earth_rate'][1])
     K1 = K4 = 2.0 * s0
     k2, K3 = 4.0 * s0**2 / g, 4.0 * s0**4 / g
-    # north channel: v, a_x, lagged, az, residual under velocity noise per step and random walk of the gyros
+    # North channel: v, a_x, lagged, az, residual under velocity noise per step and random walk of the gyros.
     rates = np.array([[-K1, g, 0.0, 0.0, 0.0], [-k2, 0.0, 0.0, -w_north, 0.0], [1.0, 0.0, -K4, 0.0, 0.0],
                       [0.0, 0.0, K3 / w_north, 0.0, 0.0], [0.0, 0.0, K3 / w_north, 0.0, -0.5 * s0]])
     noise = h * rates[:, 0]
@@ -53,18 +55,21 @@ def constants(k, s0, h) -> np.ndarray:
 
 @compiled
 def envelope(x):
-    """Decay from 1 after x = s0 t [-], by the slower pair of the loop's poles."""
+    """Return the decay from 1 after x = s0 t [-], by the slower pair of poles of the loop."""
     return (1.0 + x) * math.exp(-x)
 
 
 @compiled
 def step(s, c, k, v_east, v_north, h):
-    """One step h [s] after the last, v_east, v_north [m/s] in n'; records STATE_DTYPE, CONSTANTS_DTYPE, CONDITIONS."""
+    """Execute one step h [s] after the last; v_east, v_north: velocity error in n' [m/s].
+
+    s, c, k: records STATE_DTYPE, CONSTANTS_DTYPE, CONDITIONS_DTYPE.
+    """
     s.t += h
     s.lagged += h * (v_north - c.K4 * s.lagged)
-    # The damping, and what the strapdown has just made of w_c x v.
-    s.taken[0] = h * (c.K1 * v_east + s.command[2] * v_north)
-    s.taken[1] = h * (c.K1 * v_north - s.command[2] * v_east)
+    # The damping, and the term w_c x v that the strapdown has just added.
+    s.correction[0] = h * (c.K1 * v_east + s.command[2] * v_north)
+    s.correction[1] = h * (c.K1 * v_north - s.command[2] * v_east)
     s.command[0], s.command[1] = -c.k2 * v_north, c.k2 * v_east
     s.command[2] = min(max(c.K3 / k.earth_rate[1] * s.lagged, -MAX_AZIMUTH_RATE_RAD_S), MAX_AZIMUTH_RATE_RAD_S)
     # The loop corrects a steady az at az s0 / 2, except at 180 deg, which the envelope covers.

@@ -1,7 +1,7 @@
 """The linear extended state observer of a level channel: x1' = x2, x2' = x3 + b0 u, y = x1. Paper 001 equation (9).
 
-Linear, as the paper's is in effect: its delta = 20000 keeps fal in its linear zone. With fixed gains, scheduled ones
-or those of a Kalman filter; the covariance below holds for any.
+The observer of the paper is linear too, because its delta = 20000 keeps fal in the linear zone. The gains are fixed,
+scheduled, or those of a Kalman filter; the covariance is valid for any gains.
 """
 import math
 
@@ -11,59 +11,61 @@ from pedestal_common.compiled import compiled
 
 STATE_DTYPE = np.dtype([
     ('z', 'f8', (2, 3)),                # east, north: z1, z2, z3
-    ('push', 'f8', (2,)),               # b0 u in force since the last step [m/s3]
+    ('input', 'f8', (2,)),              # b0 u in force since the last step [m/s3]
     ('p', 'f8', (6,)),                  # p11, p12, p13, p22, p23, p33, the same for both channels
-    ('surprise', 'f8'),                 # mean of innovation^2 over its expected variance
+    ('innovation_ratio', 'f8'),         # running mean of innovation^2 over its expected variance
 ], align=True)
 
-INNOVATION_TIME_CONSTANT_S = 30.0    # time constant of that mean [s]
-EXPECTED_INNOVATION_RATIO = 1.2              # surprise of a sea as expected, its own noise included [-]
-MIN_SWELL_FREQUENCY_RAD_S = 2.0 * math.pi / 16.0    # slowest swell that a stated 1 sigma is honest on [rad/s]
+INNOVATION_TIME_CONSTANT_S = 30.0
+"""Time constant of the running mean of innovation_ratio [s]."""
+EXPECTED_INNOVATION_RATIO = 1.2
+"""Innovation ratio on a sea as expected, with the noise of the running mean [-]."""
+MIN_SWELL_FREQUENCY_RAD_S = 2.0 * math.pi / 16.0
+"""Frequency of the slowest swell on which a stated 1 sigma is valid [rad/s]."""
 
 
 @compiled
 def gains(w_o, h):
-    """(l1 [-], l2 [1/s], l3 [1/s2]) that put the three poles at exp(-w_o h)."""
+    """Return (l1 [-], l2 [1/s], l3 [1/s2]) that put the three poles at exp(-w_o h)."""
     p = math.exp(-w_o * h)
     return 1.0 - p**3, 1.5 * (1.0 - p)**2 * (1.0 + p) / h, (1.0 - p)**3 / (h * h)
 
 
 @compiled
-def predicted(z1, z2, z3, push, h):
-    """(z1, z2, z3) [m/s, m/s2, m/s3] h [s] later, push = b0 u [m/s3] in force."""
-    rate = z3 + push
+def predicted(z1, z2, z3, b0_u, h):
+    """Return (z1, z2, z3) [m/s, m/s2, m/s3] h [s] later under the input b0_u [m/s3]."""
+    rate = z3 + b0_u
     return z1 + h * z2 + 0.5 * h * h * rate, z2 + h * rate, z3
 
 
 @compiled
 def kalman_gains(p11, p12, p13, r):
-    """(l1 [-], l2 [1/s], l3 [1/s2]) that make the covariance smallest, r [m2/s2] the variance of the measured v."""
+    """Return (l1 [-], l2 [1/s], l3 [1/s2]) of the smallest covariance; r: variance of the measured v [m2/s2]."""
     return p11 / (p11 + r), p12 / (p11 + r), p13 / (p11 + r)
 
 
 @compiled
-def innovation_ratio(surprise, e_east, e_north, s, h):
-    """The running mean, h [s] later, of innovation^2 [m2/s2] over its expected variance s: 1 where the disturbance is
-    as expected."""
-    return surprise + h / INNOVATION_TIME_CONSTANT_S * (0.5 * (e_east * e_east + e_north * e_north) / s - surprise)
+def innovation_ratio(ratio, e_east, e_north, s, h):
+    """Return the running mean `ratio`, h [s] later, of innovation^2 [m2/s2] over its expected variance s; 1 if the
+    disturbance is as expected."""
+    return ratio + h / INNOVATION_TIME_CONSTANT_S * (0.5 * (e_east * e_east + e_north * e_north) / s - ratio)
 
 
 @compiled
 def swell_variance(o, s):
-    """Variance of the innovations [m2/s2] beyond that of a sea as expected, s: taken for a swell."""
-    return max(o.surprise - EXPECTED_INNOVATION_RATIO, 0.0) * s
+    """Return the variance of the innovations [m2/s2] above that of a sea as expected, s; it counts as swell."""
+    return max(o.innovation_ratio - EXPECTED_INNOVATION_RATIO, 0.0) * s
 
 
 INITIAL_VELOCITY_SIGMA_M_S, INITIAL_LEVEL_SIGMA_RAD, INITIAL_AZIMUTH_SIGMA_RAD = 0.1, math.radians(5.0), 2.0
-"""What is known at power-up [m/s], [rad], [rad]: any azimuth."""
+"""Standard deviations at power-up [m/s], [rad], [rad]; the azimuth is unknown."""
 
 
 @compiled
 def start(o, k, level_sigma, azimuth_sigma):
-    """Reset the STATE_DTYPE o at power-up: nothing observed, 1 sigma [rad] of level and azimuth as given; k
-    CONDITIONS."""
+    """Reset the STATE_DTYPE o at power-up; level_sigma, azimuth_sigma: 1 sigma [rad]; k: CONDITIONS_DTYPE."""
     for i in range(2):
-        o.push[i] = 0.0
+        o.input[i] = 0.0
         for j in range(3):
             o.z[i, j] = 0.0
     for i in range(6):
@@ -71,12 +73,12 @@ def start(o, k, level_sigma, azimuth_sigma):
     o.p[0] = INITIAL_VELOCITY_SIGMA_M_S**2
     o.p[3] = (level_sigma * k.gravity)**2
     o.p[5] = (azimuth_sigma * k.gravity * k.earth_rate[1])**2
-    o.surprise = 1.0
+    o.innovation_ratio = 1.0
 
 
 @compiled
 def predict_covariance(o, k, h):
-    """Carry the covariance o.p over h [s]: F p F^T + Q, where Q is what the gyros' random walk does to x2."""
+    """Predict the covariance o.p over h [s]: F p F^T + Q, with Q the effect of the random walk of the gyros on x2."""
     p, q, half = o.p, (k.gravity * k.gyro_noise)**2, 0.5 * h * h
     p11, p12, p13 = p[0], p[1], p[2]
     p22, p23, p33 = p[3], p[4], p[5]
@@ -88,7 +90,7 @@ def predict_covariance(o, k, h):
 
 @compiled
 def correct_covariance(o, l1, l2, l3, r):
-    """Put a correction with any gains into the covariance o.p: (I - l H) p (I - l H)^T + l r l^T, r [m2/s2]."""
+    """Correct the covariance o.p for any gains l: (I - l H) p (I - l H)^T + l r l^T, r [m2/s2]."""
     p = o.p
     p11, p12, p13 = p[0], p[1], p[2]
     p22, p23, p33 = p[3], p[4], p[5]
@@ -103,18 +105,17 @@ def correct_covariance(o, l1, l2, l3, r):
 
 @compiled
 def predict(o, h):
-    """Carry z of both channels over h [s]."""
+    """Predict z of both channels over h [s]."""
     for i in range(2):
         z = o.z[i]
-        z[0], z[1], z[2] = predicted(z[0], z[1], z[2], o.push[i], h)
+        z[0], z[1], z[2] = predicted(z[0], z[1], z[2], o.input[i], h)
 
 
 @compiled
 def correct(o, v_east, v_north, l1, l2, l3, s, h):
-    """Correct z of both channels with the measured velocities [m/s]; s: expected variance of the innovations [m2/s2].
-    """
+    """Correct z of both channels with measured velocities [m/s]; s: expected variance of the innovations [m2/s2]."""
     e_east, e_north = v_east - o.z[0, 0], v_north - o.z[1, 0]
-    o.surprise = innovation_ratio(o.surprise, e_east, e_north, s, h)
+    o.innovation_ratio = innovation_ratio(o.innovation_ratio, e_east, e_north, s, h)
     for i in range(2):
         z, e = o.z[i], e_east if i == 0 else e_north
         z[0] += l1 * e
@@ -124,21 +125,23 @@ def correct(o, v_east, v_north, l1, l2, l3, s, h):
 
 @compiled
 def azimuth(o, k):
-    """Azimuth misalignment az [rad] from the observed z3: g (-sin az w_N) north, -g (1 - cos az) w_N east."""
+    """Return the azimuth misalignment az [rad] from z3: g (-sin az w_N) north, -g (1 - cos az) w_N east."""
     return math.atan2(-o.z[1, 2] / k.gravity, k.earth_rate[1] + o.z[0, 2] / k.gravity)
 
 
 @compiled
 def tilt(o, k):
-    """Observed tilt of n' [rad], rms of both axes, that the commands have not yet removed."""
+    """Return the observed tilt of n' [rad], rms of both axes, that the commands have not removed yet."""
     return math.hypot(o.z[0, 1], o.z[1, 1]) / (math.sqrt(2.0) * k.gravity)
 
 
 @compiled
 def sigmas(o, k, swell):
-    """(azimuth, level) 1 sigma [rad]: from the covariance, widened where innovations are larger than expected, from
-    what swell adds to the variance of z3 [m2/s6], and from the biases of the sensors."""
-    wider = max(o.surprise, 1.0)
-    azimuth_variance = ((wider * o.p[5] + swell) / k.gravity**2 + k.gyro_bias**2) / k.earth_rate[1]**2
-    level_variance = (wider * o.p[3] + k.accelerometer_bias**2) / k.gravity**2
+    """Return the (azimuth, level) 1 sigma [rad] from the covariance and the biases of the sensors.
+
+    Innovations that are larger than expected increase the covariance. swell: variance of z3 due to swell [m2/s6].
+    """
+    factor = max(o.innovation_ratio, 1.0)
+    azimuth_variance = ((factor * o.p[5] + swell) / k.gravity**2 + k.gyro_bias**2) / k.earth_rate[1]**2
+    level_variance = (factor * o.p[3] + k.accelerometer_bias**2) / k.gravity**2
     return min(math.sqrt(azimuth_variance), math.pi), math.sqrt(level_variance)

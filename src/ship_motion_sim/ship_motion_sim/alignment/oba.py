@@ -1,9 +1,9 @@
-"""Optimisation-based alignment: the rotation that best maps measured specific force onto gravity's. No feedback loop.
+"""Optimisation-based alignment: the rotation that best maps measured specific force onto gravity. No feedback loop.
 
-a = int C_b^b0 f dt (gyros only, b0 the deck at the start) is, but for the velocity, C_n0^b0 b with
+a = int C_b^b0 f dt (gyros only, b0 the deck at the start) is, except for the velocity, C_n0^b0 b with
 b = -int C_n^n0 g dt. The rotation b0 -> n0 that brings the vectors a onto b with least squares is the eigenvector of
-a 4 x 4 matrix (Horn 1987). The centroids of the vectors a and of the vectors b are subtracted: that removes the
-unknown velocity at the start (where it is taken for zero, as is usual, the error is 15 times larger at 100 s), and the
+a 4 x 4 matrix (Horn 1987). The centroids of the vectors a and of the vectors b are subtracted, which removes the
+unknown velocity at the start. With the usual assumption of zero velocity the error is 15 times larger at 100 s. The
 rest of the swell averages out.
 """
 import math
@@ -15,11 +15,12 @@ from pedestal_common.geometry.quaternion import product
 from ship_motion_sim import strapdown
 from ship_motion_sim.alignment import extended_observer, riccati_eso
 
-MAX_JACOBI_SWEEPS = 12     # of Jacobi rotations at most; 4 to 6 are enough
+MAX_JACOBI_SWEEPS = 12
+"""Largest number of sweeps of Jacobi rotations; 4 to 6 are enough."""
 
 STATE_DTYPE = np.dtype([
-    ('t', 'f8'),                                        # since the start [s]
-    ('observer', extended_observer.STATE_DTYPE),              # of a_x, a_y: its covariance is the information limit
+    ('t', 'f8'),                                        # time since power-up [s]
+    ('observer', extended_observer.STATE_DTYPE),        # of a_x, a_y: its covariance is the information limit
     ('coriolis', 'f8', (3,)),                           # int w_ie x v dt [m/s]
     ('count', 'f8'),
     ('sum_a', 'f8', (3,)), ('sum_b', 'f8', (3,)), ('sum_ab', 'f8', (3, 3)),
@@ -30,7 +31,8 @@ STATE_DTYPE = np.dtype([
 
 @compiled
 def gravity_integral(t, k):
-    """b [m/s] in n0 after t [s]: the integral of the reaction to gravity, which turns with the earth. Closed form."""
+    """Return b [m/s] in n0 after t [s]: integral of the reaction to gravity, which turns with the earth. Closed
+    form."""
     north, up = k.earth_rate[1], k.earth_rate[2]
     w = math.sqrt(north * north + up * up)
     n, u = north / w, up / w
@@ -40,16 +42,16 @@ def gravity_integral(t, k):
 
 @compiled
 def step(s, k, a, v, h):
-    """Take one more pair of vectors, h [s] after the last; records STATE_DTYPE, CONDITIONS.
+    """Add one pair of vectors, h [s] after the last; s, k: records STATE_DTYPE, CONDITIONS_DTYPE.
 
-    a: int C_b^b0 f dt in b0, less the velocity a log measures [m/s], three floats. The Coriolis force of that velocity
-    is left out: 7 m/s tilt the level by 0.1 arcmin. v: the velocity in n that a GNSS measures, zeros without one.
+    a: int C_b^b0 f dt in b0, less the velocity of a log [m/s], three floats; v: velocity in n of a GNSS, zeros without
+    GNSS. The model omits the Coriolis force of the velocity of a log: 7 m/s tilt the level by 0.1 arcmin.
     """
     s.t += h
     o = s.observer
     l1, l2, l3, variance = riccati_eso.limit(o, k, h)
     if v[0] == 0.0 and v[1] == 0.0:
-        # The innovations show how the sea differs from the expected; with a GNSS b has the ship's motion already.
+        # The innovations measure the difference to the expected sea. With a GNSS, b contains the motion of the ship.
         extended_observer.predict(o, h)
         extended_observer.correct(o, a[0], a[1], l1, l2, l3, variance, h)
     s.azimuth_sigma, s.level_sigma = extended_observer.sigmas(o, k, 0.0)
@@ -59,7 +61,7 @@ def step(s, k, a, v, h):
     s.coriolis[1] += h * cy
     s.coriolis[2] += h * cz
     bx, by, bz = gravity_integral(s.t, k)
-    # From n back to n0: w_ie t is small.
+    # The rotation from n back to n0 is linear, because w_ie t is small.
     bx += v[0] + s.t * cx + s.coriolis[0]
     by += v[1] + s.t * cy + s.coriolis[1]
     bz += v[2] + s.t * cz + s.coriolis[2]
@@ -74,7 +76,7 @@ def step(s, k, a, v, h):
 
 @compiled
 def jacobi(m, v):
-    """Diagonalise a symmetric m (4, 4) in place by Jacobi rotations; v (4, 4) gets its eigenvectors as columns."""
+    """Diagonalise a symmetric m (4, 4) in place by Jacobi rotations; v (4, 4) receives the eigenvectors as columns."""
     for i in range(4):
         for j in range(4):
             v[i, j] = 1.0 if i == j else 0.0
@@ -99,13 +101,13 @@ def jacobi(m, v):
 
 @compiled
 def centred(s, i, j):
-    """sum (a_i - mean a_i)(b_j - mean b_j)."""
+    """Return sum (a_i - mean a_i)(b_j - mean b_j)."""
     return s.sum_ab[i, j] - s.sum_a[i] * s.sum_b[j] / s.count
 
 
 @compiled
 def solve(s):
-    """Quaternion (x, y, z, w) b0 -> n0 of the pairs so far."""
+    """Return the quaternion (x, y, z, w) b0 -> n0 of all pairs added."""
     m = s.matrix
     xx, xy, xz = centred(s, 0, 0), centred(s, 0, 1), centred(s, 0, 2)
     yx, yy, yz = centred(s, 1, 0), centred(s, 1, 1), centred(s, 1, 2)
@@ -127,6 +129,6 @@ def solve(s):
 
 @compiled
 def attitude(s, k, qx, qy, qz, qw):
-    """Quaternion (x, y, z, w) deck -> n now, from the deck -> b0 that the gyros give (qx, qy, qz, qw)."""
+    """Return the present quaternion (x, y, z, w) deck -> n; qx, qy, qz, qw: deck -> b0 from the gyros."""
     turned = strapdown.from_rotvec(-s.t * k.earth_rate[0], -s.t * k.earth_rate[1], -s.t * k.earth_rate[2])
     return product(turned, product(solve(s), (qx, qy, qz, qw)))

@@ -1,6 +1,6 @@
-"""The extended observer with Kalman gains: the best linear estimate of azimuth while the sea is as assumed.
+"""The extended observer with Kalman gains: the best linear estimate of azimuth if the sea is as assumed.
 
-Its covariance is the information limit: x3 from velocities with white noise r per step, x2 a random walk of q.
+The covariance is the information limit: x3 from velocities with white noise r per step, x2 a random walk of q.
 """
 import math
 
@@ -10,7 +10,7 @@ from pedestal_common.compiled import compiled
 from ship_motion_sim.alignment import extended_observer, levelling
 
 ALIGNING_BANDWIDTH_RAD_S, NAVIGATING_BANDWIDTH_RAD_S = 1.0, 0.1
-"""Bandwidth of the level control [rad/s]: quick to level a deck, slow where only noise is left to follow."""
+"""Bandwidth of the level control [rad/s]: high to level a deck, low in navigation with only noise to follow."""
 
 STATE_DTYPE = np.dtype([
     ('observer', extended_observer.STATE_DTYPE),
@@ -21,7 +21,7 @@ STATE_DTYPE = np.dtype([
 
 @compiled
 def limit(o, k, h):
-    """Carry the covariance of o over one step of h [s] and its measurement: (l1, l2, l3, expected variance of the
+    """Update the covariance of o for one step h [s] and its measurement; return (l1, l2, l3, expected variance of the
     innovation [m2/s2])."""
     r = k.velocity_density / h
     extended_observer.predict_covariance(o, k, h)
@@ -33,9 +33,11 @@ def limit(o, k, h):
 
 @compiled
 def step(s, k, v_east, v_north, h, w_c):
-    """One step h [s] after the last, v_east, v_north [m/s] in n'; records STATE_DTYPE, CONDITIONS. The level control,
-    of
-    bandwidth w_c [rad/s], is known exactly and does not affect the estimate."""
+    """Execute one step h [s] after the last; v_east, v_north: velocity error in n' [m/s].
+
+    s, k: records STATE_DTYPE, CONDITIONS_DTYPE; w_c: bandwidth of the level control [rad/s]. The level control does
+    not affect the estimate, because the observer receives its exact commands.
+    """
     o = s.observer
     for i in range(2):
         s.v1[i], s.v2[i] = levelling.differentiated(s.v1[i], s.v2[i], 0.0, h)
@@ -44,8 +46,8 @@ def step(s, k, v_east, v_north, h, w_c):
     extended_observer.correct(o, v_east, v_north, l1, l2, l3, variance, h)
     levelling.level(o, k, s.v1, s.v2, w_c, s.command)
     s.azimuth = extended_observer.azimuth(o, k)
-    # z3 is the integral of l3 / h times the innovations, and so swings with a swell in them.
+    # z3 is the integral of l3 / h times the innovations, so it oscillates with their swell.
     swing = l3 / (h * extended_observer.MIN_SWELL_FREQUENCY_RAD_S)
-    s.azimuth_sigma, level_sigma = extended_observer.sigmas(o, k, swing * swing
-                                                            * extended_observer.swell_variance(o, variance))
+    swell = swing * swing * extended_observer.swell_variance(o, variance)
+    s.azimuth_sigma, level_sigma = extended_observer.sigmas(o, k, swell)
     s.level_sigma = math.hypot(level_sigma, extended_observer.tilt(o, k))

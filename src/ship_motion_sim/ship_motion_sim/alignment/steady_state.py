@@ -5,6 +5,6 @@ from pedestal_common.reproducible import solution
 
 
 def covariance(A, Q):
-    """P = A P A^T + Q, all (n, n)."""
+    """Return P = A P A^T + Q, all (n, n)."""
     n = len(A)
     return np.reshape(solution(np.eye(n * n) - np.kron(A, A), Q.ravel()), (n, n))

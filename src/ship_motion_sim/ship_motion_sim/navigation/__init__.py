@@ -1,1 +1,1 @@
-"""Inertial navigation systems: stated errors, or an alignment and a strapdown computer."""
+"""Inertial navigation systems: a model with stated errors, or an alignment and a strapdown computer."""

@@ -1,7 +1,7 @@
-"""The INS that integrates its IMU, of every method but `model`: it aligns, navigates and knows its accuracy.
+"""The INS of every method except `model`: integration of the IMU, alignment, navigation and estimated accuracy.
 
-It reads `ship/imu/data_raw` and puts out attitude and deck rate after a latency, like `ins`. Of the ship's parameters
-it uses the latitude, and the velocity that an aid measures with noise.
+Like `ins`, it takes `ship/imu/data_raw` and puts out attitude and deck rate after a latency. Of the ship parameters it
+uses the latitude, and the velocity that an aid measures with noise.
 """
 import math
 
@@ -17,45 +17,45 @@ from ship_motion_sim.params import InsParameters
 from ship_motion_sim.sea import motion
 
 MAX_IMU_GAP_S = 0.1
-"""Time without a usable IMU message [s] over which its rates may be taken for steady: a deck's angular acceleration of
-0.1 rad/s2 makes that wrong by 0.5 mrad."""
+"""Longest time without a usable IMU message [s], over which the rates are assumed constant; an angular acceleration of
+the deck of 0.1 rad/s2 then causes an error of 0.5 mrad."""
 
 CONSTANTS_DTYPE = np.dtype([
     ('ship', motion.CONSTANTS_DTYPE),
     ('earth_rate', 'f8', (3,)),             # ENU [rad/s]
     ('latency_ns', 'i8'),
-    ('increment', 'i8'),                    # 1: the IMU gives mean rates since its last sample, 0: rates at the stamp
-    ('aid_noise', 'f8'),                    # [m/s]
+    ('increment', 'i8'),                    # 1: mean rates of the IMU since its last sample, 0: rates at the stamp
+    ('aid_noise', 'f8'),                    # rms [m/s]
     ('navigator', navigator.CONSTANTS_DTYPE),
     ('power_up', navigator.STATE_DTYPE),
 ], align=True)
 
 STATE_DTYPE = np.dtype([
     ('last_stamp_ns', 'i8'),
-    ('truth', motion.OUTPUTS_DTYPE),              # the ship as the aid measures it
+    ('truth', motion.OUTPUTS_DTYPE),        # true motion of the ship, for the aid
     *LATENCY_RING_FIELDS,
     ('navigator', navigator.STATE_DTYPE),
-    ('imu_stamp_ns', 'i8'),                 # of the last IMU message that could be used
-    ('last_rate', 'f8', (3,)), ('last_force', 'f8', (3,)),      # in it
-    ('angle', 'f8', (3,)), ('force', 'f8', (3,)),   # increments since [rad, m/s]
+    ('imu_stamp_ns', 'i8'),                 # of the last usable IMU message
+    ('last_rate', 'f8', (3,)), ('last_force', 'f8', (3,)),      # in the last usable IMU message
+    ('angle', 'f8', (3,)), ('force', 'f8', (3,)),   # increments since that message [rad, m/s]
     ('aid', 'f8', (3,)),                    # velocity that the aid measures [m/s]
-    ('mat_ed', 'f8', (3, 3)),               # deck -> earth as known
+    ('mat_ed', 'f8', (3, 3)),               # estimated deck -> earth
 ], align=True)
 
 
 def constants(params: InsParameters) -> np.ndarray:
-    """The record (1,) of CONSTANTS_DTYPE. Raises ParameterError where the azimuth can never become as good as
-    alignment.aligned_sigma demands."""
+    """Return the record (1,) of CONSTANTS_DTYPE. Raises ParameterError if the azimuth cannot reach
+    alignment.aligned_sigma."""
     record, latitude = np.zeros(1, CONSTANTS_DTYPE), math.radians(params.ship.latitude_deg)
     record['ship'] = motion.constants(params.ship)
     record['earth_rate'] = earth.rate(latitude)
     record['latency_ns'] = round(params.latency * 1e9)
     record['increment'], record['aid_noise'] = params.imu_output == 'increment', params.aid.noise
     record['navigator'] = navigator.constants(params.alignment, params.method, params.aid.source, latitude)
-    wanted, least = params.alignment.aligned_sigma, navigator.least_azimuth_sigma(record['navigator'][0])
-    if wanted <= least:
-        raise ParameterError(f'alignment.aligned_sigma = {wanted:g} rad: must be above {least:.3g} rad, the best that '
-                             f'method {params.method} reaches at latitude {params.ship.latitude_deg:g} deg with '
+    aligned, least = params.alignment.aligned_sigma, navigator.least_azimuth_sigma(record['navigator'][0])
+    if aligned <= least:
+        raise ParameterError(f'alignment.aligned_sigma = {aligned:g} rad: must be above {least:.3g} rad, the limit of '
+                             f'method {params.method} at latitude {params.ship.latitude_deg:g} deg with '
                              f'alignment.gyro_bias = {params.alignment.gyro_bias:g} rad/s')
     yaw = math.radians(90.0 - params.alignment.initial_heading_deg)
     record['power_up'] = navigator.initial_state(record['navigator'], quaternion(0.0, 0.0, yaw))
@@ -63,7 +63,7 @@ def constants(params: InsParameters) -> np.ndarray:
 
 
 def initial_state(constants) -> np.ndarray:
-    """The record (1,) of STATE_DTYPE before the first sample; constants: CONSTANTS_DTYPE (1,)."""
+    """Return the record (1,) of STATE_DTYPE before the first sample; constants: CONSTANTS_DTYPE (1,)."""
     state = np.zeros(1, STATE_DTYPE)
     state['last_stamp_ns'] = state['imu_stamp_ns'] = NO_STAMP
     state['navigator'] = constants['power_up']
@@ -83,10 +83,12 @@ def measure_aid(c, s, stamp_ns, normals):
 
 @compiled
 def integrate(c, s, stamp_ns, rate, force):
-    """Integrate an IMU message, rate (3,) [rad/s] and force (3,) [m/s2]; False after a gap, which is a new power-up.
+    """Integrate an IMU message, rate (3,) [rad/s] and force (3,) [m/s2]; return False after a gap, which resets the
+    INS to power-up.
 
-    Mean rates are the increments themselves; rates at the stamps are integrated by the trapezoidal rule. The first
-    message after a power-up ends an interval that began before it, and is not integrated."""
+    Mean rates directly give the increments; rates at the stamps are integrated by the trapezoidal rule. The first
+    message after power-up is not integrated, because its interval began before power-up.
+    """
     dt = 1e-9 * (stamp_ns - s.imu_stamp_ns) if s.imu_stamp_ns != NO_STAMP else 0.0
     if dt > MAX_IMU_GAP_S:
         s.navigator, s.imu_stamp_ns = c.power_up, NO_STAMP
@@ -104,7 +106,7 @@ def integrate(c, s, stamp_ns, rate, force):
 
 @compiled
 def measure(c, s, stamp_ns, rate, force):
-    """Put the navigator's attitude and deck rate at stamp_ns into the ring; rate, force (3,): of the IMU message."""
+    """Put attitude and deck rate of the navigator at stamp_ns into the ring; rate, force (3,): of the IMU message."""
     n = s.measured % LATENCY_RING_SIZE
     q, w = s.quaternion, s.angular_velocity
     q[n, 0], q[n, 1], q[n, 2], q[n, 3] = navigator.attitude(s.navigator, c.navigator)
@@ -113,7 +115,7 @@ def measure(c, s, stamp_ns, rate, force):
     ex, ey, ez = to_deck(s.mat_ed, e[0], e[1], e[2])
     first = s.imu_stamp_ns == NO_STAMP
     for i in range(3):
-        # A mean rate is valid half an interval ago: extrapolate it to the stamp.
+        # A mean rate belongs to the middle of its interval; this extrapolates it to the stamp.
         half = 0.5 * (rate[i] - s.last_rate[i]) if c.increment == 1 and not first else 0.0
         w[n, i] = rate[i] + half - (ex if i == 0 else ey if i == 1 else ez)
         s.last_rate[i], s.last_force[i] = rate[i], force[i]
@@ -127,7 +129,7 @@ def measure(c, s, stamp_ns, rate, force):
 
 @compiled
 def step(s, c, i, out, normals):
-    """Take one IMU message, as ins.step does; the first three of the normals (NORMALS,) are the aid's noise."""
+    """Take one IMU message like ins.step; the first three of the normals (INS_NORMALS_PER_STEP,) are for the aid."""
     out.status, out.due = ins.Status.OK, 0
     if i.stamp_ns <= s.last_stamp_ns:
         out.status = ins.Status.BAD_STAMP
@@ -148,6 +150,6 @@ def step(s, c, i, out, normals):
         out.stage = navigator.STAGE_ALIGNING
     for n in range(3):
         out.velocity[n] = s.navigator.strapdown.velocity[n]
-        # Integrated, the noise of a gyro is a walk and nothing else.
+        # The integrated noise of a gyro is a pure random walk.
         out.noise[n], out.walk[n] = 0.0, c.navigator.conditions.gyro_noise
     ins.release(c, s, i.stamp_ns, out)

@@ -1,9 +1,9 @@
 """The INS of method `model`: the true attitude with parametrised errors, released after a latency.
 
-The node reads `ship/imu/data_raw` only, which carries no attitude (REP 145 leaves that to `imu/data`). So the INS
-evaluates the stateless law of the ship's motion, with the same `ship` parameters, at the stamp of each IMU message and
-adds its errors. It compares the IMU's rate with the ship's: where the `ship` parameters differ from those of
-ship_motion_node, its status says so. `aligning_ins` integrates the IMU instead.
+The node subscribes only to `ship/imu/data_raw`, which has no attitude (in REP 145 that is part of `imu/data`). So the
+INS evaluates the stateless law of the ship motion, with the same `ship` parameters, at the stamp of each IMU message
+and adds its errors. The INS compares the rate of the IMU with that of the law. If the `ship` parameters differ from
+those of ship_motion_node, the status reports it. `aligning_ins` integrates the IMU instead.
 """
 import math
 
@@ -16,17 +16,20 @@ from ship_motion_sim import earth, imu
 from ship_motion_sim.params import InsParameters
 from ship_motion_sim.sea import motion
 
-INS_NORMALS_PER_STEP = 9     # standard normals a step takes: three wander, three attitude, three rate
+INS_NORMALS_PER_STEP = 9
+"""Number of standard normals of a step: three wander, three attitude, three rate."""
 STATUS_TEXTS = dict(
     OK='ok', BAD_STAMP='stamp does not advance', BAD_IMU='IMU data are not finite',
     IMU_DISAGREES='IMU disagrees with the ship parameters of the INS',
     BUFFER_FULL='more samples than the latency buffer holds',
-    ATTITUDE_LOST='IMU was silent for too long, the attitude is lost: it aligns anew')
+    ATTITUDE_LOST='no IMU data for too long: the attitude is lost, the alignment starts again')
 INS_STATUS_TEXTS = tuple(STATUS_TEXTS.values())
 Status = codes(STATUS_TEXTS)
 
-LATENCY_RING_SIZE = 256      # samples under way: latency / step, the largest latency at 1 kHz
+LATENCY_RING_SIZE = 256
+"""Largest number of samples that wait for the latency to pass: the largest latency at 1 kHz."""
 NO_STAMP = -2 ** 63
+"""Stamp before the first message."""
 
 CONSTANTS_DTYPE = np.dtype([
     ('ship', motion.CONSTANTS_DTYPE),
@@ -38,12 +41,12 @@ CONSTANTS_DTYPE = np.dtype([
     ('rate_noise', 'f8'),                   # [rad/s]
     ('imu_tolerance', 'f8'),                # [rad/s]
     ('latency_ns', 'i8'),
-    ('variance', 'f8', (3,)),               # of roll, pitch, heading that the model declares [rad2]
-    ('walk', 'f8', (3,)),                   # what they wander by [rad/sqrt(s)]
+    ('variance', 'f8', (3,)),               # declared variance of roll, pitch, heading [rad2]
+    ('walk', 'f8', (3,)),                   # declared random walk of roll, pitch, heading [rad/sqrt(s)]
 ], align=True)
 
 LATENCY_RING_FIELDS = [
-    ('measured', 'i8'), ('released', 'i8'),     # samples counted; sample n lies at n % LATENCY_RING_SIZE
+    ('measured', 'i8'), ('released', 'i8'),     # number of samples; sample n has index n % LATENCY_RING_SIZE
     ('stamp_ns', 'i8', (LATENCY_RING_SIZE,)),
     ('quaternion', 'f8', (LATENCY_RING_SIZE, 4)),
     ('angular_velocity', 'f8', (LATENCY_RING_SIZE, 3)),
@@ -56,7 +59,7 @@ LATENCY_RING_FIELDS = [
 STATE_DTYPE = np.dtype([
     ('last_stamp_ns', 'i8'),
     ('wander', 'f8', (3,)),                 # slow error of roll, pitch, yaw [rad]
-    ('truth', motion.OUTPUTS_DTYPE),              # ship at the last stamp
+    ('truth', motion.OUTPUTS_DTYPE),        # ship at the last stamp
     *LATENCY_RING_FIELDS,
 ], align=True)
 
@@ -73,17 +76,18 @@ OUTPUTS_DTYPE = np.dtype([
     ('quaternion', 'f8', (4,)),             # x, y, z, w, deck -> earth, with error
     ('angular_velocity', 'f8', (3,)),       # deck against earth, FLU, with noise [rad/s]
     ('linear_acceleration', 'f8', (3,)),    # of the IMU message with this stamp [m/s2]
-    ('variance', 'f8', (3,)),               # of roll, pitch, heading as declared [rad2]
-    ('stage', 'i8'),                        # of this result, navigator.STAGES; NO_STAGE: the model, which has none
-    ('noise', 'f8', (3,)), ('walk', 'f8', (3,)),    # of roll, pitch, heading as declared [rad], [rad/sqrt(s)]
-    ('velocity', 'f8', (3,)),               # ENU, now, of an INS that navigates [m/s]
+    ('variance', 'f8', (3,)),               # declared variance of roll, pitch, heading [rad2]
+    ('stage', 'i8'),                        # stage of this result, of navigator.STAGES; NO_STAGE for the model
+    ('noise', 'f8', (3,)), ('walk', 'f8', (3,)),    # declared, of roll, pitch, heading [rad], [rad/sqrt(s)]
+    ('velocity', 'f8', (3,)),               # present velocity of an INS that navigates, ENU [m/s]
 ], align=True)
 
 NO_STAGE = -1
+"""Stage of a result of method `model`."""
 
 
 def constants(params: InsParameters) -> np.ndarray:
-    """The record (1,) of CONSTANTS_DTYPE."""
+    """Return the record (1,) of CONSTANTS_DTYPE."""
     record = np.zeros(1, CONSTANTS_DTYPE)
     record['ship'] = motion.constants(params.ship)
     record['earth_rate'] = earth.rate(math.radians(params.ship.latitude_deg))
@@ -100,13 +104,13 @@ def constants(params: InsParameters) -> np.ndarray:
 
 
 def model_variance(p):
-    """Variance of roll, pitch and heading [rad2] that method model declares."""
+    """Return the variance of roll, pitch and heading [rad2] that method model declares."""
     return (p.roll_bias**2 + p.tilt_wander**2 + p.tilt_noise**2, p.pitch_bias**2 + p.tilt_wander**2 + p.tilt_noise**2,
             p.heading_bias**2 + p.heading_wander**2 + p.heading_noise**2)
 
 
 def initial_state() -> np.ndarray:
-    """The record (1,) of STATE_DTYPE before the first sample."""
+    """Return the record (1,) of STATE_DTYPE before the first sample."""
     state = np.zeros(1, STATE_DTYPE)
     state['last_stamp_ns'] = NO_STAMP
     return state
@@ -127,14 +131,14 @@ def wander(c, s, stamp_ns, normals):
 
 @compiled
 def disagrees(truth, c, measured):
-    """Whether a measured rate (3,) [rad/s] differs by more than imu_tolerance from the ship's."""
+    """Return True if a measured rate (3,) [rad/s] differs by more than imu_tolerance from that of the ship."""
     wx, wy, wz = imu.inertial_rate(truth, c.earth_rate)
     return max(abs(measured[0] - wx), abs(measured[1] - wy), abs(measured[2] - wz)) > c.imu_tolerance
 
 
 @compiled
 def measure(c, s, stamp_ns, force, normals):
-    """Put attitude and rate at stamp_ns, errors added, into the ring, with the IMU's specific force (3,) [m/s2]."""
+    """Put attitude and rate at stamp_ns, with errors, and the specific force (3,) of the IMU [m/s2] into the ring."""
     n, truth = s.measured % LATENCY_RING_SIZE, s.truth
     roll = truth.roll + c.bias[0] + s.wander[0] + c.noise[0] * normals[3]
     pitch = truth.pitch + c.bias[1] + s.wander[1] + c.noise[1] * normals[4]
@@ -152,7 +156,7 @@ def measure(c, s, stamp_ns, force, normals):
 
 @compiled
 def release(c, s, now_ns, out):
-    """Release the newest sample that is at least the latency old at now_ns; due = 0 where it was released before."""
+    """Release the newest sample of at least the age `latency` at now_ns; due = 0 if it was released before."""
     out.due = 0
     while s.released < s.measured and s.stamp_ns[s.released % LATENCY_RING_SIZE] <= now_ns - c.latency_ns:
         s.released += 1
@@ -171,11 +175,11 @@ def release(c, s, now_ns, out):
 
 @compiled
 def step(s, c, i, out, normals):
-    """Take one IMU message. Records STATE_DTYPE, CONSTANTS_DTYPE, INPUTS_DTYPE, OUTPUTS_DTYPE; normals
-    (INS_NORMALS_PER_STEP,) standard normals.
+    """Take one IMU message.
 
-    A stamp that does not advance changes nothing, and a message that is not finite is not measured; the status names
-    either.
+    s, c, i, out: records STATE_DTYPE, CONSTANTS_DTYPE, INPUTS_DTYPE, OUTPUTS_DTYPE; normals: (INS_NORMALS_PER_STEP,).
+    A stamp that does not advance changes nothing, and a message that is not finite gives no sample. The status reports
+    both.
     """
     out.status, out.due, out.stage = Status.OK, 0, NO_STAGE
     if i.stamp_ns <= s.last_stamp_ns:

@@ -1,9 +1,9 @@
 """A strapdown INS from power-up on: alignment by the selected method, then navigation.
 
-aligning    strapdown at the IMU's rate, the method's step every `step` seconds: its commands rotate n'. oba
-            commands nothing and integrates the gyros in inertial space.
-navigating  from the moment the 1-sigma of azimuth is small enough. Without aid free inertial; with one, riccati_eso
-            continues with the velocity less the aid's, so level and azimuth keep improving.
+aligning    strapdown at the rate of the IMU, the step of the method every `step` seconds: its commands rotate n'. oba
+            has no commands and integrates the gyros in inertial space.
+navigating  as soon as the 1-sigma of azimuth is small enough. Free inertial without aid. With an aid, riccati_eso
+            continues with the difference of both velocities, so level and azimuth keep improving.
 
 An aid is a velocity in deck axes (log) or ENU (gnss).
 """
@@ -26,32 +26,35 @@ METHOD_CLASSICAL, METHOD_ADRC, METHOD_ADRC_SCHEDULED, METHOD_RICCATI_ESO, METHOD
 AID_NONE, AID_LOG, AID_GNSS = range(len(VELOCITY_AIDS))
 
 CONSTANTS_DTYPE = np.dtype([
-    ('method', 'i8'), ('aid', 'i8'),            # index into METHODS, AIDS
-    ('step', 'f8'),                             # of the laws [s]
-    ('aligned_sigma', 'f8'),                    # [rad]
+    ('method', 'i8'), ('aid', 'i8'),            # index into INS_METHODS, VELOCITY_AIDS
+    ('step', 'f8'),                             # step of the laws [s]
+    ('aligned_sigma', 'f8'),                    # 1 sigma of azimuth at which navigation begins [rad]
     ('conditions', CONDITIONS_DTYPE),
     ('classical', classical.CONSTANTS_DTYPE), ('adrc', adrc.CONSTANTS_DTYPE),
 ], align=True)
 
 STATE_DTYPE = np.dtype([
     ('stage', 'i8'),
-    ('begun', 'i8'),                            # 1 once the velocity has been set to the aid's
-    ('since', 'f8'),                            # since the laws' last step [s]
-    ('free', 'f8'),                             # since navigation began [s]
+    ('velocity_set', 'i8'),                     # 1 after the velocity was set to that of the aid
+    ('since', 'f8'),                            # time since the last step of the laws [s]
+    ('free', 'f8'),                             # time since navigation without aid began [s]
     ('strapdown', strapdown.STATE_DTYPE),
     ('command', 'f8', (3,)),                    # w_c [rad/s]
     ('levelling', 'f8'),                        # w_cN of the gyrocompass, smoothed [rad/s]
-    ('azimuth', 'f8'),                          # of n', known so far [rad]
+    ('azimuth', 'f8'),                          # estimated azimuth of n' [rad]
     ('azimuth_sigma', 'f8'), ('level_sigma', 'f8'),         # [rad]
-    ('aligned_azimuth_sigma', 'f8'), ('aligned_level_sigma', 'f8'),     # when navigation began
-    ('no_rate', 'f8', (3,)),                    # zeros: inertial space, and no command
+    ('aligned_azimuth_sigma', 'f8'), ('aligned_level_sigma', 'f8'),     # at the start of navigation [rad]
+    ('no_rate', 'f8', (3,)),                    # zeros: rate of inertial space, no command
     ('classical', classical.STATE_DTYPE), ('adrc', adrc.STATE_DTYPE), ('adrc_scheduled', adrc_scheduled.STATE_DTYPE),
     ('riccati_eso', riccati_eso.STATE_DTYPE), ('oba', oba.STATE_DTYPE),
 ], align=True)
 
 
 def constants(p, method, aid, latitude) -> np.ndarray:
-    """The record (1,) of CONSTANTS_DTYPE: AlignmentParameters, names out of METHODS and AIDS, latitude [rad]."""
+    """Return the record (1,) of CONSTANTS_DTYPE of AlignmentParameters p.
+
+    method, aid: names of INS_METHODS, VELOCITY_AIDS; latitude [rad].
+    """
     record = np.zeros(1, CONSTANTS_DTYPE)
     k = conditions(p, latitude)
     record['method'], record['aid'] = INS_METHODS.index(method), VELOCITY_AIDS.index(aid)
@@ -63,7 +66,8 @@ def constants(p, method, aid, latitude) -> np.ndarray:
 
 
 def least_azimuth_sigma(c):
-    """The 1 sigma [rad] of azimuth that the method approaches after a long time; c: record of CONSTANTS_DTYPE."""
+    """Return the 1 sigma [rad] of azimuth that the method approaches after a long time; c: record of
+    CONSTANTS_DTYPE."""
     if c['method'] == METHOD_CLASSICAL:
         return float(c['classical']['azimuth'])
     k = c['conditions']
@@ -71,7 +75,7 @@ def least_azimuth_sigma(c):
 
 
 def initial_state(constants, quaternion) -> np.ndarray:
-    """The record (1,) of STATE_DTYPE at power-up; quaternion (x, y, z, w) deck -> n' as it is taken for true."""
+    """Return the record (1,) of STATE_DTYPE at power-up; quaternion (x, y, z, w) deck -> n': assumed attitude."""
     state = np.zeros(1, STATE_DTYPE)
     begin(state[0], constants[0], *map(float, quaternion))
     return state
@@ -79,7 +83,7 @@ def initial_state(constants, quaternion) -> np.ndarray:
 
 @compiled
 def begin(s, c, qx, qy, qz, qw):
-    """Power-up: records STATE_DTYPE, zero so far, and CONSTANTS_DTYPE."""
+    """Set the state s, STATE_DTYPE filled with zeros, to that at power-up; c: record of CONSTANTS_DTYPE."""
     if c.method == METHOD_OBA:
         qx, qy, qz, qw = 0.0, 0.0, 0.0, 1.0
     strapdown.set_attitude(s.strapdown, qx, qy, qz, qw)
@@ -91,12 +95,10 @@ def begin(s, c, qx, qy, qz, qw):
 
 @compiled
 def aided_velocity(s, c, aid):
-    """(E, N) components in n' [m/s] of the velocity (3,) the aid measures; a AID_GNSS is used once n' is aligned with
-    n.
+    """Return the (E, N) components in n' [m/s] of the velocity (3,) of the aid; GNSS only after n' is aligned with n.
 
-    A AID_GNSS velocity is not rotated by the azimuth estimated since: 7 m/s that rotate with the estimate would feed
-    back
-    into it, enlarged.
+    The velocity of GNSS is not rotated by the later estimate of azimuth. This avoids an amplified feedback of 7 m/s
+    into the estimate.
     """
     if c.aid == AID_LOG:
         east, north, _ = to_earth(s.strapdown.mat, aid[0], aid[1], aid[2])
@@ -108,7 +110,7 @@ def aided_velocity(s, c, aid):
 
 @compiled
 def copy_method_outputs(s, m):
-    """Copy the commands, azimuth and 1 sigmas of the method's record m into the state."""
+    """Copy the commands, azimuth and 1 sigmas of m, the record of a method, into the state."""
     for i in range(3):
         s.command[i] = m.command[i]
     s.azimuth, s.azimuth_sigma, s.level_sigma = m.azimuth, m.azimuth_sigma, m.level_sigma
@@ -116,7 +118,7 @@ def copy_method_outputs(s, m):
 
 @compiled
 def align_in_inertial_space(s, c, aid, h):
-    """One step of oba, h [s] after the last; aid (3,) [m/s]."""
+    """Execute one step of oba, h [s] after the last; aid (3,) [m/s]."""
     a, k = s.strapdown.velocity, c.conditions
     ux = uy = uz = vx = vy = vz = 0.0
     if c.aid == AID_LOG:
@@ -129,10 +131,11 @@ def align_in_inertial_space(s, c, aid, h):
 
 @compiled
 def reject_reversed_azimuth(s, c, h):
-    """Declare the gyrocompass's azimuth unknown where the level command shows that az is beyond 60 deg.
+    """Declare the azimuth of the gyrocompass unknown if the level command shows that az is beyond 60 deg.
 
-    At 180 deg of azimuth its loop is at rest too, but the level command to the north is twice the earth's rate there:
-    (19) of paper 001, cos az = 1 + w_cN / w_N."""
+    The loop is at rest also at 180 deg of azimuth, where the level command to the north is twice the earth rate: (19)
+    of paper 001, cos az = 1 + w_cN / w_N.
+    """
     s.levelling += c.classical.s0 * h * (s.command[1] - s.levelling)
     if 1.0 + s.levelling / c.conditions.earth_rate[1] < 0.5:
         s.azimuth_sigma = UNKNOWN_AZIMUTH_SIGMA_RAD
@@ -140,17 +143,17 @@ def reject_reversed_azimuth(s, c, h):
 
 @compiled
 def step_method(s, c, method, aid, h):
-    """One step, h [s] after the last, of a method that commands n'; aid (3,) [m/s]."""
+    """Execute one step, h [s] after the last, of a method that commands n'; aid (3,) [m/s]."""
     v, k = s.strapdown.velocity, c.conditions
     east, north = aided_velocity(s, c, aid)
-    if s.begun == 0:
-        v[0], v[1], s.begun = east, north, 1
+    if s.velocity_set == 0:
+        v[0], v[1], s.velocity_set = east, north, 1
     v[2] = 0.0
     v_east, v_north = v[0] - east, v[1] - north
     if method == METHOD_CLASSICAL:
         classical.step(s.classical, c.classical, k, v_east, v_north, h)
-        v[0] -= s.classical.taken[0]
-        v[1] -= s.classical.taken[1]
+        v[0] -= s.classical.correction[0]
+        v[1] -= s.classical.correction[1]
         copy_method_outputs(s, s.classical)
         reject_reversed_azimuth(s, c, h)
     elif method == METHOD_ADRC:
@@ -168,7 +171,7 @@ def step_method(s, c, method, aid, h):
 
 @compiled
 def attitude(s, c):
-    """Estimated quaternion (x, y, z, w) deck -> earth."""
+    """Return the estimated quaternion (x, y, z, w) deck -> earth."""
     q = s.strapdown.quaternion
     if c.method == METHOD_OBA and s.stage == STAGE_ALIGNING:
         if s.oba.count < 2.0:
@@ -179,7 +182,7 @@ def attitude(s, c):
 
 @compiled
 def error_velocity(s, c):
-    """(E, N) components in n' [m/s] of the velocity that the method attributes to an error of the INS."""
+    """Return the (E, N) components in n' [m/s] of the velocity that the method attributes to an error of the INS."""
     if c.method == METHOD_ADRC:
         return s.adrc.observer.z[0, 0], s.adrc.observer.z[1, 0]
     if c.method == METHOD_ADRC_SCHEDULED:
@@ -191,8 +194,11 @@ def error_velocity(s, c):
 
 @compiled
 def begin_navigation(s, c, aid):
-    """Rotate n' onto n and start to navigate. The velocity becomes the aid's (3,) [m/s]; without an aid, the part that
-    alignment did not attribute to an error, and zero after oba, whose velocity has an unknown origin."""
+    """Rotate n' onto n and start to navigate; aid (3,) [m/s].
+
+    The velocity becomes that of the aid. Without an aid, it becomes the part that alignment did not attribute to an
+    error, and zero after oba, whose velocity has an unknown origin.
+    """
     k, v = c.conditions, s.strapdown.velocity
     qx, qy, qz, qw = attitude(s, c)
     wrong_east, wrong_north = error_velocity(s, c)
@@ -217,8 +223,11 @@ def begin_navigation(s, c, aid):
 
 @compiled
 def grow_unaided_sigmas(s, k, h):
-    """Grow the 1 sigmas of an INS without aid over h [s]: random walk and bias of the gyros, and the earth's rate
-    resolved with a heading that is wrong by its 1 sigma, which tilts the level."""
+    """Increase the 1 sigmas of an INS without aid over h [s].
+
+    The causes are random walk and bias of the gyros, and the earth rate resolved with a heading that is wrong by its
+    1 sigma, which tilts the level.
+    """
     s.free += h
     walk = k.gyro_noise**2 * s.free
     s.azimuth_sigma = math.sqrt(s.aligned_azimuth_sigma**2 + walk + (k.gyro_bias * s.free)**2)
@@ -228,9 +237,9 @@ def grow_unaided_sigmas(s, k, h):
 
 @compiled
 def step(s, c, angle, force, dt, aid):
-    """Process one IMU interval of dt [s]; records STATE_DTYPE, CONSTANTS_DTYPE.
+    """Process one IMU interval of dt [s]; s, c: records STATE_DTYPE, CONSTANTS_DTYPE.
 
-    angle, force (3,): its increments, FLU [rad, m/s]; aid (3,) [m/s], finite.
+    angle, force (3,): increments of the interval, FLU [rad, m/s]; aid (3,) [m/s], finite.
     """
     k, inertial = c.conditions, c.method == METHOD_OBA and s.stage == STAGE_ALIGNING
     if inertial:

@@ -1,4 +1,4 @@
-"""The ship's truth at an instant: position, attitude and their exact derivatives. Stateless.
+"""The truth of the ship at an instant: position, attitude and their exact derivatives. Stateless.
 
     outputs = np.zeros(1, OUTPUTS_DTYPE)
     truth(constants(params)[0], 12.5, outputs[0])
@@ -17,21 +17,21 @@ MOTION_STATUS_TEXTS = ('ok', 'time is not finite')
 MOTION_OK, MOTION_BAD_TIME = range(len(MOTION_STATUS_TEXTS))
 
 CONSTANTS_DTYPE = np.dtype([
-    ('frequency', 'f8', (WAVE_COMPONENT_COUNT,)),             # w_e [rad/s]; components not in use are 0
-    ('phase', 'f8', (WAVE_COMPONENT_COUNT,)),                 # [rad]
-    ('cosine', 'f8', (WAVE_COMPONENT_COUNT, FREEDOM_COUNT)),       # Re X [m, rad]
-    ('sine', 'f8', (WAVE_COMPONENT_COUNT, FREEDOM_COUNT)),         # -Im X
-    ('yaw', 'f8'), ('cos_yaw', 'f8'), ('sin_yaw', 'f8'),    # mean heading as REP 103 yaw
-    ('speed', 'f8'),
-    ('pieces', 'i8'),                               # of a recorded motion; 0: the components it is
-    ('breaks', 'f8', (recording.MAX_PIECES + 1,)),      # [s]
+    ('frequency', 'f8', (WAVE_COMPONENT_COUNT,)),   # w_e [rad/s]; components not in use are 0
+    ('phase', 'f8', (WAVE_COMPONENT_COUNT,)),       # [rad]
+    ('cosine', 'f8', (WAVE_COMPONENT_COUNT, FREEDOM_COUNT)),    # Re X [m, rad]
+    ('sine', 'f8', (WAVE_COMPONENT_COUNT, FREEDOM_COUNT)),      # -Im X
+    ('yaw', 'f8'), ('cos_yaw', 'f8'), ('sin_yaw', 'f8'),        # mean heading as REP 103 yaw
+    ('speed', 'f8'),                                # [m/s]
+    ('pieces', 'i8'),                               # number of pieces of a recorded motion; 0: components
+    ('breaks', 'f8', (recording.MAX_PIECES + 1,)),  # [s]
     ('coefficients', 'f8', (recording.MAX_PIECES, FREEDOM_COUNT,
-                            recording.COEFFICIENTS_PER_PIECE)),      # [m, rad], highest power first
+                            recording.COEFFICIENTS_PER_PIECE)),     # [m, rad], highest power first
 ], align=True)
 
 OUTPUTS_DTYPE = np.dtype([
-    ('status', 'i8'),                               # index into MOTION_STATUS_TEXTS; not OK: everything else is NaN
-    ('freedoms', 'f8', (3, FREEDOM_COUNT)),              # surge, sway, heave [m], roll, pitch, yaw about the mean
+    ('status', 'i8'),                               # index into MOTION_STATUS_TEXTS; unless MOTION_OK, the rest is NaN
+    ('freedoms', 'f8', (3, FREEDOM_COUNT)),         # surge, sway, heave [m], roll, pitch, yaw about the mean
                                                     # heading [rad]; rows: value, first, second derivative
     ('position', 'f8', (3,)),                       # ENU [m]
     ('velocity', 'f8', (3,)),                       # ENU [m/s]
@@ -46,9 +46,9 @@ OUTPUTS_DTYPE = np.dtype([
 
 
 def constants(params: ShipParameters) -> np.ndarray:
-    """The record (1,) of CONSTANTS_DTYPE: the seaway of the seed and the mean course, or a record of both.
+    """Return the record (1,) of CONSTANTS_DTYPE: seaway of the seed and mean course, or a recorded motion.
 
-    Raises csv_table.TableError where a file is needed and cannot be used.
+    Raises csv_table.TableError for a file that cannot be used.
     """
     record = np.zeros(1, CONSTANTS_DTYPE)
     if params.motion == 'recorded':
@@ -70,7 +70,7 @@ def _put_components(record, sines):
 
 
 def _put_recorded(record, params):
-    """Put a recording into record; its mean yaw [rad]."""
+    """Put a recording into record; return its mean yaw [rad]."""
     times, freedoms = recording.read(params)
     mean = float(np.mean(freedoms[:, YAW]))
     freedoms[:, YAW] -= mean
@@ -84,8 +84,11 @@ def _put_recorded(record, params):
 
 @compiled
 def sin_cos(angle):
-    """(sin, cos), within 1e-15 up to 1e6 rad. Over an array four times as fast as libm's, which no compiler
-    vectorises. Reduction and polynomials of fdlibm (Sun Microsystems 1993: e_rem_pio2.c, k_sin.c, k_cos.c)."""
+    """Return (sin, cos), within 1e-15 up to 1e6 rad.
+
+    Because the compiler vectorises it, unlike the functions of libm, it is four times as fast over an array. Reduction
+    and polynomials of fdlibm (Sun Microsystems 1993: e_rem_pio2.c, k_sin.c, k_cos.c).
+    """
     n = math.floor(angle * (2.0 / math.pi) + 0.5)
     r = angle - n * 1.57079632673412561417 - n * 6.07710050630396597660e-11 - n * 2.02226624879595063154e-21
     z = r * r
@@ -104,7 +107,7 @@ def sin_cos(angle):
 
 @compiled
 def sum_components(ship, t, freedoms):
-    """freedoms (3, 6) = sum of all components at t and its first and second derivative: one sine and cosine each."""
+    """Fill freedoms (3, 6) with the sum of all components at t and its first and second derivative."""
     wave = np.empty((2, WAVE_COMPONENT_COUNT))
     for i in range(WAVE_COMPONENT_COUNT):
         wave[0, i], wave[1, i] = sin_cos(ship.frequency[i] * t + ship.phase[i])
@@ -121,8 +124,8 @@ def sum_components(ship, t, freedoms):
 
 @compiled
 def body_rates(roll, pitch, roll_1, pitch_1, yaw_1, roll_2, pitch_2, yaw_2):
-    """(w [rad/s], dw [rad/s2]), three floats each, FLU, of fixed-axis roll, pitch [rad] and their first and second
-    derivatives and those of yaw.
+    """Return (w [rad/s], dw [rad/s2]), three floats each, FLU, of fixed-axis roll, pitch [rad] and the first and
+    second derivatives of roll, pitch and yaw.
 
     mat_ed = Rz(yaw) Ry(pitch) Rx(roll): reference/nav.md section 3.2 (in FLU as in FRD), differentiated.
     """
@@ -138,13 +141,13 @@ def body_rates(roll, pitch, roll_1, pitch_1, yaw_1, roll_2, pitch_2, yaw_2):
 
 @compiled
 def course_to_earth(ship, along, port):
-    """(east, north) of a horizontal vector given along the mean course and to port of it, any unit."""
+    """Return (east, north) of a horizontal vector given along the mean course and to port of it, any unit."""
     return ship.cos_yaw * along - ship.sin_yaw * port, ship.sin_yaw * along + ship.cos_yaw * port
 
 
 @compiled
 def truth(ship, t, out):
-    """Fill the record out (OUTPUTS_DTYPE) with the ship (record CONSTANTS_DTYPE) at time t [s]."""
+    """Fill out, a record of OUTPUTS_DTYPE, with the truth at time t [s]; ship: record of CONSTANTS_DTYPE."""
     out.status = MOTION_OK if math.isfinite(t) else MOTION_BAD_TIME
     x = out.freedoms
     if ship.pieces > 0 and out.status == MOTION_OK:

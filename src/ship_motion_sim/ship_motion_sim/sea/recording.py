@@ -4,15 +4,14 @@
     roll_deg    positive with the port side up
     pitch_deg   positive with the bow up: the signs of a ship's instruments (PASHR), where FLU has the bow down
     heading_deg clockwise from north, 0 to 360 or -180 to 180
-    surge_m     forward along the mean heading; this and the next two columns are optional, 0 without
+    surge_m     forward along the mean heading; surge, sway and heave are optional, 0 if missing
     sway_m      to port
     heave_m     up
 
-Between the rows runs a cubic spline through all of them (not-a-knot ends), so rates and accelerations are exact
-derivatives of the motion, and what is recorded is taken for true: smooth a noisy recording before. Outside the record
-the ship comes to rest within COME_TO_REST_TIME_S in the attitude of the nearest end: a quintic from its value, rate
-and acceleration
-to the same value at rest.
+A cubic spline (not-a-knot ends) runs through all rows, so rates and accelerations are exact derivatives of the motion.
+Because the recorded values are taken as the truth, a noisy recording must be smoothed before. Outside the record the
+ship comes to rest within COME_TO_REST_TIME_S in the attitude of the nearest end: a quintic leads from value, rate and
+acceleration of this end to the same value at rest.
 """
 import numpy as np
 
@@ -21,25 +20,29 @@ from pedestal_common.geometry.interval import interval
 from pedestal_common.text_files import csv_table
 
 MAX_ROWS = 16384
-"""Most rows of a recording."""
+"""Largest number of rows of a recording."""
 MAX_PIECES = MAX_ROWS + 1
+"""Largest number of pieces, those before and after the record included."""
 COEFFICIENTS_PER_PIECE = 6
-"""Coefficients of a piece, the highest power first."""
+"""Number of coefficients of a piece, highest power first."""
 COME_TO_REST_TIME_S = 5.0
-"""Time [s] within which the ship comes to rest before and after the record."""
+"""Time in which the ship comes to rest before and after the record [s]."""
 
 COLUMN_RANGES = {'time_s': (-1e12, 1e12), 'roll_deg': (-80.0, 80.0), 'pitch_deg': (-80.0, 80.0),
                  'heading_deg': (-360.0, 360.0)}
 DISPLACEMENT_RANGES = {'surge_m': (-1e3, 1e3), 'sway_m': (-1e3, 1e3), 'heave_m': (-100.0, 100.0)}
-"""Columns of the file with the range of each; those of DISPLACEMENT_RANGES may be missing."""
+"""{column: (lowest, highest)}; the columns of DISPLACEMENT_RANGES may be missing."""
 
 
 def read(params):
-    """(times (n,) [s] from stamp 0 on, surge, sway, heave [m], roll, pitch, yaw (n, 6) [rad], REP 103) of a
-    RecordedParameters; yaw is unwrapped. Raises csv_table.TableError."""
+    """Return (times (n,) [s] from stamp 0 on, freedoms (n, 6)) of a RecordedParameters. Raises csv_table.TableError.
+
+    freedoms: surge, sway, heave [m], roll, pitch, yaw [rad], REP 103, yaw unwrapped.
+    """
     rows = csv_table.read(params.path, COLUMN_RANGES, 4, params.max_gap, 'ship.recorded.max_gap', DISPLACEMENT_RANGES)
     if len(rows) > MAX_ROWS:
-        raise csv_table.TableError(f'{params.path}: {len(rows)} rows, must be at most {MAX_ROWS}; cut or thin it out')
+        raise csv_table.TableError(f'{params.path}: {len(rows)} rows, must be at most {MAX_ROWS}: shorten '
+                                   'the file or reduce its rate')
     column = dict(zip((*COLUMN_RANGES, *DISPLACEMENT_RANGES), rows.T))
     time = column['time_s']
     length = time[-1] - time[0]
@@ -53,9 +56,9 @@ def read(params):
 
 
 def pieces(times, freedoms):
-    """(breaks (n + 2,), coefficients (n + 1, 6, COEFFICIENTS_PER_PIECE)) of freedoms (n, 6) at times (n,), holds
-    included."""
-    from scipy.interpolate import BPoly, CubicSpline, PPoly  # slow to import, and most ships move by themselves
+    """Return (breaks (n + 2,), coefficients (n + 1, 6, COEFFICIENTS_PER_PIECE)) of freedoms (n, 6) at times (n,), with
+    the pieces that lead to rest."""
+    from scipy.interpolate import BPoly, CubicSpline, PPoly  # slow to import, and only a recorded motion needs it
     spline = CubicSpline(times, freedoms)
     first, last = times[0], times[-1]
     at_first, at_last = ([spline(time, order) for order in range(3)] for time in (first, last))
@@ -66,14 +69,14 @@ def pieces(times, freedoms):
     inside = np.zeros((COEFFICIENTS_PER_PIECE, *spline.c.shape[1:]))
     inside[2:] = spline.c
     coefficients = np.concatenate((ends[0].c, inside, ends[1].c), axis=1)
-    return np.concatenate(((first - COME_TO_REST_TIME_S,), times,
-                           (last + COME_TO_REST_TIME_S,))), np.ascontiguousarray(
-        np.moveaxis(coefficients, 0, -1))
+    breaks = np.concatenate(((first - COME_TO_REST_TIME_S,), times, (last + COME_TO_REST_TIME_S,)))
+    return breaks, np.ascontiguousarray(np.moveaxis(coefficients, 0, -1))
 
 
 @compiled
 def evaluate(breaks, coefficients, count, t, freedoms):
-    """freedoms (3, 6) = the first `count` pieces at t and their first and second derivative; outside, the ends'."""
+    """Fill freedoms (3, 6) with the first `count` pieces at t and their first and second derivative; outside the
+    pieces, with the values at the nearest end."""
     t = min(max(t, breaks[0]), breaks[count])
     piece = interval(breaks[:count + 1], t)
     s = t - breaks[piece]

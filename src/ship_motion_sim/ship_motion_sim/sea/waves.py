@@ -1,7 +1,7 @@
-"""A seaway as a sum of sine waves, and the response of the hull to each. Plain numpy, run once at the start.
+"""A seaway as a sum of sine waves, and the response of the hull to each wave. Plain numpy, run once at the start.
 
-reference/nav.md section 3.1. The surface at the ship is zeta = sum Re(a e^{j(w_e t + phase)}); a wave that travels
-along the deck's unit vector (d_x, d_y) (FLU) is zeta ~ e^{-j k (d_x x + d_y y)}, so the slope along x is -j k d_x a.
+reference/nav.md section 3.1. The surface at the ship is zeta = sum Re(a e^{j(w_e t + phase)}). For a wave that travels
+along the unit vector (d_x, d_y) of the deck (FLU), zeta ~ e^{-j k (d_x x + d_y y)}. Its slope along x is -j k d_x a.
 """
 import math
 import typing
@@ -14,33 +14,36 @@ from ship_motion_sim import earth
 from ship_motion_sim.params import HullParameters, ShipParameters
 
 WAVE_COMPONENT_COUNT = 80
+"""Number of sine waves of a seaway."""
 SURGE, SWAY, HEAVE, ROLL, PITCH, YAW = range(6)
 FREEDOM_COUNT = 6
 SEA_STATES = {3: (0.88, 7.5), 4: (1.88, 8.8), 5: (3.25, 9.7), 6: (5.0, 12.4)}
-"""Sea state -> (Hs [m], Tp [s])."""
+"""{sea state: (Hs [m], Tp [s])}."""
 
 SPECTRUM_COLUMN_RANGES = {'frequency_hz': (1e-3, 10.0), 'density_m2_per_hz': (0.0, 1e4)}
-"""Of the file of a measured spectrum, with the range of each."""
+"""{column of a measured spectrum: (lowest, highest)}."""
 
-_GRID_STEPS_PER_COMPONENT = 100     # grid points per component where the spectrum is integrated
+_GRID_STEPS_PER_COMPONENT = 100
+"""Grid steps per component in the integration of the spectrum."""
 
 
 class Waves(typing.NamedTuple):
-    """n components: encounter frequency (n,) [rad/s], phase (n,) [rad], X (n, 6) complex [m, rad]."""
+    """Components of the motion: encounter frequency (n,) [rad/s], phase (n,) [rad], response X (n, 6) complex
+    [m, rad]."""
     frequency: np.ndarray
     phase: np.ndarray
     response: np.ndarray
 
 
 def shape(w, tp, gamma):
-    """JONSWAP without its level (Hasselmann et al. 1973): any positive w [rad/s] -> relative density."""
+    """Return the relative density of JONSWAP at any positive w [rad/s] (Hasselmann et al. 1973)."""
     wp = 2.0 * math.pi / tp
     width = np.where(w <= wp, 0.07, 0.09)
     return power(w, -5.0) * exp(-1.25 * power(wp / w, 4.0)) * power(gamma, exp(-0.5 * ((w - wp) / (width * wp)) ** 2))
 
 
 def band(tp):
-    """(lowest, highest) frequency [rad/s] of the components: 0.55 wp to 4 wp, but no ripples above 2.2 rad/s."""
+    """Return the (lowest, highest) frequency [rad/s] of the components: 0.55 wp to 4 wp, at most 2.2 rad/s."""
     wp = 2.0 * math.pi / tp
     return 0.55 * wp, min(4.0 * wp, 2.2)
 
@@ -54,7 +57,7 @@ def _integral(x, y):
 
 
 def spectrum(w, hs, tp, gamma):
-    """S(w) [m2 s/rad] on the band, zero outside it; its integral is Hs^2/16."""
+    """Return S(w) [m2 s/rad], zero outside the band; its integral is Hs^2/16."""
     low, high = band(tp)
     grid = _grid(tp)
     level = hs ** 2 / 16.0 / _integral(grid, shape(grid, tp, gamma))[-1]
@@ -62,30 +65,32 @@ def spectrum(w, hs, tp, gamma):
 
 
 def _second_order(w, period, damping):
-    """w_n^2 / (w_n^2 - w^2 + 2 j z w_n w): an oscillator's answer to e^{jwt}, 1 at rest."""
+    """Return w_n^2 / (w_n^2 - w^2 + 2 j z w_n w), the response of an oscillator to e^{jwt}; 1 at w = 0."""
     wn = 2.0 * math.pi / period
     return wn ** 2 / (wn ** 2 - w ** 2 + 2j * damping * wn * w)
 
 
 def _mean_over(u):
-    """sin u / u: a sine averaged over a length, u half its phase along it."""
+    """Return sin u / u: the mean of a sine over a length, u half its phase along the length."""
     v = np.where(u == 0.0, 1.0, u)
     return np.where(u == 0.0, 1.0, sin(v) / v)
 
 
 def _slope_over(u):
-    """3 (sin u - u cos u) / u^3: the best straight line through a sine along a length, against its slope."""
+    """Return 3 (sin u - u cos u) / u^3: the slope of the best straight line through a sine over a length, relative to
+    the slope of the sine in the middle."""
     small = np.abs(u) < 1e-2
     v = np.where(small, 1.0, u)
     return np.where(small, 1.0 - u ** 2 / 10.0, 3.0 * (sin(v) - v * cos(v)) / (v * v * v))
 
 
 def transfer(hull: HullParameters, w, mu, speed, gravity):
-    """(w_e, RAO): encounter frequency [rad/s] and complex response (..., 6) to 1 m of wave at w [rad/s] from mu [rad].
+    """Return (w_e, RAO): encounter frequency [rad/s] and complex response (..., 6) to 1 m of wave.
 
-    Pressure fades with depth (Smith e^{-k d/2}) and averages out over length and beam; roll, pitch and yaw follow
-    the slope along the hull. Surge and sway are the orbital motion of the water, which at a crest moves the way the
-    wave travels, so it is -j times the elevation; yaw follows the change of that sway along the hull.
+    w, mu: frequency [rad/s] and direction [rad] of the wave; speed [m/s]; gravity [m/s2]. Pressure falls with depth
+    (Smith e^{-k d/2}) and averages over length and beam. Roll, pitch and yaw follow the slope along the hull. Surge
+    and sway are the orbital motion of the water. At a crest it has the direction of the wave, so it is -j times the
+    elevation. Yaw follows the change of sway along the hull.
     """
     k = w ** 2 / gravity
     d_x, d_y = cos(mu), -sin(mu)
@@ -108,9 +113,10 @@ def transfer(hull: HullParameters, w, mu, speed, gravity):
 
 
 def density(params: ShipParameters):
-    """(w [rad/s], S [m2 s/rad]) on WAVE_COMPONENT_COUNT bins of _FINE steps each: of the sea state, or as measured.
+    """Return (w [rad/s], S [m2 s/rad]) of the sea state or the measured spectrum. Raises csv_table.TableError.
 
-    A measured density runs in straight lines between its rows. Raises csv_table.TableError.
+    The grid has WAVE_COMPONENT_COUNT bins of _GRID_STEPS_PER_COMPONENT steps each. A measured density is interpolated
+    linearly between its rows.
     """
     if params.spectrum == 'file':
         frequency, measured = csv_table.read(params.spectrum_file, SPECTRUM_COLUMN_RANGES).T
@@ -123,10 +129,10 @@ def density(params: ShipParameters):
 
 
 def seaway(params: ShipParameters):
-    """The waves: (w [rad/s], amplitude [m], phase [rad], mu [rad]), each (WAVE_COMPONENT_COUNT,).
+    """Return the waves: (w [rad/s], amplitude [m], phase [rad], mu [rad]), each (WAVE_COMPONENT_COUNT,).
 
-    One wave in each of equal bins, at a random place in its bin (equal spacing would repeat after 2 pi / dw), with
-    the bin's whole energy: sum a^2/2 = Hs^2/16 for every seed.
+    Each of equal bins has one wave, at a random frequency within the bin. This avoids the repetition after 2 pi / dw
+    of equal spacing. The wave has the whole energy of its bin: sum a^2/2 = Hs^2/16 for every seed.
     """
     grid, S = density(params)
     energy = _integral(grid, S)
@@ -152,7 +158,7 @@ def _plain(params: ShipParameters) -> Waves:
 
 
 def build(params: ShipParameters) -> Waves:
-    """The components of the ship's motion: at most WAVE_COMPONENT_COUNT of them, from waves or plain sines."""
+    """Return the components of the ship motion, at most WAVE_COMPONENT_COUNT, from waves or plain sines."""
     if params.motion == 'plain':
         return _plain(params)
     w, amplitude, phase, mu = seaway(params)

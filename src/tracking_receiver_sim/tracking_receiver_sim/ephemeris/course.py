@@ -1,9 +1,8 @@
-"""What the target flies: the course that an orbit or a table of directions prescribes, and the run that goes with it.
+"""Course of the target from an orbit or a table of directions, and the parameters of a run that follow from it.
 
-An orbit is a cubic Hermite spline through positions and velocities of its interpolation every MAX_KNOT_SPACING_S
-seconds, within
-1 mm of it. A table of directions is the cubic spline through its unit vectors, which no zenith and no north disturbs,
-at the range target.angle.range.
+An orbit becomes a cubic Hermite spline through interpolated positions and velocities every MAX_KNOT_SPACING_S, within
+1 mm of the orbit. A table of directions becomes the cubic spline through its unit vectors, at the range
+target.angle.range. Because of the unit vectors, it is smooth at the zenith and through north.
 """
 import math
 
@@ -18,22 +17,22 @@ from tracking_receiver_sim.track import instant
 from tracking_receiver_sim.track.flight import Flight
 
 MAX_KNOT_SPACING_S = 10.0
-"""[s], at most."""
+"""Largest time between two knots of the spline of an orbit [s]."""
 MAX_DURATION_S = 86400.0
-"""Run [s]."""
+"""Largest duration of a run [s]."""
 
 
 def of_orbit(ephemeris, target, duration, margin) -> Flight:
-    """The Flight of a states.Ephemeris for a run of `duration` [s], and `margin` [s] more at both ends as far as the
-    file goes; target: TargetParameters. Raises csv_table.TableError."""
+    """Return the Flight of a states.Ephemeris for a run of `duration` [s], with `margin` [s] more at both ends as far
+    as the file goes; target: TargetParameters. Raises csv_table.TableError."""
     zero = ephemeris.begin + target.track_file.start
     horizon.require(ephemeris, zero, zero + duration)
     begin, end = max(-margin, ephemeris.begin - zero), min(duration + margin, ephemeris.end - zero)
     knots = np.linspace(begin, end, 2 + int((end - begin) / MAX_KNOT_SPACING_S))
     known = np.clip(zero + knots, ephemeris.begin, ephemeris.end)
     r, v = horizon.enu(ephemeris, target.station, known)
-    there = np.isfinite(r).all(axis=1)  # a gap may begin where the margin is
-    spline = CubicHermiteSpline(knots[there], r[there], v[there])
+    finite = np.isfinite(r).all(axis=1)  # The margin may reach into a gap.
+    spline = CubicHermiteSpline(knots[finite], r[finite], v[finite])
     _check_acceleration(ephemeris, spline, zero, target.track_file.max_acceleration)
     t = np.linspace(0.0, duration, 2 + int(duration / MAX_KNOT_SPACING_S))
     east, north, up = spline(t).T
@@ -46,12 +45,14 @@ def of_orbit(ephemeris, target, duration, margin) -> Flight:
         f'{t[top]:.0f} s, {distance.min() / 1e3:.4g} to {distance.max() / 1e3:.4g} km from the station at '
         f'latitude {target.station.latitude_deg:.5f}, longitude {target.station.longitude_deg:.5f} deg, height '
         f'{target.station.height:.1f} m'),
-        float(np.linalg.norm(v[there], axis=1).max()), float(distance.max()))
+        float(np.linalg.norm(v[finite], axis=1).max()), float(distance.max()))
 
 
 def _check_acceleration(ephemeris, spline, zero, limit):
-    """Raise TableError with the line of the state nearest to the peak where the spline needs more than limit [m/s2]:
-    a wrong digit does."""
+    """Raise TableError, with the line of the state nearest to the peak, if the acceleration exceeds limit [m/s2].
+
+    A wrong digit in the file has this effect.
+    """
     size = np.linalg.norm(spline(spline.x, 2), axis=1)
     worst = int(np.argmax(size))
     if not size[worst] <= limit:
@@ -63,21 +64,24 @@ def _check_acceleration(ephemeris, spline, zero, limit):
 
 
 def run_of_orbit(ephemeris, target, given):
-    """{parameter: value} of the run of a pass: the first that climbs above horizon.LOWEST, from a whole second after
-    its rise until it sets; given: names of what is said already. Raises csv_table.TableError."""
-    said = 'target.track_file.start' in given
-    start = ephemeris.begin + target.track_file.start if said else None
+    """Return {parameter: value} of a run of the first pass that climbs above horizon.MIN_CULMINATION_DEG, from a whole
+    second after its rise until it sets.
+
+    given: names of the parameters that the scenario sets. Raises csv_table.TableError.
+    """
+    start_given = 'target.track_file.start' in given
+    start = ephemeris.begin + target.track_file.start if start_given else None
     begin, end = horizon.passage(ephemeris, target.station, start)
-    zero = begin if said or begin == ephemeris.begin else math.ceil(begin)
+    zero = begin if start_given or begin == ephemeris.begin else math.ceil(begin)
     duration = max(0.1, min(MAX_DURATION_S, math.floor(10.0 * (end - zero)) / 10.0))
-    (r, _) = horizon.enu(ephemeris, target.station, np.linspace(zero, zero + duration, 1
-                                                                + int(duration / MAX_KNOT_SPACING_S)))
+    times = np.linspace(zero, zero + duration, 1 + int(duration / MAX_KNOT_SPACING_S))
+    r, _ = horizon.enu(ephemeris, target.station, times)
     return {**_station(target), 'target.track_file.start': float(zero - ephemeris.begin), 'duration': duration,
             'receiver.reference_range': _upwards(np.nanmax(np.linalg.norm(r, axis=1)))}
 
 
 def of_directions(directions, target, _duration, _margin) -> Flight:
-    """The Flight of a directions.Directions, of all of its rows. Raises csv_table.TableError."""
+    """Return the Flight of all rows of a directions.Directions. Raises csv_table.TableError."""
     zero = directions.t[0] + target.track_file.start
     t = directions.t - zero
     if t[-1] <= 0.0:
@@ -96,14 +100,14 @@ def of_directions(directions, target, _duration, _margin) -> Flight:
 
 
 def run_of_directions(directions, target, _given):
-    """{parameter: value} of a run from the first row, or from start, to the last."""
+    """Return {parameter: value} of a run from the first row, or from track_file.start, to the last row."""
     last = directions.t[-1] - directions.t[0] - target.track_file.start
     return {**_station(target), 'duration': max(0.1, min(MAX_DURATION_S, (math.ceil(10.0 * last) - 1) / 10.0)),
             'receiver.reference_range': target.angle.range}
 
 
 def _station(target):
-    """The station as it is said: it is no matter of the file."""
+    """Return {parameter: value} of the station of the scenario, which the file does not change."""
     return {f'target.station.{name}': value for name, value in parameters.as_dict(target.station).items()}
 
 

@@ -1,8 +1,8 @@
 """Tables of directions: sat-nms program.txt, and CSV of time, azimuth and elevation.
 
-program.txt has lines of Julian date, azimuth and elevation [deg], more words are passed over. In a CSV the columns are
-found by the beginnings of their names, or are the three of a file whose first line is numbers already. A time is UTC
-as ISO 8601 throughout, or a number of seconds from anywhere.
+program.txt has lines of Julian date, azimuth and elevation [deg]; further words are passed over. The columns of a CSV
+are found by the first words of their names. If the first line consists of numbers, the file has exactly three columns.
+All times are UTC as ISO 8601, or all are seconds from any origin.
 """
 import array
 import csv
@@ -18,21 +18,29 @@ from tracking_receiver_sim.track import instant
 
 COLUMN_NAMES = {'time': ('time', 'utc', 'epoch', 'timestamp', 't'), 'azimuth': ('azimuth', 'az'),
                 'elevation': ('elevation', 'el')}
-"""{what: first words of the names of its column}."""
+"""{quantity: first words of the names of its column}."""
 ANGLE_LIMITS_DEG = {'azimuth': (-720.0, 720.0), 'elevation': (-90.0, 90.0)}
+"""{angle: (lowest, highest)} [deg]."""
 JULIAN_DATE_LIMITS = 2_400_000.5, 2_536_000.0
-"""Julian dates: until 2231."""
+"""Range of Julian dates: until 2231."""
 UNIX_EPOCH_JULIAN_DATE = 2_440_587.5
-"""Julian date of 1970."""
+"""Julian date of 1970-01-01T00:00 UTC."""
 MIN_ROWS = 4
+"""Least number of rows of a table."""
 MAX_STEP_DEG = 20.0
-"""Between two rows [deg]: what lies between is not known otherwise."""
+"""Largest angle between two rows [deg], because the path between distant rows is not known."""
 NAME_WORD_PATTERN = re.compile(r'[a-z]+|\d+')
 
 
 class Directions(typing.NamedTuple):
-    """A table of n rows. line: (n,) in the file; t: (n,) [s] after midnight, growing; azimuth, elevation: (n,) [rad];
-    midnight: UTC since 1970 [s] of t = 0, None where the file has no date; description: what the file is."""
+    """A table of n rows.
+
+        line                (n,) line in the file
+        t                   (n,) [s] after midnight, growing
+        azimuth, elevation  (n,) [rad]
+        midnight            UTC since 1970 [s] of t = 0, None if the file has no date
+        description         format and number of rows
+    """
     path: str
     line: np.ndarray
     t: np.ndarray
@@ -43,7 +51,7 @@ class Directions(typing.NamedTuple):
 
 
 def is_program(beginning):
-    """Whether the first lines of a file (bytes) are those of a program.txt."""
+    """Return True if the first lines of a file (bytes) are those of a program.txt."""
     for text in beginning.decode('ascii', 'replace').splitlines():
         words = text.split('#', 1)[0].split()
         if words:
@@ -53,14 +61,14 @@ def is_program(beginning):
 
 
 def is_table(beginning):
-    """Whether the first line of a file (bytes) is the head, or a row, of a table of directions as CSV."""
+    """Return True if the first line of a file (bytes) is the head, or a row, of a table of directions as CSV."""
     first = next(iter(beginning.decode('utf-8', 'replace').splitlines()), '').removeprefix('\ufeff')
     cells = first.split(',')
     return _columns(cells) is not None or _is_row(cells)
 
 
 def read_program(path, _wanted='') -> Directions:
-    """The table in a program.txt. Raises TableError."""
+    """Return the Directions of a program.txt. Raises TableError."""
     rows, limits = array.array('d'), {'Julian date': JULIAN_DATE_LIMITS, **ANGLE_LIMITS_DEG}
     for line, text in lines.read(path):
         text = text.split('#', 1)[0].rstrip()
@@ -73,7 +81,7 @@ def read_program(path, _wanted='') -> Directions:
 
 
 def read_table(path, _wanted='') -> Directions:
-    """The table in a CSV file. Raises TableError."""
+    """Return the Directions of a CSV file. Raises TableError."""
     rows, dated = array.array('d'), None
     with csv_table.stream(path) as stream:
         try:
@@ -107,7 +115,7 @@ def read_table(path, _wanted='') -> Directions:
 
 
 def _columns(cells):
-    """Where time, azimuth and elevation are by the names of the columns; None where one of them is not."""
+    """Return the indices of time, azimuth and elevation by the names of the columns; None if one is missing."""
     words = [NAME_WORD_PATTERN.findall(cell.lower()) or [''] for cell in cells]
     places = [next((i for i, name in enumerate(words) if name[0] in names and 'rad' not in name), None)
               for names in COLUMN_NAMES.values()]

@@ -1,4 +1,4 @@
-"""An orbit seen from a station: where it is, what of it a run may use, when it is above the horizon."""
+"""An orbit seen from a station: position, time range that a run may use, and passes above the horizon."""
 import numpy as np
 from scipy.optimize import brentq
 
@@ -9,45 +9,46 @@ from tracking_receiver_sim.ephemeris import frames, interpolation, states
 from tracking_receiver_sim.track import instant
 
 PASS_SEARCH_STEP_S = 20.0
-"""Time between two looks [s]; a pass that is shorter may be missed."""
+"""Step of the search for a pass [s]; a shorter pass may be missed."""
 PASS_SEARCH_BATCH_SIZE = 500
-"""Looks at once; no more are taken after the pass that is sought."""
+"""Number of steps computed at once; the search ends with the batch of the pass."""
 MIN_CULMINATION_DEG = 10.0
-"""Culmination [deg] below which a pass is not chosen: it stays where refraction and buildings are."""
+"""Least culmination of a chosen pass [deg]: a lower pass stays in the region of refraction and buildings."""
 SEGMENT_GAP_TOLERANCE_S = 1e-3
-"""Time between two segments [s] that is no gap."""
+"""Largest time between two segments [s] that does not count as a gap."""
 
 
 def enu(ephemeris, station, t):
-    """ENU position [m] and velocity against the earth [m/s], (n, 3) each, at t (n,); NaN where no segment holds t."""
+    """Return ENU position [m] and velocity against the earth [m/s], (n, 3) each, at t (n,); NaN outside all
+    segments."""
     r, v = np.full((2, len(t), 3), np.nan)
     for segment in reversed(ephemeris.segments):
-        mine = (t >= segment.begin - SEGMENT_GAP_TOLERANCE_S) & (t <= segment.end + SEGMENT_GAP_TOLERANCE_S)
-        if mine.any():
-            inside = t[mine].clip(segment.t[0], segment.t[-1])
-            r[mine], v[mine] = frames.earth_fixed(segment.frame, ephemeris.midnight + inside,
-                                                  *interpolation.at(segment, inside))
+        covered = (t >= segment.begin - SEGMENT_GAP_TOLERANCE_S) & (t <= segment.end + SEGMENT_GAP_TOLERANCE_S)
+        if covered.any():
+            inside = t[covered].clip(segment.t[0], segment.t[-1])
+            r[covered], v[covered] = frames.earth_fixed(segment.frame, ephemeris.midnight + inside,
+                                                        *interpolation.at(segment, inside))
     origin, to_enu = station_frame(station)
     return turned(to_enu, r - origin), turned(to_enu, v)
 
 
 def elevation(ephemeris, station, t):
-    """[rad] (n,) at t (n,); NaN where no segment holds t."""
+    """Return the elevation [rad] (n,) at t (n,); NaN outside all segments."""
     east, north, up = enu(ephemeris, station, np.atleast_1d(t))[0].T
     return arctan2(up, np.hypot(east, north))
 
 
 def require(ephemeris, begin, end):
-    """Raise csv_table.TableError where an orbit does not tell all of the time from begin to end [s]."""
-    def said(t):
+    """Raise csv_table.TableError if an orbit does not cover all of the time from begin to end [s]."""
+    def utc(t):
         return instant.iso(ephemeris.midnight + t)
 
     first, last = ephemeris.segments[0], ephemeris.segments[-1]
     if begin < ephemeris.begin - SEGMENT_GAP_TOLERANCE_S or end > ephemeris.end + SEGMENT_GAP_TOLERANCE_S:
         line = first.line[0] if begin < ephemeris.begin else last.line[-1]
-        raise csv_table.TableError(f'{ephemeris.path}: line {line}: the run from {said(begin)} to {said(end)} is not '
-                                   f'all inside the file, which may be used from {said(ephemeris.begin)} to '
-                                   f'{said(ephemeris.end)}')
+        raise csv_table.TableError(f'{ephemeris.path}: line {line}: the run from {utc(begin)} to {utc(end)} must be '
+                                   f'inside the usable time of the file, {utc(ephemeris.begin)} to '
+                                   f'{utc(ephemeris.end)}')
     gaps = [(before.end, after.begin, after.line[0])
             for before, after in zip(ephemeris.segments, ephemeris.segments[1:])]
     for segment in ephemeris.segments:
@@ -55,15 +56,15 @@ def require(ephemeris, begin, end):
     for since, until, line in gaps:
         if until - since > SEGMENT_GAP_TOLERANCE_S and begin < until and end > since:
             raise csv_table.TableError(f'{ephemeris.path}: line {line}: gap of {until - since:g} s above this state, '
-                                       f'in the run from {said(begin)} to {said(end)}')
+                                       f'in the run from {utc(begin)} to {utc(end)}')
 
 
 def passage(ephemeris, station, start=None):
-    """(t of the beginning, t of the end) of the first pass that climbs above MIN_CULMINATION_DEG, from rise to set or
-    as far as the
-    file goes; start: t at which the run begins in any case, None: the run begins with the pass.
+    """Return (t of the beginning, t of the end) of the first pass that climbs above MIN_CULMINATION_DEG, from rise to
+    set or as far as the file goes.
 
-    Raises csv_table.TableError where there is none.
+    start: t at which the run begins; None: the run begins with the pass. Raises csv_table.TableError if there is no
+    such pass.
     """
     t = np.append(np.arange(ephemeris.begin, ephemeris.end, PASS_SEARCH_STEP_S), ephemeris.end)
     seen = np.full(len(t), np.nan)
@@ -75,15 +76,17 @@ def passage(ephemeris, station, start=None):
             ended = j < at + PASS_SEARCH_BATCH_SIZE or at + PASS_SEARCH_BATCH_SIZE >= len(t)
             if ended and np.degrees(seen[i:j].max()) >= MIN_CULMINATION_DEG and (start is None or t[j - 1] > start):
                 return _ends(ephemeris, station, t, seen, (i, j), start)
-    raise csv_table.TableError(f'{ephemeris.path}: the orbit does not climb above {MIN_CULMINATION_DEG:g} deg over latitude '
-                               f'{station.latitude_deg:g}, longitude {station.longitude_deg:g} deg from '
+    raise csv_table.TableError(f'{ephemeris.path}: the orbit does not climb above {MIN_CULMINATION_DEG:g} deg at '
+                               f'latitude {station.latitude_deg:g}, longitude {station.longitude_deg:g} deg from '
                                f'{instant.iso(ephemeris.midnight + (ephemeris.begin if start is None else start))} to '
                                f'{instant.iso(ephemeris.midnight + ephemeris.end)}')
 
 
 def _ends(ephemeris, station, t, seen, pass_of, start):
-    """(rise, or start where that is said, and set) of a pass at the looks [i, j), to a millisecond where the looks
-    beside it are below the horizon."""
+    """Return (rise, or start if given, and set) of a pass in the search steps [i, j).
+
+    Rise and set are exact to a millisecond if the steps before and after the pass are below the horizon.
+    """
     i, j = pass_of
     rise, down = t[i] if start is None else start, t[j - 1]
     if start is None and i and np.isfinite(seen[i - 1]):

@@ -1,4 +1,5 @@
-"""Lines of a text file with their numbers, read so that no file hangs or fills the process; words, numbers, times."""
+"""Lines of a text file with their line numbers, and the words, numbers and times in them. Limits on length and count
+keep every file from blocking the process or filling its memory."""
 import contextlib
 import datetime
 import functools
@@ -7,23 +8,23 @@ import re
 from pedestal_common.text_files import csv_table
 
 MAX_LINE_CHARS = 1024
-"""Characters of a line; the CCSDS books allow 254."""
+"""Largest number of characters of a line; the CCSDS books allow 254."""
 
 WORD_PATTERN = re.compile(r'\S+')
 NUMBER_PATTERN = re.compile(r'[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?', re.ASCII)
 CCSDS_TIME_PATTERN = re.compile(r'(\d{4}-(?:\d\d-\d\d|\d{3}))[T ](\d\d):(\d\d):(\d\d)(?:\.(\d{1,18}))?Z?', re.ASCII)
 YEAR_LIMITS = 1957, 2199
-"""Of times."""
+"""Range of the years of a time."""
 
 
 def wrong(path, line, column, problem):
-    """The TableError at a place in a file, both counted from 1."""
+    """Return a TableError at a line and column of a file, both counted from 1."""
     return csv_table.TableError(f'{path}: line {line}, column {column}: {problem}')
 
 
 def read(path, encoding='ASCII'):
-    """Iterator of (number, text) of the lines of a file that are not empty. Raises TableError for one that is too long
-    or in another encoding."""
+    """Yield (number, text) of each line of a file that is not empty. Raises TableError for a line that is too long or
+    in another encoding."""
     with csv_table.stream(path) as stream:
         number = 0
         while line := stream.readline(MAX_LINE_CHARS + 1):
@@ -35,20 +36,22 @@ def read(path, encoding='ASCII'):
             try:
                 text = line.decode(encoding).rstrip()
             except UnicodeDecodeError as error:
-                raise wrong(path, number, error.start + 1, f'byte {line[error.start]:#04x} is no {encoding}') from None
+                raise wrong(path, number, error.start + 1,
+                            f'byte {line[error.start]:#04x}: must be {encoding}') from None
             if text:
                 yield number, text
 
 
 def numbers(path, line, text, limits):
-    """The numbers of a text {name: (low, high)}, a name for each, words beyond them passed over. Raises TableError."""
+    """Return the numbers in a text; limits: {name: (low, high)} of each, further words are passed over. Raises
+    TableError."""
     if '_' not in text:
         with contextlib.suppress(ValueError):
             values = [float(word) for word in text.split()[:len(limits)]]
             if len(values) == len(limits) and all(
                     low <= value <= high for value, (low, high) in zip(values, limits.values())):
                 return values
-    values, words = [], WORD_PATTERN.finditer(text)  # word by word, to say which is wrong
+    values, words = [], WORD_PATTERN.finditer(text)  # word by word, so that the error names the wrong word
     for name, (low, high) in limits.items():
         word = next(words, None)
         if word is None:
@@ -63,8 +66,8 @@ def numbers(path, line, text, limits):
 
 
 def instant(path, line, column, name, text):
-    """(days since 1970, seconds of the day) of a time as CCSDS writes it, YYYY-MM-DDThh:mm:ss or YYYY-DDDThh:mm:ss, in
-    whatever system. Raises TableError."""
+    """Return (days since 1970, seconds of the day) of a CCSDS time, YYYY-MM-DDThh:mm:ss or YYYY-DDDThh:mm:ss, in any
+    time system. Raises TableError."""
     match = CCSDS_TIME_PATTERN.fullmatch(text)
     try:
         date, hours, minutes, seconds, fraction = match.groups() if match else [''] * 5
@@ -80,7 +83,7 @@ def instant(path, line, column, name, text):
 
 @functools.lru_cache(64)
 def _days(text):
-    """Days since 1970 of YYYY-MM-DD or YYYY-DDD. Raises ValueError."""
+    """Return the days since 1970 of YYYY-MM-DD or YYYY-DDD. Raises ValueError."""
     year, *rest = map(int, text.split('-'))
     date = (datetime.date(year, *rest) if len(rest) == 2 else
             datetime.date(year, 1, 1) + datetime.timedelta(days=rest[0] - 1))
@@ -90,6 +93,6 @@ def _days(text):
 
 
 def text(day, second):
-    """ISO 8601 to the microsecond of a time as `instant` gives it."""
+    """Return ISO 8601 to the microsecond of a time in the form that `instant` returns."""
     begin = datetime.datetime(1970, 1, 1) + datetime.timedelta(days=day)
     return (begin + datetime.timedelta(microseconds=round(second * 1e6))).isoformat(timespec='microseconds')

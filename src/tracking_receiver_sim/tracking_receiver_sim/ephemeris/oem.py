@@ -10,13 +10,14 @@ from tracking_receiver_sim.ephemeris import frames, lines, states
 ENTRY_PATTERN = re.compile(r'([A-Z0-9_]+)( *= *)(.*)', re.ASCII)
 FILE_SIGNATURE = b'CCSDS_OEM_VERS'
 STATE_LIMITS = {**dict.fromkeys('xyz', (-2e6, 2e6)), **dict.fromkeys(('vx', 'vy', 'vz'), (-100.0, 100.0))}
-"""Of the numbers in a line of data [km], [km/s]."""
+"""{number in a line of data: (lowest, highest)} [km], [km/s]."""
 MAX_SEGMENTS = 1000
+"""Largest number of segments of a file."""
 REQUIRED_KEYWORDS = ('OBJECT_NAME', 'OBJECT_ID', 'CENTER_NAME', 'REF_FRAME', 'TIME_SYSTEM')
 
 
 class _Entry(str):
-    """The value of a keyword; line, column: where it stands."""
+    """The value of a keyword; line, column: its place in the file."""
 
     def __new__(cls, value, line, column):
         entry = super().__new__(cls, value)
@@ -25,8 +26,10 @@ class _Entry(str):
 
 
 def read(path, wanted='') -> states.Ephemeris:
-    """The orbit of one object in an OEM; wanted: its name or its international designator, '' where there is but one.
-    Raises TableError."""
+    """Return the Ephemeris of one object in an OEM. Raises TableError.
+
+    wanted: name or international designator of the object; it may be empty for a file of one object.
+    """
     objects, midnight = {}, None
     for meta, rows in _blocks(path):
         names = meta['OBJECT_NAME'].upper(), meta['OBJECT_ID'].upper()
@@ -34,7 +37,7 @@ def read(path, wanted='') -> states.Ephemeris:
             midnight = int(rows[0, 1]) if len(rows) else 0
         objects.setdefault(names, []).append((meta, rows))
     if not objects:
-        raise csv_table.TableError(f'{path}: no META_START in it')
+        raise csv_table.TableError(f'{path}: META_START is missing')
     wanted = wanted.strip().upper()
     found = [names for names in objects if not wanted or wanted in names]
     if len(found) != 1:
@@ -54,8 +57,7 @@ def read(path, wanted='') -> states.Ephemeris:
 
 
 def _blocks(path):
-    """Iterator of ({keyword: _Entry}, table (n, 9)) of the segments; a row is line, day, second, numbers of
-    STATE_LIMITS."""
+    """Yield ({keyword: _Entry}, table (n, 9)) of each segment; a row is line, day, second, numbers of STATE_LIMITS."""
     meta, rows, begun, state, count = {}, array.array('d'), 0, 'header', 0
     for line, text in lines.read(path):
         word = text.split(None, 1)[0]
@@ -109,7 +111,8 @@ def _segment(path, meta, rows, midnight):
                           f'REF_FRAME = {meta["REF_FRAME"]!s:.40}: must be {frames.names()}')
     if 'REF_FRAME_EPOCH' in meta:
         entry = meta['REF_FRAME_EPOCH']
-        raise lines.wrong(path, entry.line, entry.column, 'REF_FRAME_EPOCH: must be absent, frames are of date')
+        raise lines.wrong(path, entry.line, entry.column, 'REF_FRAME_EPOCH: must be absent, because only frames of '
+                          'date are supported')
     _one_of(path, meta, 'TIME_SYSTEM', tuple(frames.TIME_SYSTEM_OFFSETS_S))
     ahead = frames.ahead_of_utc(system, midnight)
 
@@ -124,7 +127,7 @@ def _segment(path, meta, rows, midnight):
 
 
 def _interpolation(path, meta):
-    """(method, degree), '' and None where the file says none."""
+    """Return (method, degree); '' and None if the file gives none."""
     if 'INTERPOLATION' not in meta:
         return '', None
     method, degree = _one_of(path, meta, 'INTERPOLATION', states.INTERPOLATION_METHODS), None

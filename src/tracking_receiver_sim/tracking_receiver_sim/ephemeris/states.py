@@ -1,4 +1,4 @@
-"""An orbit as a file tells it: states in segments, each with its frame and the polynomial that joins its states."""
+"""Orbit of a file: states in segments, each with its frame and the polynomial that joins its states."""
 import typing
 
 import numpy as np
@@ -7,30 +7,33 @@ from pedestal_common.text_files import csv_table
 
 INTERPOLATION_METHODS = ('HERMITE', 'LAGRANGE', 'LINEAR')
 DEGREE_LIMITS = 1, 19
+"""Range of the degree of a polynomial."""
 DEFAULT_INTERPOLATION = 'HERMITE', 7
-"""Interpolation where the file says none."""
+"""Method and degree of the interpolation if the file gives none."""
 
 RADIUS_LIMITS_M = 6.3e6, 2e9
-"""Distance from the centre of the earth [m]: what is lower is in other units."""
+"""Range of the distance from the centre of the earth [m]; a lower value points to another unit."""
 
 GAP_STEP_RATIO = 3.0
-"""A step that is longer than so many of its neighbours is a gap."""
+"""Ratio of a step in time to both of its neighbours above which the step is a gap."""
 
 
 def gaps(t):
-    """Which of the n - 1 steps between times (n,) are more than GAP_STEP_RATIO times as long as both of their
-    neighbours."""
+    """Return a mask (n - 1,): True for steps between times (n,) that exceed GAP_STEP_RATIO times both neighbours."""
     step = np.diff(t)
     longest = np.maximum(np.append(0.0, step[:-1]), np.append(step[1:], 0.0))
     return (step > GAP_STEP_RATIO * longest) & (longest > 0.0)
 
 
 class Segment(typing.NamedTuple):
-    """States that one polynomial after the other joins.
+    """States that consecutive polynomials join.
 
-    line: (n,) in the file; t: (n,) [s], growing; r, v: (n, 3) [m], [m/s], v None where the file has none; frame: a
-    name that frames.earth_fixed knows; method: HERMITE or LAGRANGE; degree: of the polynomial; begin, end: t between
-    which it may be used.
+        line        (n,) line in the file
+        t           (n,) [s], growing
+        r, v        (n, 3) [m], [m/s]; v is None if the file has no velocities
+        frame       name of a frame that frames.earth_fixed supports
+        method      HERMITE or LAGRANGE, with the degree of the polynomial
+        begin, end  usable range of t
     """
     line: np.ndarray
     t: np.ndarray
@@ -44,13 +47,13 @@ class Segment(typing.NamedTuple):
 
     @property
     def nodes(self):
-        """States of a polynomial."""
+        """Number of states of a polynomial."""
         return (self.degree + 1) // 2 if self.method == 'HERMITE' else self.degree + 1
 
 
 class Ephemeris(typing.NamedTuple):
-    """The orbit of one object. midnight: UTC since 1970 [s] of t = 0; segments: in order of time; description: what
-    the file is."""
+    """The orbit of one object. midnight: UTC since 1970 [s] of t = 0; segments: in order of time; description: format,
+    number of states, frame and interpolation."""
     path: str
     midnight: float
     segments: tuple
@@ -58,23 +61,23 @@ class Ephemeris(typing.NamedTuple):
 
     @property
     def begin(self):
-        """t of the first state that may be used."""
+        """First usable t."""
         return self.segments[0].begin
 
     @property
     def end(self):
-        """t of the last state that may be used."""
+        """Last usable t."""
         return self.segments[-1].end
 
 
 def segment(path, place, table, frame, method, degree, begin=None, end=None) -> Segment:
-    """A Segment of a table (n, 8) of line, t, x, y, z [m], vx, vy, vz [m/s]; (n, 5) without velocities.
+    """Return a Segment of a table (n, 8) of line, t, x, y, z [m], vx, vy, vz [m/s]; (n, 5) without velocities.
 
-    place: the line where the segment begins; degree: None where the file says none. Raises TableError where time does
-    not grow, a state is no orbit about the earth, or the states are too few.
+    place: first line of the segment; method, degree: '' and None if the file gives none. Raises TableError if time
+    does not grow, a state is outside RADIUS_LIMITS_M, or the states are too few.
     """
     if not len(table):
-        raise csv_table.TableError(f'{path}: line {place}: no state in the segment that begins here')
+        raise csv_table.TableError(f'{path}: line {place}: the segment that begins here has no state')
     line, t, r = table[:, 0].astype(int), table[:, 1], table[:, 2:5]
     back = np.flatnonzero(~(np.diff(t) > 0.0))
     if back.size:
@@ -86,16 +89,18 @@ def segment(path, place, table, frame, method, degree, begin=None, end=None) -> 
     if outside.size:
         i = int(outside[0])
         raise csv_table.TableError(f'{path}: line {line[i]}: {radius[i] / 1e3:g} km from the centre of the earth, '
-                                   f'must be {RADIUS_LIMITS_M[0] / 1e3:g} to {RADIUS_LIMITS_M[1] / 1e3:g} km: in other units?')
+                                   f'must be {RADIUS_LIMITS_M[0] / 1e3:g} to {RADIUS_LIMITS_M[1] / 1e3:g} km; check '
+                                   'the unit')
     v = table[:, 5:8] if table.shape[1] == 8 else None
     chosen = (method or (DEFAULT_INTERPOLATION[0] if v is not None else 'LAGRANGE')).upper()
-    made = Segment(line, t, r, v, frame, 'LAGRANGE' if chosen == 'LINEAR' else chosen, 1, begin=max(
-        t[0], t[0] if begin is None else begin), end=min(t[-1], t[-1] if end is None else end))
+    result = Segment(line, t, r, v, frame, 'LAGRANGE' if chosen == 'LINEAR' else chosen, 1,
+                     begin=max(t[0], t[0] if begin is None else begin),
+                     end=min(t[-1], t[-1] if end is None else end))
     if degree is None:
-        most = 2 * len(t) - 1 if made.method == 'HERMITE' else len(t) - 1
-        degree = 1 if chosen == 'LINEAR' else min(DEFAULT_INTERPOLATION[1], max(1, most))
-    made = made._replace(degree=1 if chosen == 'LINEAR' else degree)
-    if len(t) < max(2, made.nodes):
+        max_degree = 2 * len(t) - 1 if result.method == 'HERMITE' else len(t) - 1
+        degree = min(DEFAULT_INTERPOLATION[1], max(1, max_degree))
+    result = result._replace(degree=1 if chosen == 'LINEAR' else degree)
+    if len(t) < max(2, result.nodes):
         raise csv_table.TableError(f'{path}: line {place}: {len(t)} states in the segment that begins here, must be '
-                                   f'at least {max(2, made.nodes)} for {made.method} of degree {made.degree}')
-    return made
+                                   f'at least {max(2, result.nodes)} for {result.method} of degree {result.degree}')
+    return result

@@ -1,8 +1,7 @@
 """STK ephemeris files (.e): EphemerisTimePosVel, EphemerisTimePosVelAcc and EphemerisTimePos about the earth.
 
-Keywords are read without regard to case, as STK does. Two states of one instant end a segment and begin the next.
-Blocks inside of the ephemeris (SegmentBoundaryTimes and the like) and what follows its states (covariance) are passed
-over.
+The case of keywords does not matter, as in STK. Two states of one instant end a segment and begin the next. Blocks
+inside the ephemeris (for example SegmentBoundaryTimes) and the covariance after the states are passed over.
 """
 import array
 import datetime
@@ -15,24 +14,27 @@ from tracking_receiver_sim.ephemeris import lines, states
 
 FILE_SIGNATURE_PATTERN = re.compile(rb'stk\.v\.\d+', re.IGNORECASE)
 FRAME_NAMES = {'fixed': 'ITRF', 'j2000': 'EME2000', 'icrf': 'ICRF', 'temeofdate': 'TEME', 'trueofdate': 'TOD'}
-"""{CoordinateSystem: our name}."""
+"""{CoordinateSystem: frame of frames.earth_fixed}."""
 METRES_PER_UNIT = {'meters': 1.0, 'kilometers': 1000.0}
+"""{DistanceUnit: its length [m]}."""
 METHOD_NAMES = {'lagrange': 'LAGRANGE', 'hermite': 'HERMITE'}
-"""{InterpolationMethod: our name}; LagrangeVOP, which interpolates what a Kepler orbit leaves over, is refused."""
+"""{InterpolationMethod: method of states.Segment}; LagrangeVOP, which interpolates the difference to a Kepler orbit,
+is refused."""
 STATE_KEYWORDS = {'ephemeristimepos': False, 'ephemeristimeposvel': True, 'ephemeristimeposvelacc': True}
-"""{keyword before the states: whether they have velocities}."""
+"""{keyword before the states: True if the states have velocities}."""
 GEODETIC_MARK = 'lla'
-"""In the keyword before states in latitude, longitude and height."""
+"""Part of the keyword before states in latitude, longitude and height."""
 READ_KEYWORDS = ('numberofephemerispoints', 'scenarioepoch', 'interpolationmethod', 'interpolationsamplesm1',
                  'interpolationorder', 'centralbody', 'coordinatesystem', 'distanceunit')
 IGNORED_KEYWORDS = ('blockingfactor', 'coordinatesystemepoch', 'messagelevel', 'timeformat')
 MAX_SEGMENTS = 1000
+"""Largest number of segments of a file."""
 MONTH_NAMES = 'jan feb mar apr may jun jul aug sep oct nov dec'.split()
 EPOCH_PATTERN = re.compile(r'(\d{1,2}) ([a-z]{3})[a-z]* (\d{4}) (\d{1,2}):(\d\d):(\d\d(?:\.\d*)?)', re.ASCII)
 
 
 def read(path, _wanted='') -> states.Ephemeris:
-    """The orbit in an STK ephemeris file. Raises TableError."""
+    """Return the Ephemeris of an STK ephemeris file. Raises TableError."""
     head, limits, rows, skipped = {}, None, array.array('d'), ''
     for line, text in lines.read(path):
         text = text.split('#', 1)[0].rstrip()
@@ -54,19 +56,21 @@ def read(path, _wanted='') -> states.Ephemeris:
             head[words[0]] = line, len(text) - len(value) + 1, value.strip('"')
         elif words[0] != 'begin':
             column = len(text) - len(text.lstrip()) + 1
-            geodetic = 'states in latitude, longitude and height are not read: ' if GEODETIC_MARK in words[0] else ''
+            geodetic = ('states in latitude, longitude and height are not supported: ' if GEODETIC_MARK in words[0]
+                        else '')
             raise lines.wrong(path, line, column,
                               f'{words[0]!r:.40}: {geodetic}must be one of {", ".join(STATE_KEYWORDS)}, '
-                              'or a keyword before them')
+                              'or a keyword of the header')
     if not limits:
-        raise csv_table.TableError(f'{path}: none of {", ".join(STATE_KEYWORDS)} in it')
+        raise csv_table.TableError(f'{path}: the keyword of the states is missing, must be one of '
+                                   f'{", ".join(STATE_KEYWORDS)}')
     table = np.array(rows).reshape(-1, 1 + len(limits))
     table[:, 2:] *= unit
     return _ephemeris(path, head, table)
 
 
 def _limits(path, head, with_velocity):
-    """(unit [m], {name of a number in a line: its limits})."""
+    """Return (unit [m], {name of a number in a line: (lowest, highest)})."""
     unit = _choice(path, head, 'distanceunit', METRES_PER_UNIT, 'meters')
     limits = {'time': (-1e9, 1e9), **dict.fromkeys('xyz', (-2e9 / unit, 2e9 / unit))}
     if with_velocity:
@@ -83,8 +87,8 @@ def _ephemeris(path, head, table):
     method = _choice(path, head, 'interpolationmethod', METHOD_NAMES, 'lagrange')
     if method == 'HERMITE' and table.shape[1] == 5:
         place = head['interpolationmethod']
-        raise lines.wrong(path, place[0], place[1], 'InterpolationMethod = Hermite: must be Lagrange, the states have '
-                          'no velocity')
+        raise lines.wrong(path, place[0], place[1], 'InterpolationMethod = Hermite: must be Lagrange, because the '
+                          'states have no velocity')
     degree = _degree(path, head, method)
     table[:, 1] += second
     ends = np.flatnonzero(np.diff(table[:, 1]) == 0.0) + 1
@@ -98,7 +102,7 @@ def _ephemeris(path, head, table):
 
 
 def _epoch(path, line, column, text):
-    """(midnight since 1970 [s], seconds past it) of a time as STK writes it."""
+    """Return (midnight since 1970 [s], seconds of the day) of a time in the form of STK."""
     match = EPOCH_PATTERN.fullmatch(' '.join(text.lower().split()))
     try:
         day, month, year, hours, minutes, seconds = match.groups()
@@ -120,7 +124,8 @@ def _choice(path, head, name, choices, default):
 
 
 def _degree(path, head, method):
-    """Of the polynomial, by the number of its states: InterpolationSamplesM1 is that number less 1."""
+    """Return the degree of the polynomial, None if the file gives none; InterpolationSamplesM1 is the number of its
+    states less 1."""
     name = next((name for name in ('interpolationsamplesm1', 'interpolationorder') if name in head), '')
     if not name:
         return None
@@ -129,6 +134,6 @@ def _degree(path, head, method):
     samples = int(text) + 1 if text.isdecimal() and len(text) < 4 else 0
     degree = 2 * samples - 1 if method == 'HERMITE' and name == 'interpolationsamplesm1' else samples - 1
     if not low <= degree <= high or method == 'HERMITE' and degree % 2 == 0:
-        raise lines.wrong(path, line, column, f'{name} = {text!r:.20}: must make a polynomial of a degree from {low} '
-                          f'to {high}')
+        raise lines.wrong(path, line, column, f'{name} = {text!r:.20}: must give a polynomial of a degree from {low} '
+                          f'to {high}{", odd for Hermite" if method == "HERMITE" else ""}')
     return degree

@@ -1,10 +1,10 @@
-"""Where a target is seen: refracted by the air, and as it was when the wave left it.
+"""Apparent position of a target: with refraction by the air, and at the time when the wave left it.
 
-The refraction is the VLBI Field System's (file poclb/refrwn.c, for radio waves in moist air, as katpoint gives it):
+The refraction is that of the VLBI Field System (file poclb/refrwn.c, for radio waves in moist air, also in katpoint):
 
-    R = 5.7295787e-5 N (cot E - 42.5 / (E + 0.4)^2.64) - 40 / (E + 2.7)^4        R, E in deg, E of the target as it is
+    R = 5.7295787e-5 N (cot E - 42.5 / (E + 0.4)^2.64) - 40 / (E + 2.7)^4        R, E in deg, E the true elevation
 
-A line of light needs r / c: a target at a velocity v is seen v r / c behind.
+The wave needs the time r / c: the apparent position of a target with velocity v is v r / c behind the true one.
 """
 import math
 
@@ -16,19 +16,19 @@ SPEED_OF_LIGHT_M_S = 299792458.0
 """Speed of light [m/s]."""
 
 MIN_ELEVATION_RAD = math.radians(1.0)
-"""Below this elevation the refraction stays as it is there."""
+"""Elevation [rad] below which the refraction stays constant."""
 
 PATH_DTYPE = np.dtype([('refractivity', 'f8'), ('light_time', 'i8')], align=True)
 
 
 def constants(p) -> np.ndarray:
-    """PATH (1,) of PathParameters."""
+    """Return PATH_DTYPE (1,) of PathParameters."""
     return np.array([(p.refractivity, p.light_time)], PATH_DTYPE)
 
 
 @compiled
 def refraction(N, elevation):
-    """(R [rad], its derivative by the elevation) at the elevation [rad] of a target as it is."""
+    """Return (R [rad], its derivative by the elevation) at a true elevation [rad]."""
     E = min(max(elevation, MIN_ELEVATION_RAD), 0.5 * math.pi)
     degrees, per_N = math.degrees(E), 0.57295787e-4 * N
     bent = per_N * (1.0 / math.tan(E) - 42.5 / (degrees + 0.4)**2.64) - 40.0 / (degrees + 2.7)**4
@@ -39,7 +39,7 @@ def refraction(N, elevation):
 
 @compiled
 def _bent(N, r, v):
-    """Vector [m] and velocity [m/s], ENU from the antenna, turned up by the refraction."""
+    """Return a vector [m] and its velocity [m/s], ENU from the antenna, turned up by the refraction."""
     (e, n, u), (ve, vn, vu) = r, v
     h = math.hypot(e, n)
     if h == 0.0:
@@ -58,8 +58,8 @@ def _bent(N, r, v):
 
 @compiled
 def seen(c, r, v):
-    """(vector [m], its velocity [m/s]), ENU from the antenna, at which a target at r with the velocity v is seen;
-    three floats each; c: record of PATH."""
+    """Return the apparent (vector [m], velocity [m/s]) of a target at r with velocity v, ENU from the antenna; three
+    floats each; c: record of PATH_DTYPE."""
     if c.light_time != 0:
         t = math.sqrt(r[0] * r[0] + r[1] * r[1] + r[2] * r[2]) / SPEED_OF_LIGHT_M_S
         r = r[0] - v[0] * t, r[1] - v[1] * t, r[2] - v[2] * t
@@ -75,7 +75,7 @@ def _all_seen(c, r, v, out):
 
 
 def all_seen(p, r, v):
-    """Vectors (n, 3) [m] at which targets at r (n, 3) with velocities v (n, 3) are seen through PathParameters."""
+    """Return the apparent vectors (n, 3) [m] of targets at r (n, 3) with velocities v (n, 3), for PathParameters."""
     out = np.empty(r.shape)
     _all_seen(constants(p), np.ascontiguousarray(r), np.ascontiguousarray(v), out)
     return out

@@ -1,12 +1,12 @@
-"""The image of a target below the horizon: a wave that came off level ground.
+"""The image of a target below the horizon: a wave that level ground reflects.
 
-A far target at the elevation E has its image at -E; the wave is 2 h sin E longer under way, is turned round (-1, both
-polarisations at low angles) and loses amplitude on rough ground:
+A far target at the elevation E has its image at -E. The path of the reflected wave is longer by 2 h sin E. The
+reflection inverts the wave (-1, both polarisations at low angles), and rough ground reduces its amplitude:
 
     Gamma = -rho exp(-2 (2 pi sigma_h sin E / lambda)^2) exp(-j 4 pi h sin E / lambda)
 
 Roughness: W. S. Ament, Proceedings of the IRE 41 (1953) 142; the geometry: Barton, Modern Radar System Analysis,
-chapter on multipath. The wave scattered in all directions, and the curvature of the earth, are left out.
+chapter on multipath. The model omits diffuse scattering and the curvature of the earth.
 """
 import math
 from collections import namedtuple
@@ -17,21 +17,21 @@ from pedestal_common.compiled import compiled
 from pedestal_common.geometry.line_of_sight import offsets, to_deck
 
 MULTIPATH_DTYPE = np.dtype([('reflection', 'f8'), ('rough', 'f8'), ('phase', 'f8')], align=True)
-"""rho; 2 pi sigma_h / lambda; 4 pi h / lambda."""
+"""Constants of the image. reflection: rho; rough: 2 pi sigma_h / lambda; phase: 4 pi h / lambda."""
 
 Image = namedtuple('Image', 'real imaginary dX dE')
-"""Gamma, and where the image is off the beam: cross-elevation, elevation [rad]."""
+"""Image of a target. real, imaginary: Gamma; dX, dE: cross-elevation and elevation of the image off the beam [rad]."""
 
 
 def constants(p) -> np.ndarray:
-    """MULTIPATH_DTYPE (1,) of MultipathParameters."""
+    """Return MULTIPATH_DTYPE (1,) of MultipathParameters."""
     per_m = 2.0 * math.pi / p.wavelength
     return np.array([(p.reflection, per_m * p.roughness, 2.0 * per_m * p.height)], MULTIPATH_DTYPE)
 
 
 @compiled
 def image(c, i, e, n, u):
-    """The Image of a target seen at an ENU vector from the antenna; i: beam and attitude (receiver.INPUTS)."""
+    """Return the Image of a target at an apparent ENU vector from the antenna; i: record of receiver.INPUTS_DTYPE."""
     if c.reflection == 0.0 or u <= 0.0:
         return Image(0.0, 0.0, 0.0, 0.0)
     sin_E = u / math.sqrt(e * e + n * n + u * u)

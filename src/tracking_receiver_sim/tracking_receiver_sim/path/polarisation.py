@@ -1,15 +1,15 @@
-"""How much of a wave an antenna takes whose polarisation is another one.
+"""Polarisation efficiency: the part of the power of a wave that an antenna of another polarisation receives.
 
     eta = 1/2 + (4 r_1 r_2 + (r_1^2 - 1) (r_2^2 - 1) cos(2 dtau)) / (2 (r_1^2 + 1) (r_2^2 + 1))
 
 r_1, r_2: signed axial ratios of both ellipses, dtau the angle between their long axes. Stutzman, Polarization in
-Electromagnetic Systems, chapter on antenna-wave interaction; the same for circular, elliptical and linear ones.
+Electromagnetic Systems, chapter on antenna-wave interaction; for circular, elliptical and linear polarisation.
 """
 import math
 
 
 def efficiency(wave, antenna):
-    """eta of two PolarisationParameters: 1 where they are alike."""
+    """Return eta of two PolarisationParameters; 1 if both are equal."""
     r_1, r_2 = (10.0**(0.05 * p.axial_ratio_db) * (1.0 if p.sense == 'right' else -1.0) for p in (wave, antenna))
     return max(0.5 + (4.0 * r_1 * r_2 + (r_1**2 - 1.0) * (r_2**2 - 1.0) * math.cos(2.0 * (wave.tilt - antenna.tilt)))
                / (2.0 * (r_1**2 + 1.0) * (r_2**2 + 1.0)), 0.0)

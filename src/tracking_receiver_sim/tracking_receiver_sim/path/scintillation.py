@@ -1,10 +1,12 @@
 """Scintillation: turbulence of the air makes level and direction of the wave wander, a first-order Gauss-Markov
 process each.
 
-Level [dB]: sigma at the elevation E is that of the zenith over sin^1.2 E (ITU-R P.618, section 2.4.1, with its
-factors of humidity, frequency and aperture in the value at the zenith). Direction: its variance goes with the
-length of the path through the turbulence, so sigma with 1 / sqrt(sin E) (Tatarskii, The Effects of the Turbulent
-Atmosphere on Wave Propagation, angle of arrival: 2.91 D^(-1/3) times the integral of C_n^2 along the path).
+Level [dB]: sigma at the elevation E is that of the zenith over sin^1.2 E (ITU-R P.618, section 2.4.1). The value at
+the zenith contains the factors of humidity, frequency and aperture.
+
+Direction: the variance is proportional to the length of the path through the turbulence, so sigma is proportional to
+1 / sqrt(sin E). Tatarskii, The Effects of the Turbulent Atmosphere on Wave Propagation, angle of arrival:
+2.91 D^(-1/3) times the integral of C_n^2 along the path.
 """
 import math
 
@@ -13,27 +15,28 @@ import numpy as np
 from pedestal_common.compiled import compiled
 
 NORMALS_PER_STEP = 3
-"""Standard normals of a step: level, two axes."""
+"""Number of standard normals of a step: level, two axes."""
 
 MIN_SIN_ELEVATION = math.sin(math.radians(4.0))
-"""Below 4 deg it grows no further: where P.618 ends."""
+"""Sine of the elevation (4 deg, the limit of P.618) below which the scintillation stays constant."""
 
 SCINTILLATION_DTYPE = np.dtype([('level', 'f8'), ('angle', 'f8'), ('keep', 'f8'), ('draw', 'f8'), ('on', 'i8')],
                                align=True)
-"""1-sigma at the zenith [dB], [rad]; the process of unit variance: x = keep x + draw w."""
+"""Constants of the scintillation. level, angle: 1-sigma at the zenith [dB], [rad]; keep, draw: factors of the process
+of unit variance, x = keep x + draw w."""
 
 
 def constants(p, period) -> np.ndarray:
-    """SCINTILLATION_DTYPE (1,) of ScintillationParameters, for steps of period [s]."""
+    """Return SCINTILLATION_DTYPE (1,) of ScintillationParameters, for steps of period [s]."""
     keep = math.exp(-period / p.time_constant)
     return np.array([(p.level_db, p.angle, keep, math.sqrt(1.0 - keep * keep), p.on)], SCINTILLATION_DTYPE)
 
 
 @compiled
 def wander(c, x, sin_E, normals, first):
-    """(factor of the amplitude, cross-elevation, elevation [rad] that the wave is turned by) one step later.
+    """Return (factor of the amplitude, deflection of the wave in cross-elevation, elevation [rad]) one step later.
 
-    x (3,): the process, changed; normals: from index `first` on.
+    x (3,): state of the process, updated; normals: used from index `first` on.
     """
     for i in range(NORMALS_PER_STEP):
         x[i] = c.keep * x[i] + c.draw * normals[first + i]

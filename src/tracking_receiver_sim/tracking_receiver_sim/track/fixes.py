@@ -1,4 +1,4 @@
-"""The fixes of a log: read as they come, of one aircraft, in order of time."""
+"""The fixes of one aircraft in a log, read from the stream and checked for their order in time."""
 import array
 import collections
 import pathlib
@@ -10,20 +10,23 @@ from pedestal_common.text_files import csv_table
 from tracking_receiver_sim.track import instant
 
 MAX_LISTED_AIRCRAFT = 12
-"""Aircraft that are named where a file holds several."""
+"""Number of aircraft that an error lists for a file with several."""
 
 MAX_AIRCRAFT = 10_000
-"""Of a file."""
+"""Largest number of aircraft in a file."""
 
 MIN_FIXES = 4
-"""Fixes of a track."""
+"""Least number of fixes of a track."""
 
 
 class Log:
-    """What its reader says of a file.
+    """Description of a log, which its reader fills in.
 
-    form: its name; time_name: of the time in it; dated: the time is UTC since 1970 once `offset` [s] is added;
-    remarks: sentences about the numbers; passed_over: {what: how many}.
+        form            name of the format
+        time_name       name of the time in the file
+        dated, offset   True if the time plus `offset` [s] is UTC since 1970
+        remarks         sentences about the numbers
+        passed_over     {kind of row or sentence: its number}
     """
 
     def __init__(self):
@@ -34,8 +37,8 @@ class Log:
 class Fixes(typing.NamedTuple):
     """The fixes of one aircraft, n of them.
 
-    line: (n,) in the file; time: (n,) [s], growing, UTC since 1970 where `dated`; latitude, longitude: (n,) WGS84
-    [deg]; altitude: (n,) above the ellipsoid [m]; description: what the file is and what was passed over.
+    line: (n,) in the file; time: (n,) [s], growing, UTC since 1970 if `dated`; latitude, longitude: (n,) WGS84 [deg];
+    altitude: (n,) above the ellipsoid [m]; description: format, remarks and the number of rows passed over.
     """
     path: str
     line: np.ndarray
@@ -48,21 +51,22 @@ class Fixes(typing.NamedTuple):
 
 
 def read(track, rows) -> Fixes:
-    """The fixes of the file of a TrackFileParameters; rows: the reader of its form. Raises csv_table.TableError."""
+    """Return the Fixes of the file of a TrackFileParameters; rows: reader of its format. Raises
+    csv_table.TableError."""
     log, numbers, names = Log(), array.array('d'), {}
-    for line, who, *fix in rows(track.path, log):
+    for line, identities, *fix in rows(track.path, log):
         if len(numbers) >= 6 * csv_table.MAX_CSV_ROWS:
             raise csv_table.too_long(track.path, line)
         if len(names) > MAX_AIRCRAFT:
             raise csv_table.TableError(f'{track.path}: line {line}: must be at most {MAX_AIRCRAFT} aircraft')
-        number, known_as = names.setdefault(who[:1], (len(names), set()))
-        known_as.update(who)
+        number, known_as = names.setdefault(identities[:1], (len(names), set()))
+        known_as.update(identities)
         numbers.extend((line, number, *fix))
     table = np.array(numbers).reshape(-1, 6)
     aircraft, number = _chosen(track, names)
     line, time, *position = table[table[:, 1] == number][:, (0, 2, 3, 4, 5)].T
     if len(line) < MIN_FIXES:
-        raise csv_table.TableError(f'{track.path}: {len(line)} rows, must be at least {MIN_FIXES}{_passed_over(log)}')
+        raise csv_table.TableError(f'{track.path}: {len(line)} fixes, must be at least {MIN_FIXES}{_passed_over(log)}')
     fixes = Fixes(track.path, line.astype(int), time + log.offset, *position, log.dated,
                   f'{pathlib.Path(track.path).name}: {log.form}{aircraft}'
                   + ''.join(f', {remark}' for remark in log.remarks) + _passed_over(log))
@@ -71,16 +75,19 @@ def read(track, rows) -> Fixes:
 
 
 def _chosen(track, names):
-    """(' of' its names, its number) of the aircraft that is asked for or alone; names: {identity: (number, names)}."""
-    asked = track.aircraft.strip().lower()
-    matches = [row for row in names.values() if not asked or asked in {name.lower() for name in row[1]}]
+    """Return (' of' its names, its number) of the aircraft that `track` names, or of the only one.
+
+    names: {identity: (number, names)}. Raises TableError if no aircraft or several match.
+    """
+    wanted = track.aircraft.strip().lower()
+    matches = [row for row in names.values() if not wanted or wanted in {name.lower() for name in row[1]}]
     if len(matches) == 1:
         number, known_as = matches[0]
         label = _label(known_as)
         return f' of {label}' if label else '', number
     if not names:
         return '', 0
-    labels = [_label(known_as) or 'one without a name' for _, known_as in names.values()]
+    labels = [_label(known_as) or 'aircraft without a name' for _, known_as in names.values()]
     more = f' and {len(labels) - MAX_LISTED_AIRCRAFT} more' if len(labels) > MAX_LISTED_AIRCRAFT else ''
     raise csv_table.TableError(f'{track.path}: aircraft = {track.aircraft!r:.60}: must name one of the {len(labels)} '
                                f'in the file: {", ".join(labels[:MAX_LISTED_AIRCRAFT])}{more}')
@@ -91,7 +98,7 @@ def _label(known_as):
 
 
 def _passed_over(log):
-    return ''.join(f', passed over {count} x {what}' for what, count in sorted(log.passed_over.items()))
+    return ''.join(f', passed over {count} x {kind}' for kind, count in sorted(log.passed_over.items()))
 
 
 def _check_order(fixes, track, log):

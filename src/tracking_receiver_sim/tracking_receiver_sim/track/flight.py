@@ -1,16 +1,16 @@
-"""A flight as a cubic spline in the station's ENU frame, from fixes that are held, coarse and noisy.
+"""A flight as a cubic spline in the ENU frame of the station, from fixes that are held, coarse and noisy.
 
 Held positions: an ADS-B log repeats latitude and longitude until the next message comes. Such a repetition is no
-measurement and is dropped. Where they stay for max_gap or longer, or throughout the file, the target stands.
+measurement and is dropped. If a position stays for max_gap or longer, or throughout the file, the target stands still.
 
 Smoothing: per axis the fixes are position + white noise of sigma, and the acceleration is white of the density q^2
-(constant velocity, CV). The Rauch-Tung-Striebel smoother of this model, started with no knowledge, is at the fixes and
-between them the natural cubic spline f that minimises
+(constant velocity, CV). The Rauch-Tung-Striebel smoother of this model, started without prior knowledge, equals the
+natural cubic spline f that minimises
 
     sum (x_k - f(t_k))^2 + lambda integral f''^2 dt,   lambda = sigma^2 / q^2
 
-(Wahba, J. R. Stat. Soc. B 40 (1978) 364-372; Kohn and Ansley, SIAM J. Sci. Stat. Comput. 8 (1987) 33-48), which scipy
-solves in a time proportional to the fixes. Without smoothing the spline runs through every fix.
+(Wahba, J. R. Stat. Soc. B 40 (1978) 364-372; Kohn and Ansley, SIAM J. Sci. Stat. Comput. 8 (1987) 33-48). scipy solves
+it in a time proportional to the number of fixes. Without smoothing the spline runs through every fix.
 """
 import typing
 
@@ -23,18 +23,17 @@ from pedestal_common.text_files import csv_table
 from tracking_receiver_sim.track import instant
 
 SAMPLES_PER_PIECE = 4
-"""Of a piece of the spline, for peak speed and range."""
+"""Number of samples of a piece of the spline, for peak speed and range."""
 
 ALTITUDE_STEPS_M = (('100 ft', 30.48), ('25 ft', 7.62))
-"""Steps [m] in which altitudes are broadcast."""
+"""Names and sizes [m] of the steps in which aircraft broadcast their altitude."""
 ALTITUDE_TOLERANCE_M = 0.06
-"""A multiple of a step is met within this [m]: logs are rounded to 0.1 m."""
+"""Largest distance from a multiple of a step [m]: logs are rounded to 0.1 m."""
 
 
 class Flight(typing.NamedTuple):
-    """A flight as the target takes it. breaks: (m + 1,) [s] from stamp 0; coefficients: (4, m, 3) as in target.Target;
-    start_time: UTC of stamp 0 in ISO 8601, empty without a date; summary: two lines for people, of the log and of the
-    path; speed: the peak [m/s]; greatest_range: from the station [m]."""
+    """A flight: breaks, coefficients, start_time and summary as in target.Target, with the peak speed [m/s] and the
+    greatest range from the station [m]."""
     breaks: np.ndarray
     coefficients: np.ndarray
     start_time: str
@@ -44,7 +43,7 @@ class Flight(typing.NamedTuple):
 
 
 def lay_out(fixes, track, station) -> Flight:
-    """The Flight of Fixes, of a TrackFileParameters and a StationParameters; raises csv_table.TableError."""
+    """Return the Flight of Fixes, a TrackFileParameters and a StationParameters; raises csv_table.TableError."""
     kept, dropped = without_held(fixes, track.max_gap)
     origin, to_enu = geodesy.station_frame(station)
     earth_fixed = geodesy.geocentric(np.radians(kept.latitude), np.radians(kept.longitude), kept.altitude)
@@ -66,7 +65,7 @@ def lay_out(fixes, track, station) -> Flight:
 
 
 def without_held(fixes, max_gap):
-    """(Fixes without held positions, how many were dropped)."""
+    """Return (Fixes without held positions, number of dropped fixes)."""
     moved = np.append(True, (np.diff(fixes.latitude) != 0.0) | (np.diff(fixes.longitude) != 0.0))
     first = np.flatnonzero(moved)
     last = np.append(first[1:], len(moved)) - 1
@@ -77,13 +76,13 @@ def without_held(fixes, max_gap):
 
 
 def smoothed(time, enu, track):
-    """The smoothing spline of positions enu (n, 3) [m] at times (n,) [s]; a PPoly."""
+    """Return the smoothing spline, a PPoly, of positions enu (n, 3) [m] at times (n,) [s]; raises TableError."""
     if len(time) < 5:
         raise csv_table.TableError(f'{track.path}: {len(time)} fixes, must be at least 5 to be smoothed')
     sigmas = track.sigma_horizontal, track.sigma_horizontal, track.sigma_vertical
     axes = [PPoly.from_spline(make_smoothing_spline(time, x, lam=(sigma / track.acceleration_noise)**2))
             for x, sigma in zip(enu.T, sigmas)]
-    pieces = slice(3, -3)  # those before the first and past the last fix have no length
+    pieces = slice(3, -3)  # The pieces before the first and past the last fix have no length.
     return PPoly(np.stack([axis.c[:, pieces] for axis in axes], axis=-1), axes[0].x[pieces])
 
 
@@ -93,8 +92,11 @@ def _samples(breaks):
 
 
 def _check_limits(fixes, spline, track):
-    """(peak speed [m/s], peak acceleration [m/s2]) of a spline; raises TableError with the line of the fix nearest to
-    the peak where it is above the limit. The acceleration is linear between the breaks: its peak is at one of them."""
+    """Return (peak speed [m/s], peak acceleration [m/s2]) of a spline.
+
+    Raises TableError, with the line of the fix nearest to the peak, if a peak is above its limit. The acceleration is
+    linear between the breaks, so its peak is at a break.
+    """
     times = _samples(spline.x)
     peaks = []
     for name, limit, unit, at, order in (('acceleration', track.max_acceleration, 'm/s2', spline.x, 2),

@@ -1,8 +1,8 @@
 """Tracks as GPX: every trkpt with a time and an ele, read from the stream by expat.
 
-expat says the line of a point, keeps nothing of what it has read, and ends at a document type declaration, so that no
-entity is ever expanded and no file fetched. ele is above mean sea level; the height above the ellipsoid is
-ele + geoidheight where the point says so, otherwise ele is taken for it, and that is said.
+expat gives the line of a point and keeps no parsed data in memory. The reader stops at a document type declaration.
+This avoids the expansion of entities and access to other files. ele is above mean sea level. The height above the
+ellipsoid is ele + geoidheight; without geoidheight ele is taken instead, with a remark in the log.
 """
 from xml.parsers import expat
 
@@ -10,27 +10,29 @@ from pedestal_common.text_files import csv_table
 from tracking_receiver_sim.track import instant
 
 PARSE_CHUNK_BYTES = 1 << 20
-"""Bytes that are parsed at once; expat reads a token that is not complete again with each piece."""
+"""Number of bytes that are parsed at once; expat reads an incomplete token again with each piece."""
 
 MAX_XML_DEPTH, MAX_TEXT_CHARS = 100, 200
-"""Elements within each other, and characters of a text that is read; a longer one is cut."""
+"""Largest depth of nested elements, and the number of characters to which a text is cut."""
 
 OEM_XML_HINT = '; an OEM must be in the notation KEYWORD = value, not XML'
 
 TEXT_ELEMENTS = ('ele', 'time', 'geoidheight', 'name')
-"""Elements whose text is read."""
+"""Elements whose text the reader takes."""
 
 
 def rows(path, log):
-    """Fixes (line, (name of the track,), UTC [s], latitude, longitude [deg], altitude [m]) of a GPX file; log: the
-    fixes.Log in which it is noted what the file is. Raises TableError."""
+    """Yield the fixes (line, (name of the track,), UTC [s], latitude, longitude [deg], altitude [m]) of a GPX file.
+
+    log: fixes.Log, which receives the description of the file. Raises TableError.
+    """
     log.form, log.time_name, log.dated = 'GPX', 'time', True
     points = _Points(path, log)
     try:
         with csv_table.stream(path) as stream:
             while piece := stream.read(PARSE_CHUNK_BYTES):
                 points.parser.Parse(piece)
-                yield from points.taken()
+                yield from points.take()
             points.parser.Parse(b'', True)
     except expat.ExpatError as error:
         raise csv_table.TableError(f'{path}: line {error.lineno}: not well-formed XML: '
@@ -40,20 +42,20 @@ def rows(path, log):
 
 
 class _Points:
-    """What expat calls. It holds the texts of the point that is open, and the fixes until they are taken."""
+    """Handlers of expat, with the texts of the open point and the fixes since the last `take`."""
 
     def __init__(self, path, log):
         self.path, self.log = path, log
         self.path_of_elements, self.texts, self.fixes = [], {}, []
         self.tracks, self.track, self.with_ele = 0, '', False
-        self.parser = expat.ParserCreate('UTF-8')  # whatever the file calls its encoding
+        self.parser = expat.ParserCreate('UTF-8')  # The encoding that the file declares does not count.
         self.parser.buffer_text = True
         self.parser.StartDoctypeDeclHandler = self.doctype
         self.parser.StartElementHandler, self.parser.EndElementHandler = self.start, self.end
         self.parser.CharacterDataHandler = self.text
 
-    def taken(self):
-        """The fixes since the last call."""
+    def take(self):
+        """Return the fixes since the last call."""
         fixes, self.fixes = self.fixes, []
         return fixes
 
@@ -65,8 +67,8 @@ class _Points:
         name = name.rpartition(':')[2]
         self.path_of_elements.append(name)
         if len(self.path_of_elements) > MAX_XML_DEPTH:
-            raise csv_table.TableError(f'{self.path}: line {self.parser.CurrentLineNumber}: must be at most {MAX_XML_DEPTH} '
-                                       'elements within each other')
+            raise csv_table.TableError(f'{self.path}: line {self.parser.CurrentLineNumber}: must be at most '
+                                       f'{MAX_XML_DEPTH} nested elements')
         if len(self.path_of_elements) == 1 and name != 'gpx':
             raise csv_table.TableError(f'{self.path}: line {self.parser.CurrentLineNumber}: element {name!r:.60}: '
                                        f'must be gpx{OEM_XML_HINT if name in ("oem", "ndm") else ""}')

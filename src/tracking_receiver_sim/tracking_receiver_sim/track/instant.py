@@ -1,18 +1,18 @@
-"""Instants of logs: UTC as ISO_TIME_PATTERN 8601, and seconds since 1970."""
+"""Instants of logs: UTC as ISO 8601, and seconds since 1970."""
 import datetime
 import re
 
 from pedestal_common.text_files import csv_table
 
 UNIX_TIME_LIMITS_S = (0.0, 4102444800.0)
-"""Seconds since 1970 that an instant may have: until 2100."""
+"""Range of an instant, in seconds since 1970: until 2100."""
 
-ISO_TIME_PATTERN = re.compile(r'(\d{4}-\d\d-\d\d)[T ](\d\d:\d\d:\d\d)(?:[.,](\d{1,9}))?(?: ?(?:Z|UTC|([+-]\d\d):?(\d\d)))?',
-                              re.ASCII)
+ISO_TIME_PATTERN = re.compile(
+    r'(\d{4}-\d\d-\d\d)[T ](\d\d:\d\d:\d\d)(?:[.,](\d{1,9}))?(?: ?(?:Z|UTC|([+-]\d\d):?(\d\d)))?', re.ASCII)
 
 
 def seconds(path, line, name, text):
-    """UTC seconds since 1970 of a text: ISO_TIME_PATTERN 8601 (without a zone: UTC) or the number itself. Raises
+    """Return UTC seconds since 1970 of a text: ISO 8601 (without a zone: UTC) or the number itself. Raises
     TableError."""
     text = (text or '').strip()
     match = ISO_TIME_PATTERN.fullmatch(text)
@@ -30,6 +30,6 @@ def seconds(path, line, name, text):
 
 
 def iso(value):
-    """UTC seconds since 1970 as ISO_TIME_PATTERN 8601 to the millisecond."""
+    """Return UTC seconds since 1970 as ISO 8601 to the millisecond."""
     since_1970 = datetime.timedelta(milliseconds=round(value * 1e3))
     return (datetime.datetime(1970, 1, 1) + since_1970).isoformat(timespec='milliseconds') + 'Z'

@@ -1,7 +1,7 @@
-"""Logs of NMEA 0183: GGA for time of day, position and height, RMC for the date. Every other sentence is passed over.
+"""Logs of NMEA 0183: GGA for time of day, position and height, RMC for the date. Other sentences are passed over.
 
-The height above the ellipsoid is altitude + geoidal separation. What stands before the $ of a line, for example a
-logger's own time, is passed over. Sentences with a wrong checksum and GGA without a fix are passed over and counted.
+The height above the ellipsoid is altitude + geoidal separation. Text before the $ of a line, for example the time of
+a logger, is passed over. Sentences with a wrong checksum and GGA without a fix are passed over and counted.
 """
 import datetime
 import re
@@ -13,12 +13,14 @@ from pedestal_common.text_files import csv_table
 
 SENTENCE_PATTERN = re.compile(r'\$..(?:GGA|RMC),.*', re.ASCII)
 MAX_LINE_CHARS = 1024
-"""Characters of a line; the standard allows 82."""
+"""Largest number of characters of a line; the standard allows 82."""
 
 
 def rows(path, log):
-    """Fixes (line, (), time [s], latitude, longitude [deg], altitude [m]) of a log; log: the fixes.Log in which it is
-    noted what the file is. The time is UTC once an RMC said the date, and otherwise since midnight. Raises TableError.
+    """Yield the fixes (line, (), time [s], latitude, longitude [deg], altitude [m]) of a log.
+
+    log: fixes.Log, which receives the description of the file. The time is since midnight; with the offset in `log`,
+    from the date of an RMC, it becomes UTC since 1970. Raises TableError.
     """
     log.form, log.time_name, log.dated = 'NMEA', 'time', False
     days, last, without_separation = 0, None, False
@@ -64,7 +66,7 @@ def _lines(path):
 
 
 def _time_of_day(path, line, sentence):
-    """Seconds since midnight of a GGA; raises TableError."""
+    """Return the seconds since midnight of a GGA; raises TableError."""
     time = sentence.timestamp
     if not isinstance(time, datetime.time):
         raise csv_table.TableError(f'{path}: line {line}: time = {sentence.data[0]!r:.60}: must be hhmmss.ss')
@@ -72,7 +74,7 @@ def _time_of_day(path, line, sentence):
 
 
 def _angle(path, line, name, text, side, sides, limit):
-    """Degrees of a ddmm.mm and its side, positive on the first of the sides; raises TableError."""
+    """Return the degrees of a ddmm.mm and its side, positive on the first of the sides; raises TableError."""
     value = csv_table.number(path, line, name, text, 0.0, 100.0 * limit)
     degrees, minutes = divmod(value, 100.0)
     if minutes >= 60.0 or side not in tuple(sides):

@@ -1,11 +1,11 @@
-"""Flights as CSV. The name of its column of time says what a file holds: a row of CSV_LAYOUTS.
+"""Flights as CSV. The name of the column of time selects the layout of a file, a row of CSV_LAYOUTS.
 
-    our own                     time_s, latitude_deg, longitude_deg, altitude_m: every cell is a number
+    native                      time_s, latitude_deg, longitude_deg, altitude_m: every cell is a number
     traffic (ADS-B)             timestamp, latitude, longitude, geoaltitude or altitude: in feet
     OpenSky state vectors       time, lat, lon, geoaltitude or baroaltitude: in metres
 
-The geometric altitude of ADS-B is above the ellipsoid; where a file has only the barometric one, that is taken for it
-and said. ADS-B logs have rows without a position: these are passed over and counted.
+The geometric altitude of ADS-B is above the ellipsoid. If a file has only the barometric altitude, it is taken
+instead, with a remark in the log. Rows of ADS-B logs without a position are passed over and counted.
 """
 import typing
 
@@ -13,18 +13,23 @@ from pedestal_common.text_files import csv_table
 from tracking_receiver_sim.track import instant
 
 METRES_PER_FOOT = 0.3048
-"""[m]"""
+"""Length of a foot [m]."""
 
 ALTITUDE_LIMITS_FT, ALTITUDE_LIMITS_M = (-3000.0, 500_000.0), (-1000.0, 150_000.0)
-"""Altitudes of ADS-B."""
+"""Ranges of altitudes of ADS-B [ft], [m]."""
 
 EMPTY_CELL_TEXTS = ('', 'nan', 'none', 'null')
-"""What a log writes where it knows nothing."""
+"""Texts of a cell without a value, in lower case."""
 
 
 class CsvLayout(typing.NamedTuple):
-    """Names of the columns; altitudes: the best first, and the unit of both [m]; adsb: cells may be empty, the time is
-    UTC and aircraft have an icao24 or a callsign."""
+    """Layout of a CSV file.
+
+        time, latitude, longitude   names of the columns
+        altitudes                   names of the columns of altitude, the best first
+        unit, limits                unit of an altitude [m], and range in this unit
+        adsb                        True: UTC, aircraft with an icao24 or a callsign, possibly empty cells
+    """
     name: str
     time: str
     latitude: str
@@ -35,16 +40,19 @@ class CsvLayout(typing.NamedTuple):
     adsb: bool
 
 
-CSV_LAYOUTS = (CsvLayout('CSV', 'time_s', 'latitude_deg', 'longitude_deg', ('altitude_m',), 1.0, (-1000.0, 1e8),
-                         False),
-               CsvLayout('ADS-B', 'timestamp', 'latitude', 'longitude', ('geoaltitude', 'altitude'), METRES_PER_FOOT,
-                         ALTITUDE_LIMITS_FT, True),
-               CsvLayout('ADS-B', 'time', 'lat', 'lon', ('geoaltitude', 'baroaltitude'), 1.0, ALTITUDE_LIMITS_M, True))
+CSV_LAYOUTS = (
+    CsvLayout('CSV', 'time_s', 'latitude_deg', 'longitude_deg', ('altitude_m',), 1.0, (-1000.0, 1e8), False),
+    CsvLayout('ADS-B', 'timestamp', 'latitude', 'longitude', ('geoaltitude', 'altitude'), METRES_PER_FOOT,
+              ALTITUDE_LIMITS_FT, True),
+    CsvLayout('ADS-B', 'time', 'lat', 'lon', ('geoaltitude', 'baroaltitude'), 1.0, ALTITUDE_LIMITS_M, True))
+"""Known layouts; the first one is for a file without a known column of time."""
 
 
 def rows(path, log):
-    """Fixes (line, (icao24, callsign), time [s], latitude, longitude [deg], altitude [m]) of a CSV file; log: the
-    fixes.Log in which it is noted what the file is. Raises TableError."""
+    """Yield the fixes (line, (icao24, callsign), time [s], latitude, longitude [deg], altitude [m]) of a CSV file.
+
+    log: fixes.Log, which receives the description of the file. Raises TableError.
+    """
     with csv_table.opened(path) as reader:
         header = reader.fieldnames or ()
         form = next((form for form in CSV_LAYOUTS if form.time in header), CSV_LAYOUTS[0])
