@@ -99,7 +99,7 @@ class PageNode(Remote):
         self.path = self.path if path is None else path
 
     def _take_commands(self):
-        """Serve what the pages ask."""
+        """Take the commands of the pages."""
         now = time.monotonic()
         while not self._server.requests.empty():
             self._pages.take(self._server.requests.get_nowait(), now)

@@ -46,8 +46,10 @@ MAX_STAMP_DISTANCE_NS = 3600 * NS_PER_SECOND
 
 
 class RecorderNode(shell.Shell):
-    """Recorder of the graph. Lockstep: in the order of steps (StepOrder). Realtime: in the order of arrival; the
-    publish time is the wall time of the publisher."""
+    """Recorder of the graph, in lockstep in the order of steps (StepOrder), in realtime in the order of arrival.
+
+    In realtime the publish time is the wall time of the publisher.
+    """
 
     def __init__(self):
         super().__init__('recorder', RecorderParameters)

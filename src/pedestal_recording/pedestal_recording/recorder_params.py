@@ -11,7 +11,7 @@ class RecorderParameters(topic_flags(topics.TOPIC_BY_NAME)):
     """Destination of the recording, and a description of the run for the metadata of the bag."""
     bag: str = text('recording',
                     'directory of the bag; must not exist, or hold the unfinished recording of this realtime run')
-    duration: float = parameter(0.0, 0.0, 86400.0, 's', 'run time at the end of the recording; 0: stopped by hand')
+    duration: float = parameter(0.0, 0.0, 86400.0, 's', 'run time at which the recording ends; 0: no limit')
     scenario: str = text('', 'name of the scenario')
     beamwidth: float = parameter(0.0175, 1e-4, 0.5, 'rad', 'half-power beamwidth, for the scale of the report')
     seed: int = parameter(1, 0, 2**31 - 1, '', 'seed of the run')

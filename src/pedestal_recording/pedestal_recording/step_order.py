@@ -26,8 +26,7 @@ class StepOrder:
     unplaced   number of messages without a place in an unwritten step (doubled, late, without stamp)
 
     A step is complete with one message of every step topic. At every whole second it also needs the diagnostics of
-    every node of the graph, and the first step needs the `once` topics. An unplaced message is written after the
-    next step.
+    every node of the graph. The first step needs the `once` topics. An unplaced message follows the next step.
     """
 
     def __init__(self, topics, nodes, write):

@@ -1,10 +1,9 @@
 """Writing of a bag: a rosbag2 directory (metadata.yaml version 9) with an MCAP file. No ROS here.
 
-The Writer of the mcap library makes the records. This module adds four properties. A
-chunk ends by log time. The file stays whole on a full disk. The file is locked while it is written. All schemas and
-channels also stand before the first chunk, so a broken chunk does not lose them.
-
-The file does not depend on its path, the host or the wall clock, so equal messages give equal bytes.
+The Writer of the mcap library makes the records. This module adds four properties. A chunk ends by log time. The file
+stays whole on a full disk. The file is locked while it is written. All schemas and channels also stand before the
+first chunk, so a broken chunk does not lose them. The file does not depend on its path, the host or the wall clock, so
+equal messages give equal bytes.
 
 A recorder of a realtime run that died may be started again. It continues in a new file of the bag, NAME_1.mcap and so
 on, until a file reaches the planned end of the run.

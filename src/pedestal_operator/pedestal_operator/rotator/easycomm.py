@@ -1,7 +1,7 @@
 """Requests and answers of the EasyComm protocols I, II and III. No sockets, no ROS here.
 
 A line has words of two letters and a value, separated by spaces. A query is answered with the same letters and the
-value, a setting is not answered (hamlib/rotators/easycomm, easycomm.txt).
+value (azimuth 0 to 360 deg), a setting is not answered (hamlib/rotators/easycomm, easycomm.txt).
 """
 import re
 import typing
@@ -60,7 +60,7 @@ def read(line) -> LineRequest:
 
 
 def answer(request, angles, status, errors, version) -> bytes:
-    """Return the answer to a LineRequest. angles: (azimuth, elevation) [deg]; status, errors: numbers of GS and GE."""
+    """Return the answer to a LineRequest. angles: (azimuth, elevation) [deg]; status, errors: of GS and GE."""
     values = {'AZ': f'AZ{round(angles[0] % 360.0, 1) % 360.0:.1f}', 'EL': f'EL{angles[1]:.1f}', 'GS': f'GS{status}',
               'GE': f'GE{errors}', 'VE': f'VE{version}'}
     return f'{" ".join(values[word] for word in request.queries)}\n'.encode() if request.queries else b''

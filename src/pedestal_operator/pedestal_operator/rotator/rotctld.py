@@ -1,6 +1,6 @@
 """Requests and answers of the network protocol of rotctld from Hamlib, line by line. No sockets, no ROS here.
 
-Tested with Hamlib 4.5.4 (rotctl -m 2, rotctld -m 1) and gpredict. The reference reads words; this module reads lines,
+Written for Hamlib 4.5.4 (rotctl -m 2, rotctld -m 1) and gpredict. The reference reads words; this module reads lines,
 with three differences. A command with too few arguments is refused at once and does not take the next line. An unknown
 command is answered. Numbers must be finite.
 """
