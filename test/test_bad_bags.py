@@ -120,27 +120,27 @@ def being_written(path):
 VERBS = ('verify', 'report', 'recover', 'rerun')
 CASES = {
     truncated: {'verify': 'the file ends at byte', 'recover': None,
-                '': ('the file ends at byte', 'inside a record', '`pedestal recover` makes a bag of what is there')},
-    not_one_chunk: {'verify': 'the file ends at byte', 'recover': 'not one message in it can be read',
+                '': ('the file ends at byte', 'inside a record', '`pedestal recover` recovers its readable messages')},
+    not_one_chunk: {'verify': 'the file ends at byte', 'recover': 'no message in it is readable',
                     '': ('the file ends at byte',)},
     empty: {'': ('_0.mcap: empty file',)},
-    no_message: {'verify': "no topic of the drive's steps has a message", 'report': None,
-                 'recover': 'not one message in it can be read', 'rerun': 'holds no configuration'},
+    no_message: {'verify': 'no topic of the steps of the drive has a message', 'report': None,
+                 'recover': 'no message in it is readable', 'rerun': 'holds no configuration'},
     text: {'': ('notes.mcap: not an MCAP file',)},
     encrypted: {'': ('x.mcap: not an MCAP file',)},
     sqlite: {'': ('x_0.db3: an SQLite bag, not an MCAP file', '`ros2 bag convert`')},
     other_profile: {'': ("/pose is encoded as 'json': not a ROS 2 recording",)},
-    several: {'': ('2 .mcap files in it where one belongs, or NAME_0.mcap, NAME_1.mcap ...',)},
-    no_bag: {'': ('0 .mcap files in it where one belongs',)},
+    several: {'': ('2 .mcap files in it, must be one, or NAME_0.mcap, NAME_1.mcap ...',)},
+    no_bag: {'': ('0 .mcap files in it, must be one',)},
     missing: {'': ('No such file or directory',)},
-    wrong_type: {'verify': 'of type geometry_msgs/msg/Vector3Stamped, where the graph has sensor_msgs/msg/JointState',
+    wrong_type: {'verify': 'type geometry_msgs/msg/Vector3Stamped, must be sensor_msgs/msg/JointState',
                  'report': None, 'recover': None, 'rerun': 'holds no configuration'},
     backwards: {'verify': '1 stamps go back, the first from 1.495000 to 1.450000 s',
                 'report': 'the stamps of joint_states go back, the first from 1.495000 to 1.450000 s',
                 'recover': None, 'rerun': 'holds no configuration'},
     being_written: {'': ('is being written; wait until its recorder has ended',)},
 }
-"""What each verb says, '' standing for those not named: the one line of an error. None: it does its work."""
+"""{maker of a bag: {verb: text of its error, None for success}}; '' stands for all other verbs."""
 
 
 @pytest.mark.parametrize('make', CASES, ids=lambda make: make.__name__)
@@ -173,5 +173,5 @@ def test_the_report_of_numbers_that_are_strange_but_readable(tmp_path):
     assert cli.main(['report', str(tmp_path / 'bag')]) == 0
     whole(tmp_path / 'never off the target')
     assert cli.main(['report', str(tmp_path / 'never off the target')]) == 0
-    said = 'joint_states: of type geometry_msgs/msg/Vector3Stamped, where the graph has sensor_msgs/msg/JointState'
+    said = 'joint_states: type geometry_msgs/msg/Vector3Stamped, must be sensor_msgs/msg/JointState'
     assert said in (tmp_path / 'bag' / 'report.html').read_text()

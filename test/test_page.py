@@ -119,11 +119,11 @@ def test_a_monitor_may_only_look_and_an_operator_takes_nothing_away(lone):
     with site.open('monitor', '') as monitor, site.open() as operator:
         assert hear(monitor, lambda message: message.get('replies'))[0]['role'] == 'monitor'
         monitor.send(json.dumps({'ask': 'preset', 'id': 1}))
-        assert 'only look' in hear(monitor, reply('preset'))[0]['reply']
+        assert 'may send stop only' in hear(monitor, reply('preset'))[0]['reply']
         monitor.send(json.dumps({'jog': [1, 0]}))
-        assert 'only look' in hear(monitor, reply('rate'))[0]['reply']
+        assert 'may send stop only' in hear(monitor, reply('rate'))[0]['reply']
         operator.send(json.dumps({'ask': 'take', 'arguments': {'role': 'supervisor'}}))
-        assert 'only a supervisor' in hear(operator, reply('take'))[0]['reply']
+        assert 'only the role supervisor' in hear(operator, reply('take'))[0]['reply']
         operator.send(json.dumps({'ask': 'stow'}))
         assert 'did not reply' in hear(operator, reply('stow'))[0]['reply']                  # there is no control unit
 
@@ -277,7 +277,7 @@ def press(page, client, selector, done):
             pressed = time.monotonic()
             page.locator(selector).click()
         return False
-    client.until(come, PATIENCE, lambda: f'{mode(client)}; the page says {page.locator("#said").text_content()!r}')
+    client.until(come, PATIENCE, lambda: f'{mode(client)}; the page says {page.locator("#message").text_content()!r}')
 
 
 def enters(client, wanted):
@@ -315,7 +315,7 @@ def test_an_operator_at_the_page(antenna, browser):
     press(page, client, '[data-verb=preset]', enters(client, 'preset'))
     press(page, client, '[data-verb=preset]', says(page, '#az-actual', '20.000°'))
     page.locator('[name=elevation]').fill('150')
-    press(page, client, '[data-verb=preset]', says(page, '#said', 'outside limits'))
+    press(page, client, '[data-verb=preset]', says(page, '#message', 'outside limits'))
     reads(page, '#log-list', 'anna@page')
     client.trigger('adu/emergency_stop')
     page.locator('[data-alarm="emergency stop"] button', has_text='ack').click()
@@ -325,7 +325,7 @@ def test_an_operator_at_the_page(antenna, browser):
     holds(page, '() => document.querySelector("[data-verb=program]").ariaDisabled === "false"')
     press(page, client, '[data-verb=program]', enters(client, 'program'))
     press(page, client, '#stop', enters(client, 'stop'))
-    press(page, client, '#release', says(page, '#control', 'nobody'))
+    press(page, client, '#release', says(page, '#control', 'none'))
     assert {urllib.parse.urlsplit(url).netloc for url in requests} == {site.netloc}
     assert page.errors == []
     page.context.close()
@@ -393,7 +393,7 @@ def test_a_jog_ends_with_its_page_or_its_silence(antenna):
     with site.open(name='bert') as page:
         time.sleep(0.6)                                                     # it has seen nothing for so long
         page.send('{"jog": [0.5, 0]}')
-        assert 'behind the antenna' in hear(page, reply('rate'))[0]['reply']
+        assert 'the state on the page is' in hear(page, reply('rate'))[0]['reply']
 
 
 @needs_chromium
@@ -417,7 +417,7 @@ def test_a_jog_ends_with_its_browser(antenna, browser):
 def test_the_antenna_tracks_on_when_the_server_is_killed(antenna):
     run, client, site = antenna
     with site.open(name='carla') as page:
-        hear(page, lambda message: message.get('told', {}).get('present'))
+        hear(page, lambda message: message.get('status', {}).get('present'))
         page.send(json.dumps({'ask': 'program', 'id': 3}))
         assert hear(page, reply('program')) == [{'id': 3, 'verb': 'program', 'granted': True,
                                                  'reply': 'mode is program'}]

@@ -126,8 +126,8 @@ class Remote:
         """{topic: text}."""
         return {'acu/mode': modes.MODES[self._acu.parts['outputs']['mode']]}
 
-    def hear(self, topic):
-        """Nothing is heard but the encoders."""
+    def subscribe_numbers(self, topic):
+        """Do nothing: the encoders are the only source."""
 
     def present(self, topic):
         """Whether a topic is there."""
@@ -145,8 +145,8 @@ class Remote:
             look = staticmethod(lambda: None)
         return Told
 
-    def ask(self, verb, arguments=None):
-        """Ask the control unit between two steps."""
+    def request(self, verb, arguments=None):
+        """Send a command to the control unit between two steps."""
         command = self._requests.add(verb, self.who, arguments)
         self._requests.take(command, self._acu.command(command))
         return command.number
@@ -170,7 +170,7 @@ def server(acu):
         request = rotctld.read(line)
         control.look(t)
         if request.name == 'get_pos':
-            return rotctld.answer(request, rotctld.RESULT_OK, rotctld.position(*control.pointing.angles_told()))
+            return rotctld.answer(request, rotctld.RESULT_OK, rotctld.position(*control.pointing.earth_angles()))
         outcome = control.go('gpredict', *request.values, t).look(remote, t)
         return rotctld.answer(request, rotctld.RESULT_REJECTED if outcome else rotctld.RESULT_OK)
     return ask

@@ -18,7 +18,7 @@ setup(
     zip_safe=False,
     maintainer='pedestal maintainers',
     maintainer_email='pedestal@example.org',
-    description='What operates the antenna by hand and connects other programs: console, page, rotator protocols.',
+    description='Operation of the antenna by persons and other programs: console, page, rotator protocols.',
     license='Apache-2.0',
     entry_points={'console_scripts': [
         'easycomm_node = pedestal_operator.easycomm_node:main',

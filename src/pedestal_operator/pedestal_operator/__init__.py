@@ -1,5 +1,5 @@
-"""What operates the antenna: a console, one-shot commands, and the servers that other programs talk to.
+"""Operation of the antenna: a console, single commands, the page, and servers for other programs.
 
-They know the graph by its topics only: they hear what it tells (`remote_node`), and ask on acu/command and
-NODE/inject.
+These programs use the topics of the graph only. They subscribe to its state (`remote_node`), and publish commands on
+acu/command and NODE/inject.
 """

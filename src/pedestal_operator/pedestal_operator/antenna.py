@@ -1,4 +1,4 @@
-"""The last messages of an antenna, of a running graph or of a recording."""
+"""Last messages of an antenna, from a running graph or a recording."""
 import abc
 import math
 
@@ -6,24 +6,28 @@ from pedestal_common.graph import nodes
 
 
 class Antenna(abc.ABC):
-    """Read the last messages. beam: prefix of the beam's nodes; numbers: {topic: numbers of its last message}; status:
-    {node: its last DiagnosticStatus}."""
+    """Reader of the last messages of an antenna.
+
+    beam      prefix of the nodes of the beam
+    numbers   {topic: numbers of its last message}
+    status    {node: its last DiagnosticStatus}
+    """
 
     @abc.abstractmethod
     def present(self, name):
         """Return True if a topic or node published lately."""
 
-    def told(self, node) -> dict:
-        """{key: text} of a node's last diagnostics; {} where it is silent."""
+    def diagnostics_of(self, node) -> dict:
+        """Return {key: text} of the last diagnostics of a node, {} if stale."""
         name = self.beam + node if nodes.row(node).of_beam else node
         return {pair.key: pair.value for pair in self.status[name].values} if self.present(name) else {}
 
     def angles(self, topic):
-        """(azimuth, elevation) [deg] of joint_states or acu/reference; NaN where it is silent."""
+        """Return (azimuth, elevation) [deg] of joint_states or acu/reference, NaN if stale."""
         return self._degrees(topic, 0)
 
     def rates(self):
-        """(azimuth, elevation) rates [deg/s] of the axes; NaN where they are silent."""
+        """Return (azimuth, elevation) rates [deg/s] of the axes, NaN if stale."""
         return self._degrees('joint_states', 2)
 
     def _degrees(self, topic, first):

@@ -13,14 +13,14 @@ from pedestal_operator.viewers import frames
 from pedestal_operator.viewers.frame_source import FrameSource
 
 FRAME_PERIOD_S = 1.0 / 30.0
-"""Time [s] between two messages on tf."""
+"""Period of the messages on tf [s]."""
 
 TF_QUEUE_DEPTH = 100
-"""Messages that tf2 itself keeps for its readers."""
+"""Queue depth of tf, equal to that of tf2 [messages]."""
 
 
 class FramesNode(shell.Shell):
-    """Latches the model at its start; where tf2_msgs is installed it tells the frames while somebody listens."""
+    """Publisher of the model at the start, and of the frames while tf has a subscriber, if tf2_msgs is installed."""
     awaits = 'its end'
 
     def __init__(self):
@@ -32,22 +32,23 @@ class FramesNode(shell.Shell):
         try:
             from tf2_msgs.msg import TFMessage
         except ImportError:
-            self.get_logger().info('tells no frames: tf2_msgs is not installed, robot_state_publisher does it as well')
+            self.get_logger().info('publishes no frames, because tf2_msgs is not installed; '
+                                   'robot_state_publisher can publish them')
             return
-        self._frames, self._told = FrameSource(self), 0
+        self._frames, self._published_stamp = FrameSource(self), 0
         self._tf = self.create_publisher(TFMessage, 'tf', QoSProfile(depth=TF_QUEUE_DEPTH))
-        self.every(FRAME_PERIOD_S, self._look)
+        self.every(FRAME_PERIOD_S, self._publish_frames)
 
-    def _look(self):
-        self._frames.want(self._tf.get_subscription_count() > 0)
+    def _publish_frames(self):
+        self._frames.set_active(self._tf.get_subscription_count() > 0)
         stamp, transforms = self._frames.read()
-        if stamp != self._told:
-            self._told = stamp
+        if stamp != self._published_stamp:
+            self._published_stamp = stamp
             self._tf.publish(messages.serialize(frames.tf_message(stamp, transforms)))
 
 
 def main(args=None) -> int:
-    """Run the node until it is stopped; args: of the command line, None for sys.argv."""
+    """Run the node until it is stopped. args: of the command line, None for sys.argv."""
     return shell.main(FramesNode, args)
 
 

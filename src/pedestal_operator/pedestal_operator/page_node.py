@@ -1,4 +1,4 @@
-"""ROS node that shows the antenna to a browser and lets it be operated there."""
+"""ROS node that serves the page of the operator to browsers."""
 import pedestal_common.entry  # noqa: F401
 
 # isort: split
@@ -22,61 +22,62 @@ from pedestal_operator.page.page_server import PageServer
 from pedestal_operator.remote_node import Remote
 
 STATE_PERIOD_S, POLL_PERIOD_S, SLOW_STATE_PERIOD_S = 0.05, 0.01, 1.0
-"""Time [s] between two states that pages are sent, two looks at what they ask, two of what changes slowly."""
+"""Periods of the states sent to pages, of the check for their commands, and of the slow part of the state [s]."""
 
 
 @dataclasses.dataclass(frozen=True)
 class PageParameters(parameters.Parameters):
-    """The server."""
-    address: str = parameters.text('127.0.0.1', 'on which it listens')
-    port: int = parameters.parameter(8080, 0, 65535, '', 'TCP port; 0: a free one, which it says')
-    names: str = parameters.text('', 'by which a browser may call it beside its address, comma separated')
-    clients: int = parameters.parameter(32, 1, 256, '', 'pages at a time')
+    """Parameters of the page server."""
+    address: str = parameters.text('127.0.0.1', 'address of the server')
+    port: int = parameters.parameter(8080, 0, 65535, '', 'TCP port; 0: a free port, which the node prints')
+    names: str = parameters.text('', 'further names of the server in addresses of browsers, separated by commas')
+    clients: int = parameters.parameter(32, 1, 256, '', 'largest number of open pages')
 
 
 class PageNode(Remote):
-    """Hears the graph for all pages, and asks for each of them under the name of its user."""
+    """Client of the graph for all pages; a command carries the name of the user of its page."""
     awaits = 'pages'
 
     def __init__(self):
         super().__init__('operator_page', 'page', parameters_type=PageParameters)
         self.alarms, self.path, self.configuration, self.log = [], None, {}, Log()
         self._history = collections.deque(maxlen=round(page_state.CHART_SPAN_S / page_state.CHART_PERIOD_S))
-        self._past, self._coming = page_sky.BeamHistory(page_state.CHART_SPAN_S), UpcomingPasses()
-        self._pages = PageRequests(self._ask_for, self.replied, lambda client, message: self._server.reply(client, message),
+        self._beam_history, self._upcoming_passes = page_sky.BeamHistory(page_state.CHART_SPAN_S), UpcomingPasses()
+        self._pages = PageRequests(self._request_for, self.replied,
+                                   lambda client, message: self._server.reply(client, message),
                                    lambda: self.texts.get('acu/mode') == 'rate')
-        self._sheets, self._logged = {}, None
+        self._parameter_requests, self._sent_log_revision = {}, None
         p = self.parameters
         names = [name.strip() for name in p.names.split(',') if name.strip()]
         if not page_security.is_loopback(p.address):
             names.append(socket.gethostname())
-            self.get_logger().warning(f'listens on {p.address}: whoever reaches this address and has a token operates '
-                                      'the antenna, and the connection is not encrypted')
+            self.get_logger().warning(f'listens on {p.address}: every person with a token can operate the antenna '
+                                      'from another machine; the connection is not encrypted')
         self._server = PageServer(p.address, p.port, names, p.clients, self._history.copy)
         for topic in page_state.EXTRA_NUMBER_TOPICS:
-            self.hear(topic)
+            self.subscribe_numbers(topic)
         self.message_reader('ins/state', self._text_taker('ins/state'))
         self.message_reader('acu/blockage', self._text_taker('acu/blockage'))
         self.message_reader('acu/alarms', self._take_alarms)
         self.message_reader('acu/program_track', self._take_program)
         for role in page_security.PAGE_ROLES:
             print(f'page, {role}: {self._server.access.url(role)}', flush=True)
-        self.every(POLL_PERIOD_S, self._look)
-        self.every(STATE_PERIOD_S, self._show)
-        self.every(page_state.CHART_PERIOD_S, self._remember)
-        self.every(SLOW_STATE_PERIOD_S, self._look_slowly)
+        self.every(POLL_PERIOD_S, self._take_commands)
+        self.every(STATE_PERIOD_S, self._send_state)
+        self.every(page_state.CHART_PERIOD_S, self._add_chart_point)
+        self.every(SLOW_STATE_PERIOD_S, self._send_slow_state)
 
     @property
     def now(self):
-        """UTC [s]."""
+        """Time in UTC [s]."""
         return self.clock()[1] * 1e-9
 
-    def _ask_for(self, who, verb, arguments):
+    def _request_for(self, who, verb, arguments):
         self.who = who
-        return self.ask(verb, arguments)
+        return self.request(verb, arguments)
 
     def _take_reply(self, status):
-        """Replies to whomever are events too."""
+        """Keep the reply to a request of a page, and log the replies to all clients."""
         super()._take_reply(status)
         with contextlib.suppress(ValueError):
             self.log.replied(self.now, *commands.of_reply(status))
@@ -97,48 +98,48 @@ class PageNode(Remote):
         path = page_sky.path(message, page_state.epoch(self))
         self.path = self.path if path is None else path
 
-    def _look(self):
-        """Serve what the pages ask."""
+    def _take_commands(self):
+        """Take the commands of the pages."""
         now = time.monotonic()
-        while not self._server.asked.empty():
-            self._pages.take(self._server.asked.get_nowait(), now)
+        while not self._server.requests.empty():
+            self._pages.take(self._server.requests.get_nowait(), now)
         self._pages.look(now)
 
-    def _show(self):
-        """Send the newest state, while anybody looks."""
+    def _send_state(self):
+        """Send the newest state, if a page is open."""
         if not self._server.pages:
             return
-        sections = {'now': page_state.now(self), 'told': page_state.status_section(self),
+        sections = {'now': page_state.now(self), 'status': page_state.status_section(self),
                     'alarms': page_state.alarms(self)}
-        if self._logged != self.log.revision:
-            sections['log'], self._logged = list(self.log.lines), self.log.revision
+        if self._sent_log_revision != self.log.revision:
+            sections['log'], self._sent_log_revision = list(self.log.lines), self.log.revision
         self._server.publish(sections)
 
-    def _remember(self):
-        """A point of the strip charts, for pages that come later."""
+    def _add_chart_point(self):
+        """Add a point to the strip charts, for later pages."""
         if self.present('joint_states'):
             self._history.append(page_state.history_row(page_state.now(self)))
 
-    def _look_slowly(self):
-        """What changes slowly: where the beam was, what the nodes' parameters are."""
+    def _send_slow_state(self):
+        """Send the slow part of the state: history of the beam, parameters of the nodes, sky."""
         for node, names in page_state.SHOWN_PARAMETERS.items():
-            self._ask_parameters(node, names)
+            self._request_parameters(node, names)
         if self.present('joint_states'):
-            self._past.add(self.now, page_state.now(self)['beam'])
-        self._server.publish({'fixed': page_state.fixed(self), 'past': self._past.places,
-                              'sky': page_state.sky(self, self._coming.look(self))})
+            self._beam_history.add(self.now, page_state.now(self)['beam'])
+        self._server.publish({'fixed': page_state.fixed(self), 'past': self._beam_history.places,
+                              'sky': page_state.sky(self, self._upcoming_passes.look(self))})
 
-    def _ask_parameters(self, node, names):
-        """Ask a node for its parameters when it comes, or comes again."""
-        client, future = self._sheets.get(node) or (None, None)
+    def _request_parameters(self, node, names):
+        """Request the parameters of a node at its start and at each restart."""
+        client, future = self._parameter_requests.get(node) or (None, None)
         if not self.present(node):
-            self._sheets[node] = client, None
+            self._parameter_requests[node] = client, None
             return
         client = client or self.create_client(GetParameters, f'{node}/get_parameters')
         if future is None and client.service_is_ready():
             future = client.call_async(GetParameters.Request(names=list(names)))
             future.add_done_callback(lambda done: self._take_parameters(names, done.result()))
-        self._sheets[node] = client, future
+        self._parameter_requests[node] = client, future
 
     def _take_parameters(self, names, response):
         for name, value in zip(names, response.values):
@@ -149,12 +150,12 @@ class PageNode(Remote):
     def close(self):
         """Close the server, then the node."""
         self._server.close()
-        self._coming.close()
+        self._upcoming_passes.close()
         super().close()
 
 
 def main(args=None) -> int:
-    """Run the server until it is stopped; args: of the command line, None for sys.argv."""
+    """Run the server until it is stopped. args: of the command line, None for sys.argv."""
     return shell.main(PageNode, args)
 
 

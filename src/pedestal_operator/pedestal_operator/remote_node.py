@@ -1,4 +1,4 @@
-"""A node that stands outside the graph: it hears what the antenna tells, asks, and waits for the reply."""
+"""Node outside the graph that receives the state of the antenna, sends commands, and waits for replies."""
 import getpass
 import math
 import os
@@ -18,20 +18,23 @@ from pedestal_operator.antenna import Antenna
 from pedestal_operator.requests import Requests
 
 NUMBER_TOPICS = ('joint_states', 'acu/reference', 'tracking_receiver/angle_error')
+"""Topics of numbers that every client receives."""
+
 TEXT_TOPICS = ('acu/mode', 'adu/state', 'acu/keyhole')
+"""Topics of text that every client receives."""
 
 MAX_MESSAGE_AGE_S = 2.5
-"""Time [s] after which what was heard last is no longer told as the present state."""
+"""Age after which the last message is stale [s]."""
 
 REPLY_TIMEOUT_S = 5.0
-"""Time [s] within which a node replies to a command, or is silent."""
+"""Longest wait for the reply to a command [s]."""
 
 RETRY_PERIOD_S = 1.0
-"""Time [s] without a reply after which a command is said again: the node may not have discovered us before."""
+"""Time without a reply after which a command is repeated [s], because discovery may have been incomplete."""
 
 
 def user():
-    """The name by which a person at a terminal asks: login@host."""
+    """Return the name of the person at the terminal: login@host."""
     try:
         name = getpass.getuser()
     except (KeyError, OSError):
@@ -40,10 +43,14 @@ def user():
 
 
 class Remote(Shell, Antenna):
-    """Hears the graph and asks it. who: by which name it asks from now on; node: whose commands it can ask for.
+    """Client of a graph.
 
-    numbers: {topic: numbers of its last message, as `records` orders them}; texts: {topic: its last text};
-    status: {node: its last DiagnosticStatus}; heard: {topic or node: when [s, steady]}.
+    who       name of the person or program in the next commands
+    node      node that receives the commands
+    numbers   {topic: numbers of its last message in the order of `records`}
+    texts     {topic: its last text}
+    status    {node: its last DiagnosticStatus}
+    arrivals  {topic or node: time of its last message [s, monotonic clock]}
     """
 
     def __init__(self, name, who, node='acu', beam='', parameters_type=parameters.Parameters):
@@ -51,32 +58,32 @@ class Remote(Shell, Antenna):
         self.links = nodes.links(nodes.MAX_BEAMS if beam else 0)
         self.beam = f'{beam}/' if beam else ''
         self.who, self.node = who, nodes.row(node)
-        self.numbers, self.texts, self.status, self.heard = {}, {}, {}, {}
+        self.numbers, self.texts, self.status, self.arrivals = {}, {}, {}, {}
         self._requests = Requests(f'{os.getpid()}.{time.time_ns()}')
         for topic in NUMBER_TOPICS:
-            self.hear(topic)
+            self.subscribe_numbers(topic)
         for topic in TEXT_TOPICS:
             self.message_reader(topic, self._text_taker(topic))
         self.message_reader('diagnostics', self._take_status)
         self.message_reader(self.node.replies, self._take_reply)
-        self._asks = self.writer(self.node.obeys)
+        self._send_command = self.writer(self.node.obeys)
 
-    def hear(self, topic):
-        """Hear the numbers of one more topic."""
+    def subscribe_numbers(self, topic):
+        """Subscribe to a further topic of numbers."""
         decoder = records.Decoder(topic, records.empty(records.of(topic), 1))
 
-        def take(message, _anew):
-            self.numbers[topic], self.heard[topic] = message, time.monotonic()
+        def take(message, _):
+            self.numbers[topic], self.arrivals[topic] = message, time.monotonic()
         self.reader(topic, decoder.decoded, take)
 
     def _text_taker(self, topic):
         def take(message):
-            self.texts[topic], self.heard[topic] = message.data, time.monotonic()
+            self.texts[topic], self.arrivals[topic] = message.data, time.monotonic()
         return take
 
     def _take_status(self, array):
         for status in array.status:
-            self.status[status.name], self.heard[status.name] = status, time.monotonic()
+            self.status[status.name], self.arrivals[status.name] = status, time.monotonic()
 
     def _take_reply(self, status):
         try:
@@ -85,49 +92,48 @@ class Remote(Shell, Antenna):
             return
         self._requests.take(command, reply)
 
-    def ask(self, verb, arguments=None) -> str:
-        """Ask for a verb with {argument: value}: the number of the request, by which `replied` finds its reply."""
+    def request(self, verb, arguments=None) -> str:
+        """Send a command with {argument: value}. Return the number of the request, for `replied`."""
         number = self._requests.add(verb, self.who, arguments).number
-        self.ask_again(number)
+        self.repeat_request(number)
         return number
 
-    def ask_again(self, number):
-        """Say a request once more, under its number: what came of the first one may be told twice."""
-        self._asks(messages.serialize(commands.message(self._requests.asked(number))))
+    def repeat_request(self, number):
+        """Send a request again under its number; its reply may then arrive twice."""
+        self._send_command(messages.serialize(commands.message(self._requests.pending_command(number))))
 
     def replied(self, number) -> Reply | None:
-        """The Reply to a request, once; None as long as there is none."""
+        """Return the Reply to a request once, None before it arrives."""
         return self._requests.replied(number)
 
     def present(self, name):
-        """Whether a topic or node was heard lately."""
-        return name in self.heard and time.monotonic() - self.heard[name] < MAX_MESSAGE_AGE_S
+        """Return True if the last message of a topic or node is not stale."""
+        return name in self.arrivals and time.monotonic() - self.arrivals[name] < MAX_MESSAGE_AGE_S
 
     def query(self, names):
-        """The Query for parameters of the node that is asked."""
+        """Return a Query for parameters of the commanded node."""
         return Query(self.create_client(GetParameters, f'{self.beam}{self.node.name}/get_parameters'), names)
 
 
 class Query:
-    """Numbers that a node has as parameters. values: [number], None until the node has told them."""
+    """Numeric parameters of a node. values: [number], None before the reply of the node."""
 
     def __init__(self, client, names):
         self._client, self._request = client, GetParameters.Request(names=names)
-        self._asked, self._future = -math.inf, None
+        self._request_time, self._future = -math.inf, None
         self.values = None
 
     def look(self):
-        """Ask for them, again and again until they are told."""
+        """Request the parameters, and repeat the request until the reply arrives."""
         now = time.monotonic()
         if self.values is None and self._future and self._future.done():
             self.values = [value.double_value for value in self._future.result().values] or None
-        elif self.values is None and now - self._asked > REPLY_TIMEOUT_S and self._client.service_is_ready():
-            self._asked, self._future = now, self._client.call_async(self._request)
+        elif self.values is None and now - self._request_time > REPLY_TIMEOUT_S and self._client.service_is_ready():
+            self._request_time, self._future = now, self._client.call_async(self._request)
 
 
 class RemoteSession:
-    """A Remote with its executor, as a context. Raises GraphError where no node of the graph is heard. arguments: of
-    ROS 2, for the Remote."""
+    """A Remote with its executor, as a context. make() -> the Remote; arguments: of ROS 2."""
 
     def __init__(self, make, arguments=()):
         self._make, self._arguments = make, arguments
@@ -145,33 +151,33 @@ class RemoteSession:
         rclpy.try_shutdown()
 
     def spin(self, seconds):
-        """Hear for so long, or until something has come."""
+        """Receive messages for some seconds, or until the first callback."""
         self._executor.spin_once(timeout_sec=seconds)
 
     def until(self, condition, seconds):
-        """What a condition gave as soon as it was true, or at last after so many seconds."""
+        """Return the value of a condition as soon as it is true, or its last value after some seconds."""
         deadline = time.monotonic() + seconds
         while not (value := condition()) and time.monotonic() < deadline:
             self.spin(0.05)
         return value
 
-    def find(self, seconds=REPLY_TIMEOUT_S):
-        """Wait until the node that is asked hears us and we hear its replies. Raises GraphError."""
+    def wait_for_node(self, seconds=REPLY_TIMEOUT_S):
+        """Wait for the connections to and from the commanded node. Raises GraphError after `seconds`."""
         row, remote = self.remote.node, self.remote
-        _, asked = remote._link(row.obeys)
-        _, replies = remote._link(row.replies)
-        if not self.until(lambda: remote.count_subscribers(asked) > 0 and remote.count_publishers(replies) > 0,
-                          seconds):
+        _, command_topic = remote._link(row.obeys)
+        _, reply_topic = remote._link(row.replies)
+        if not self.until(lambda: remote.count_subscribers(command_topic) > 0
+                          and remote.count_publishers(reply_topic) > 0, seconds):
             raise GraphError(f'no {remote.beam}{row.name} on ROS_DOMAIN_ID {remote.context.get_domain_id()} within '
                              f'{seconds:g} s: is a graph running?')
-        self.until(lambda: False, 0.2)  # the other side of the discovery
+        self.until(lambda: False, 0.2)  # time for the discovery of this node by the other one
 
-    def ask(self, verb, arguments=None, seconds=REPLY_TIMEOUT_S) -> Reply:
-        """Ask and wait for the Reply. Raises GraphError."""
-        number, deadline = self.remote.ask(verb, arguments), time.monotonic() + seconds
+    def request(self, verb, arguments=None, seconds=REPLY_TIMEOUT_S) -> Reply:
+        """Send a command and wait for the Reply. Raises GraphError after `seconds`."""
+        number, deadline = self.remote.request(verb, arguments), time.monotonic() + seconds
         while (reply := self.until(lambda: self.remote.replied(number),
                                    min(RETRY_PERIOD_S, deadline - time.monotonic()))) is None:
             if time.monotonic() > deadline:
                 raise GraphError(f'{self.remote.node.name} did not reply to {verb} within {seconds:g} s')
-            self.remote.ask_again(number)
+            self.remote.repeat_request(number)
         return reply

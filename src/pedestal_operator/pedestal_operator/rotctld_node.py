@@ -1,4 +1,4 @@
-"""ROS node that Hamlib's clients and gpredict talk to: the rotctld protocol over TCP."""
+"""ROS node that serves the rotctld protocol over TCP to clients of Hamlib and to gpredict."""
 import pedestal_common.entry  # noqa: F401
 
 # isort: split
@@ -13,42 +13,43 @@ from pedestal_operator.rotator.rotctld import RESULT_BUSY, RESULT_INVALID, RESUL
 from pedestal_operator.rotator.server_node import ServerNode, ServerParameters, tcp_port
 
 RESULT_BY_OUTCOME = {controller.OUTCOME_DONE: RESULT_OK, controller.OUTCOME_REFUSED: RESULT_REJECTED,
-                     controller.OUTCOME_OUT_OF_REACH: RESULT_INVALID,
-                     controller.OUTCOME_BUSY: RESULT_BUSY, controller.OUTCOME_NO_REPLY: RESULT_TIMEOUT}
+                     controller.OUTCOME_OUT_OF_REACH: RESULT_INVALID, controller.OUTCOME_BUSY: RESULT_BUSY,
+                     controller.OUTCOME_NO_REPLY: RESULT_TIMEOUT}
+"""{outcome of a request: result of the protocol}."""
 
 VERB_BY_COMMAND = {'park': 'stow', 'reset': 'acu/reset_faults'}
-"""{command: verb of the control unit}."""
+"""{command of rotctld: command of the control unit}."""
 
 
 @dataclasses.dataclass(frozen=True)
 class RotctldParameters(ServerParameters):
-    """The server."""
+    """Parameters of the rotctld server."""
     port: int = tcp_port(4533)
-    read_only: bool = parameters.flag(False, 'commands that move the antenna are refused')
-    raw_azimuth: bool = parameters.flag(False, 'tell the azimuth as it is, not modulo 360 deg')
-    jog_rate: float = parameters.parameter(5.0, 0.01, 60.0, 'deg/s', 'of `move` at 100 %')
+    read_only: bool = parameters.flag(False, 'refusal of all commands that move the antenna')
+    raw_azimuth: bool = parameters.flag(False, 'azimuth in answers over the whole travel, not modulo 360 deg')
+    jog_rate: float = parameters.parameter(5.0, 0.01, 60.0, 'deg/s', 'rate of `move` at 100 %')
 
 
 class RotctldClient(Client):
-    """request, ask: what it waits for an answer to."""
-    request = ask = None
+    """request, pending: the rotctld.Request without an answer, and its controller.PendingRequest."""
+    request = pending = None
 
 
 class RotctldNode(ServerNode):
-    """Answers its clients in order."""
+    """Server of the rotctld protocol; it answers the lines of a client in order."""
 
     def __init__(self):
         super().__init__('rotctld', RotctldParameters, rotctld.MAX_LINE_BYTES, RotctldClient)
 
     def serve(self, client, now):
-        """Answer what waits, in order; a request that asks the antenna waits for its reply first."""
-        while client.ask or client.lines:
-            if client.ask:
-                outcome = client.ask.look(self, now)
+        """Answer the lines in order; a command of the antenna is answered after the reply of the control unit."""
+        while client.pending or client.lines:
+            if client.pending:
+                outcome = client.pending.look(self, now)
                 if outcome is None:
                     return
-                client.ask = None
-                client.say(rotctld.answer(client.request, RESULT_BY_OUTCOME[outcome]))
+                client.pending = None
+                client.queue_answer(rotctld.answer(client.request, RESULT_BY_OUTCOME[outcome]))
                 continue
             line = client.lines.popleft()
             request = rotctld.read(line) if line is not None else rotctld.Request('', error=RESULT_INVALID)
@@ -58,45 +59,45 @@ class RotctldNode(ServerNode):
                 client.gone = ''
                 client.lines.clear()
             elif request.error != RESULT_OK:
-                client.say(rotctld.answer(request, request.error))
+                client.queue_answer(rotctld.answer(request, request.error))
             elif request.name in rotctld.SET_COMMANDS:
                 self._move(client, request, now)
             else:
-                client.say(rotctld.answer(request, RESULT_OK, self._lines(request)))
+                client.queue_answer(rotctld.answer(request, RESULT_OK, self._lines(request)))
 
     def _move(self, client, request, now):
         if self.parameters.read_only:
-            client.say(rotctld.answer(request, RESULT_REJECTED))
+            client.queue_answer(rotctld.answer(request, RESULT_REJECTED))
             return
-        ask, name = self.controller, client.name
+        control, name = self.controller, client.name
         client.request = request
         if request.name == 'set_pos':
-            client.ask = ask.go(name, *request.values, now)
+            client.pending = control.go(name, *request.values, now)
         elif request.name == 'move':
-            way, percent = request.values
+            direction, percent = request.values
             rate = self.parameters.jog_rate * (50 if percent == -1 else percent) / 100.0
-            client.ask = ask.jog(name, [rate * part for part in rotctld.MOVE_DIRECTIONS[way]], now)
+            client.pending = control.jog(name, [rate * part for part in rotctld.MOVE_DIRECTIONS[direction]], now)
         elif request.name == 'stop':
-            client.ask = ask.stop(name, now)
+            client.pending = control.stop(name, now)
         else:
-            client.ask = ask.do(name, VERB_BY_COMMAND[request.name], now)
+            client.pending = control.do(name, VERB_BY_COMMAND[request.name], now)
 
     def _lines(self, request):
-        """What a request without motion is answered with: [(name, text)]."""
+        """Return [(name, text)], the values in the answer to a request without motion."""
         pointing, limits = self.controller.pointing, self.controller.pointing.limits
         if request.name == 'get_pos':
-            return rotctld.position(*pointing.angles_told(), self.parameters.raw_azimuth)
+            return rotctld.position(*pointing.earth_angles(), self.parameters.raw_azimuth)
         if request.name == 'get_info':
             return [('Info', f'pedestal, {self.texts.get("acu/mode", "no control unit")}'[:63])]
         if request.name == 'get_status':
-            return [('Status flags', rotctld.flags(self.rates(), pointing.angles_told(), limits))]
+            return [('Status flags', rotctld.flags(self.rates(), pointing.earth_angles(), limits))]
         if request.name == 'dump_caps':
             return [('', f'Caps of the pedestal: azimuth {limits.azimuth}, elevation {limits.elevation} deg')]
         return rotctld.state(limits, bool(request.separator))
 
 
 def main(args=None) -> int:
-    """Run the server until it is stopped; args: of the command line, None for sys.argv."""
+    """Run the server until it is stopped. args: of the command line, None for sys.argv."""
     return shell.main(RotctldNode, args)
 
 

@@ -1,4 +1,4 @@
-"""The state of the antenna as an operator reads it: one table for the terminal, for JSON and for other programs."""
+"""State of the antenna for operators: one table for the terminal, for JSON and for other programs."""
 import math
 import typing
 
@@ -7,7 +7,7 @@ from pedestal_common.node.unit import LEVEL_OK
 
 
 class Row(typing.NamedTuple):
-    """One item: its group, its name, a number or text (None: not heard), its unit."""
+    """An item: group, name, number or text (None if not received), unit."""
     group: str
     name: str
     value: object
@@ -15,32 +15,32 @@ class Row(typing.NamedTuple):
 
     @property
     def text(self):
-        """The value as a person reads it."""
+        """Value as text for a person."""
         if self.value is None or isinstance(self.value, float) and math.isnan(self.value):
             return '-'
         return f'{self.value:.4f}' if isinstance(self.value, float) else str(self.value)
 
 
 ACU_STATUS_KEYS = ('mode', 'reason', 'fallback', 'control', 'drive', 'faults', 'locked', 'coasting', 'keyhole')
-"""Keys of the control unit's diagnostics."""
+"""Keys in the diagnostics of the control unit."""
 
 
 def rows(remote) -> list:
-    """The Rows of what a remote_node.Remote hears now."""
-    actual, wanted = remote.angles('joint_states'), remote.angles('acu/reference')
-    told = remote.told('acu')
+    """Return the Rows of the present state of a remote_node.Remote."""
+    actual, commanded = remote.angles('joint_states'), remote.angles('acu/reference')
+    acu = remote.diagnostics_of('acu')
     found = [Row('angle', axis, angle, 'deg') for axis, angle in zip(topics.AXES, actual)]
-    found += [Row('commanded', axis, angle, 'deg') for axis, angle in zip(topics.AXES, wanted)]
-    found += [Row('deviation', axis, a - b, 'deg') for axis, a, b in zip(topics.AXES, wanted, actual)]
+    found += [Row('commanded', axis, angle, 'deg') for axis, angle in zip(topics.AXES, commanded)]
+    found += [Row('deviation', axis, a - b, 'deg') for axis, a, b in zip(topics.AXES, commanded, actual)]
     found += [Row('rate', axis, rate, 'deg/s') for axis, rate in zip(topics.AXES, remote.rates())]
     found += [Row('receiver', name, value, unit) for name, value, unit in _receiver(remote)]
-    found += [Row('acu', key, told.get(key)) for key in ACU_STATUS_KEYS]
+    found += [Row('acu', key, acu.get(key)) for key in ACU_STATUS_KEYS]
     found.append(Row('adu', 'state', remote.texts.get('adu/state')))
     return found
 
 
 def alarms(remote) -> list:
-    """[(node, text)] of the nodes whose diagnostics say that something is not well, and of those that are silent."""
+    """Return [(node, text)] of the nodes whose diagnostics are not OK, and of silent nodes."""
     found = [(name, status.message) for name, status in remote.status.items()
              if status.level != LEVEL_OK and remote.present(name)]
     return found + [(name, 'silent') for name in remote.status if not remote.present(name)]

@@ -192,14 +192,14 @@ class Station:
     """An antenna ashore with the elements of the ISS, at a time [s UTC]."""
     LINES = {'line_1': '1 25544U 98067A   19343.69339541  .00001764  00000-0  38792-4 0  9991',
              'line_2': '2 25544  51.6439 211.2001 0007417  17.6667  85.6398 15.50103472202482'}
-    TOLD = {'acu': LINES, 'tracking_receiver': {}}
+    DIAGNOSTICS = {'acu': LINES, 'tracking_receiver': {}}
     PLACE = dict(zip((f'prediction.station.{name}' for name in page_state.STATION_PARAMETERS), (47.4, 8.5, 500.0)))
 
-    def __init__(self, now, told=TOLD, **configuration):
-        self.now, self._told, self.configuration = now, told, {**self.PLACE, **configuration}
+    def __init__(self, now, diagnostics=DIAGNOSTICS, **configuration):
+        self.now, self._diagnostics, self.configuration = now, diagnostics, {**self.PLACE, **configuration}
 
-    def told(self, node):
-        return self._told[node]
+    def diagnostics_of(self, node):
+        return self._diagnostics[node]
 
 
 SKYFIELD = 1575909336.7, 1575909988.3, 1575915162.3, 1575915710.2
@@ -208,7 +208,7 @@ UT1 = UTC."""
 
 
 def coming(antenna):
-    """What page_passes.Coming knows, once it knows it."""
+    """Return the result of page_passes.UpcomingPasses after its search."""
     looked = page_passes.UpcomingPasses()
     deadline = monotonic() + 60.0
     while not looked.look(antenna) and monotonic() < deadline:

@@ -89,7 +89,7 @@ def test_lines_are_cut_and_long_ones_kept_out_of_memory():
     assert lines.take(b'p\nP 1 2\nS') == ['p', 'P 1 2'] and lines.take(b'\n') == ['S']
     for _ in range(100):
         assert lines.take(b'x' * 10_000) == []
-    assert len(lines._rest) <= rotctld.MAX_LINE_BYTES
+    assert len(lines._remainder) <= rotctld.MAX_LINE_BYTES
     assert lines.take(b'x\np\n') == [None, 'p']
 
 

@@ -1,3 +1,3 @@
-"""Recordings: a rosbag2 directory with MCAP files, written, read, proved complete, repaired, exported.
+"""Recordings: rosbag2 directories with MCAP files, and programs that write, read, verify, recover and export them.
 
-Knows pedestal_common alone, and no ROS."""
+The package depends on pedestal_common only. Its recorder node alone needs ROS."""

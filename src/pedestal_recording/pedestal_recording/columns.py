@@ -1,8 +1,8 @@
-"""Messages of one topic as columns: the numbers of many CDR messages read at once through numpy.
+"""Messages of one topic as columns: numpy reads the numbers of many CDR messages at once.
 
-Messages of a topic that differ in their numbers only have them at the same places. The first message is walked by the
-type's definition to find these places; all messages alike in everything that is not a number are then one array of
-bytes, and a column is a slice of it. What is left over (other names, other lengths) is done again the same way.
+Messages of equal shape have their numbers at equal places. The definition of the type gives these places for the first
+message. All messages with equal bytes outside the numbers form one array of bytes, and a column is a slice of the
+array. The remaining messages (other names, other lengths) are read the same way.
 """
 import numpy as np
 
@@ -11,15 +11,17 @@ from pedestal_common.wire import cdr
 from pedestal_common.wire.cdr import STAMPED_TYPES
 
 MAX_MESSAGE_SHAPES = 100
-"""Kinds of messages of one length that are read all at once; what is left is read one by one."""
+"""Largest number of shapes of one length that are read as arrays; further messages are read one by one."""
 
 CELL_LIMITS = 4_000_000, 4
-"""Numbers in the columns at the most: so many, and one more for so many bytes of the messages. Messages that name
-other columns each time would fill a table as wide as it is long."""
+"""Largest number of cells in the columns: a base, and the number of bytes of messages for each further cell.
+
+This avoids a table as wide as it is long, from messages that each name other columns.
+"""
 
 
 def stamps(data, type_name, log):
-    """Header stamps [ns] (n,) of messages; the log times where the type has none or a message is too short."""
+    """Return header stamps [ns] (n,) of messages; log times for a type without header, or with a message too short."""
     log = np.asarray(log, np.int64)
     if type_name not in STAMPED_TYPES or not len(data) or min(map(len, data)) < 12:
         return log.copy()
@@ -28,17 +30,18 @@ def stamps(data, type_name, log):
 
 
 def table(data, type_name, log, start=0):
-    """The columns of CDR messages of one type, log times [ns] given.
+    """Return the columns of CDR messages of one type with their log times [ns].
 
-    `t` [s] is the header stamp, or the log time of a type without one, after start [ns]. Then one array per number:
+    `t` [s] is the header stamp after start [ns], or the log time for a type without header. Each number is an array:
     JointState     azimuth.position, azimuth.velocity, azimuth.effort, elevation.position, ...
     JointTrajectory  the first point: azimuth.position, azimuth.velocity, azimuth.acceleration, ...
     Vector3Stamped x, y, z
     Odometry       position.x, orientation.w, twist.linear.x, twist.angular.z, ...
     Imu            orientation.w, angular_velocity.x, linear_acceleration.z, orientation_variance.z, ...
     String         data (a list of texts)
-    others         the path of the field. Covariances and header are left out; a DiagnosticArray has `t` only.
-    A number that a message lacks is NaN in its row. Raises ValueError when bytes are no such message.
+    others         the path of the field
+    Covariances and header are omitted; a DiagnosticArray has `t` only. A missing number is NaN in its row. Raises
+    ValueError for bytes that are no message of the type.
     """
     out = {'t': (stamps(data, type_name, log) - start) / 1e9}
     if type_name == 'std_msgs/msg/String':
@@ -54,7 +57,7 @@ def table(data, type_name, log, start=0):
 
 
 def _fill(out, block, rows, type_name, count, most):
-    """Put the numbers of messages of one length (m, length) into rows of the columns, of at most so many numbers."""
+    """Put the numbers of messages of one length (m, length) into rows of the columns, of `most` cells at most."""
     shapes = 0
     while rows.size:
         walk = cdr.Places(block[0].tobytes(), type_name)
@@ -77,8 +80,10 @@ def _fill(out, block, rows, type_name, count, most):
 
 
 def alike(data, type_name, template, names):
-    """Which of the messages (n,) equal a template (CDR bytes) in all but the stamp and the columns of these names; the
-    padding that DDS adds at their end does not count."""
+    """Return a mask (n,) of the messages that equal a template (CDR bytes) except for stamp and the named columns.
+
+    The padding that DDS adds at the end of a message does not count.
+    """
     walk = cdr.Places(template, type_name)
     fixed = [np.arange(start, stop) for start, stop in walk.fixed]
     for path, start, dtype in walk.numbers:

@@ -1,6 +1,6 @@
-"""How a bag was made: scenario, parameters of all nodes, versions and git revision, as text for its metadata.
+"""Origin of a bag for its metadata: scenario, parameters of all nodes, versions and git revision, as text.
 
-Nothing here depends on the path, the host or the wall clock, so that equal runs still give equal bytes.
+The texts do not depend on the path, the host or the wall clock, so equal runs give equal bytes.
 """
 import contextlib
 import importlib.metadata
@@ -15,13 +15,17 @@ from pedestal_common.text_files import plain_yaml
 
 VERSIONED_PACKAGES = ('pedestal_common', 'ship_motion_sim', 'tracking_receiver_sim', 'acu_tracker', 'adu_drive',
                       'pedestal_bringup', 'numpy', 'numba', 'rclpy')
+"""Packages whose versions are recorded."""
+
 GIT_TIMEOUT_S = 5.0
+"""Longest duration of a git command [s]."""
+
 OMITTED_PARAMETERS = ('bag', 'scenario_yaml', 'parameters_yaml')
-"""Parameters of the recorder that are no part of how a run was made: where to, and the configuration itself."""
+"""Parameters of the recorder outside the recorded configuration: the destination, and the configuration itself."""
 
 
 def _git(*arguments):
-    """What a git command on this source tree prints; '' when it fails, or there is no git."""
+    """Return the output of a git command on this source tree, '' if it fails or git is missing."""
     try:
         done = subprocess.run(['git', '--no-optional-locks', *arguments], cwd=pathlib.Path(__file__).parent,
                               capture_output=True, text=True, timeout=GIT_TIMEOUT_S, check=True)
@@ -31,17 +35,19 @@ def _git(*arguments):
 
 
 def git_revision():
-    """Revision of the source tree this file is kept in, '-dirty' when a file of it is changed; '' when it is in none
-    (installed, also into an environment that lies in somebody's repository)."""
+    """Return the revision of the source tree of this file, with '-dirty' if a tracked file is changed.
+
+    Return '' for an installed file, also in an environment inside another repository.
+    """
     if not _git('ls-files', '--error-unmatch', pathlib.Path(__file__).name):
         return ''
-    # Not `git describe --dirty`, which takes the lock of the index and writes it, whatever it is told.
+    # `git describe --dirty` would lock and write the index in spite of --no-optional-locks.
     revision = _git('rev-parse', '--verify', 'HEAD')
     return revision + ('-dirty' if revision and _git('status', '--porcelain', '--untracked-files=no') else '')
 
 
 def versions():
-    """{'version.NAME': version} of Python, of our packages and of those that make the numbers."""
+    """Return {'version.NAME': version} of Python and of VERSIONED_PACKAGES."""
     versions = {'version.python': platform.python_version()}
     for package in VERSIONED_PACKAGES:
         with contextlib.suppress(importlib.metadata.PackageNotFoundError):
@@ -50,7 +56,7 @@ def versions():
 
 
 def recorder_parameters(scenario):
-    """The recorder's parameters {name: text} that describe a scenario.Scenario."""
+    """Return the parameters {name: text} of the recorder that describe a scenario.Scenario."""
     values = {node: parameters.as_dict(scenario.node_parameters(node))
               for node in scenario.nodes if node != 'operator'}
     values['recorder'] = {key: value for key, value in values['recorder'].items() if key not in OMITTED_PARAMETERS}
@@ -58,7 +64,7 @@ def recorder_parameters(scenario):
 
 
 def records(scenario_yaml, parameters_yaml):
-    """The metadata records {name: {text: text}} of the texts that recorder_parameters gave; none of an empty one."""
+    """Return the metadata records {name: {text: text}} of the texts of recorder_parameters, none for an empty text."""
     content = {}
     if scenario_yaml:
         content['scenario'] = {'yaml': scenario_yaml}
@@ -69,9 +75,9 @@ def records(scenario_yaml, parameters_yaml):
 
 
 def line(bag):
-    """One line on how a bag.Bag was made."""
+    """Return one line on the origin of a bag.Bag."""
     run = bag.metadata
-    parts = ['not said in the bag, it holds no configuration']
+    parts = ['unknown, the bag holds no configuration']
     if bag.configuration['scenario']:
         parts = [f'scenario {run.get("scenario", "")}', run.get('pacing', ''), f'seed {run.get("seed", "")}',
                  f'git {run.get("git") or "unknown"}']

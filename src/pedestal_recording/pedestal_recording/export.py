@@ -1,8 +1,7 @@
-"""`pedestal export`: a recording as one table per topic, for MATLAB, pandas and whoever else reads CSV or Parquet.
+"""`pedestal export`: a recording as one table per topic, for MATLAB, pandas and other readers of CSV or Parquet.
 
-A row is a message, a column a number of it (columns.table), after its stamp in seconds and in integer nanoseconds.
-Where a row for each message would leave something out, there is one for each point of a trajectory of several points,
-one for each status of a diagnostics message.
+A row is a message, a column one of its numbers (columns.table), after its stamp in seconds and in integer nanoseconds.
+A trajectory of several points has one row per point, and a diagnostics message one row per status.
 """
 import contextlib
 import csv
@@ -19,12 +18,14 @@ TIME_COLUMN, STAMP_COLUMN = 't [s]', 'stamp [ns]'
 
 
 def export(path, file_format='csv', output=None, names=(), overwrite=False):
-    """Write the topics of a bag as tables; iterator of (file, rows, columns), or (None, why, topic) of one left out.
+    """Write the topics of a bag as tables. Yield (file, rows, columns), or (None, reason, topic) of an omitted topic.
 
-    file_format: 'csv' or 'parquet'. names: topics to write, all when empty; of those named each must be readable, of
-    all the unreadable ones are left out. output: folder, default `export` in the bag (beside a bare .mcap). overwrite:
-    replace files. A file is `acu.rate_command.csv` and so on.
-    Raises bag.BagError, ValueError where Parquet cannot be written, or, before anything is written, FileExistsError.
+    file_format   'csv' or 'parquet'
+    names         topics to write, each of a known type; when empty, all topics except those of unknown type
+    output        folder, by default `export` in the bag (beside a bare .mcap); a file is `acu.rate_command.csv` etc.
+    overwrite     True to replace files
+
+    Raises bag.BagError, ValueError if Parquet cannot be written, or FileExistsError before the first write.
     """
     write = _parquet_writer() if file_format == 'parquet' else _write_csv
     bag = bags.read(path)
@@ -34,11 +35,11 @@ def export(path, file_format='csv', output=None, names=(), overwrite=False):
     existing = [file for file in files.values() if file.exists()]
     if existing and not overwrite:
         more = f' and {len(existing) - 1} more' if len(existing) > 1 else ''
-        raise FileExistsError(f'{existing[0]} exists already{more}; --overwrite replaces')
+        raise FileExistsError(f'{existing[0]} exists already{more}; --overwrite replaces the files')
     folder.mkdir(parents=True, exist_ok=True)
     for name, file in files.items():
         if bag.topics[name] not in messages.ROS_TYPESTORE.fielddefs:
-            reason = f'{name} is of type {bag.topics[name]}, which is not known here'
+            reason = f'{name} is of the unknown type {bag.topics[name]}'
             if names:
                 raise bags.BagError(f'{path}: {reason}')
             yield None, reason, name
@@ -51,7 +52,7 @@ def export(path, file_format='csv', output=None, names=(), overwrite=False):
 
 @contextlib.contextmanager
 def whole(file):
-    """The path of a file that becomes `file` once it is whole, and nothing otherwise."""
+    """Yield the path of a temporary file that becomes `file` when it is whole, and is removed after an error."""
     part = file.with_name(file.name + '.part')
     try:
         yield part
@@ -61,7 +62,7 @@ def whole(file):
 
 
 def table(bag, name):
-    """{header: array or list} of a topic: `t [s]`, `stamp [ns]`, then its columns, each with its unit."""
+    """Return {header: array or list} of a topic: `t [s]`, `stamp [ns]`, then its columns, each with its unit."""
     type_name = bag.topics[name]
     rows = bag.rows(name)
     stamps = rows.stamp
@@ -79,13 +80,13 @@ def _times(stamps):
 
 
 def _header(name, type_name, column):
-    """The head of a column: its unit behind it, where the topic is one of the graph and of its type."""
+    """Return the header of a column, with its unit for a topic of the graph that has the type of the graph."""
     unit = layouts.unit(nodes.plain(name), type_name, column)
     return f'{column} [{unit}]' if unit else column
 
 
 def _has_tracks(bag, name):
-    """Whether a message has other than one point; messages of one length are taken to be alike."""
+    """Return True if a message has more or fewer than one point; one message of each length is read."""
     of_length = {len(data): data for _, _, _, data in bag.raw(name)}
     try:
         return any(len(messages.deserialize(data, bag.topics[name]).points) != 1 for data in of_length.values())
@@ -94,7 +95,7 @@ def _has_tracks(bag, name):
 
 
 def _tracks(bag, name, stamps):
-    """Trajectories of several points: a row is a point, at its time after the stamp of its message."""
+    """Return the table of trajectories of several points: a row is a point, with its time after the stamp."""
     type_name = bag.topics[name]
     points = []
     for stamp, (_, _, _, message) in zip(stamps.tolist(), bag.messages(name)):
@@ -110,7 +111,7 @@ def _tracks(bag, name, stamps):
 
 
 def _diagnostics(bag, name, stamps):
-    """Diagnostics: a row is a status; its values are one text, key=value, separated by '; '."""
+    """Return the table of diagnostics: a row is a status with its values as one text, 'key=value; key=value'."""
     statuses = [(stamp, status) for stamp, (_, _, _, message) in zip(stamps.tolist(), bag.messages(name))
                 for status in message.status]
     return {**_times(np.array([stamp for stamp, _ in statuses], np.int64)),
@@ -120,7 +121,7 @@ def _diagnostics(bag, name, stamps):
 
 
 def _write_csv(file, content, _description):
-    """Numbers as the shortest text that reads back as the same float, NaN as NaN, texts quoted where needed."""
+    """Write numbers as the shortest text of the same float, NaN as NaN, and texts with quotes where needed."""
     with open(file, 'w', newline='', encoding='utf-8') as stream:
         writer = csv.writer(stream, lineterminator='\n')
         writer.writerow(content)
@@ -138,7 +139,7 @@ def _parquet_writer():
         import pyarrow
         import pyarrow.parquet
     except ImportError:
-        raise ValueError("Parquet is written by pyarrow, which is not installed: pip install pyarrow, or the extra "
+        raise ValueError("Parquet needs pyarrow, which is not installed: pip install pyarrow, or the extra "
                          "'pedestal_recording[parquet]'") from None
 
     def write(file, content, description):

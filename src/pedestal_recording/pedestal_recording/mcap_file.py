@@ -1,8 +1,7 @@
-"""One MCAP file, record by record: where each begins and ends, and the records of a chunk unpacked.
+"""Records of one MCAP file: their places in the file, and the unpacked records of a chunk.
 
-What a file claims is held against what it is: a few bytes can stand for gigabytes of zeros in a compressed chunk, or
-for millions of empty messages. So time and memory are bounded by the length of the file (MAX_CHUNK_BYTES,
-UNPACKED_LIMITS, MESSAGE_LIMITS).
+A few bytes of a compressed chunk can stand for gigabytes of zeros, or for millions of empty messages. Therefore the
+length of the file limits time and memory (MAX_CHUNK_BYTES, UNPACKED_LIMITS, MESSAGE_LIMITS).
 """
 import fcntl
 import io
@@ -20,16 +19,16 @@ from mcap.writer import MCAP0_MAGIC as MAGIC
 from pedestal_common.text_files import files
 
 MAX_CHUNK_BYTES = 32_000_000
-"""Bytes of a chunk, packed or unpacked, at the most."""
+"""Largest size of a chunk, packed or unpacked [bytes]."""
 
 UNPACKED_LIMITS = 32_000_000, 200
-"""Bytes of all chunks, unpacked, at the most: so many, and so many more for each byte of the file."""
+"""Largest size of all unpacked chunks [bytes]: a base, and an addition for each byte of the file."""
 
 MESSAGE_LIMITS = 500_000, 0.25
-"""Messages at the most: so many, and so many more for each byte of the file."""
+"""Largest number of messages: a base, and an addition for each byte of the file."""
 
 MESSAGE_HEAD = struct.Struct('<xQHIQQ')
-"""Length, channel, sequence, log and publish time: the head of a message record after its opcode."""
+"""Head of a message record after its opcode: length, channel, sequence number, log time and publish time."""
 
 SQLITE_MAGIC = b'SQLite format 3'
 _RECORD = struct.Struct('<BQ')
@@ -41,16 +40,16 @@ _READ = {Opcode.HEADER: records.Header.read, Opcode.SCHEMA: records.Schema.read,
 
 
 class BagError(ValueError):
-    """A bag cannot be written or read; one line that names the file and what is wrong with it."""
+    """A bag cannot be written or read; one line with the file and the problem."""
 
 
 def reason(error):
-    """What an OSError says, without the path."""
+    """Return the text of an OSError without the path."""
     return error.strerror or str(error)
 
 
 def frame(data, at):
-    """(opcode, where its content ends) of the record at a place in bytes; ValueError when none is there."""
+    """Return (opcode, end of its content) of the record at a place in bytes. Raises ValueError if none is there."""
     if at + 9 > len(data):
         raise ValueError('the file ends')
     opcode, length = _RECORD.unpack_from(data, at)
@@ -62,14 +61,15 @@ def frame(data, at):
 
 
 def parsed(opcode, content):
-    """The record of the mcap library in the bytes behind its head; None of a kind that is not read here."""
+    """Return the record of the mcap library from its content (bytes); None for a kind that is not read here."""
     return _READ[opcode](ReadDataStream(io.BytesIO(content))) if opcode in _READ else None
 
 
 def unpacked(chunk) -> bytes:
-    """The records in a records.Chunk. Raises ValueError where it is longer than MAX_CHUNK_BYTES, is not as long as it
-    claims, or
-    its checksum is wrong."""
+    """Return the records in a records.Chunk.
+
+    Raises ValueError if the chunk is longer than MAX_CHUNK_BYTES or than it claims, or if its checksum is wrong.
+    """
     size = chunk.uncompressed_size
     if max(size, len(chunk.data)) > MAX_CHUNK_BYTES:
         raise ValueError(f'a chunk of {size} bytes, must be at most {MAX_CHUNK_BYTES}')
@@ -80,14 +80,14 @@ def unpacked(chunk) -> bytes:
     except (zstandard.ZstdError, RuntimeError, EOFError):  # lz4 raises RuntimeError
         raise ValueError('a corrupted chunk') from None
     if len(data) != size:
-        raise ValueError('a chunk that is not as long as it claims')
+        raise ValueError('a chunk whose length differs from its header')
     if chunk.uncompressed_crc and zlib.crc32(data) != chunk.uncompressed_crc:
         raise ValueError('a corrupted chunk')
     return data
 
 
 def _zstd(data, size):
-    """Refuses a frame of another length before the memory for it is taken."""
+    """Decompress a frame; one of another length is refused before memory is allocated for it."""
     if not size or zstandard.frame_content_size(data) not in (-1, size):
         return b''
     return zstandard.ZstdDecompressor().decompress(data, max_output_size=size)
@@ -98,9 +98,9 @@ _UNPACK = {'': lambda data, size: data, 'zstd': _zstd,
 
 
 class McapFile:
-    """An open MCAP file, read in pieces; `size`: its length [bytes]; locked: this process writes it itself.
+    """An open MCAP file, read in pieces. size: its length [bytes]; locked: True if this process writes it.
 
-    Raises BagError when it is missing, empty, foreign or no regular file, or while its recorder still writes it.
+    Raises BagError if the file is missing, empty, foreign or not regular, or while its recorder still writes it.
     """
 
     def __init__(self, path, locked=False):
@@ -117,7 +117,7 @@ class McapFile:
         if not head:
             raise BagError(f'{path}: empty file')
         if head == SQLITE_MAGIC:
-            raise BagError(f'{path}: an SQLite bag, not an MCAP file; `ros2 bag convert` makes one of it')
+            raise BagError(f'{path}: an SQLite bag, not an MCAP file; `ros2 bag convert` converts it')
         if not head.startswith(MAGIC):
             raise BagError(f'{path}: not an MCAP file')
         self._left = UNPACKED_LIMITS[0] + UNPACKED_LIMITS[1] * self.size
@@ -133,7 +133,7 @@ class McapFile:
             pass
 
     def read(self, start, stop) -> bytes:
-        """The bytes [start, stop) of the file, as far as they are there."""
+        """Return the bytes [start, stop) of the file, fewer at its end."""
         if stop - start > _WINDOW:
             return os.pread(self._stream.fileno(), stop - start, start)
         if start < self._start or stop > self._start + len(self._window):
@@ -141,9 +141,9 @@ class McapFile:
         return self._window[start - self._start:stop - self._start]
 
     def pieces(self):
-        """Iterator of (opcode, start, stop) of the records up to the footer, neighbouring messages as one piece.
+        """Yield (opcode, start, stop) of the records up to the footer, neighbouring messages as one piece.
 
-        Raises EOFError, which says where and why the file ends before its end.
+        Raises EOFError with place and reason if the file ends early.
         """
         messages = None
         try:
@@ -171,17 +171,16 @@ class McapFile:
                 raise EOFError(f'broken record at byte {at}: no record')
             stop = at + 9 + length
             if stop > self.size:
-                raise EOFError(f'the file ends at byte {self.size} inside a record that goes on to {stop}')
+                raise EOFError(f'the file ends at byte {self.size} inside a record that ends at byte {stop}')
             yield opcode, at, stop
             at = stop
         if self.read(at, at + len(MAGIC) + 1) != MAGIC:
-            raise EOFError(f'the file does not end where its footer does, at byte {at}')
+            raise EOFError(f'the file does not end with its footer at byte {at}')
 
     def chunk(self, start, stop, again=False) -> bytes:
-        """The records in the chunk record at [start, stop); again: it was unpacked before.
+        """Return the records in the chunk record at [start, stop); again: True if it was unpacked before.
 
-        Raises ValueError when it cannot be unpacked, or when the chunks of the file unpack to more than
-        UNPACKED_LIMITS.
+        Raises ValueError if unpacking fails, or if the chunks of the file unpack to more than UNPACKED_LIMITS.
         """
         if stop - start > 2 * MAX_CHUNK_BYTES:
             raise ValueError(f'a chunk of {stop - start} bytes, must be at most {MAX_CHUNK_BYTES}')
@@ -191,14 +190,13 @@ class McapFile:
         return unpacked(chunk)
 
     def spend(self, chunk):
-        """Count the bytes that a records.Chunk claims to hold. Raises ValueError when all are more than
-        UNPACKED_LIMITS."""
+        """Count the bytes that a records.Chunk claims to hold. Raises ValueError above UNPACKED_LIMITS."""
         self._left -= chunk.uncompressed_size
         if self._left < 0:
             raise ValueError(f'its chunks unpack to more than {UNPACKED_LIMITS[1]} times its length')
 
     def count(self, messages):
-        """Count messages that are read. Raises ValueError when all are more than MESSAGE_LIMITS."""
+        """Count messages that are read. Raises ValueError above MESSAGE_LIMITS."""
         self._messages += messages
         if self._messages > MESSAGE_LIMITS[0] + MESSAGE_LIMITS[1] * self.size:
             raise ValueError(f'more than {self._messages - messages} messages in {self.size} bytes')

@@ -1,4 +1,4 @@
-"""The recorder: every topic of the graph into a bag, raw, nothing lost unsaid."""
+"""ROS node that records every topic of the graph in a bag, byte by byte, and reports each lost message."""
 import pedestal_common.entry  # noqa: F401
 
 # isort: split
@@ -25,31 +25,40 @@ from pedestal_recording.step_order import OrderError, StepOrder
 from pedestal_recording.writer import Writer
 
 QUIET_TIME_S = 0.5
+"""Time without a message after which the recorder ends [s]."""
+
 MAX_DRAIN_S = 4.0
-"""At the end the recorder goes on until nothing came for QUIET_TIME_S seconds, for MAX_DRAIN_S seconds at the most;
-all of MAX_DRAIN_S
-when others were heard but a topic of every step was not: Fast DDS repeats what a reader missed while it was being
-discovered with the next heartbeat of the writer, by default every 3 s."""
+"""Longest wait for messages at the end [s].
+
+The recorder waits for all of this time if it received messages, but none of a topic that is published every step.
+Fast DDS resends the messages that a subscriber missed during discovery with the next heartbeat, by default every 3 s.
+"""
 
 LAST_OPENED_TOPIC = 'diagnostics'
-"""The topic that every node writes, and in lockstep waits for its reader before its first step: the recorder opens it
-when the executor hears of all others. What is there before is taken in another order than that in which it came."""
+"""Topic that the recorder opens last, when the executor serves all other topics.
+
+Every node publishes this topic, and in lockstep waits for its subscriber before the first step. This avoids messages
+that wait when the executor starts, which it would take in another order than that of their arrival.
+"""
 
 MAX_STAMP_DISTANCE_NS = 3600 * NS_PER_SECOND
-"""Time [ns] from the drive's beyond which no stamp is believed."""
+"""Largest plausible distance of a stamp from the time of the drive [ns]."""
 
 
 class RecorderNode(shell.Shell):
-    """Lockstep: in the order of steps (StepOrder). Realtime: as it comes, published at the writer's wall time."""
+    """Recorder of the graph, in lockstep in the order of steps (StepOrder), in realtime in the order of arrival.
+
+    In realtime the publish time is the wall time of the publisher.
+    """
 
     def __init__(self):
         super().__init__('recorder', RecorderParameters)
         names = self.graph.members
         if self.graph.lockstep and not names:
-            raise parameters.ParameterError("graph.nodes = '': in lockstep the recorder must know whom to wait for")
+            raise parameters.ParameterError("graph.nodes = '': must name the nodes of the graph in lockstep")
         beams, flags = self.graph.beams, [flag for flag in topics.TOPIC_FLAGS if getattr(self.parameters, flag)]
         recorded = nodes.recorded(names, flags, beams) if names else list(self.links.values())
-        if self.graph.lockstep:  # where commands have no place between two steps, but the replies, which repeat them
+        if self.graph.lockstep:  # a command has no place between two steps; its reply has, and repeats the command
             recorded = [link for link in recorded if link.rate != 'command']
         self._end = round(self.parameters.duration * NS_PER_SECOND) or None
         self._bag = Writer(self.parameters.bag, recorded, {
@@ -61,13 +70,13 @@ class RecorderNode(shell.Shell):
             configuration.records(self.parameters.scenario_yaml, self.parameters.parameters_yaml))
         self._order = StepOrder(recorded, names, self._bag.write)
         self._lost = collections.Counter()
-        self._writers = {}
+        self._streams = {}
         self._stamp = self.graph.start
-        self._broken = 0
-        self._taken = [0] * len(recorded)
-        self._of_every_step = [index for index, topic in enumerate(recorded) if topic.rate == 'step']
+        self._without_stamp = 0
+        self._received = [0] * len(recorded)
+        self._step_topics = [index for index, topic in enumerate(recorded) if topic.rate == 'step']
         self._error = None
-        self._quiet = None
+        self._last_arrival = None
         self.diagnose_with(self._diagnosis)
         for index, topic in enumerate(recorded):
             if topic.name != LAST_OPENED_TOPIC:
@@ -78,15 +87,14 @@ class RecorderNode(shell.Shell):
             self.every(1.0, lambda: self._write(self._bag.flush))
 
     def _record(self, index, topic):
-        """Subscribe with a history that drops nothing in lockstep, whatever the writer keeps, and holds seconds in
-        realtime."""
-        take = self._taker(index, topic)
+        """Subscribe to a topic. The history keeps all messages in lockstep, and those of several seconds in realtime.
+        """
+        take = self._receiver(index, topic)
         if self.graph.lockstep:
             profile = middleware.qos(topic.rate)
             profile.history = HistoryPolicy.KEEP_ALL
             self.create_subscription(middleware.message_class(topic.type), topic.name, subscriptions.pair(take),
-                                     profile,
-                                     raw=True)
+                                     profile, raw=True)
         else:
             subscriptions.subscribe(self, topic, topic.name, take, 'recorded')
 
@@ -95,83 +103,83 @@ class RecorderNode(shell.Shell):
         for index, topic in self._last:
             self._record(index, topic)
 
-    def _taker(self, index, topic):
-        put = self._in_step(index, topic) if self.graph.lockstep else self._as_it_comes(index, topic)
-        counted = self._unbroken(index, topic) if self.graph.lockstep else self._by_writer(index, topic)
+    def _receiver(self, index, topic):
+        put = self._into_step(index, topic) if self.graph.lockstep else self._on_arrival(index, topic)
+        count = self._lockstep_counter(index, topic) if self.graph.lockstep else self._realtime_counter(index, topic)
         checked = len(topic.writers) == 1 and (self.graph.lockstep or topic.rate != 'once')
-        taken = self._taken
+        received = self._received
 
         def take(data, info):
-            taken[index] += 1
+            received[index] += 1
             try:
                 if checked:
-                    counted(info)
+                    count(info)
                 put(data, info)
             except (BagError, OrderError) as error:
                 self._fail(str(error))
         return take
 
-    def _unbroken(self, index, topic):
-        """Lockstep: the numbers of the one writer go up by one. A topic that is always there begins with the first."""
+    def _lockstep_counter(self, index, topic):
+        """Return a check of lockstep: the numbers of the only publisher rise by 1, on a step topic from 1 on."""
         expected = 1 if topic.rate == 'step' and self.graph.members else 0
 
-        def counted(info):
+        def count(info):
             nonlocal expected
             number = info['publication_sequence_number']
             if number is not None and expected != 0 and number not in (1, expected):
                 if number < expected:
-                    self._fail(f'{topic.name} has more than one writer: another graph runs on ROS_DOMAIN_ID '
+                    self._fail(f'{topic.name} has more than one publisher: another graph runs on ROS_DOMAIN_ID '
                                f'{self.context.get_domain_id()}; set a free one')
                 else:
                     self._lost[topic.name] += number - expected
                     self._bag.skip(index, number - expected)
                     self._fail(self._losses())
             expected = (number or 0) + 1
-        return counted
+        return count
 
-    def _by_writer(self, index, topic):
-        """Realtime: what is missing in the numbers of each writer; writers come and go."""
-        writers = self._writers[topic.name] = Streams()
+    def _realtime_counter(self, index, topic):
+        """Return a counter of the messages missing in realtime, from the sequence numbers of each publisher."""
+        publishers = self._streams[topic.name] = Streams()
 
-        def counted(info):
-            before = writers.lost
-            writers.of(info['publication_sequence_number'], info['source_timestamp'], time.monotonic_ns())
-            if writers.lost > before:
-                self._lost[topic.name] = writers.lost
-                self._bag.skip(index, writers.lost - before)
-        return counted
+        def count(info):
+            before = publishers.lost
+            publishers.of(info['publication_sequence_number'], info['source_timestamp'], time.monotonic_ns())
+            if publishers.lost > before:
+                self._lost[topic.name] = publishers.lost
+                self._bag.skip(index, publishers.lost - before)
+        return count
 
     def _losses(self):
         return 'lost ' + ', '.join(f'{count} of {name}' for name, count in self._lost.items())
 
     def _fail(self, reason):
-        """End with this reason; raised in a callback it would come with rclpy's own traceback on stderr."""
+        """End with a reason. Because rclpy prints a traceback for an exception in a callback, none is raised."""
         self._error = self._error or reason
         self.finished = True
 
     def _stamp_in(self, data):
-        """The stamp in a message's bytes; None when there is none."""
+        """Return the stamp in the bytes of a message [ns], None without a valid stamp."""
         try:
             return messages.stamp_of(data)
         except ValueError:
-            self._broken += 1
+            self._without_stamp += 1
             return None
 
     def _sender(self, data):
-        """Whose diagnostics these are; '' when they cannot be read."""
+        """Return the name of the node that published diagnostics, '' if the message is unreadable."""
         try:
             return messages.deserialize(data, 'diagnostic_msgs/msg/DiagnosticArray').status[0].name
         except (ValueError, IndexError):
-            self._broken += 1
+            self._without_stamp += 1
             return ''
 
-    def _in_step(self, index, topic):
+    def _into_step(self, index, topic):
         order, stamp_in, slot = self._order, self._stamp_in, self._order.slot(topic.name)
 
         def put(data, _):
             stamp = stamp_in(data)
             if stamp is None:
-                order.take_odd(index, data)
+                order.take_unplaced(index, data)
             else:
                 order.take(slot, stamp, data)
             return stamp
@@ -179,7 +187,7 @@ class RecorderNode(shell.Shell):
         def put_clock(data, info):
             self._tick(put(data, info))
 
-        def put_change(data, _):
+        def put_event(data, _):
             order.take_change(index, data)
 
         def put_diagnostics(data, _):
@@ -187,26 +195,28 @@ class RecorderNode(shell.Shell):
             sender_slot = order.slot(topic.name, sender)
             if sender != self.name:
                 if sender_slot is None or stamp is None:
-                    order.take_odd(index, data)
+                    order.take_unplaced(index, data)
                 else:
                     order.take(sender_slot, stamp, data)
 
         if topic.rate in topics.EVENT_RATES:
-            return put_change
+            return put_event
         return {'clock': put_clock, 'diagnostics': put_diagnostics}.get(topic.name, put)
 
     def _log_time(self, stamp):
-        """Where a message of this stamp is laid: at its stamp, but at the drive's time where that is none, is of the
-        future, or is MAX_STAMP_DISTANCE_NS from it."""
+        """Return the log time of a message [ns]: its stamp, or the time of the drive.
+
+        The time of the drive replaces a stamp that is missing, in the future, or MAX_STAMP_DISTANCE_NS away from it.
+        """
         if stamp is not None:
             now = self._stamp or stamp
-            if abs(stamp
-                   - now) < MAX_STAMP_DISTANCE_NS and stamp <= self.clock()[1] + self.graph.future * NS_PER_SECOND:
+            latest = self.clock()[1] + self.graph.future * NS_PER_SECOND
+            if abs(stamp - now) < MAX_STAMP_DISTANCE_NS and stamp <= latest:
                 return stamp
-            self._broken += 1
+            self._without_stamp += 1
         return self._stamp
 
-    def _as_it_comes(self, index, topic):
+    def _on_arrival(self, index, topic):
         write, stamp_in, log_time = self._bag.write, self._stamp_in, self._log_time
         clock = PublisherGate(lambda data: (messages.stamp_of(data),) * 2, round(self.graph.future * NS_PER_SECOND))
 
@@ -229,7 +239,7 @@ class RecorderNode(shell.Shell):
         return {'clock': put_clock, 'diagnostics': put_diagnostics}.get(topic.name, put)
 
     def _tick(self, stamp):
-        """The drive's time has come this far."""
+        """Take a new time of the drive [ns]."""
         if stamp is None:
             return
         if self.graph.lockstep and stamp // NS_PER_SECOND > self._stamp // NS_PER_SECOND:
@@ -239,7 +249,7 @@ class RecorderNode(shell.Shell):
             self.finished = True
 
     def _write(self, write):
-        """Call what writes to the disk, and end where that cannot be."""
+        """Call a function that writes to the disk, and end the node if it raises BagError."""
         try:
             write()
         except BagError as error:
@@ -247,36 +257,38 @@ class RecorderNode(shell.Shell):
 
     def _diagnosis(self):
         level, message = LEVEL_OK, 'recording'
-        if self._broken or self._order.odd:
-            level, message = LEVEL_WARN, 'recording; some messages have no valid or no proper stamp'
-        others = [name for name, writers in self._writers.items() if writers.several(time.monotonic_ns())]
-        if others:
-            level, message = LEVEL_WARN, f'recording; {", ".join(others)}: more than one writer'
+        if self._without_stamp or self._order.unplaced:
+            level, message = LEVEL_WARN, 'recording; some messages have no valid stamp or no place in a step'
+        doubled = [name for name, publishers in self._streams.items() if publishers.several(time.monotonic_ns())]
+        if doubled:
+            level, message = LEVEL_WARN, f'recording; {", ".join(doubled)}: more than one publisher'
         if self._lost:
             level, message = LEVEL_ERROR, self._losses()
         return Diagnosis(level, message, [
             ('messages', str(self._bag.messages)), ('waiting steps', str(self._order.waiting)),
-            ('lost', str(self._lost.total())), ('without valid stamp', str(self._broken)),
-            ('out of order', str(self._order.odd))])
+            ('lost', str(self._lost.total())), ('without valid stamp', str(self._without_stamp)),
+            ('out of order', str(self._order.unplaced))])
 
     def draining(self):
-        """Whether messages may still come: until all steps are written, nothing came for QUIET_TIME_S, or MAX_DRAIN_S
-        is over."""
+        """Return True while messages may still arrive.
+
+        This ends when all steps are written, after QUIET_TIME_S without a message, or after MAX_DRAIN_S.
+        """
         now = time.monotonic()
         if self._error is not None:
             return False
         if self._end is not None and self._order.written >= self._end and not self._order.waiting:
             return False
-        taken = sum(self._taken)
-        if self._quiet is None:
-            self._quiet, self._drain_end = (now, taken), now + MAX_DRAIN_S
-        elif taken != self._quiet[1]:
-            self._quiet = now, taken
-        unheard = taken and not all(self._taken[index] for index in self._of_every_step)
-        return now < self._drain_end and (unheard or now < self._quiet[0] + QUIET_TIME_S)
+        received = sum(self._received)
+        if self._last_arrival is None:
+            self._last_arrival, self._drain_end = (now, received), now + MAX_DRAIN_S
+        elif received != self._last_arrival[1]:
+            self._last_arrival = now, received
+        incomplete = received and not all(self._received[index] for index in self._step_topics)
+        return now < self._drain_end and (incomplete or now < self._last_arrival[0] + QUIET_TIME_S)
 
     def close(self):
-        """Write what waits and finish the bag; messages, losses and SHA-256 are its result."""
+        """Write the waiting steps and finish the bag. The result of the node has its messages, losses and SHA-256."""
         self._write(self._order.finish)
         self._write(self._bag.close)
         self.result = {'bag': str(self._bag.path), 'messages': self._bag.messages, 'lost': self._lost.total(),
@@ -288,7 +300,7 @@ class RecorderNode(shell.Shell):
 
 
 def main(args=None):
-    """Run the node to its end; the exit code."""
+    """Run the node to its end, and return the exit code."""
     return shell.main(RecorderNode, args)
 
 

@@ -1,8 +1,8 @@
-"""Makes a readable bag of what is there in a damaged one: killed recorder, full disk, cut or corrupted file.
+"""Recovery: a readable bag from a damaged bag (killed recorder, full disk, cut or corrupted file).
 
-Each file is read through mmap, chunk after chunk, and the messages of each chunk whose checksum holds are written
-anew: the memory taken is that of one chunk and of the index, whatever the size of the recording. A bag of several
-files becomes one of one file.
+Each file is read through mmap, chunk after chunk. The messages of each chunk with a correct checksum are written to
+the new bag. Memory is needed for one chunk and the index, independent of the size of the recording. A bag of several
+files becomes a bag of one file.
 """
 import collections
 import dataclasses
@@ -25,7 +25,7 @@ _COPIED_OPCODES = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.METADATA, Opcode.CHUNK)
 _END_OPCODES = (Opcode.DATA_END, Opcode.FOOTER)
 _COMPRESSION = re.compile(rb'\x04\x00\x00\x00zstd|\x03\x00\x00\x00lz4')
 _BEFORE_COMPRESSION = 9 + 8 + 8 + 8 + 4
-"""Bytes of a chunk record before the name of its compression."""
+"""Length of a chunk record before the name of its compression [bytes]."""
 
 _LENGTH = struct.Struct('<Q')
 _FOOTER = 9 + 20 + len(MAGIC)
@@ -33,29 +33,33 @@ _FOOTER = 9 + 20 + len(MAGIC)
 
 @dataclasses.dataclass
 class Gap:
-    """Bytes [start, stop) of a file that cannot be used, why, and the log times [ns] before and after them; None where
-    no message is there. file: its name, '' of a bag that has only one."""
+    """Unusable bytes [start, stop) of a file, the reason, and the log times before and after them [ns], None without a
+    message. file: its name, '' in a bag of one file."""
     start: int
     stop: int
-    why: str
+    problem: str
     before: int | None
     after: int | None = None
     file: str = ''
 
     def line(self, start=0):
-        """The gap as text, in time after start [ns]."""
-        return (f'bytes {self.start} to {self.stop}{self.file and f" of {self.file}"} unused ({self.why})'
+        """Return the gap as text, with times after start [ns]."""
+        return (f'bytes {self.start} to {self.stop}{self.file and f" of {self.file}"} unused ({self.problem})'
                 + (f', after {(self.before - start) / 1e9:.6f} s' if self.before is not None else '')
                 + (f', before {(self.after - start) / 1e9:.6f} s' if self.after is not None else ''))
 
 
 @dataclasses.dataclass
 class Recovered:
-    """What was recovered into the bag at `path`, and what is missing.
+    """Recovered messages in the new bag at `path`, and the missing ones.
 
-    counts: {topic: messages}; first, last: log times [ns]; ended: whether the recorder came to its end;
-    planned_end: of the run [ns], None when the bag does not say; start: of the scenario's time [ns]; gaps: [Gap];
-    lost: {topic: messages missing between those that are there, by the recorder's sequence numbers}.
+    counts        {topic: messages}
+    first, last   log times [ns]
+    ended         True if the recorder came to its end
+    planned_end   of the run [ns], None if unknown
+    start         time 0 of the scenario in the stamps [ns]
+    gaps          [Gap]
+    lost          {topic: messages missing in the middle, by the sequence numbers of the recorder}
     """
     path: pathlib.Path
     counts: dict
@@ -69,11 +73,11 @@ class Recovered:
 
     @property
     def unused(self):
-        """Bytes of the file that cannot be used."""
+        """Unusable bytes of the file."""
         return sum(gap.stop - gap.start for gap in self.gaps)
 
     def lines(self):
-        """The report as text: the gaps, what is lost by them and at the end, the new bag last."""
+        """Return the report as lines of text: the gaps, the losses in the middle and at the end, the new bag last."""
         lines = [gap.line(self.start) for gap in self.gaps]
         first, last = self.first - self.start, self.last - self.start
         if self.lost:
@@ -85,7 +89,7 @@ class Recovered:
         planned = self.planned_end is not None and self.last < self.planned_end
         if planned or not self.ended:
             lines.append(f'the recording {"ends" if self.ended else "breaks off"} after {last / 1e9:.6f} s'
-                         + (f', the run was to go on to {(self.planned_end - self.start) / 1e9:.6f} s'
+                         + (f', the planned end is {(self.planned_end - self.start) / 1e9:.6f} s'
                             if planned else ''))
         total = sum(self.counts.values())
         return [*(lines or ['nothing is missing']),
@@ -94,10 +98,10 @@ class Recovered:
 
 
 def recover(path, output=None) -> Recovered:
-    """Write what can be read of a bag as a new bag, by default beside it with '-recovered' after its name.
+    """Write the readable messages of a bag as a new bag, by default beside it with '-recovered' after its name.
 
-    Raises BagError when nothing can be read, when it is being written, or when the new bag cannot be written; then
-    nothing of the new one is left. The old one is only read.
+    Raises BagError if nothing is readable, the bag is being written, or the new bag cannot be written. Then no part of
+    the new bag remains. The old bag is only read.
     """
     files = [McapFile(file) for file in bags.locate(path)]
     if output is None:
@@ -108,9 +112,9 @@ def recover(path, output=None) -> Recovered:
         salvage = _Salvage(bag, len(files) > 1)
         for file in files:
             with open(file.path, 'rb') as stream, mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ) as data:
-                salvage.take_all(file, data)
+                salvage.add_file(file, data)
         if not bag.messages:
-            raise BagError(f'{files[0].path}: not one message in it can be read')
+            raise BagError(f'{files[0].path}: no message in it is readable')
         bag.flush()
         recovered = salvage.recovered()
         bag.add_metadata('recovered', {'messages_lost': str(sum(recovered.lost.values())),
@@ -132,7 +136,7 @@ def _follows(data, at):
 
 
 def _read(file, opcode, data, start, stop):
-    """The record at [start, stop), None of a kind that is not kept; of a chunk its records as bytes."""
+    """Return the record at [start, stop), for a chunk its records as bytes; None for a kind that is not kept."""
     if opcode not in _COPIED_OPCODES:
         return None
     record = parsed(opcode, data[start + 9:stop])
@@ -143,7 +147,7 @@ def _read(file, opcode, data, start, stop):
 
 
 def _next_chunk(file, data, start):
-    """Where the next chunk begins whose checksum holds; the end of the data when there is none."""
+    """Return the start of the next chunk with a correct checksum, the end of the data if there is none."""
     for name in _COMPRESSION.finditer(data, start):
         at = name.start() - _BEFORE_COMPRESSION
         try:
@@ -152,17 +156,17 @@ def _next_chunk(file, data, start):
                 if name.end() + 8 + _LENGTH.unpack_from(data, name.end())[0] == stop:
                     _read(file, opcode, data, at, stop)
                     return at
-        except Exception:  # whatever a decoder makes of bytes that are no chunk
+        except Exception:  # a decoder may raise anything on bytes that are no chunk
             continue
     return len(data)
 
 
 def _pieces(file, data):
-    """Iterator of (opcode, start, stop, record) of the records of the data section; of bytes that cannot be used
-    (0, start, stop, why).
+    """Yield (opcode, start, stop, record) of the records of the data section, (0, start, stop, reason) of unusable
+    bytes.
 
-    After a broken record comes the one behind it if there is one, else the next whole chunk behind everything that
-    was good.
+    After a broken record follows the record behind it. If there is none, the next whole chunk behind the last good
+    record follows.
     """
     at = good = len(MAGIC)
     while at < len(data):
@@ -170,7 +174,7 @@ def _pieces(file, data):
         try:
             opcode, stop = frame(data, at)
             record = _read(file, opcode, data, at, stop)
-        except Exception as error:  # whatever a decoder makes of broken bytes
+        except Exception as error:  # a decoder may raise anything on broken bytes
             if stop is None or not _follows(data, stop):
                 stop = _next_chunk(file, data, good)
             if stop > at:
@@ -185,7 +189,7 @@ def _pieces(file, data):
 
 
 def _summary(file, data):
-    """Schemas and channels of the summary, where there is one: the chunk that declares them may be broken."""
+    """Yield schemas and channels of the summary, if any, because the chunk that declares them may be broken."""
     footer = len(data) - _FOOTER
     if footer < len(MAGIC) or data[footer] != Opcode.FOOTER or data[-len(MAGIC):] != MAGIC:
         return
@@ -200,12 +204,15 @@ def _summary(file, data):
 
 
 class _Salvage:
-    """Adds the messages of damaged files to a new BagFile and keeps count of what cannot be used.
+    """Writer of the messages of damaged files to a new BagFile, and counter of the unusable bytes.
 
-    several: whether a gap must say in which file it is. _schemas, _channels: {number in the file: number in the bag};
-    _names: {channel of the bag: topic}; _counts: {topic: messages added}; _first, _last: their log times [ns];
-    _sequence, _before: {channel of the bag: number of its last message, and of the last one of the files before};
-    _unsure: channels of the bag without a message since the last gap.
+    several                True if a gap must name its file
+    _schemas, _channels    {number in the file: number in the bag}
+    _names                 {channel of the bag: topic}
+    _counts                {topic: messages added}
+    _first, _last          log times of the added messages [ns]
+    _sequence, _before     {channel of the bag: sequence number of its last message; the same of the files before}
+    _unsure                channels of the bag without a message since the last gap
     """
 
     def __init__(self, bag, several):
@@ -219,8 +226,8 @@ class _Salvage:
         self._gaps = []
         self._ended = False
 
-    def take_all(self, file, data):
-        """One pass over the bytes of a McapFile."""
+    def add_file(self, file, data):
+        """Take all messages from the bytes of a McapFile."""
         self._file = file
         self._schemas, self._channels, self._before = {}, {}, dict(self._sequence)
         try:
@@ -228,7 +235,7 @@ class _Salvage:
                 self._declare(record)
         except BagError:
             raise
-        except Exception:  # whatever a decoder makes of broken bytes: what it declares, the file declares as well
+        except Exception:  # a decoder may raise anything on broken bytes; the file itself repeats the declarations
             pass
         for opcode, start, stop, record in _pieces(file, data):
             try:
@@ -255,7 +262,7 @@ class _Salvage:
         self._ended = opcode in _END_OPCODES
 
     def _declare(self, record):
-        """Take over a schema or channel that is new."""
+        """Add a new schema or channel to the bag."""
         if isinstance(record, records.Schema):
             if record.id not in self._schemas:
                 self._schemas[record.id] = self._once(self._bag.add_schema, record.name, record.encoding, record.data)
@@ -268,22 +275,22 @@ class _Salvage:
             self._counts.setdefault(self._names[channel], 0)
 
     def _once(self, add, *content):
-        """The number under which the bag has this schema or channel; files of a bag declare the same."""
+        """Return the number of a schema or channel in the bag; the files of a bag repeat the same ones."""
         key = add.__name__, str(content)
         if key not in self._declared or not self._several:
             self._declared[key] = add(*content)
         return self._declared[key]
 
-    def _skip(self, start, stop, why):
+    def _skip(self, start, stop, problem):
         file = self._file.path.name if self._several else ''
         if self._gaps and self._gaps[-1].stop == start and self._gaps[-1].file == file:
             self._gaps[-1].stop = stop
             return
-        self._gaps.append(Gap(start, stop, why, self._last, file=file))
+        self._gaps.append(Gap(start, stop, problem, self._last, file=file))
         self._unsure = set(self._channels.values())
 
     def _add_messages(self, raw):
-        """Add the messages of a chunk's bytes; ValueError, and none added, when one belongs to no known channel."""
+        """Add the messages of a chunk (bytes). Raises ValueError, and adds none, if a message has no known channel."""
         first = last = None
         number = at = 0
         while at < len(raw):
@@ -291,9 +298,9 @@ class _Salvage:
             if opcode == Opcode.MESSAGE:
                 _, channel, _, log, _ = MESSAGE_HEAD.unpack_from(raw, at)
                 if channel not in self._channels:
-                    raise ValueError(f'channel {channel} is declared nowhere')
+                    raise ValueError(f'channel {channel} is not declared')
                 if stop < at + MESSAGE_HEAD.size or log >= 2**63:
-                    raise ValueError('a message with a head that cannot be')
+                    raise ValueError('a message with an invalid head')
                 first, last = (log, log) if first is None else (min(first, log), max(last, log))
                 number += 1
             else:
@@ -315,7 +322,7 @@ class _Salvage:
         self._last = last if self._last is None else max(self._last, last)
 
     def _add(self, channel, sequence, log, publish, data):
-        """Add a message. Where the recorder numbers them from 1, the first after a gap says how many were in it."""
+        """Add a message. The recorder numbers from 1, so the first number after a gap gives the size of the gap."""
         sequence += self._before.get(channel, 0)
         self._bag.add_message(channel, sequence & 0xffffffff, log, publish, data)
         if channel in self._unsure:
@@ -325,7 +332,7 @@ class _Salvage:
         self._counts[self._names[channel]] += 1
 
     def recovered(self):
-        """The Recovered of the bag, once a message was added."""
+        """Return the Recovered of the bag, after at least one message was added."""
         ours = 'pacing' in self._metadata.get('pedestal', {})
         lost = {self._names[channel]: count for channel, count in self._lost.items() if ours and count > 0}
         return Recovered(self._bag.path, self._counts, self._first, self._last, self._ended,

@@ -1,6 +1,6 @@
-"""The order of a lockstep recording: step after step, inside a step as in the table of topics, whatever came first.
+"""Order of the messages in a lockstep recording: step after step, within a step as in the table of topics.
 
-Arrival depends on the machine's load, the steps do not; so equal runs give equal files.
+The order of arrival depends on the load of the machine, the order of steps does not. So equal runs give equal files.
 """
 import heapq
 
@@ -8,22 +8,25 @@ from pedestal_common.graph.steps import NS_PER_SECOND
 from pedestal_common.graph.topics import EVENT_RATES
 
 MAX_WAITING_STEPS = 10_000
+"""Largest number of steps that wait for an incomplete step."""
 
 
 class OrderError(ValueError):
-    """Steps pile up behind one that never becomes complete; one line naming its stamp and what it lacks."""
+    """More than MAX_WAITING_STEPS steps wait for an incomplete step; one line with its stamp and missing messages."""
 
 
 class StepOrder:
-    """Collects the messages of each step and writes the step when it is complete and all before it are written.
+    """Collector of the messages of each step. A step is written when it is complete and all earlier steps are written.
 
-    topics: the recorded rows of topics.TOPICS. nodes: names of the nodes in the graph. write(index of the topic,
-    log time, publish time [ns], bytes) is called in canonical order; both times are the stamp of the step.
+    topics     recorded rows of topics.TOPICS
+    nodes      names of the nodes in the graph
+    write      called in canonical order: write(index of the topic, log time, publish time [ns], bytes), with the stamp
+               of the step as both times
+    written    stamp of the last written step [ns], -1 before the first
+    unplaced   number of messages without a place in an unwritten step (doubled, late, without stamp)
 
-    A step is complete with one message of every step topic; at every whole second also with the diagnostics of every
-    node of the graph, and the first step also with the `once` topics. A message that fits in no step that is still to
-    be written (doubled, late, without stamp) is written after the next step and counted in `odd`. written: stamp [ns]
-    of the last step that was written, -1 before the first.
+    A step is complete with one message of every step topic. At every whole second it also needs the diagnostics of
+    every node of the graph. The first step needs the `once` topics. An unplaced message follows the next step.
     """
 
     def __init__(self, topics, nodes, write):
@@ -47,30 +50,30 @@ class StepOrder:
         self._buckets = {}
         self._stamps = []
         self._changes = {index: [] for index in self._answer_slot}
-        self._odd = []
+        self._unplaced = []
         self.written = -1
-        self.odd = 0
+        self.unplaced = 0
 
     @property
     def waiting(self):
-        """How many steps wait for a message."""
+        """Number of steps that wait for a message."""
         return len(self._buckets)
 
     def slot(self, name, node=None):
-        """The number that `take` wants for a topic, or for a node's messages on a topic of many writers; None for one
-        that is not recorded."""
+        """Return the slot number of a topic, for a topic with several publishers of one node; None if not recorded.
+        """
         return self._slot_of.get((name, node))
 
     def take(self, slot, stamp, data):
-        """Take a message of a slot: its stamp [ns] and bytes. Raises OrderError when too many steps wait."""
+        """Take a message of a slot: its stamp [ns] and bytes. Raises OrderError if too many steps wait."""
         bucket = self._buckets.get(stamp)
         if bucket is None:
             if stamp <= self.written:
-                self.take_odd(self._slots[slot - 1][0], data)
+                self.take_unplaced(self._slots[slot - 1][0], data)
                 return
             bucket = self._open(stamp)
         if bucket[slot] is not None:
-            self.take_odd(self._slots[slot - 1][0], data)
+            self.take_unplaced(self._slots[slot - 1][0], data)
             return
         bucket[slot] = data
         if slot in self._last_answer:
@@ -81,26 +84,28 @@ class StepOrder:
             self._advance()
 
     def take_change(self, index, data):
-        """Take the bytes of a message of a `change` topic, by the topic's index: it belongs to the step after the last
-        one that its writer has answered."""
+        """Take the bytes of a message of a `change` topic, by the index of the topic.
+
+        The message belongs to the step after the last step that its publisher has answered.
+        """
         self._changes[index].append((self._last_answer[self._answer_slot[index]], data))
 
-    def take_odd(self, index, data):
-        """Take the bytes of a message that belongs to no step, by the index of its topic."""
-        self.odd += 1
-        self._odd.append((index, data))
+    def take_unplaced(self, index, data):
+        """Take the bytes of a message without a place in a step, by the index of its topic."""
+        self.unplaced += 1
+        self._unplaced.append((index, data))
 
     def _open(self, stamp):
         if len(self._stamps) >= MAX_WAITING_STEPS:
             first = self._stamps[0]
-            raise OrderError(f'step {first / NS_PER_SECOND:.6f} s still waits for {", ".join(self.missing(first))} after '
-                             f'{MAX_WAITING_STEPS} later steps')
+            raise OrderError(f'step {first / NS_PER_SECOND:.6f} s still waits for {", ".join(self.missing(first))} '
+                             f'after {MAX_WAITING_STEPS} later steps')
         bucket = self._buckets[stamp] = [self._steps, *[None] * len(self._slots)]
         heapq.heappush(self._stamps, stamp)
         return bucket
 
-    def _lacks(self, stamp):
-        """Slots without which the step is not complete."""
+    def _missing_slots(self, stamp):
+        """Return the empty slots that keep the step incomplete."""
         bucket = self._buckets[stamp]
         needed = self._needed['step'] if bucket[0] else []
         if self.written < 0:
@@ -110,15 +115,15 @@ class StepOrder:
         return [slot for slot in needed if bucket[slot] is None]
 
     def missing(self, stamp):
-        """Names of what the step with a stamp [ns] waits for."""
-        names = [(topic.name, node) for slot in self._lacks(stamp) for _, topic, node in [self._slots[slot - 1]]]
-        return [f'{name} of {node}' if node else name for name, node in names]
+        """Return the names of the messages that the step with a stamp [ns] waits for."""
+        slots = [self._slots[slot - 1] for slot in self._missing_slots(stamp)]
+        return [f'{topic.name} of {node}' if node else topic.name for _, topic, node in slots]
 
     def _advance(self):
-        while self._stamps and not self._buckets[self._stamps[0]][0] and not self._lacks(self._stamps[0]):
-            self._put()
+        while self._stamps and not self._buckets[self._stamps[0]][0] and not self._missing_slots(self._stamps[0]):
+            self._write_first_step()
 
-    def _put(self):
+    def _write_first_step(self):
         stamp = heapq.heappop(self._stamps)
         bucket = self._buckets.pop(stamp)
         write = self._write
@@ -130,20 +135,20 @@ class StepOrder:
                 changes = self._changes[index]
                 while changes and changes[0][0] < stamp:
                     write(index, stamp, stamp, changes.pop(0)[1])
-        self._put_odd()
+        self._put_unplaced()
 
-    def _put_odd(self):
-        odd, self._odd = self._odd, []
-        for index, data in odd:
+    def _put_unplaced(self):
+        unplaced, self._unplaced = self._unplaced, []
+        for index, data in unplaced:
             self._write(index, max(self.written, 0), max(self.written, 0), data)
 
     def finish(self):
-        """Write everything that still waits, in order."""
+        """Write all waiting messages, in order."""
         while self._stamps:
-            self._put()
+            self._write_first_step()
         stamp = max(self.written, 0)
         for index, changes in self._changes.items():
             for _, data in changes:
                 self._write(index, stamp, stamp, data)
             changes.clear()
-        self._put_odd()
+        self._put_unplaced()

@@ -1,6 +1,6 @@
-"""Is a recording complete? Every step of every topic there, once, in order; counts and sequence numbers agree.
+"""Verification of a recording: each step of each topic is there once, in order; counts and sequence numbers agree.
 
-And did its run come to the planned end? A recording can be complete up to where its run was aborted.
+The report also states whether the run came to its planned end. The recording of an aborted run may be complete.
 """
 import collections
 import dataclasses
@@ -16,14 +16,15 @@ from pedestal_common.wire import messages
 from pedestal_recording import configuration
 
 MAX_LATENCY_NS = 1_000_000_000
-"""A topic may end this much [ns] before the last step: the next messages were still on their way (latency)."""
+"""Largest time between the end of a topic and the last step, for messages still in transit [ns]."""
 
 MAX_SHOWN_GAPS = 10
+"""Largest number of gaps of a topic that the report lists."""
 
 
 @dataclasses.dataclass
 class TopicCheck:
-    """One topic: count, first and last stamp [s] (NaN when empty), what is wrong with it."""
+    """Result for one topic: count, first and last stamp [s] (NaN without messages), problems as texts."""
     name: str
     count: int
     first: float
@@ -33,10 +34,15 @@ class TopicCheck:
 
 @dataclasses.dataclass
 class Report:
-    """What verify found. topics: [TopicCheck]; problems: of the whole bag, texts; steps: how many the run has; period
-    [s], NaN when there are fewer than two; made: how the bag was made, a line; end, planned_end: time [ns] of the last
-    step, and of the one the run was to go on to, None when the bag does not say; lost: steps that the drive made
-    without the command for them, and all it made, as its last diagnostics say; None where they do not."""
+    """Result of `verify`.
+
+    topics            [TopicCheck]
+    problems          of the whole bag, texts
+    steps, period     number of steps of the run, and their period [s], NaN with fewer than two steps
+    made              origin of the bag, one line
+    end, planned_end  times of the last step and of the planned last step [ns]; None if unknown
+    lost              (steps of the drive without their command, all its steps) from its last diagnostics, None without
+    """
     path: str
     topics: list
     problems: list
@@ -49,38 +55,38 @@ class Report:
 
     @property
     def complete(self):
-        """Whether there is no problem up to the end of the recording."""
+        """True without a problem up to the end of the recording."""
         return not self.problems and not any(check.problems for check in self.topics)
 
     @property
     def aborted(self):
-        """Whether the recording ends before the planned end of its run."""
+        """True if the recording ends before the planned end of its run."""
         return self.planned_end is not None and self.end < self.planned_end
 
     @property
     def finished(self):
-        """Whether the recording is complete, up to the planned end of its run."""
+        """True if the recording is complete up to the planned end of its run."""
         return self.complete and not self.aborted
 
     @property
     def ending(self):
-        """How the run ended, a line; '' when it came to its planned end, or none is known."""
+        """End of an aborted run, one line; '' for a run that came to its planned end or has none."""
         return (f'aborted: ends at {self.end / 1e9:.6f} s, planned end {self.planned_end / 1e9:.6f} s'
                 if self.aborted else '')
 
     @property
     def lost_steps(self):
-        """The steps that the drive lost, as text; '' where none is known of."""
+        """Lost steps of the drive as text, '' without any."""
         return '{} of {}'.format(*self.lost) if self.lost and self.lost[0] else ''
 
     @property
     def loss(self):
-        """A line on them, '' where none is known of."""
+        """Line about the lost steps of the drive, '' without any."""
         return f'lost steps: {self.lost_steps}, made by the drive without the command for them' if (
             self.lost_steps) else ''
 
     def lines(self):
-        """The report as text: a row per topic, the gaps under it, the verdict last."""
+        """Return the report as lines of text: a row per topic, its gaps below it, the verdict last."""
         width = max([len(check.name) for check in self.topics], default=5)
         lines = [f'{"topic":{width}} {"messages":>9} {"first s":>14} {"last s":>14}']
         for check in self.topics:
@@ -108,17 +114,16 @@ class _Grid(typing.NamedTuple):
 
     @property
     def steps(self):
-        """How many there are."""
+        """Number of steps."""
         return (self.last - self.first) // self.period + 1 if self.period else 0
 
     def at(self, stamp):
-        """The first step at or after a stamp [ns], a number or an array."""
+        """Return the first step at or after a stamp [ns], a number or an array."""
         return self.first - (self.first - stamp) // self.period * self.period
 
 
 def verify(bag) -> Report:
-    """Judge a bag.Bag. The steps are the stamps of joint_states (else of the first step topic that has any).
-    """
+    """Check a bag.Bag. The steps are the stamps of joint_states, else of the first step topic with messages."""
     rows = {name: bag.rows(name) for name in bag.topics}
     stamps = {name: row.stamp - bag.start for name, row in rows.items()}
     graph, planned = bag.graph, bag.planned_end
@@ -130,11 +135,11 @@ def verify(bag) -> Report:
               for name, stamp in stamps.items()]
     problems = [bag.damage] if bag.damage else []
     if not of_steps:
-        problems.append("no topic of the drive's steps has a message")
+        problems.append('no topic of the steps of the drive has a message')
     counts = {check.name: check.count for check in checks}
     if bag.statistics is not None and bag.statistics != counts:
         problems.append(f'the summary counts {_differences(bag.statistics, counts)}')
-    problems += _away([rows[name] for name in of_steps], bag.start, grid)
+    problems += _unrecorded_steps([rows[name] for name in of_steps], bag.start, grid)
     if bag.path.is_dir():
         problems += _metadata_file(bag, counts)
     drive = bag.last_values(nodes.DRIVE_NODE)
@@ -146,41 +151,41 @@ def verify(bag) -> Report:
 
 
 def count(text):
-    """The whole number that a value of the diagnostics is, None for any other text."""
+    """Return a value of the diagnostics as a whole number, None if it is none."""
     return int(text) if text.isdecimal() and len(text) < 20 else None
 
 
 def _problems(bag, rows, name, stamp, grid):
-    """What is wrong with a topic, its rows of the index (n,) and its stamps (n,) [ns] since the start given."""
+    """Return the problems of a topic, from its rows of the index (n,) and its stamps (n,) [ns] since the start."""
     topic, ours = bag.graph.get(name), 'pacing' in bag.metadata
     rate = topic.rate if topic else ''
     if bag.metadata.get('pacing') == 'realtime' and rate == 'step':
-        # Steps that nobody made, and what strangers said, are no fault of the recording.
+        # Missing steps of the graph, and messages of foreign publishers, are no fault of the recording.
         return ([] if stamp.size else ['no message']) + _numbering(rows)
     problems = _order(stamp) if topic and len(topic.writers) == 1 else []
     if rate == 'step':
         problems += _steps(stamp, 'adu' in topic.writers, grid)
         if ours and not np.array_equal(rows.stamp, rows.log):
-            problems.append(f'{np.sum(rows.stamp != rows.log)} messages logged at a time that is not their stamp')
-    elif rate == 'once' and not 1 <= stamp.size <= len(bag.files):  # each recorder hears what is latched
-        problems.append(f'{stamp.size} messages where one is due')
+            problems.append(f'{np.sum(rows.stamp != rows.log)} messages with a log time that differs from their stamp')
+    elif rate == 'once' and not 1 <= stamp.size <= len(bag.files):  # each recorder receives a latched message
+        problems.append(f'{stamp.size} messages, must be 1')
     elif rate == 'second' and bag.metadata.get('pacing') == 'lockstep' and grid.period:
         problems += _seconds(bag, name, stamp, grid)
     if topic and bag.topics[name] != topic.type:
-        problems.append(f'of type {bag.topics[name]}, where the graph has {topic.type}')
+        problems.append(f'type {bag.topics[name]}, must be {topic.type}')
     if ours:
         problems += _numbering(rows)
     return problems
 
 
 def _differences(claimed, counts):
-    """Where the counts {topic: messages} that a file claims are not those that are there, as text."""
-    return ', '.join(f'{claimed.get(name, 0)} of {name} where {counts.get(name, 0)} are'
+    """Return the differences between claimed and actual counts {topic: messages} as text."""
+    return ', '.join(f'{claimed.get(name, 0)} of {name} instead of {counts.get(name, 0)}'
                      for name in dict.fromkeys((*claimed, *counts)) if claimed.get(name, 0) != counts.get(name, 0))
 
 
 def _grid(stamps):
-    """The _Grid of the stamps {topic: (n,) [ns]} of the topics that have one message for each step."""
+    """Return the _Grid of the stamps {topic: (n,) [ns]} of the step topics."""
     if not stamps:
         return _Grid(0, 0, 0)
     steps = np.unique(next((stamp for name, stamp in stamps.items() if nodes.plain(name) == 'joint_states'),
@@ -190,22 +195,21 @@ def _grid(stamps):
 
 
 def _order(stamp):
-    """Stamps that go back."""
+    """Return the problem of stamps that go back, [] without any."""
     back = np.flatnonzero(np.diff(stamp) < 0)
     return [f'{back.size} stamps go back, the first from {stamp[back[0]] / 1e9:.6f} '
             f'to {stamp[back[0] + 1] / 1e9:.6f} s'] if back.size else []
 
 
 def _missing(numbers, count):
-    """[(first, last)] of the gaps in ascending whole numbers (n,), repeated or not, that are to be 0 to count - 1."""
+    """Return [(first, last)] of the gaps in ascending whole numbers (n,) that should include 0 to count - 1."""
     bounds = np.concatenate(([-1], numbers[(numbers >= 0) & (numbers < count)], [count]))
     gaps = np.flatnonzero(np.diff(bounds) > 1)
     return list(zip((bounds[gaps] + 1).tolist(), (bounds[gaps + 1] - 1).tolist()))
 
 
 def _steps(stamp, of_drive, grid):
-    """Steps that are missing or doubled, stamps that are none. of_drive: written by the drive, which makes the steps.
-    """
+    """Return the problems of missing or doubled steps, and of other stamps. of_drive: published by the drive."""
     if not stamp.size:
         return ['no message']
     problems = []
@@ -217,7 +221,7 @@ def _steps(stamp, of_drive, grid):
         return problems
     between = np.sum((unique - grid.first) % grid.period != 0)
     if between:
-        problems.append(f'{between} stamps are no step')
+        problems.append(f'{between} stamps lie between two steps')
     missing = _missing((unique - grid.first) // grid.period, grid.steps)
     if not of_drive and missing and missing[-1][1] == grid.steps - 1 \
             and (missing[-1][1] - missing[-1][0] + 1) * grid.period <= MAX_LATENCY_NS:
@@ -233,7 +237,7 @@ def _steps(stamp, of_drive, grid):
 
 
 def _seconds(bag, name, stamp, grid):
-    """Diagnostics that are missing: every node with a topic in the bag owes one at the first step of every second."""
+    """Return the missing diagnostics as problems: each node with a topic in the bag publishes at each whole second."""
     first, last = -(-grid.first // NS_PER_SECOND), grid.last // NS_PER_SECOND
     count = max(last - first + (grid.at(last * NS_PER_SECOND) <= grid.last), 0)
     stamps_of = collections.defaultdict(list)
@@ -258,10 +262,10 @@ def _seconds(bag, name, stamp, grid):
     return problems
 
 
-def _away(of_steps, start, grid):
-    """Where no step was recorded between two files: the recorder of the first was killed, and another one started.
+def _unrecorded_steps(of_steps, start, grid):
+    """Return the gaps between two files: a recorder was killed, and another recorder was started later.
 
-    of_steps: rows of the index of each topic of the steps.
+    of_steps: rows of the index of each step topic.
     """
     none = np.zeros(0, np.int64)
     number = np.concatenate([none, *(row.channel >> 16 for row in of_steps)])
@@ -272,25 +276,25 @@ def _away(of_steps, start, grid):
 
 
 def _numbering(rows):
-    """What is wrong with the sequence numbers of a topic; in each file they begin with 1."""
+    """Return the problems of the sequence numbers of a topic; they begin with 1 in each file."""
     file = rows.channel >> 16
     return [problem for number in np.unique(file) for problem in _sequence(rows.sequence[file == number])]
 
 
 def _sequence(sequence):
-    """Numbers that are missing or repeated: the recorder counts from 1, with a gap for what was lost on its way."""
+    """Return the problems of sequence numbers. The recorder counts from 1, with a gap for each lost message."""
     if not sequence.size:
         return []
     steps = np.diff(sequence, prepend=0)
     lost = int(np.sum(steps[steps > 1] - 1))
-    problems = [f'sequence numbers say that {lost} were lost'] if lost else []
+    problems = [f'{lost} messages lost, by the sequence numbers'] if lost else []
     if np.any(steps <= 0):
         problems.append(f'{np.sum(steps <= 0)} sequence numbers go back or repeat')
     return problems
 
 
 def _metadata_file(bag, counts):
-    """What metadata.yaml claims otherwise than it is."""
+    """Return the differences between metadata.yaml and the files."""
     file = bag.path / 'metadata.yaml'
     try:
         information = plain_yaml.read(file)['rosbag2_bagfile_information']
@@ -310,5 +314,5 @@ def _metadata_file(bag, counts):
     if claimed != counts:
         problems.append(f'metadata.yaml counts {_differences(claimed, counts)}')
     if total != sum(counts.values()):
-        problems.append(f'metadata.yaml counts {total} messages where {sum(counts.values())} are')
+        problems.append(f'metadata.yaml counts {total} messages instead of {sum(counts.values())}')
     return problems

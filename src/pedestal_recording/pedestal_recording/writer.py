@@ -1,12 +1,12 @@
-"""Writes a bag: a rosbag2 directory (metadata.yaml version 9) with an MCAP file. No ROS here.
+"""Writing of a bag: a rosbag2 directory (metadata.yaml version 9) with an MCAP file. No ROS here.
 
-The mcap library's Writer makes the records. Added to it here: a chunk ends by log time, the file stays whole when the
-disk is full, it is locked while it is written, and every schema and channel also stands before the first chunk, so
-that a broken chunk takes none of them with it. Nothing in the file depends on its path, the host or the wall clock:
+The Writer of the mcap library makes the records. This module adds four properties. A chunk ends by log time. The file
+stays whole on a full disk. The file is locked while it is written. All schemas and channels also stand before the
+first chunk, so a broken chunk does not lose them. The file does not depend on its path, the host or the wall clock, so
 equal messages give equal bytes.
 
-The recorder of a realtime run that died may be started again: it goes on in a new file of the bag, NAME_1.mcap and so
-on, until one has come to the planned end of the run.
+A recorder of a realtime run that died may be started again. It continues in a new file of the bag, NAME_1.mcap and so
+on, until a file reaches the planned end of the run.
 """
 import collections
 import contextlib
@@ -31,20 +31,19 @@ from pedestal_recording.mcap_file import BagError, McapFile, parsed, reason
 TARGET_CHUNK_BYTES = 1_000_000
 TARGET_CHUNK_SPAN_NS = 1_000_000_000
 TARGET_CHUNK_MESSAGES = 100_000
-"""A chunk ends after this many bytes, ns of log time (so that a crash loses at most the last second) or messages."""
+"""Size [bytes], log time [ns] and messages after which a chunk ends. A crash loses one second at most."""
 
 COMMON_METADATA_KEYS = ('scenario', 'pacing', 'seed', 'planned_end_ns')
-"""What the metadata of all files of a bag say alike."""
+"""Keys of the metadata with equal values in all files of a bag."""
 
 _INFINITE = {'sec': 9223372036, 'nsec': 854775807}
 
-
 _PAIR, _INDEX = struct.Struct('<QQ'), struct.Struct('<HI')
-"""First and last log time of a chunk; channel and bytes of its message index, whose entries are pairs."""
+"""First and last log time of a chunk; channel and size of a message index, whose entries are pairs."""
 
 
 def _qos(rate):
-    """The offered_qos_profiles of a topic of a rate."""
+    """Return the offered_qos_profiles of a topic of a rate."""
     depth, latched = topics.QOS_BY_RATE[rate].lockstep, topics.QOS_BY_RATE[rate].latched
     return [{'history': 'keep_last' if depth else 'keep_all', 'depth': depth, 'reliability': 'reliable',
              'durability': 'transient_local' if latched else 'volatile',
@@ -53,8 +52,10 @@ def _qos(rate):
 
 
 class _Disk:
-    """The stream under the library's Writer: what it wrote since the last flush comes into the file as a whole or not
-    at all. size: bytes that are in the file already; they are not written again."""
+    """Stream below the Writer of the library. Bytes since the last flush reach the file as a whole or not at all.
+
+    size: number of bytes that the file already has; they are not written again.
+    """
 
     def __init__(self, path, stream, size=0):
         self.path, self.stream, self.end = path, stream, 0
@@ -65,12 +66,11 @@ class _Disk:
         self._pending += data
 
     def tell(self):
-        """Where in the file the next byte comes."""
+        """Return the position of the next byte in the file."""
         return self.end + len(self._pending)
 
     def flush(self):
-        """Put what was kept into the file. Raises BagError when the disk does not take it; the file is then as it was.
-        """
+        """Write the kept bytes to the file. If the disk does not take them, restore the file; raises BagError."""
         data, self._pending = bytes(self._pending), bytearray()
         if self.end >= self._size:
             view = memoryview(data)
@@ -85,11 +85,11 @@ class _Disk:
 
 
 class BagFile:
-    """A bag in the making: `path` its directory, `file` the MCAP file in it.
+    """A bag that is being written. path: its directory; file: its MCAP file.
 
-    directory: must not exist; earlier: files of the bag in it, behind which this one comes.
-    Raises BagError, naming the file, when the disk does not take a chunk. What was written by then stays readable;
-    every message after it is dropped, so that a bag has no hole.
+    directory: must not exist; earlier: files of the bag before this file.
+    Raises BagError with the name of the file if the disk does not take a chunk. The earlier chunks stay readable. All
+    later messages are dropped, so a bag has no gap.
     """
 
     def __init__(self, directory, earlier=()):
@@ -115,13 +115,15 @@ class BagFile:
         self._mcap.start('ros2', 'pedestal')
 
     def add_schema(self, name, encoding, data):
-        """Declare a message type by its name and its definition (text as bytes) in an encoding; its number."""
+        """Declare a message type by its name and its definition (text as bytes) in an encoding. Return its number."""
         number = self._mcap.register_schema(name, encoding, data)
         return self._declared(records.Schema(id=number, name=name, encoding=encoding, data=data))
 
     def add_channel(self, topic, schema, metadata):
-        """Declare a topic of CDR messages by its name with '/', the number of its schema and {text: text}; its
-        number."""
+        """Declare a topic of CDR messages by its name with '/', the number of its schema and {text: text}.
+
+        Return its number.
+        """
         number = self._mcap.register_channel(topic, 'cdr', schema, metadata)
         return self._declared(records.Channel(id=number, topic=topic, message_encoding='cdr', schema_id=schema,
                                               metadata=metadata))
@@ -133,7 +135,7 @@ class BagFile:
         return record.id
 
     def add_metadata(self, name, content):
-        """Add a metadata record {text: text}; the one named `pedestal` is also custom_data of metadata.yaml."""
+        """Add a metadata record {text: text}; the record `pedestal` is also custom_data of metadata.yaml."""
         self._mcap.add_metadata(name, content)
 
     def add_message(self, channel, sequence, log_time, publish_time, data):
@@ -151,7 +153,7 @@ class BagFile:
         self._mcap.add_message(channel, log_time, data, publish_time, sequence)
 
     def flush(self):
-        """End the chunk: everything added is in the file when this returns."""
+        """End the chunk. After the return all added messages are in the file."""
         added, self._in_chunk, self._chunk_size = self._in_chunk, 0, 0
         if self._full:
             return
@@ -164,23 +166,26 @@ class BagFile:
 
     @property
     def messages(self):
-        """How many messages were added and not dropped."""
+        """Number of messages added and not dropped."""
         return self._in_file + self._in_chunk
 
     def close(self):
-        """Write what is left, the summary and metadata.yaml; on a full disk whatever of it fits, then BagError."""
+        """Write the last chunk, the summary and metadata.yaml. On a full disk, write the part that fits.
+
+        Raises BagError on a full disk.
+        """
         with contextlib.closing(self._disk.stream):
             try:
                 self.flush()
             finally:
                 if self._full:
-                    self._forget_what_did_not_fit()
+                    self._truncate_after_disk_full()
                 self._mcap.finish()
                 self._disk.flush()
                 self._write_metadata_file()
 
-    def _forget_what_did_not_fit(self):
-        """The library's Writer cannot take back a chunk: a new one is given what is in the file, to end it."""
+    def _truncate_after_disk_full(self):
+        """Give the content of the file to a new Writer of the library, because a Writer cannot take back a chunk."""
         self._start(_Disk(self.file, self._disk.stream, self._disk.end))
         with open(self.file, 'rb') as stream, contextlib.suppress(EndOfFile):
             for record in StreamReader(stream, emit_chunks=True).records:
@@ -199,7 +204,7 @@ class BagFile:
         self._mcap.flush()
 
     def _write_metadata_file(self):
-        """metadata.yaml, from what is in the files."""
+        """Write metadata.yaml from the content of the files."""
         contents = [_Content(file) for file in (*self._earlier, self.file)]
         files = [{'path': content.path.name, **_times([content]), 'message_count': content.total}
                  for content in contents]
@@ -232,7 +237,7 @@ class BagFile:
 
 
 class _Content:
-    """What is in an MCAP file of ours, without a look at its messages, also where its recorder was killed.
+    """Content of an MCAP file of the recorder, also of a killed one, without its messages.
 
     path; metadata: {record: {text: text}}; first, last: log times [ns], 0 without a message.
     """
@@ -261,13 +266,13 @@ class _Content:
             self._channels[record.id] = record
 
     def topics(self):
-        """Iterator of (records.Channel, name of its type, messages) of every topic."""
+        """Yield (records.Channel, name of its type, number of messages) of every topic."""
         for number, channel in self._channels.items():
             yield channel, self._schemas[channel.schema_id], self._counts[number]
 
 
 def _times(contents):
-    """The span of some _Contents as metadata.yaml says it."""
+    """Return the time span of some _Contents in the form of metadata.yaml."""
     known = [content for content in contents if content.total] or contents[:1]
     start, end = min(content.first for content in known), max(content.last for content in known)
     return {'duration': {'nanoseconds': end - start}, 'starting_time': {'nanoseconds_since_epoch': start}}
@@ -281,13 +286,15 @@ def _profiles(channel):
 
 
 def _earlier_files(directory, metadata):
-    """The files of a bag that is to be gone on with: the one of a realtime run, with this metadata, that has not come
-    to its end; [] where there is none. Raises BagError for any other bag, and while its recorder still writes it."""
+    """Return the files of an unfinished bag to continue: of a realtime run with this metadata; [] without a bag.
+
+    Raises BagError for any other bag, and while its recorder still writes it.
+    """
     path = pathlib.Path(directory)
     if metadata.get('pacing') != 'realtime' or not any(path.glob('*.mcap')):
         return []
     files = locate(path)
-    if not files[-1].stat().st_size:  # its recorder died before the first byte
+    if not files[-1].stat().st_size:  # the recorder died before the first byte
         files.pop().unlink()
         if not files:
             path.rmdir()
@@ -295,11 +302,11 @@ def _earlier_files(directory, metadata):
     McapFile(files[-1])
     earlier = _Content(files[0]).metadata.get('pedestal', {})
     if any(earlier.get(key) != str(metadata[key]) for key in COMMON_METADATA_KEYS if key in metadata):
-        raise BagError(f'{directory} exists already, of another run; a recording is never overwritten')
+        raise BagError(f'{directory} exists already and is of another run; a recording is never overwritten')
     try:
         information = plain_yaml.read(path / 'metadata.yaml')['rosbag2_bagfile_information']
         finished = information['custom_data'].get('finished') != 'false'
-    except FileNotFoundError:  # its recorder was killed
+    except FileNotFoundError:  # the recorder was killed
         finished = False
     except (OSError, UnicodeDecodeError, yaml.YAMLError, KeyError, TypeError, AttributeError):
         finished = True
@@ -309,12 +316,14 @@ def _earlier_files(directory, metadata):
 
 
 class Writer(BagFile):
-    """A bag of topics of the graph, whose messages it numbers from 1.
+    """A bag of topics of the graph, with messages numbered from 1.
 
-    directory: must not exist, or be a bag that is to be gone on with (see this module). rows: of topics.TOPICS, or
-    nodes.Links; a message names its topic by the index in them. metadata: {text: text} of the run, kept as the
-    metadata record `pedestal`. more: {name: {text: text}} of further metadata records. Raises BagError as a BagFile
-    does.
+    directory   must not exist, or must be a bag to continue (see this module)
+    rows        rows of topics.TOPICS, or nodes.Links; a message names its topic by the index in them
+    metadata    {text: text} of the run, for the metadata record `pedestal`
+    more        {name: {text: text}} of further metadata records
+
+    Raises BagError like a BagFile.
     """
 
     def __init__(self, directory, rows, metadata, more=()):
@@ -335,5 +344,5 @@ class Writer(BagFile):
         self.add_message(self._channels[topic], sequence & 0xffffffff, log_time, publish_time, data)
 
     def skip(self, topic, count):
-        """Leave a gap in the topic's sequence numbers: messages that were lost before they came here."""
+        """Leave a gap in the sequence numbers of a topic, for messages that did not reach the recorder."""
         self._sequences[topic] += count

@@ -178,7 +178,7 @@ def test_a_bag_that_does_not_say_how_it_was_made_is_no_gap(recording):
     content = bag.read(recording)
     assert content.configuration == {'scenario': '', 'parameters': {}}
     report = verify(load(recording))
-    assert report.complete and report.made == 'made by: not said in the bag, it holds no configuration'
+    assert report.complete and report.made == 'made by: unknown, the bag holds no configuration'
     assert report.made in report.lines()
 
 
@@ -415,14 +415,14 @@ def test_verify_finds_what_the_recorder_lost(tmp_path, rows):
             writer.skip(NAMES.index('clock'), 3)
         writer.write(NAMES.index(name), stamp, stamp, data)
     writer.close()
-    assert any('sequence numbers say that 3 were lost' in line for line in verify(load(tmp_path / 'b')).lines())
+    assert any('3 messages lost, by the sequence numbers' in line for line in verify(load(tmp_path / 'b')).lines())
 
 
 def test_verify_finds_damage_and_wrong_counts(tmp_path, rows, recording):
     path = write(tmp_path / 'b', rows)
     text = (path / 'metadata.yaml').read_text()
     (path / 'metadata.yaml').write_text(text.replace('message_count: 450', 'message_count: 449', 1))
-    assert verify(load(path)).problems == ['metadata.yaml counts 449 of clock where 450 are']
+    assert verify(load(path)).problems == ['metadata.yaml counts 449 of clock instead of 450']
     (path / 'metadata.yaml').write_text(': [')
     assert verify(load(path)).problems[0].startswith('metadata.yaml cannot be read')
     (path / 'metadata.yaml').unlink()

@@ -182,7 +182,7 @@ def test_times_are_those_of_the_scenario(rows, tmp_path):
     assert content.table('joint_states')['t'][-1] == 1.995
     assert report.ending == 'aborted: ends at 1.995000 s, planned end 4.000000 s'
     assert {check.last for check in report.topics if check.name == 'clock'} == {1.995}
-    assert 'ends after 1.995000 s, the run was to go on to 4.000000 s' in recover(tmp_path / 'run').lines()[0]
+    assert 'ends after 1.995000 s, the planned end is 4.000000 s' in recover(tmp_path / 'run').lines()[0]
 
 
 @pytest.mark.parametrize('name', ['leo_pass', 'servo_sine', 'servo_step', 'ship_pass', 'uav_flyby'])

@@ -190,10 +190,10 @@ def test_a_type_that_is_not_known(tmp_path, capsys):
     path = foreign(tmp_path / 'bag')
     assert export(path) == 0
     said = capsys.readouterr()
-    assert said.err == ('pedestal: left out: other is of type my_msgs/msg/Unknown, which is not known here\n')
+    assert said.err == ('pedestal: left out: other is of the unknown type my_msgs/msg/Unknown\n')
     assert [file.name for file in (path / 'export').iterdir()] == ['acu.mode.csv']
     assert export(path, '--topics', 'other') == 1
-    assert 'my_msgs/msg/Unknown, which is not known here' in capsys.readouterr().err
+    assert 'of the unknown type my_msgs/msg/Unknown' in capsys.readouterr().err
 
 
 def cut(path):

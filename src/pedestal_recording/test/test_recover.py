@@ -111,7 +111,7 @@ def test_a_chunk_that_is_broken_in_the_middle_is_left_out_and_said(whole, tmp_pa
     assert found.lost == {**dict.fromkeys(step, 200), 'diagnostics': diagnostics}
     total = 200 * len(step) + diagnostics
     assert lines[1].startswith(f'lost in the middle: 200 steps, {total} messages: 200 of clock, ')
-    assert lines[2] == 'the recording ends after 6.995000 s, the run was to go on to 20.000000 s'
+    assert lines[2] == 'the recording ends after 6.995000 s, the planned end is 20.000000 s'
     assert last.endswith(f'0.000000 to 6.995000 s; {stop - start} bytes unused')
     problems = [problem for check in verify(load(found.path)).topics for problem in check.problems]
     assert 'missing 200 steps from 3.000000 to 3.995000 s' in problems
@@ -138,7 +138,7 @@ def test_a_file_cut_short_or_filled_up_with_rubbish_reads_to_its_last_chunk(whol
     found = recover(damaged(whole, tmp_path, lambda data: data[:stop - 1] + tail))
     assert held(found.path) == without_seconds(made, 5, 6)
     assert found.unused == stop - 1 - start + len(tail)
-    assert 'the recording breaks off after 4.995000 s, the run was to go on to 20.000000 s' in found.lines()
+    assert 'the recording breaks off after 4.995000 s, the planned end is 20.000000 s' in found.lines()
 
 
 def test_a_whole_bag_comes_back_with_everything_in_it(whole, tmp_path, made):
@@ -187,7 +187,7 @@ def test_a_foreign_bag(tmp_path, made, options):
 def test_channels_declared_nowhere_are_said(tmp_path, made):
     data = foreign(tmp_path / 'f.mcap', made)
     (tmp_path / 'f.mcap').write_bytes(data[:1000] + b'\xff' + data[1001:-2000])
-    with pytest.raises(bag.BagError, match='not one message in it can be read'):
+    with pytest.raises(bag.BagError, match='no message in it is readable'):
         recover(tmp_path / 'f.mcap')
     assert [entry.name for entry in tmp_path.iterdir()] == ['f.mcap']
 
@@ -199,7 +199,7 @@ def test_what_cannot_be_recovered_leaves_nothing_behind(whole, tmp_path):
     with pytest.raises(bag.BagError, match='is being written'):
         recover(tmp_path / 'live')
     writer.close()
-    with pytest.raises(bag.BagError, match='not one message'):
+    with pytest.raises(bag.BagError, match='no message'):
         recover(tmp_path / 'live')
     command = ('import resource, sys; resource.setrlimit(resource.RLIMIT_FSIZE, (200_000, 200_000)); '
                'from pedestal import cli; sys.exit(cli.main(["recover", sys.argv[1], "--output", "out"]))')

@@ -73,7 +73,7 @@ def test_any_arrival_gives_the_canonical_order(seed):
     assert collected.order.waiting == 3
     collected.order.finish()
     assert collected.rows == [(name, k * T, data) for name, k, data, _ in rows]
-    assert collected.order.odd == 0
+    assert collected.order.unplaced == 0
 
 
 def test_a_step_waits_for_every_topic_and_at_a_second_for_every_node():
@@ -98,10 +98,10 @@ def test_doubled_late_and_stampless_messages_are_kept_and_counted():
         if row[1] == 2 and row[0] == 'clock':
             collected.put('clock', 0, 'late')
             collected.put('joint_states', 2, 'first')
-            collected.order.take_odd(NAMES.index('ship/truth') if 'ship/truth' in NAMES else 0, 'stampless')
+            collected.order.take_unplaced(NAMES.index('ship/truth') if 'ship/truth' in NAMES else 0, 'stampless')
         collected.put(*row)
     collected.order.finish()
-    assert collected.order.odd == 3
+    assert collected.order.unplaced == 3
     assert [row[2] for row in collected.rows[-3:]] == ['late', 'stampless', 'joint_states 2']
     assert {row[1] for row in collected.rows[-3:]} == {2 * T}
     assert len(collected.rows) == len(rows) + 3

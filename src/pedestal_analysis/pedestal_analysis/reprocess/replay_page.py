@@ -167,7 +167,7 @@ class Player:
         moved = False
         while True:
             try:
-                client, message, _ = self._server.asked.get_nowait()
+                client, message, _ = self._server.requests.get_nowait()
             except queue.Empty:
                 return moved
             wanted = (message or {}).get('replay')
@@ -187,7 +187,7 @@ class Player:
 
     def _show(self, slowly):
         recording = self._recording
-        sections = {'now': page_state.now(recording), 'told': page_state.status_section(recording),
+        sections = {'now': page_state.now(recording), 'status': page_state.status_section(recording),
                     'alarms': page_state.alarms(recording), 'log': recording.lines(),
                     'replay': {'length': recording.length, 'position': recording.position, 'playing': self._playing,
                                'rate': self._rate}}

@@ -1,1 +1,1 @@
-"""The operator's page: its server, what it shows, and what it may ask for."""
+"""Page of the operator: its server, its content, and the commands that it may send."""

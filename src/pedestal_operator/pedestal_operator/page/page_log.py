@@ -1,48 +1,51 @@
-"""The event log of the page: who asked for what, and what the antenna said of it. No ROS here."""
+"""Event log of the page: commands with their senders and replies, changed states and alarms. No ROS here."""
 import collections
 
 MAX_LOG_LINES = 200
-"""Lines that are shown, and people whose jogs are remembered."""
+"""Largest number of lines, and of names whose last jog is kept."""
 
 JOG_VERB, NEW_JOG_PAUSE_S = 'rate', 2.0
-"""The verb of a jog, which is asked for again and again, and the time [s] after which another one is a new line."""
+"""Command of a jog, which is repeated, and the pause after which a jog is a new line [s]."""
 
 
 class Log:
-    """The newest lines, at most so many. lines: [{'t': s UTC, 'who': name, 'text': line, 'bad': whether it is a
-    refusal or an alarm}]; revision: counts them."""
+    """The newest lines, `most` at most.
+
+    lines      [{'t': UTC [s], 'who': name, 'text': line, 'bad': True for a refusal or an alarm}]
+    revision   number of lines added
+    """
 
     def __init__(self, most=MAX_LOG_LINES):
         self.lines, self.revision = collections.deque(maxlen=most), 0
-        self._jogged, self._texts, self._alarms = {}, {}, {}
+        self._last_jogs, self._texts, self._alarms = {}, {}, {}
 
-    def say(self, t, who, text, bad=False):
+    def add_line(self, t, who, text, bad=False):
         """Add a line."""
         self.lines.append({'t': t, 'who': who, 'text': text, 'bad': bad})
         self.revision += 1
 
     def replied(self, t, command, reply):
-        """A commands.Command was answered by a commands.Reply."""
-        before, self._jogged[command.who] = self._jogged.get(command.who, -NEW_JOG_PAUSE_S), t
+        """Log the commands.Reply to a commands.Command, a repeated jog once."""
+        before, self._last_jogs[command.who] = self._last_jogs.get(command.who, -NEW_JOG_PAUSE_S), t
         if command.verb != JOG_VERB:
-            del self._jogged[command.who]
+            del self._last_jogs[command.who]
         elif t - before < NEW_JOG_PAUSE_S and reply.granted:
             return
-        if len(self._jogged) > MAX_LOG_LINES:
-            self._jogged.clear()
-        self.say(t, command.who, f'{command.verb}: {reply.text}', not reply.granted)
+        if len(self._last_jogs) > MAX_LOG_LINES:
+            self._last_jogs.clear()
+        self.add_line(t, command.who, f'{command.verb}: {reply.text}', not reply.granted)
 
     def text(self, t, topic, text):
-        """A text topic says something else."""
+        """Log the text of a topic if it has changed."""
         if self._texts.get(topic) != text:
             self._texts[topic] = text
-            self.say(t, topic, text, topic == 'adu/state' and text.startswith(('fault', 'emergency')))
+            self.add_line(t, topic, text, topic == 'adu/state' and text.startswith(('fault', 'emergency')))
 
     def alarms(self, t, alarms):
-        """The list of alarms (page_state.alarms) is another one."""
+        """Log the changed states in a list of alarms (page_state.alarms)."""
         states = {alarm['name']: alarm['state'] for alarm in alarms}
         for name in (*states, *(name for name in self._alarms if name not in states)):
             state = states.get(name, 'normal')
             if state != self._alarms.get(name, 'normal'):
-                self.say(t, 'alarm', f'{name}: {state}', state == 'unacknowledged')
+                self.add_line(t, 'alarm', f'{name}: {state}', state == 'unacknowledged')
         self._alarms = states

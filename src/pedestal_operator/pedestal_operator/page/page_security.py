@@ -1,8 +1,8 @@
-"""Who may talk to the page's server: by token, by the name it was called by, and from which page. No ROS, no server.
+"""Access to the server of the page by token, name of the host and origin of the request. No ROS, no server.
 
-A token stands for a role. It comes once, in the address of the page, and from then on in a cookie that no script can
-read and that the browser sends to its own site only. `Host` must be a name of this server, or a foreign site could
-make its own name point here (DNS rebinding); `Origin` must be our own page for whatever is asked.
+A token stands for a role. It arrives once in the address of the page, then in a cookie. No script can read the cookie,
+and the browser sends it to this site only. `Host` must be a name of this server. This avoids that a foreign site lets
+its own name point here (DNS rebinding). `Origin` must be this page for every request that can command the antenna.
 """
 import hmac
 import ipaddress
@@ -11,17 +11,17 @@ import typing
 from http import cookies
 
 PAGE_ROLES = ('operator', 'monitor', 'supervisor')
-"""A monitor looks and may stop; an operator asks; a supervisor takes control away from others."""
+"""Roles: an operator sends commands; a monitor may send `stop` only; a supervisor may take control from others."""
 
 UNRESTRICTED_VERBS = ('stop',)
-"""Verbs that every role may ask for."""
+"""Commands that every role may send."""
 
 SUPERVISOR_REQUESTS = (('take', 'role', 'supervisor'),)
-"""(verb, argument, value) for supervisors only."""
+"""(command, argument, value) for supervisors only."""
 
 
 class Refused(Exception):  # noqa: N818  no error of the server
-    """A request that is not served. status: of HTTP; reason: one line."""
+    """A refused request. status: of HTTP; reason: one line."""
 
     def __init__(self, status, reason):
         super().__init__(reason)
@@ -29,8 +29,10 @@ class Refused(Exception):  # noqa: N818  no error of the server
 
 
 class Request(typing.NamedTuple):
-    """What is judged of a request. path: without the query; token: of the query; asks: whether it is a web socket or
-    anything but GET and HEAD."""
+    """Parts of a request that decide about access.
+
+    path: without the query; token: of the query; asks: True for a web socket, and for all methods except GET and HEAD.
+    """
     host: str
     origin: str
     cookie: str
@@ -40,7 +42,7 @@ class Request(typing.NamedTuple):
 
 
 class Access:
-    """The tokens of a server at an address and port, made anew with it. names: by which it is called beside that."""
+    """New tokens of a server at an address and port. names: further names of the server."""
 
     def __init__(self, address, port, names=()):
         self.tokens = {role: secrets.token_urlsafe(24) for role in PAGE_ROLES}
@@ -52,21 +54,21 @@ class Access:
         self._here = _bracketed(address), port
 
     def url(self, role):
-        """Where the page is for a role, its token in it."""
+        """Return the address of the page for a role, with its token."""
         host, port = self._here
         return f'http://{host}:{port}/?token={self.tokens[role]}'
 
     def role(self, request):
-        """The role of a Request. Raises Refused: 400 of a wrong host, 403 of a foreign page, 401 without a token."""
+        """Return the role of a Request. Raises Refused: 400 wrong host, 403 foreign page, 401 no valid token."""
         if request.host.lower() not in self._hosts:
-            raise Refused(400, 'this server is not called by that name')
+            raise Refused(400, 'unknown name of this server: open the address that the server printed at its start')
         if request.origin.lower() != f'http://{request.host.lower()}' and (request.origin or request.asks):
-            raise Refused(403, 'not asked by our own page')
+            raise Refused(403, 'the request comes from another page than that of this server')
         given = request.token if request.path == '/' and request.token else self._of_cookie(request.cookie)
         for role, token in self.tokens.items():
             if hmac.compare_digest(token.encode(), given.encode(errors='replace')):
                 return role
-        raise Refused(401, 'no token, or a wrong one: open the address that was printed when the page was started')
+        raise Refused(401, 'missing or wrong token: open the address that the server printed at its start')
 
     def _of_cookie(self, header):
         try:
@@ -77,19 +79,19 @@ class Access:
 
 
 def refusal_reason(role, verb, arguments) -> str:
-    """'' where a role may ask for a verb with {argument: value}, else why not."""
+    """Return the reason why a role may not send a command with {argument: value}, '' if it may."""
     if verb in UNRESTRICTED_VERBS:
         return ''
     if role == 'monitor':
-        return 'this page may only look, and stop'
+        return 'the role monitor may send stop only'
     if role != 'supervisor' and any(verb == name and str(arguments.get(argument)) == value
                                     for name, argument, value in SUPERVISOR_REQUESTS):
-        return 'only a supervisor takes control away'
+        return 'only the role supervisor may take control from others'
     return ''
 
 
 def is_loopback(address):
-    """Whether an address is reached from this machine only."""
+    """Return True if an address is reachable from this machine only."""
     try:
         return ipaddress.ip_address(address).is_loopback
     except ValueError:
@@ -101,7 +103,7 @@ def _bracketed(name):
 
 
 def headers(host):
-    """[(name, value)] of every answer: nothing is loaded from elsewhere, kept, framed or guessed."""
+    """Return the headers [(name, value)] of every answer: content of this site only, revalidated, without frames."""
     return [('content-security-policy',
              "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self'; "
              f"connect-src 'self' ws://{host}; frame-ancestors 'none'; base-uri 'none'; form-action 'none'"),

@@ -1,10 +1,9 @@
-"""The server of the page: its files, and a web socket for each page, in a thread of its own. No ROS here.
+"""Server of the page: its files, and a web socket for each page, in a separate thread. No ROS here.
 
-What a page is sent is a state in sections, each with a revision. Messages are numbered, and a page says which one it
-has seen. While MAX_UNSEEN_MESSAGES of them are on their way it gets no other; then one with the sections that have
-changed since, so
-the newest wins: nothing is queued for anybody but the few replies to what he asked. A page that sees nothing for
-PAGE_TIMEOUT_S is dropped.
+A message to a page has the sections of the state whose revisions have changed. Messages are numbered, and a page
+acknowledges the number of the last one. A page with MAX_UNSEEN_MESSAGES unacknowledged messages receives no further
+message; the next one has the newest sections. So no queue grows except the short queue of replies to the page. A page
+without an acknowledgement for PAGE_TIMEOUT_S is dropped.
 """
 import asyncio
 import collections
@@ -31,46 +30,46 @@ from pedestal_operator.page.page_security import Refused
 STATIC_FOLDER = pathlib.Path(__file__).parents[1] / 'static'
 
 MAX_UNSEEN_MESSAGES = 4
-"""Messages that a page has not seen yet at the most."""
+"""Largest number of unacknowledged messages to a page."""
 
 PAGE_TIMEOUT_S = 5.0
-"""Time [s] for which a page may see nothing before it is dropped."""
+"""Time without an acknowledgement after which a page is dropped [s]."""
 
 MAX_MESSAGE_BYTES = 4096
-"""Bytes of a message from a page at the most."""
+"""Largest message from a page [bytes]."""
 
 MAX_QUEUED_REQUESTS, MAX_QUEUED_REPLIES = 200, 50
-"""Asks of all pages that wait for the node, and replies that wait for a page, at the most."""
+"""Largest number of waiting commands of all pages, and of waiting replies to a page."""
 
 REQUEST_BURST_LIMIT, REQUEST_BURST_PERIOD_S = 40, 1.0
-"""So many asks of a page are heard in this time [s]; a jog takes five."""
+"""Largest number of messages from a page in a period, and the period [s]; a jog needs five in 1 s."""
 
 SHUTDOWN_TIMEOUT_S = 1.0
-"""Time [s] that the pages are given when the server ends."""
+"""Grace period of the pages when the server ends [s]."""
 
 
 class PageMessage(typing.NamedTuple):
-    """What a page has asked: a dict, None where it has left; age: of the newest state that it has seen [s]."""
+    """Message of a page: a dict, None when the page has left. age: of the last acknowledged state [s]."""
     client: 'Client'
     message: dict | None
     age: float
 
 
 class Client:
-    """A page. name: of its user; role: of page_security.ROLES; address: of its host."""
+    """A page. name: of its user; role: of page_security.PAGE_ROLES; address: of its host."""
 
     def __init__(self, name, role, address):
         self.name, self.role, self.address = name, role, address
         self.replies = collections.deque(maxlen=MAX_QUEUED_REPLIES)
         self.wake = asyncio.Event()
-        self._revisions, self._asked = {}, collections.deque(maxlen=REQUEST_BURST_LIMIT)
-        self._number, self._sent, self._seen = 0, {}, time.monotonic()
+        self._revisions, self._message_times = {}, collections.deque(maxlen=REQUEST_BURST_LIMIT)
+        self._number, self._sent, self._acknowledged = 0, {}, time.monotonic()
 
     def __str__(self):
         return f'{self.name}@page {self.address}'
 
     def newest(self, sections):
-        """The message of what has changed for it: JSON; sections: {name: (revision, JSON)}."""
+        """Return the next message, JSON with the changed sections. sections: {name: (revision, JSON)}."""
         self._number += 1
         self._sent[self._number] = time.monotonic()
         parts = [f'"number":{self._number}', *(f'"{name}":{text}' for name, (revision, text) in sections.items()
@@ -81,51 +80,55 @@ class Client:
             self.replies.clear()
         return '{' + ','.join(parts) + '}'
 
-    def see(self, number):
-        """It has seen the message of a number."""
+    def acknowledge(self, number):
+        """Take the acknowledgement of a message by its number."""
         if type(number) is int and number in self._sent:
-            self._seen = self._sent[number]
+            self._acknowledged = self._sent[number]
             self._sent = {other: at for other, at in self._sent.items() if other > number}
             self.wake.set()
 
     @property
     def busy(self):
-        """Whether it has enough to see."""
+        """True while the page may receive no further message."""
         return len(self._sent) >= MAX_UNSEEN_MESSAGES
 
     @property
     def gone(self):
-        """Whether it has seen nothing for PAGE_TIMEOUT_S."""
+        """True after PAGE_TIMEOUT_S without an acknowledgement."""
         return self.busy and time.monotonic() - next(iter(self._sent.values())) > PAGE_TIMEOUT_S
 
     @property
     def age(self):
-        """Age [s] of the newest state that it has seen."""
-        return time.monotonic() - self._seen
+        """Age of the last acknowledged state [s]."""
+        return time.monotonic() - self._acknowledged
 
     def too_fast(self):
-        """Whether it asks more than REQUEST_BURST_LIMIT times in REQUEST_BURST_PERIOD_S."""
-        self._asked.append(time.monotonic())
-        return len(self._asked) == REQUEST_BURST_LIMIT and self._asked[-1] - self._asked[0] < REQUEST_BURST_PERIOD_S
+        """Count a message. Return True above REQUEST_BURST_LIMIT messages in REQUEST_BURST_PERIOD_S."""
+        self._message_times.append(time.monotonic())
+        times = self._message_times
+        return len(times) == REQUEST_BURST_LIMIT and times[-1] - times[0] < REQUEST_BURST_PERIOD_S
 
 
 class PageServer:
-    """Serves from when it is made until `close`. asked: a queue of Asked, for the node; pages: how many there are.
+    """A server that runs from its construction to `close`.
 
-    history() -> what a new page draws of the past; called in a thread of the server. Raises OSError where the
-    address and port cannot be had.
+    requests    queue of PageMessage, for the node
+    pages       number of pages
+    history()   return the past of the charts for a new page; called in a thread of the server
+
+    Raises OSError if the address and port are not available.
     """
 
     def __init__(self, address, port, names, most, history):
-        self.pages, self.asked = 0, queue.Queue(MAX_QUEUED_REQUESTS)
+        self.pages, self.requests = 0, queue.Queue(MAX_QUEUED_REQUESTS)
         family = socket.AF_INET6 if ':' in address else socket.AF_INET
         self._socket = socket.create_server((address, port), family=family)
         self.access = page_security.Access(address, self._socket.getsockname()[1], names)
         self._most, self._history = most, history
         self._clients, self._sections, self._revision, self._named = set(), {}, 0, 0
         self._published = {}
-        app = Starlette(routes=[Route('/', self._index), Route('/history', self._past),
-                                WebSocketRoute('/socket', self._talk),
+        app = Starlette(routes=[Route('/', self._index), Route('/history', self._history_answer),
+                                WebSocketRoute('/socket', self._serve_page),
                                 Mount('/', StaticFiles(directory=STATIC_FOLDER))])
         self._server = uvicorn.Server(uvicorn.Config(
             self._guarded(app), log_config=None, log_level='critical', access_log=False, lifespan='off', http='h11',
@@ -141,18 +144,18 @@ class PageServer:
             self._loop.run_until_complete(self._server.serve([self._socket]))
 
     def publish(self, sections):
-        """Tell every page those of {name: content} that are not as they were; from the node's thread."""
+        """Send the changed sections of {name: content} to every page; called from the thread of the node."""
         texts = {name: encoded(content) for name, content in sections.items()}
         fresh = {name: text for name, text in texts.items() if self._published.get(name) != text}
         self._published |= fresh
         self._call(self._take, fresh)
 
     def reply(self, client, message):
-        """Tell one page; from the node's thread."""
-        self._call(self._say, client, json.dumps(message))
+        """Send a message to one page; called from the thread of the node."""
+        self._call(self._queue_reply, client, json.dumps(message))
 
     def _call(self, function, *arguments):
-        with contextlib.suppress(RuntimeError):  # the loop is closed: the server has ended
+        with contextlib.suppress(RuntimeError):  # the loop is closed after the end of the server
             self._loop.call_soon_threadsafe(function, *arguments)
 
     def _take(self, sections):
@@ -162,19 +165,19 @@ class PageServer:
             client.wake.set()
 
     @staticmethod
-    def _say(client, text):
+    def _queue_reply(client, text):
         client.replies.append(text)
         client.wake.set()
 
     def close(self):
-        """End: every page is told, and those that do not listen are left after SHUTDOWN_TIMEOUT_S."""
+        """Close the connections to all pages, by force after SHUTDOWN_TIMEOUT_S."""
         self._server.should_exit = True
         self._thread.join(3.0 * SHUTDOWN_TIMEOUT_S)
 
     def _guarded(self, app):
-        """The app behind page_security; its answers carry the headers."""
+        """Return the app behind page_security, with the headers on its answers."""
         async def guarded(scope, receive, send):
-            request = _judged(scope)
+            request = _request(scope)
             try:
                 scope['role'] = self.access.role(request)
             except Refused as refused:
@@ -185,7 +188,7 @@ class PageServer:
         return guarded
 
     async def _index(self, request):
-        """The page; the address with the token only sets the cookie, so that the token stays out of the history."""
+        """Answer with the page. An address with a token only sets the cookie; the token stays out of the history."""
         if 'token' not in request.query_params:
             return await StaticFiles(directory=STATIC_FOLDER).get_response('index.html', request.scope)
         answer = RedirectResponse('/', 303)
@@ -193,13 +196,14 @@ class PageServer:
                           samesite='strict')
         return answer
 
-    async def _past(self, _):
+    async def _history_answer(self, _):
         return Response(await asyncio.to_thread(lambda: encoded(list(self._history()))), media_type='application/json')
 
-    async def _talk(self, websocket):
-        """A page as long as it is there."""
+    async def _serve_page(self, websocket):
+        """Serve a page until it leaves."""
         if len(self._clients) >= self._most:
-            await websocket.send_denial_response(PlainTextResponse(f'there are {self._most} pages already\n', 503))
+            await websocket.send_denial_response(PlainTextResponse(
+                f'too many pages: must be at most {self._most}\n', 503))
             return
         self._named += 1
         role = websocket.scope['role']
@@ -210,8 +214,8 @@ class PageServer:
         self._clients.add(client)
         self.pages = len(self._clients)
         client.wake.set()
-        tasks = [asyncio.ensure_future(self._tell(websocket, client)),
-                 asyncio.ensure_future(self._hear(websocket, client))]
+        tasks = [asyncio.ensure_future(self._send_states(websocket, client)),
+                 asyncio.ensure_future(self._receive(websocket, client))]
         try:
             await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
         finally:
@@ -220,40 +224,41 @@ class PageServer:
             for task in tasks:
                 task.cancel()
             await asyncio.gather(*tasks, return_exceptions=True)
-            self._ask(PageMessage(client, None, client.age))
+            self._put(PageMessage(client, None, client.age))
 
-    async def _tell(self, websocket, client):
+    async def _send_states(self, websocket, client):
         while not client.gone:
             await client.wake.wait()
             client.wake.clear()
             if not client.busy:
                 await asyncio.wait_for(websocket.send_text(client.newest(self._sections)), PAGE_TIMEOUT_S)
 
-    async def _hear(self, websocket, client):
+    async def _receive(self, websocket, client):
         with contextlib.suppress(WebSocketDisconnect):
             while True:
                 message = _parsed(await websocket.receive())
                 if message is None:
-                    self._say(client, json.dumps({'error': 'that was no message of this page'}))
+                    self._queue_reply(client, json.dumps({'error': 'unknown message: must be a JSON object'}))
                 elif 'seen' in message:
-                    client.see(message['seen'])
+                    client.acknowledge(message['seen'])
                 elif client.too_fast():
-                    self._say(client,
-                              json.dumps({'error': f'more than {REQUEST_BURST_LIMIT} messages in {REQUEST_BURST_PERIOD_S:g} s'}))
-                elif not self._ask(PageMessage(client, message, client.age)):
-                    self._say(client, json.dumps({'error': 'too many asks wait for the antenna'}))
+                    self._queue_reply(client, json.dumps({
+                        'error': f'more than {REQUEST_BURST_LIMIT} messages in {REQUEST_BURST_PERIOD_S:g} s'}))
+                elif not self._put(PageMessage(client, message, client.age)):
+                    self._queue_reply(client, json.dumps({
+                        'error': f'too many waiting commands: must be at most {MAX_QUEUED_REQUESTS}'}))
 
-    def _ask(self, asked):
-        """Hand an ask to the node; whether there was room."""
+    def _put(self, message):
+        """Queue a PageMessage for the node. Return True if the queue had room."""
         try:
-            self.asked.put_nowait(asked)
+            self.requests.put_nowait(message)
         except queue.Full:
             return False
         return True
 
 
 def encoded(value):
-    """JSON of a value; a number that is none is null, which JSON has and browsers read."""
+    """Return a value as JSON, with null for a number that is not finite, because JSON has no NaN."""
     return json.dumps(_plain(value), separators=(',', ':'), allow_nan=False)
 
 
@@ -265,8 +270,8 @@ def _plain(value):
     return [_plain(item) for item in value] if isinstance(value, (list, tuple)) else value
 
 
-def _judged(scope):
-    """The page_security.Request of an ASGI scope."""
+def _request(scope):
+    """Return the page_security.Request of an ASGI scope."""
     given = {}
     for key, value in scope['headers']:
         given.setdefault(key.decode('latin-1'), value.decode('latin-1'))
@@ -277,7 +282,7 @@ def _judged(scope):
 
 
 def _adding(send, host):
-    """send, with page_security.headers added to the start of an answer."""
+    """Return a `send` that adds page_security.headers to the start of an answer."""
     extra = [(name.encode(), value.encode('latin-1')) for name, value in page_security.headers(host)]
 
     async def adding(message):
@@ -288,12 +293,12 @@ def _adding(send, host):
 
 
 def _name(text):
-    """A user's name as he gave it, without what does not belong into one."""
+    """Return the name of a user without characters that are not allowed in a name."""
     return ''.join(letter for letter in text if letter.isalnum() or letter in '.-_')[:32]
 
 
 def _parsed(message):
-    """The dict in a message of a web socket, None where there is none. Raises WebSocketDisconnect at its end."""
+    """Return the dict in a message of a web socket, None without a dict. Raises WebSocketDisconnect at its end."""
     if message['type'] == 'websocket.disconnect':
         raise WebSocketDisconnect(message.get('code', 1005))
     try:

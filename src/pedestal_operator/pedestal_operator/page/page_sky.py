@@ -1,4 +1,4 @@
-"""What the sky plot of the page shows: in earth angles [deg], whatever the deck does. No ROS here."""
+"""Content of the sky plot of the page, in earth angles [deg] also on a moving deck. No ROS here."""
 import collections
 import math
 import typing
@@ -10,23 +10,23 @@ from pedestal_common.graph import topics
 from pedestal_common.wire import messages
 
 HORIZON_STEP_DEG = 5.0
-"""Degrees of azimuth between two points of what is drawn around the horizon."""
+"""Azimuth between two points of a line around the horizon [deg]."""
 
 MAX_PATH_POINTS = 240
-"""Points of a path at the most."""
+"""Largest number of points of a path."""
 
 MIN_HISTORY_STEP_DEG = 0.3
-"""Degrees from one place of the past to the next: less than a line is wide."""
+"""Smallest distance between two points of the beam history, less than the width of a line [deg]."""
 
 
 class Path(typing.NamedTuple):
-    """A program track: times (n,) [s UTC], angles (n, 2) [deg] earth azimuth, unwrapped, and elevation."""
+    """A program track: times (n,) in UTC [s], angles (n, 2) [deg]: unwrapped earth azimuth, elevation."""
     times: np.ndarray
     angles: np.ndarray
 
 
 def path(message, midnight):
-    """The Path of an acu/program_track, None of a preset; midnight: to what a stamp 0 belongs [s UTC]."""
+    """Return the Path of an acu/program_track, None for a preset. midnight: UTC of a stamp 0 [s]."""
     if len(message.points) < 2 or not set(topics.AXES) <= set(message.joint_names):
         return None
     start = messages.nanoseconds(message.header.stamp) * 1e-9 or midnight
@@ -37,7 +37,7 @@ def path(message, midnight):
 
 
 def thinned(path):
-    """[[azimuth, elevation, time], ...] of a Path, MAX_PATH_POINTS rows."""
+    """Return [[azimuth, elevation, time], ...] of a Path, MAX_PATH_POINTS rows at most."""
     if path is None:
         return []
     rows = np.unique(np.linspace(0, len(path.times) - 1, MAX_PATH_POINTS).astype(int))
@@ -45,7 +45,7 @@ def thinned(path):
 
 
 def passage(path, loss):
-    """What an operator wants to know of a Path before it begins; loss: text of the predicted loss [s], '' for none."""
+    """Return [the pass of a Path], [] without a rise. loss: text of the predicted loss of track [s], '' for none."""
     if path is None:
         return []
     up = np.flatnonzero(path.angles[:, 1] > 0.0)
@@ -61,13 +61,13 @@ def passage(path, loss):
 
 
 class BeamHistory:
-    """Where the beam was in the last `span` seconds. places: [[azimuth, elevation], ...] [deg]."""
+    """Past directions of the beam in the last `span` seconds. places: [[azimuth, elevation], ...] [deg]."""
 
     def __init__(self, span):
         self._span, self._rows = span, collections.deque()
 
     def add(self, t, place):
-        """The beam is there at t [s]; a place of NaN is not known."""
+        """Add the direction of the beam at a time t [s]; an unknown direction is NaN."""
         while self._rows and self._rows[0][0] < t - self._span:
             self._rows.popleft()
         last = self._rows[-1][1] if self._rows else (math.inf, math.inf)
@@ -76,12 +76,12 @@ class BeamHistory:
 
     @property
     def places(self):
-        """What is drawn of the path, in order of time."""
+        """Points of the history, in order of time."""
         return [place for _, place in self._rows]
 
 
 class Deck:
-    """The deck at an attitude, a quaternion deck -> earth (x, y, z, w); None: ashore, where its angles are earth's."""
+    """Deck at an attitude, a quaternion deck -> earth (x, y, z, w); None ashore (deck and earth angles are equal)."""
 
     def __init__(self, quaternion):
         self._to_earth = None
@@ -90,7 +90,7 @@ class Deck:
             line_of_sight.rotation(*quaternion, self._to_earth)
 
     def seen(self, azimuth, elevation):
-        """[azimuth, elevation] [deg] against the earth of deck angles [deg]; NaN stays NaN."""
+        """Return earth angles [azimuth, elevation] [deg] of deck angles [deg]; NaN stays NaN."""
         if self._to_earth is None or not math.isfinite(azimuth + elevation):
             return [round(azimuth, 3), round(elevation, 3)]
         deck = line_of_sight.direction(math.radians(azimuth), math.radians(elevation))
@@ -98,7 +98,7 @@ class Deck:
         return [round(math.degrees(angle), 3) for angle in earth]
 
     def line(self, points):
-        """[[azimuth, elevation], ...] of deck angles [deg], a point each HORIZON_STEP_DEG between two of them."""
+        """Return a line of deck angles [deg] in earth angles [[azimuth, elevation], ...], one per HORIZON_STEP_DEG."""
         found = []
         for (A, E), (B, F) in zip(points, points[1:]):
             count = max(int(abs(B - A) / HORIZON_STEP_DEG), 1)
@@ -106,10 +106,10 @@ class Deck:
         return found + [self.seen(*points[-1])] if points else found
 
     def sector(self, low, high, top):
-        """The outline of a hidden sector of the deck from azimuth low to high [deg], up to elevation top [deg]."""
+        """Return the outline of a hidden sector of the deck, azimuth low to high and elevation 0 to top [deg]."""
         return self.line([(low, 0.0), (low, top), (high, top), (high, 0.0)])
 
 
 def numbers(text):
-    """[[number [deg], ...], ...] of a parameter 'a b; c d' [rad]."""
+    """Return [[number [deg], ...], ...] of a parameter 'a b; c d' [rad]."""
     return [[math.degrees(float(word)) for word in part.split()] for part in text.split(';') if part.strip()]

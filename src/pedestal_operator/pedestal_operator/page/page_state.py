@@ -1,9 +1,11 @@
-"""What the page is sent, in sections of JSON: of a running antenna or of a recording alike. No ROS here.
+"""Sections of the state that the page shows, of a running antenna or of a recording. No ROS here.
 
-An antenna here is whatever tells, as remote_node.Remote does: numbers {topic: numbers of its last message}, texts
-{topic: its last text}, status, present(topic), told(node) -> {key: text}, angles(topic) [deg], rates() [deg/s];
-and now [s UTC], alarms (list of DiagnosticStatus), configuration {name of a parameter: value}, path (page_sky.Path or
-None).
+The functions take an antenna.Antenna with four further attributes:
+
+now             UTC [s]
+alarms          list of DiagnosticStatus
+configuration   {name of a parameter: value}
+path            page_sky.Path or None
 """
 import math
 
@@ -11,16 +13,17 @@ from pedestal_common.graph import topics
 from pedestal_common.graph.modes import MODE_ROWS
 from pedestal_operator.page import page_sky
 
-(ANGLE_ERROR_TOPIC, MOTOR_STATES_TOPIC, ATTITUDE_TOPIC) = ('tracking_receiver/angle_error', 'adu/motor_states',
-                                                           'ship/imu/data')
+ANGLE_ERROR_TOPIC = 'tracking_receiver/angle_error'
+MOTOR_STATES_TOPIC = 'adu/motor_states'
+ATTITUDE_TOPIC = 'ship/imu/data'
 EXTRA_NUMBER_TOPICS = (MOTOR_STATES_TOPIC, ATTITUDE_TOPIC)
-"""Topics that the page needs beside those of every client."""
+"""Topics of numbers that the page receives in addition to those of every client."""
 
 TEXT_TOPIC_BY_NAME = {'mode': 'acu/mode', 'drive': 'adu/state', 'keyhole': 'acu/keyhole', 'blockage': 'acu/blockage'}
-"""{what the page calls it: the topic of the text}."""
+"""{name on the page: topic of the text}."""
 
 STATION_PARAMETERS, ELEMENT_PARAMETERS = ('latitude_deg', 'longitude_deg', 'height'), ('line_1', 'line_2')
-"""Parameters of the station, and of the elements of a satellite."""
+"""Names of the parameters of a station, and of the elements of a satellite."""
 
 SHOWN_PARAMETERS = {'acu': ('graph.start', 'tracker.receiver.beamwidth', 'blockage', 'floor', 'prediction.start_time',
                             *(f'prediction.station.{name}' for name in STATION_PARAMETERS),
@@ -28,20 +31,20 @@ SHOWN_PARAMETERS = {'acu': ('graph.start', 'tracker.receiver.beamwidth', 'blocka
                             *(f'{axis}.stow' for axis in topics.AXES)),
                     'tracking_receiver': ('receiver.acquire_level_dbhz', 'receiver.lose_level_dbhz', 'target.kind',
                                           *(f'target.leo_pass.{name}' for name in ELEMENT_PARAMETERS))}
-"""{node: its parameters that are shown}."""
+"""{node: parameters that the page reads}."""
 
 BUTTON_MODES = tuple(row.name for row in MODE_ROWS if row.button)
-"""Modes with a button; `stop` has one of its own, `rate` is the jog, `slave` is for programs."""
+"""Modes with a button; `stop` has a separate button, `rate` is the jog, `slave` is for programs."""
 
 CHART_SPAN_S, CHART_PERIOD_S = 600.0, 0.5
-"""Time [s] of the strip charts, and from one of their points to the next."""
+"""Time span of the strip charts, and time between two points [s]."""
 
 REFUSAL_PREFIX = 'refused '
-"""Before the name of a mode in the diagnostics of the control unit."""
+"""Start of a key in the diagnostics of the control unit, before the name of a mode."""
 
 HISTORY_COLUMNS = ('t', 'cross_elevation', 'elevation', 'azimuth_error', 'elevation_error', 'azimuth_rate',
-                   'elevation_rate',
-                   *topics.MOTOR_NAMES, 'level')
+                   'elevation_rate', *topics.MOTOR_NAMES, 'level')
+"""Columns of the strip charts."""
 
 
 def _deck(antenna):
@@ -49,15 +52,15 @@ def _deck(antenna):
 
 
 def now(antenna) -> dict:
-    """The numbers of this moment: angles and rates [deg, deg/s], errors [deg], level [dB-Hz], torques [Nm]."""
+    """Return the present numbers: angles and rates [deg, deg/s], errors [deg], level [dB-Hz], torques [Nm]."""
     actual, commanded = antenna.angles('joint_states'), antenna.angles('acu/reference')
     receiver, torques = (math.nan,) * 3, ()
     if antenna.present(ANGLE_ERROR_TOPIC):
         x, y, level = antenna.numbers[ANGLE_ERROR_TOPIC]
         receiver = math.degrees(x), math.degrees(y), level
     if antenna.present(MOTOR_STATES_TOPIC):
-        torques = [round(float(torque),
-                         3) for torque in antenna.numbers[MOTOR_STATES_TOPIC][-len(topics.MOTOR_NAMES):]]
+        torques = [round(float(torque), 3)
+                   for torque in antenna.numbers[MOTOR_STATES_TOPIC][-len(topics.MOTOR_NAMES):]]
     return {'t': antenna.now, 'mode': antenna.texts.get('acu/mode', ''),
             'axes': [{'actual': a, 'commanded': c, 'error': c - a, 'rate': rate}
                      for a, c, rate in zip(actual, commanded, antenna.rates())],
@@ -66,7 +69,7 @@ def now(antenna) -> dict:
 
 
 def history_row(frame) -> list:
-    """A row of HISTORY_COLUMNS from `now`."""
+    """Return a row of HISTORY_COLUMNS from the numbers of `now`."""
     azimuth, elevation = frame['axes']
     x, y, level = frame['receiver']
     torques = [*frame['torques'], *(math.nan,) * len(topics.MOTOR_NAMES)][:len(topics.MOTOR_NAMES)]
@@ -74,9 +77,9 @@ def history_row(frame) -> list:
     return [round(frame['t'], 2), *(round(float(value), 5) for value in row)]
 
 
-def status_section(antenna, heard=('acu', 'adu', 'tracking_receiver', 'ins', 'ship_motion')) -> dict:
-    """What changes once a second at the most: mode and why, control, axes, times to the limits, refusals."""
-    acu = antenna.told('acu')
+def status_section(antenna, nodes=('acu', 'adu', 'tracking_receiver', 'ins', 'ship_motion')) -> dict:
+    """Return the slow part of the state: mode and its reason, control, axes, times to the limits, refusals."""
+    acu = antenna.diagnostics_of('acu')
     texts = {name: antenna.texts.get(topic, '') for name, topic in TEXT_TOPIC_BY_NAME.items()}
     return {'present': bool(acu), **texts,
             **{key: acu.get(key, '') for key in ('reason', 'fallback', 'control', 'faults', 'locked', 'coasting')},
@@ -84,17 +87,17 @@ def status_section(antenna, heard=('acu', 'adu', 'tracking_receiver', 'ins', 'sh
                      for axis in topics.AXES],
             'steps': acu.get('clock_steps', ''), 'offset_ms': acu.get('offset joint_states_ms', ''),
             'nodes': {name: antenna.status[name].message if antenna.present(name) else 'silent'
-                      for name in heard if name in antenna.status},
+                      for name in nodes if name in antenna.status},
             'refused': refusals(acu) if acu else dict.fromkeys((*BUTTON_MODES, 'rate'), 'the control unit is silent')}
 
 
 def refusals(acu) -> dict:
-    """{mode: why it would be refused now}, which the control unit asks its own table of modes."""
-    return {key.removeprefix(REFUSAL_PREFIX): why for key, why in acu.items() if key.startswith(REFUSAL_PREFIX)}
+    """Return {mode: reason of its present refusal} from the diagnostics of the control unit."""
+    return {key.removeprefix(REFUSAL_PREFIX): text for key, text in acu.items() if key.startswith(REFUSAL_PREFIX)}
 
 
 def alarms(antenna) -> list:
-    """The list of acu/alarms, in its order; times in [s UTC]."""
+    """Return the list of acu/alarms in its order, with times in UTC [s]."""
     begin = epoch(antenna)
     found = []
     for status in antenna.alarms:
@@ -107,13 +110,13 @@ def alarms(antenna) -> list:
 
 
 def epoch(antenna):
-    """When the time of the graph is 0 [s UTC]: graph.start, or the day's beginning."""
+    """Return time 0 of the graph in UTC [s]: graph.start, or the start of the day."""
     return antenna.configuration.get('graph.start', 0) * 1e-9 or antenna.now // 86400.0 * 86400.0
 
 
 def fixed(antenna) -> dict:
-    """What a run does not change: beamwidth and limits [deg], thresholds of the level [dB-Hz], the axes of the
-    charts."""
+    """Return the constants of a run: beamwidth and limits [deg], thresholds of the level [dB-Hz], axes of the charts.
+    """
     p = antenna.configuration
 
     def degrees(name):
@@ -126,9 +129,11 @@ def fixed(antenna) -> dict:
 
 
 def sky(antenna, coming) -> dict:
-    """The sky plot: the path, what hides it, what the antenna cannot reach, the sun, and passes; coming: those after
-    the program track, as page_passes.Coming knows them."""
-    deck, p, acu = _deck(antenna), antenna.configuration, antenna.told('acu')
+    """Return the sky plot: path, hidden sectors, directions out of reach, sun and passes.
+
+    coming: passes after the program track, from page_passes.UpcomingPasses.
+    """
+    deck, p, acu = _deck(antenna), antenna.configuration, antenna.diagnostics_of('acu')
     begin = epoch(antenna)
     hole = [begin + float(acu[key]) for key in ('keyhole_begins_s', 'keyhole_ends_s') if key in acu]
     floor = page_sky.numbers(p.get('floor', ''))

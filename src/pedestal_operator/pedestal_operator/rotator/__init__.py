@@ -1,1 +1,1 @@
-"""The protocols of antenna rotators, and the controller behind them."""
+"""Protocols of antenna rotators, and the controller behind them."""

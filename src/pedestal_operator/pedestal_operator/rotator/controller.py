@@ -1,31 +1,33 @@
-"""What programs that point the antenna do to it, whatever they speak: one at a time is in control, set-points become
-motion, a jog goes on as long as its program is there."""
+"""Control of the antenna by programs, independent of their protocol.
+
+One program at a time is in control. Set-points become a motion. A jog lasts until its program leaves.
+"""
 import math
 
 from pedestal_operator.rotator.pointing import Pointing
 
 CLIENT_REPLY_TIMEOUT_S = 1.5
-"""Time [s] within which the control unit replies; Hamlib's clients wait for 2 s."""
+"""Longest wait for a reply of the control unit [s]; clients of Hamlib wait for 2 s."""
 
 CONTROL_TIMEOUT_S = 10.0
-"""Time [s] without a command of its holder after which control is given back."""
+"""Time without a command of a client after which its control is released [s]."""
 
 JOG_REPEAT_PERIOD_S = 0.2
-"""Time [s] after which a jog is asked for again: less than half of the dead man's."""
+"""Period of the repetition of a jog [s], less than half of the jog timeout of the control unit."""
 
 OUTCOME_DONE, OUTCOME_REFUSED, OUTCOME_OUT_OF_REACH, OUTCOME_BUSY, OUTCOME_NO_REPLY = range(5)
-"""What came of an ask: the control unit was willing, or not; no such place; another client is in control; no reply."""
+"""Outcomes of a request; OUTCOME_BUSY: another client is in control."""
 
 
 class PendingRequest:
-    """An ask of a client on its way. outcome: of the list above, None as long as it is not known."""
+    """Pending request of a client. outcome: an outcome above, None before it is known."""
 
     def __init__(self, numbers, deadline, outcome=None):
         self.numbers, self.deadline, self.outcome = list(numbers), deadline, outcome
         self._refusal = ''
 
     def look(self, remote, now):
-        """Hear the replies; the outcome."""
+        """Take the replies. Return the outcome."""
         for number in list(self.numbers):
             reply = remote.replied(number)
             if reply is not None:
@@ -45,71 +47,72 @@ def _outcome(refusal):
 
 
 class Controller:
-    """Asks for the clients of a server, by their names. remote: remote_node.Remote."""
+    """Requests for the clients of a server, with their names. remote: remote_node.Remote."""
 
     def __init__(self, remote):
         self._remote = remote
         self.pointing = Pointing(remote)
-        self._holder, self._used = '', 0.0
-        self._jog, self._told, self._jogs = None, 0.0, False
+        self._holder, self._last_command_time = '', 0.0
+        self._jog, self._last_jog_time, self._was_jogging = None, 0.0, False
 
     def go(self, client, azimuth, elevation, now) -> PendingRequest:
-        """Point at a direction [deg]."""
-        return self._ask(client, now, lambda: self.pointing.go(azimuth, elevation, now))
+        """Point the antenna to a direction [deg]."""
+        return self._request(client, now, lambda: self.pointing.go(azimuth, elevation, now))
 
     def do(self, client, verb, now) -> PendingRequest:
-        """Ask for a verb without arguments."""
-        return self._ask(client, now, lambda: self._remote.ask(verb), continues=False)
+        """Send a command without arguments."""
+        return self._request(client, now, lambda: self._remote.request(verb), continues=False)
 
     def jog(self, client, rates, now) -> PendingRequest:
-        """Move at rates (azimuth, elevation) [deg/s] until something else is asked for or the client leaves."""
-        ask = self._ask(client, now, lambda: self._remote.ask('rate', _rates(rates)), continues=False)
-        if ask.outcome is None:
-            self._jog, self._told, self._jogs = rates, now, False
-        return ask
+        """Move at rates (azimuth, elevation) [deg/s] until the next command, or until the client leaves."""
+        pending = self._request(client, now, lambda: self._remote.request('rate', _rates(rates)), continues=False)
+        if pending.outcome is None:
+            self._jog, self._last_jog_time, self._was_jogging = rates, now, False
+        return pending
 
     def stop(self, client, now) -> PendingRequest:
-        """Stand: everybody may ask for it."""
-        self.pointing.forget()
+        """Stop the axes; every client may stop them."""
+        self.pointing.reset()
         self._jog, self._remote.who = None, client
-        return PendingRequest([self._remote.ask('stop')], now + CLIENT_REPLY_TIMEOUT_S)
+        return PendingRequest([self._remote.request('stop')], now + CLIENT_REPLY_TIMEOUT_S)
 
     def look(self, now):
-        """Keep a jog alive; end a motion that no set-point continues; give control back when nobody uses it."""
+        """Repeat a jog, end a motion without further set-points, and release unused control."""
         self._remote.who = self._holder
         self.pointing.look(now)
-        jogs = self._remote.texts.get('acu/mode') == 'rate'
-        if self._jogs and not jogs:
-            self._jog = None    # somebody has asked for another mode
-        self._jogs = jogs
-        if self._jog and now - self._told >= JOG_REPEAT_PERIOD_S:
-            self._told = self._used = now
-            self._remote.ask('rate', _rates(self._jog))
-        if self._holder and now - self._used > CONTROL_TIMEOUT_S:
+        is_jogging = self._remote.texts.get('acu/mode') == 'rate'
+        if self._was_jogging and not is_jogging:
+            self._jog = None  # another mode was commanded
+        self._was_jogging = is_jogging
+        if self._jog and now - self._last_jog_time >= JOG_REPEAT_PERIOD_S:
+            self._last_jog_time = self._last_command_time = now
+            self._remote.request('rate', _rates(self._jog))
+        if self._holder and now - self._last_command_time > CONTROL_TIMEOUT_S:
             self.leave(self._holder, now)
 
     def leave(self, client, now):
-        """A client has gone: what it jogged stands, what it held is free."""
+        """Stop the jog of a client that has left, and release its control."""
         if client != self._holder:
             return
         self._remote.who = client
         if self._jog:
-            self._remote.ask('stop')
+            self._remote.request('stop')
         self.pointing.settle(now)
         self._jog, self._holder = None, ''
-        self._remote.ask('release')
+        self._remote.request('release')
 
-    def _ask(self, client, now, ask, continues=True):
+    def _request(self, client, now, send, continues=True):
         if self._holder not in ('', client):
             return PendingRequest([], now, OUTCOME_BUSY)
         if not continues:
-            self.pointing.forget()
+            self.pointing.reset()
         self._jog, self._remote.who = None, client
-        numbers = [] if self._holder else [self._remote.ask('take')]
-        self._holder, self._used = client, now
-        number = ask()
-        return PendingRequest([], now, OUTCOME_OUT_OF_REACH) if number is None else PendingRequest([*numbers, number],
-                                                                                                   now + CLIENT_REPLY_TIMEOUT_S)
+        numbers = [] if self._holder else [self._remote.request('take')]
+        self._holder, self._last_command_time = client, now
+        number = send()
+        if number is None:
+            return PendingRequest([], now, OUTCOME_OUT_OF_REACH)
+        return PendingRequest([*numbers, number], now + CLIENT_REPLY_TIMEOUT_S)
 
 
 def _rates(rates):

@@ -1,4 +1,4 @@
-"""Programs that talk in lines, over TCP or a serial device, each read and written without waiting for any of them."""
+"""Server of line protocols over TCP and a serial device; it never waits for a client."""
 import collections
 import contextlib
 import os
@@ -7,43 +7,49 @@ import socket
 import tty
 
 MAX_UNREAD_BYTES = 65_536
-"""Bytes of answers that a client may leave unread; what comes then is dropped."""
+"""Largest size of unread answers of a client [bytes]; further answers are dropped."""
 
 MAX_WAITING_LINES = 100
-"""Lines of a client that may wait for an answer before it is no longer read."""
+"""Largest number of waiting lines of a client; further input is left unread."""
 
 READ_CHUNK_BYTES = 65_536
+"""Largest size of one read [bytes]."""
 
 
 class Lines:
-    """Cuts bytes into lines of at most `longest`; of a longer one nothing is kept."""
+    """Splitter of bytes into lines of at most `longest` bytes; a longer line is dropped."""
 
     def __init__(self, longest):
-        self._longest, self._rest, self._skips = longest, b'', False
+        self._longest, self._remainder, self._skips_line = longest, b'', False
 
     def take(self, data):
-        """The lines that bytes have completed; None for one that was too long."""
-        *lines, self._rest = (self._rest + data).replace(b'\r', b'\n').split(b'\n')
+        """Return the lines that bytes complete, None for a line that is too long."""
+        *lines, self._remainder = (self._remainder + data).replace(b'\r', b'\n').split(b'\n')
         found = []
         for line in lines:
-            too_long, self._skips = self._skips or len(line) > self._longest, False
+            too_long, self._skips_line = self._skips_line or len(line) > self._longest, False
             found.append(None if too_long else line.decode('ascii', 'replace'))
-        if len(self._rest) > self._longest:
-            self._rest, self._skips = b'', True
+        if len(self._remainder) > self._longest:
+            self._remainder, self._skips_line = b'', True
         return found
 
 
 class Client:
-    """A program at the other end. name: how the recording calls it; lines: what it has said and is not answered yet;
-    dropped: answers that it did not read; gone: why it has left, None as long as it is there."""
+    """A connected program.
+
+    name      its name in recordings
+    lines     unanswered lines
+    dropped   number of answers dropped because they were not read
+    gone      reason of its end, None while it is connected
+    """
 
     def __init__(self, stream, name, longest):
         self.stream, self.name = stream, name
         self.lines, self.dropped, self.gone = collections.deque(), 0, None
-        self._cut, self._out = Lines(longest), bytearray()
+        self._splitter, self._out = Lines(longest), bytearray()
 
     def receive(self):
-        """Take what has come."""
+        """Read the available bytes."""
         try:
             data = os.read(self.stream.fileno(), READ_CHUNK_BYTES)
         except BlockingIOError:
@@ -52,19 +58,19 @@ class Client:
             self.gone = error.strerror
             return
         if data:
-            self.lines += self._cut.take(data)
+            self.lines += self._splitter.take(data)
         else:
             self.gone = ''
 
-    def say(self, data):
-        """Put an answer behind those that are still to be sent."""
+    def queue_answer(self, data):
+        """Queue an answer behind the waiting answers."""
         if len(self._out) + len(data) > MAX_UNREAD_BYTES:
             self.dropped += 1
         else:
             self._out += data
 
     def send(self):
-        """Send as much as the other end takes."""
+        """Send as many bytes as the client takes."""
         if self._out:
             try:
                 del self._out[:os.write(self.stream.fileno(), self._out)]
@@ -75,14 +81,15 @@ class Client:
 
 
 class LineServer:
-    """The clients of one TCP port (port < 0: none), and of a serial device ('': none). Raises OSError.
+    """Clients of one TCP port (port < 0: none), and of a serial device ('': none). Raises OSError.
 
-    kind: what the names of the clients begin with; longest: bytes of a line; make_client(stream, name, longest).
+    kind: start of the names of the clients; most: largest number of clients; longest: largest length of a line
+    [bytes]; make_client(stream, name, longest) -> a Client.
     """
 
     def __init__(self, kind, address, port, most, longest, device='', make_client=Client):
         self._kind, self._most, self._longest, self._make = kind, most, longest, make_client
-        self._selector, self.clients, self.turned_away = selectors.DefaultSelector(), [], 0
+        self._selector, self.clients, self.refused_count = selectors.DefaultSelector(), [], 0
         self._server = None
         if port >= 0:
             self._server = socket.create_server((address, port), backlog=most)
@@ -96,11 +103,11 @@ class LineServer:
 
     @property
     def port(self):
-        """The port it listens on."""
+        """Number of the TCP port."""
         return self._server.getsockname()[1]
 
     def look(self):
-        """Take new clients and what has come from each."""
+        """Accept new clients, and read from all clients."""
         for key, _ in self._selector.select(0):
             if key.fileobj is self._server:
                 self._accept()
@@ -108,7 +115,7 @@ class LineServer:
                 key.data.receive()
 
     def send(self):
-        """Send what is to be sent; the clients that have left, and are forgotten."""
+        """Send the waiting answers. Return the clients that have left, after their removal."""
         left = []
         for client in list(self.clients):
             client.send()
@@ -128,7 +135,7 @@ class LineServer:
         with contextlib.suppress(OSError):
             connection, (host, port, *_) = self._server.accept()
             if len(self.clients) >= self._most:
-                self.turned_away += 1
+                self.refused_count += 1
                 connection.close()
                 return
             connection.setblocking(False)

@@ -1,24 +1,23 @@
-"""The network protocol of Hamlib's rotctld, line by line: what a line asks for, and how it is answered. No sockets, no
-ROS here.
+"""Requests and answers of the network protocol of rotctld from Hamlib, line by line. No sockets, no ROS here.
 
-Written against Hamlib 4.5.4 (rotctl -m 2, rotctld -m 1) and gpredict. Other than in the reference, which reads words
-instead of lines, a command with too few arguments is refused at once and does not take the next line, an unknown one
-is answered, and numbers must be finite.
+Written for Hamlib 4.5.4 (rotctl -m 2, rotctld -m 1) and gpredict. The reference reads words; this module reads lines,
+with three differences. A command with too few arguments is refused at once and does not take the next line. An unknown
+command is answered. Numbers must be finite.
 """
 import math
 import re
 import typing
 
 MAX_LINE_BYTES = 256
-"""Bytes of a line at the most."""
+"""Largest length of a line [bytes]."""
 
 (RESULT_OK, RESULT_INVALID, RESULT_NOT_IMPLEMENTED, RESULT_TIMEOUT, RESULT_REJECTED, RESULT_NOT_AVAILABLE,
  RESULT_BUSY) = (0, -1, -4, -5, -9, -11, -14)
-"""Results `RPRT n` (hamlib/rig.h)."""
+"""Results n of `RPRT n` (hamlib/rig.h)."""
 
 
 class Row(typing.NamedTuple):
-    """A command: letter, long name, number of arguments; sets: answered by RPRT alone."""
+    """A command: letter, long name, number of arguments. sets: True if the answer is RPRT only."""
     letter: str
     name: str
     arguments: int = 0
@@ -30,29 +29,36 @@ COMMANDS = (Row('p', 'get_pos'), Row('P', 'set_pos', 2, True), Row('S', 'stop', 
             Row('1', 'dump_caps'), Row('', 'dump_state'), Row('q', 'quit'), Row('Q', 'quit'))
 
 SET_COMMANDS = tuple(row.name for row in COMMANDS if row.sets)
+"""Commands that are answered by RPRT only."""
 
 UNAVAILABLE_COMMANDS = (*'wCUuXx3LlDdEeBAaVv', 'send_cmd', 'set_conf', 'set_func', 'get_func', 'set_parm', 'get_parm',
                         'dump_conf', 'lonlat2loc', 'loc2lonlat', 'dms2dec', 'dec2dms', 'dmmm2dec', 'dec2dmmm', 'qrb',
                         'a_sp2a_lp', 'd_sp2d_lp', 'set_level', 'get_level')
-"""Commands of the reference that an antenna control unit has no use for."""
+"""Commands of the reference without a function in an antenna control unit."""
 
 MOVE_DIRECTIONS = {2: (0, 1), 4: (0, -1), 8: (-1, 0), 16: (1, 0), 32: (-1, 1), 64: (1, 1), 128: (-1, -1), 256: (1, -1)}
-"""{number: way (azimuth, elevation)} of `move`."""
+"""{number: direction (azimuth, elevation)} of `move`."""
 
 _DIRECTION_NUMBERS = {'UP': 2, 'DOWN': 4, 'LEFT': 8, 'CCW': 8, 'RIGHT': 16, 'CW': 16, 'UP_LEFT': 32, 'UP_CCW': 32,
-                      'UP_RIGHT': 64,
-                      'UP_CW': 64, 'DOWN_LEFT': 128, 'DOWN_CCW': 128, 'DOWN_RIGHT': 256, 'DOWN_CW': 256}
+                      'UP_RIGHT': 64, 'UP_CW': 64, 'DOWN_LEFT': 128, 'DOWN_CCW': 128, 'DOWN_RIGHT': 256,
+                      'DOWN_CW': 256}
 
 
 class Limits(typing.NamedTuple):
-    """Ends of the travel [deg]."""
+    """Limits (low, high) of the axes [deg]."""
     azimuth: tuple = (-180.0, 360.0)
     elevation: tuple = (0.0, 90.0)
 
 
 class Request(typing.NamedTuple):
-    """A line understood: the name of its command, its arguments, its separator ('\\n' in plain, else the character
-    of an extended response), the header of that response. error: what it is refused with, OK for none."""
+    """Content of a line.
+
+    name        of the command
+    values      its arguments
+    separator   character between the lines of an extended response, '' for a plain response
+    header      first line of an extended response
+    error       result of a refusal, RESULT_OK without one
+    """
     name: str
     values: tuple = ()
     separator: str = ''
@@ -61,7 +67,7 @@ class Request(typing.NamedTuple):
 
 
 def read(line) -> Request | None:
-    """The Request of a line without its end; None where there is nothing to answer."""
+    """Return the Request of a line without its end, None for a line without an answer."""
     line = line.strip()
     if not line or line.startswith('#'):
         return None
@@ -89,15 +95,14 @@ def read(line) -> Request | None:
 
 
 def _values(name, given):
-    """The numbers of a command's arguments. Raises ValueError."""
+    """Return the arguments of a command as numbers. Raises ValueError."""
     if name == 'move':
-        way = _DIRECTION_NUMBERS.get(given[0].upper()) or int(given[0])
+        direction = _DIRECTION_NUMBERS.get(given[0].upper()) or int(given[0])
         speed = int(given[1])
-        if way not in MOVE_DIRECTIONS or not (speed == -1 or 1 <= speed <= 100):
+        if direction not in MOVE_DIRECTIONS or not (speed == -1 or 1 <= speed <= 100):
             raise ValueError
-        return way, speed
-    values = tuple(_number(text) for text in given)
-    return values
+        return direction, speed
+    return tuple(_number(text) for text in given)
 
 
 def _number(text):
@@ -110,7 +115,7 @@ def _number(text):
 
 
 def answer(request, result, lines=()) -> bytes:
-    """The answer to a Request: its result, and lines of what was asked for, [(name in extended responses, text)]."""
+    """Return the answer to a Request. lines: [(name in extended responses, text)] of its values."""
     if not request.separator:
         text = ''.join(f'{value}\n' for _, value in lines) if lines and result == RESULT_OK else f'RPRT {result}\n'
         return text.encode()
@@ -121,13 +126,13 @@ def answer(request, result, lines=()) -> bytes:
 
 
 def position(azimuth, elevation, raw=False):
-    """Lines of get_pos [deg], the azimuth 0 to 360, or raw as it is."""
-    told = azimuth if raw else round(azimuth % 360.0, 2) % 360.0
-    return [('Azimuth', f'{told:.2f}'), ('Elevation', f'{elevation:.2f}')]
+    """Return the lines of get_pos [deg]; azimuth from 0 to 360, unchanged if raw."""
+    shown = azimuth if raw else round(azimuth % 360.0, 2) % 360.0
+    return [('Azimuth', f'{shown:.2f}'), ('Elevation', f'{elevation:.2f}')]
 
 
 def state(limits, extended):
-    """Lines of dump_state."""
+    """Return the lines of dump_state."""
     (low_az, high_az), (low_el, high_el) = limits
     if extended:
         return [('rotctld Protocol Ver', '1'), ('Rotor Model', '2'), ('Minimum Azimuth', f'{low_az:.6f}'),
@@ -138,7 +143,7 @@ def state(limits, extended):
 
 
 def flags(rates, angles, limits):
-    """Status words: what moves [deg/s], what stands at an end of its travel."""
+    """Return the status words of moving axes (rates [deg/s]) and of axes at a limit (angles [deg])."""
     words, moving = [], [abs(rate) > 0.01 for rate in rates]
     if any(moving):
         words.append('MOVING')
@@ -153,7 +158,7 @@ def flags(rates, angles, limits):
 
 
 def turn(azimuth, near, limits):
-    """The azimuth [deg] on the turn nearest to `near` that lies inside the limits; None where none does."""
+    """Return the azimuth [deg] on the turn nearest to `near` inside the limits, None if no turn is inside."""
     low, high = limits
     candidates = [azimuth + 360.0 * k for k in range(-4, 5) if low <= azimuth + 360.0 * k <= high]
     return min(candidates, key=lambda candidate: abs(candidate - near), default=None)

@@ -1,4 +1,4 @@
-"""The node of a server that other programs talk to in lines, whatever they speak."""
+"""Base of the nodes that serve a line protocol to other programs."""
 import dataclasses
 import time
 
@@ -8,29 +8,30 @@ from pedestal_operator.rotator.controller import Controller
 from pedestal_operator.rotator.line_server import LineServer
 
 POLL_PERIOD_S = 0.005
-"""Time [s] between two looks at the clients."""
+"""Period of the service of the clients [s]."""
 
 
 @dataclasses.dataclass(frozen=True)
 class ServerParameters(parameters.Parameters):
-    """What every server has; each adds its `port`."""
-    address: str = parameters.text('127.0.0.1', 'on which it listens; anybody who reaches it can ask for motion')
-    clients: int = parameters.parameter(8, 1, 64, '', 'at most so many at a time')
+    """Common parameters of the servers; each server adds its `port`."""
+    address: str = parameters.text('127.0.0.1', 'address of the server; programs that reach it can move the antenna')
+    clients: int = parameters.parameter(8, 1, 64, '', 'largest number of connected clients')
 
 
 def tcp_port(default):
-    """The parameter `port` of a server."""
-    return parameters.parameter(default, 0, 65535, '', 'TCP port; 0: a free one, which it says')
+    """Return the parameter `port` of a server."""
+    return parameters.parameter(default, 0, 65535, '', 'TCP port; 0: a free port, which the node prints')
 
 
 class ServerNode(Remote):
-    """Serves its clients between two looks of its executor.
+    """Node that serves its clients from a timer.
 
-    parameters_type: its ServerParameters; longest: bytes of a line; make_client: see line_server.LineServer.
+    parameters_type: its ServerParameters; longest: largest length of a line [bytes]; make_client: see
+    line_server.LineServer.
     """
     awaits = 'clients'
     device = ''
-    """Serial device that it serves as well, '' for none; overridden by a server that can."""
+    """Serial device of a further client, '' for none; overridden by servers with serial devices."""
 
     def __init__(self, name, parameters_type, longest, make_client):
         super().__init__(name, name, parameters_type=parameters_type)
@@ -39,13 +40,13 @@ class ServerNode(Remote):
         self._server = LineServer(name, p.address, p.port, p.clients, longest, self.device, make_client)
         self.get_logger().info(f'listens on {p.address}:{self._server.port}'
                                + (f' and {self.device}' if self.device else ''))
-        self.every(POLL_PERIOD_S, self._look)
+        self.every(POLL_PERIOD_S, self._serve_clients)
 
     def serve(self, client, now):
-        """Answer what a client has said, at the time now [s]; overridden."""
+        """Answer the lines of a client at the time now [s]; overridden."""
         raise NotImplementedError
 
-    def _look(self):
+    def _serve_clients(self):
         now = time.monotonic()
         self._server.look()
         self.controller.look(now)
@@ -53,9 +54,9 @@ class ServerNode(Remote):
             self.serve(client, now)
         for client in self._server.send():
             self.controller.leave(client.name, now)
-            told = f'{client.dropped} answers dropped that it did not read' if client.dropped else ''
-            if client.gone or told:
-                self.get_logger().warning(f'{client.name}: {", ".join(filter(None, (client.gone, told)))}')
+            dropped = f'{client.dropped} answers dropped, because they were not read' if client.dropped else ''
+            if client.gone or dropped:
+                self.get_logger().warning(f'{client.name}: {", ".join(filter(None, (client.gone, dropped)))}')
 
     def close(self):
         """Close the port, then the node."""

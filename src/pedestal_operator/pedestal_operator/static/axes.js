@@ -1,35 +1,35 @@
-// Angles, errors and rates of the axes, their travel, the level of the signal and the dial of its errors.
+// Angles, errors, rates and travel of the axes, the signal level, and the dial of the receiver errors.
 import {onDraw} from './link.js';
 import {draw, set, show} from './svg.js';
-import {find, number, say, time} from './text.js';
+import {find, number, setText, time} from './text.js';
 
 const AXES = ['az', 'el'];
-const SOON = 20;  // s to a limit from which on it is told
-const TRAIL = 25;  // points of the dial's trail
-const EDGE = 0.6;  // beamwidths at the edge of the dial
+const LIMIT_WARNING_S = 20;  // time to a limit
+const TRAIL_POINTS = 25;  // of the dial
+const DIAL_RADIUS_BEAMWIDTHS = 0.6;
 
-function axisState(told, now, axis) {
-  const {limit_s: limit, limited} = told.axes[axis];
+function axisState(status, now, axis) {
+  const {limit_s: limit, limited} = status.axes[axis];
   if (limited) return [`${limited} limited`, 'warn'];
   const left = parseFloat(limit);
-  if (Number.isFinite(left) && left < SOON) return [`limit in ${left.toFixed(0)} s`, 'warn'];
+  if (Number.isFinite(left) && left < LIMIT_WARNING_S) return [`limit in ${left.toFixed(0)} s`, 'warn'];
   if (now.axes[axis].actual === null) return ['silent', 'bad'];
-  return [Math.abs(now.axes[axis].rate) < 0.002 ? 'stands' : 'moves', ''];
+  return [Math.abs(now.axes[axis].rate) < 0.002 ? 'stopped' : 'moving', ''];
 }
 
-function showAxes({now, told, fixed}) {
+function showAxes({now, status, fixed}) {
   AXES.forEach((name, i) => {
     const axis = now.axes[i];
     const wide = fixed && fixed.beamwidth && Math.abs(axis.error) > 0.1 * fixed.beamwidth;
-    say(find(`${name}-actual`), `${number(axis.actual, 3)}°`);
-    say(find(`${name}-commanded`), `${number(axis.commanded, 3)}°`);
-    say(find(`${name}-error`), `${number(axis.error, 4)}°`, wide ? 'warn' : '');
-    say(find(`${name}-rate`), `${number(axis.rate, 3)} °/s`);
-    if (told) say(find(`${name}-state`), ...axisState(told, now, i));
+    setText(find(`${name}-actual`), `${number(axis.actual, 3)}°`);
+    setText(find(`${name}-commanded`), `${number(axis.commanded, 3)}°`);
+    setText(find(`${name}-error`), `${number(axis.error, 4)}°`, wide ? 'warn' : '');
+    setText(find(`${name}-rate`), `${number(axis.rate, 3)} °/s`);
+    if (status) setText(find(`${name}-state`), ...axisState(status, now, i));
   });
 }
 
-// A bar from limit to limit; its scale is in degrees, so that whole turns can be counted.
+// A bar from limit to limit. Its scale is in degrees and shows whole turns.
 class Travel {
   constructor(id) {
     this.svg = find(id);
@@ -53,13 +53,13 @@ class Travel {
       draw(this.svg, 'text', {x: this.x(angle), y: 24, 'text-anchor': 'middle'}, `${angle}`);
     }
     if (stow !== null) draw(this.svg, 'line', {x1: this.x(stow), x2: this.x(stow), y1: 2, y2: 13, class: 'stow'});
-    this.wanted = draw(this.svg, 'line', {y1: 1, y2: 14, class: 'there'});
+    this.commanded = draw(this.svg, 'line', {y1: 1, y2: 14, class: 'there'});
     this.actual = draw(this.svg, 'line', {y1: 1, y2: 14, class: 'here'});
   }
 
   show({actual, commanded}) {
     if (!this.actual) return;
-    for (const [line, angle] of [[this.actual, actual], [this.wanted, commanded]]) {
+    for (const [line, angle] of [[this.actual, actual], [this.commanded, commanded]]) {
       show(line, angle !== null);
       if (angle === null) continue;
       const x = this.x(angle).toFixed(1);
@@ -95,16 +95,16 @@ class Level {
     this.scale(Math.max(80, 10 * Math.ceil((level || 0) / 10)), detect, loss);
     if (!this.drawn) return;
     set(this.bar, {width: level === null ? 0 : this.x(level).toFixed(0)});
-    say(find('level'), `${number(level, 1)} dB-Hz`);
-    say(find('lock'), locked ? '● locked' : '○ no lock', locked ? '' : 'warn');
+    setText(find('level'), `${number(level, 1)} dB-Hz`);
+    setText(find('lock'), locked ? '● locked' : '○ no lock', locked ? '' : 'warn');
   }
 }
 
-// Cross-elevation to the right, elevation up, in beamwidths: where the target is, seen from the beam.
+// Direction of the target from the beam in beamwidths: cross-elevation to the right, elevation up.
 class Dial {
   constructor() {
     this.svg = find('dial');
-    const unit = 100 / EDGE;
+    const unit = 100 / DIAL_RADIUS_BEAMWIDTHS;
     for (const [share, label] of [[0.1, '0.1'], [0.5, '0.5 beamwidth']]) {
       draw(this.svg, 'circle', {cx: 0, cy: 0, r: share * unit, class: 'ring'});
       draw(this.svg, 'text', {x: 4, y: -share * unit - 3}, label);
@@ -120,14 +120,15 @@ class Dial {
   }
 
   show([x, y], beamwidth) {
-    const there = x !== null && y !== null && beamwidth;
-    show(this.none, !there);
-    show(this.spot, there);
-    show(this.trail, there);
-    if (!there) { this.past = []; return; }
-    const place = [x, -y].map((error) => Math.max(-105, Math.min(105, error / beamwidth * 100 / EDGE)).toFixed(1));
+    const visible = x !== null && y !== null && beamwidth;
+    show(this.none, !visible);
+    show(this.spot, visible);
+    show(this.trail, visible);
+    if (!visible) { this.past = []; return; }
+    const unit = 100 / DIAL_RADIUS_BEAMWIDTHS;
+    const place = [x, -y].map((error) => Math.max(-105, Math.min(105, error / beamwidth * unit)).toFixed(1));
     this.past.push(place.join(','));
-    this.past = this.past.slice(-TRAIL);
+    this.past = this.past.slice(-TRAIL_POINTS);
     set(this.spot, {cx: place[0], cy: place[1]});
     set(this.trail, {points: this.past.join(' ')});
   }
@@ -137,18 +138,18 @@ export function begin() {
   const travels = AXES.map((name) => new Travel(`${name}-travel`));
   const level = new Level();
   const dial = new Dial();
-  onDraw((came, state) => {
-    if (!came.now) return;
+  onDraw((sections, state) => {
+    if (!sections.now) return;
     showAxes(state);
     const fixed = state.fixed || {};
     travels.forEach((travel, i) => {
       const limits = fixed.limits && fixed.limits[i];
       if (limits && limits[0] !== null) travel.scale(limits, fixed.stow[i]);
-      travel.show(came.now.axes[i]);
+      travel.show(sections.now.axes[i]);
     });
-    const [x, y, strength] = came.now.receiver;
+    const [x, y, strength] = sections.now.receiver;
     level.show(strength, x !== null, fixed);
     dial.show([x, y], fixed.beamwidth);
-    say(find('time'), time(came.now.t));
+    setText(find('time'), time(sections.now.t));
   });
 }

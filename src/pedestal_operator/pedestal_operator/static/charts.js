@@ -2,9 +2,9 @@
 import {onDraw} from './link.js';
 import {find, make, time} from './text.js';
 
-const PERIOD = 0.5;  // s between two points: a thousand of them, on some hundreds of pixels
-const DRAWN = 1000;  // ms between two drawings, which move the lines by less than a pixel
-const MISSED = 15;  // s without a point, by a page that was hidden or had no link, which are asked for
+const POINT_PERIOD_S = 0.5;  // some hundred pixels show about a thousand points
+const DRAW_PERIOD_MS = 1000;  // the lines move by less than a pixel
+const MAX_GAP_S = 15;  // after a longer gap (hidden page, lost link) the page requests the history
 const COLOURS = ['--first', '--second', '--third', '--fourth'];
 const STYLES = ['first', 'second', 'third', 'fourth'];
 const CHARTS = {
@@ -24,7 +24,7 @@ function row(now) {
           ...torques, now.receiver[2]];
 }
 
-// Lines of 0.05 and 0.1 beamwidths on the chart of the errors.
+// Draw lines at 0.05 and 0.1 beamwidths on the chart of the errors.
 function marks(plot, beamwidth) {
   if (!beamwidth) return;
   const {ctx, bbox} = plot;
@@ -90,36 +90,36 @@ export function begin() {
     }
   }
 
-  async function fetchPast() {
+  async function fetchHistory() {
     const rows = await (await fetch('history', {cache: 'no-store'})).json();
     data = columns.map((_, i) => rows.map((values) => values[i]));
     last = data[0].at(-1) ?? -Infinity;
     redraw();
   }
 
-  onDraw((came) => {
-    if (came.fixed) {
-      beamwidth = came.fixed.beamwidth;
-      span = came.fixed.span;
+  onDraw((sections) => {
+    if (sections.fixed) {
+      beamwidth = sections.fixed.beamwidth;
+      span = sections.fixed.span;
       if (!columns) {
-        columns = came.fixed.history;
+        columns = sections.fixed.history;
         data = columns.map(() => []);
-        fetchPast();
+        fetchHistory();
       }
     }
-    const now = came.now;
+    const now = sections.now;
     if (!now || !columns) return;
-    if (now.t < last || now.t > last + MISSED) {  // also where the slider of a recording was moved
+    if (now.t < last || now.t > last + MAX_GAP_S) {  // also after a move of the slider of a recording
       last = now.t;
-      fetchPast();
+      fetchHistory();
       return;
     }
-    if (now.t - last < PERIOD) return;
+    if (now.t - last < POINT_PERIOD_S) return;
     last = now.t;
     row(now).forEach((value, i) => data[i].push(value));
     const old = data[0].findIndex((t) => t >= last - span);
     if (old > 50) data.forEach((values) => values.splice(0, old));
-    if (performance.now() - drawn < DRAWN) return;
+    if (performance.now() - drawn < DRAW_PERIOD_MS) return;
     drawn = performance.now();
     redraw();
   });

@@ -1,63 +1,66 @@
-// What the operator does: modes, preset, jog, control, STOP. A button that would be refused says why.
-import {ask, jog, late, me, onState, rename, state} from './link.js';
-import {find, make, say} from './text.js';
+// Commands of the operator: modes, preset, jog, control, STOP. A button shows the reason of a refusal.
+import {isStale, jog, me, onState, rename, request, state} from './link.js';
+import {find, make, setText} from './text.js';
 
-const REPEAT = 200;  // ms between two messages of a jog that is held
-const UNCONFIRMED = 1500;  // ms after STOP without a reply
-const RATES = [0.1, 0.2, 0.5, 1, 2, 5];
+const JOG_PERIOD_MS = 200;
+const STOP_REPLY_TIMEOUT_MS = 1500;
+const JOG_RATES_DEG_S = [0.1, 0.2, 0.5, 1, 2, 5];
 const FALLBACKS = ['coast', 'memory', 'program', 'search', 'preset', 'standby'];
-const RADIANS = Math.PI / 180;
-const FREE = ['standby'];  // what the holder of control cannot keep from others
+const RADIANS_PER_DEGREE = Math.PI / 180;
+const FREE_COMMANDS = ['standby'];  // allowed without control
 
-const holds = (told) => told.control === '' || told.control.startsWith(`${me.name}@page `);
+const hasControl = (status) => status.control === '' || status.control.startsWith(`${me.name}@page `);
 
-// Why a verb would be refused now; '' where nothing is known against it.
+// Return the reason of a present refusal of a command, '' without a known reason.
 export function refusal(verb) {
-  if (state.replay) return 'a recording';
-  if (!me.open || late()) return 'no link';
-  if (me.role === 'monitor') return 'only looks';
-  if (!state.told) return 'no state yet';
-  if (!FREE.includes(verb) && verb !== 'take' && !holds(state.told)) return `held by ${state.told.control}`;
-  return state.told.refused[verb === 'jog' ? 'rate' : verb] || '';
+  if (state.replay) return 'recording';
+  if (!me.open || isStale()) return 'no link';
+  if (me.role === 'monitor') return 'role monitor';
+  if (!state.status) return 'no state received';
+  if (!FREE_COMMANDS.includes(verb) && verb !== 'take' && !hasControl(state.status)) {
+    return `held by ${state.status.control}`;
+  }
+  return state.status.refused[verb === 'jog' ? 'rate' : verb] || '';
 }
 
-function offer(button, why) {
-  if (button.title === why && button.hasAttribute('aria-disabled')) return;
-  button.setAttribute('aria-disabled', String(Boolean(why)));
-  button.title = why;
+function setRefusal(button, reason) {
+  if (button.title === reason && button.hasAttribute('aria-disabled')) return;
+  button.setAttribute('aria-disabled', String(Boolean(reason)));
+  button.title = reason;
   const small = button.querySelector('small');
-  if (small) say(small, state.replay ? '' : why);
+  if (small) setText(small, state.replay ? '' : reason);
 }
 
 function press(button, verb, act) {
   button.onclick = (event) => {
     event.preventDefault();
-    const why = refusal(verb);
-    if (why) saying(`${verb}: ${why}`, true); else act();
+    const reason = refusal(verb);
+    if (reason) showMessage(`${verb}: ${reason}`, true); else act();
   };
 }
 
-function saying(text, bad = false) { say(find('said'), text, bad ? 'warn' : ''); }
+function showMessage(text, bad = false) { setText(find('message'), text, bad ? 'warn' : ''); }
 
 function warn(text) {
   find('banner').hidden = false;
-  say(find('banner'), text);
+  setText(find('banner'), text);
 }
 
-function modes(names) {
+function showModes(names) {
   find('modes').replaceChildren(...names.filter((name) => name !== 'preset').map((name) => {
     const button = make('button', '', name);
     button.dataset.verb = name;
     button.appendChild(make('small'));
-    press(button, name, () => ask(name));
+    press(button, name, () => request(name));
     return button;
   }));
 }
 
-// Held: the rates are sent again and again. Let go, hidden, out of focus, gone: they are not, and the axes stand.
+// The page repeats the rates while a button is held. When the button is released, or the page is hidden, loses focus
+// or closes, the repetition ends and the axes stop.
 class Jog {
   constructor() {
-    for (const rate of RATES) {
+    for (const rate of JOG_RATES_DEG_S) {
       const option = make('option', '', `${rate}`);
       option.value = rate;
       find('jog-rate').appendChild(option);
@@ -79,13 +82,13 @@ class Jog {
 
   hold(button) {
     this.release();
-    const why = refusal('jog');
-    if (why) { saying(`jog: ${why}`, true); return; }
-    const ways = button.dataset.jog.split(' ').map(Number);
-    const tell = () => jog(ways.map((way) => way * Number(find('jog-rate').value)));
+    const reason = refusal('jog');
+    if (reason) { showMessage(`jog: ${reason}`, true); return; }
+    const directions = button.dataset.jog.split(' ').map(Number);
+    const sendJog = () => jog(directions.map((direction) => direction * Number(find('jog-rate').value)));
     button.classList.add('held');
-    tell();
-    this.timer = setInterval(tell, REPEAT);
+    sendJog();
+    this.timer = setInterval(sendJog, JOG_PERIOD_MS);
   }
 
   release() {
@@ -96,108 +99,115 @@ class Jog {
     jog([0, 0]);
   }
 
-  offer() {
-    const why = refusal('jog');
-    say(find('jog-why'), state.replay ? '' : why);
-    for (const button of this.buttons) offer(button, why);
-    if (why) this.release();
+  update() {
+    const reason = refusal('jog');
+    setText(find('jog-refusal'), state.replay ? '' : reason);
+    for (const button of this.buttons) setRefusal(button, reason);
+    if (reason) this.release();
   }
 }
 
 class Stop {
   constructor() {
-    this.asked = null;
+    this.requestTime = null;
     find('stop').onclick = () => {
-      this.asked = performance.now();
-      if (!ask('stop')) this.fail('STOP was not sent: no link');
+      this.requestTime = performance.now();
+      if (!request('stop')) this.fail('STOP was not sent: no link');
     };
     setInterval(() => {
-      if (this.asked !== null && performance.now() - this.asked > UNCONFIRMED) this.fail('STOP is not confirmed');
+      if (this.requestTime !== null && performance.now() - this.requestTime > STOP_REPLY_TIMEOUT_MS) {
+        this.fail('STOP has no reply');
+      }
     }, 200);
   }
 
-  fail(what) {
-    this.asked = null;
-    warn(`${what}. Use the emergency stop of the antenna.`);
+  fail(problem) {
+    this.requestTime = null;
+    warn(`${problem}. Use the emergency stop of the antenna.`);
   }
 
-  heard(reply) {
+  take(reply) {
     if (['stop', 'standby'].includes(reply.verb) && reply.granted) {
-      this.asked = null;
+      this.requestTime = null;
       find('banner').hidden = true;
     }
   }
 }
 
-function head({told}) {
-  say(find('mode'), told.mode || '-');
-  say(find('reason'), told.reason ? `${told.reason}${told.coasting === '1' ? ', coasting' : ''}` : '');
-  const ready = told.drive.startsWith('enabled');
-  say(find('drive'), told.drive || '-', ready && told.drive === 'enabled' ? '' : ready ? 'warn' : 'bad');
-  say(find('control'), told.control || 'nobody', told.control && !holds(told) ? 'warn' : '');
-  say(find('fallback'), told.fallback || '-');
-  for (const button of find('modes').children) button.classList.toggle('on', button.dataset.verb === told.mode);
+function showHeader({status}) {
+  setText(find('mode'), status.mode || '-');
+  setText(find('reason'), status.reason ? `${status.reason}${status.coasting === '1' ? ', coasting' : ''}` : '');
+  const ready = status.drive.startsWith('enabled');
+  setText(find('drive'), status.drive || '-', ready && status.drive === 'enabled' ? '' : ready ? 'warn' : 'bad');
+  setText(find('control'), status.control || 'none', status.control && !hasControl(status) ? 'warn' : '');
+  setText(find('fallback'), status.fallback || '-');
+  for (const button of find('modes').children) button.classList.toggle('on', button.dataset.verb === status.mode);
 }
 
-function link() {
-  const {told} = state;
-  const silent = told ? Object.keys(told.nodes).find((name) => told.nodes[name] === 'silent') : '';
-  const lost = !me.open ? 'lost' : late() ? 'late' : !told || !told.present ? 'no ACU' : silent ? `no ${silent}` : 'live';
-  const stepped = told && told.steps > 0;
-  say(find('time-label'), `${state.now && state.now.t < 1e8 ? 'time' : 'UTC'}${stepped ? ', clock stepped' : ''}`,
+function showLink() {
+  const {status} = state;
+  const silent = status ? Object.keys(status.nodes).find((name) => status.nodes[name] === 'silent') : '';
+  const condition = !me.open ? 'lost' : isStale() ? 'stale' : !status || !status.present ? 'no ACU'
+    : silent ? `no ${silent}` : 'live';
+  const stepped = status && status.steps > 0;
+  setText(find('time-label'), `${state.now && state.now.t < 1e8 ? 'time' : 'UTC'}${stepped ? ', clock stepped' : ''}`,
       stepped ? 'label warn' : 'label');
-  say(find('link'), state.replay ? 'recording' : lost, lost === 'live' || state.replay ? '' : 'bad');
-  say(find('role'), `${me.role || 'page'}, your name`, 'label');
+  setText(find('link'), state.replay ? 'recording' : condition, condition === 'live' || state.replay ? '' : 'bad');
+  setText(find('role'), `${me.role || 'page'}, user name`, 'label');
   if (document.activeElement !== find('name')) find('name').value = me.name;
 }
 
 export function begin() {
-  const hold = new Jog();
+  const jogButtons = new Jog();
   const stop = new Stop();
   const preset = find('preset').elements;
   press(find('preset').querySelector('button'), 'preset', () => {
     const angles = ['azimuth', 'elevation'].map((axis) => Number(preset[axis].value.replace(',', '.')));
     const empty = ['azimuth', 'elevation'].some((axis) => preset[axis].value.trim() === '');
-    if (empty || !angles.every(Number.isFinite)) { saying('preset: two angles in degrees are needed', true); return; }
-    ask('preset', {azimuth: angles[0] * RADIANS, elevation: angles[1] * RADIANS});
+    if (empty || !angles.every(Number.isFinite)) {
+      showMessage('preset: azimuth and elevation must be numbers [deg]', true);
+      return;
+    }
+    request('preset', {azimuth: angles[0] * RADIANS_PER_DEGREE, elevation: angles[1] * RADIANS_PER_DEGREE});
   });
-  press(find('take'), 'take', () => ask('take', me.role === 'supervisor' ? {role: 'supervisor'} : {}));
-  press(find('release'), 'release', () => ask('release'));
-  press(find('reset'), 'reset', () => ask('reset'));
+  press(find('take'), 'take', () => request('take', me.role === 'supervisor' ? {role: 'supervisor'} : {}));
+  press(find('release'), 'release', () => request('release'));
+  press(find('reset'), 'reset', () => request('reset'));
   for (const name of FALLBACKS) find('choose-fallback').appendChild(make('option', '', name));
-  find('choose-fallback').onchange = (event) => ask('fallback', {mode: event.target.value});
+  find('choose-fallback').onchange = (event) => request('fallback', {mode: event.target.value});
   find('name').onchange = (event) => rename(event.target.value);
   let known = '';
   const refresh = () => {
-    link();
-    for (const button of document.querySelectorAll('[data-verb]')) offer(button, refusal(button.dataset.verb));
-    const {told} = state;
-    const taken = told && !holds(told) && me.role !== 'supervisor' ? `held by ${told.control}` : '';
-    offer(find('take'), refusal('take') || taken || (told && told.control && holds(told) ? 'it is yours' : ''));
-    offer(find('release'), refusal('release') || (told && told.control === '' ? 'nobody has it' : ''));
-    offer(find('reset'), refusal('reset'));
-    hold.offer();
+    showLink();
+    for (const button of document.querySelectorAll('[data-verb]')) setRefusal(button, refusal(button.dataset.verb));
+    const {status} = state;
+    const taken = status && !hasControl(status) && me.role !== 'supervisor' ? `held by ${status.control}` : '';
+    const held = status && status.control && hasControl(status) ? 'you are in control' : '';
+    setRefusal(find('take'), refusal('take') || taken || held);
+    setRefusal(find('release'), refusal('release') || (status && status.control === '' ? 'control is free' : ''));
+    setRefusal(find('reset'), refusal('reset'));
+    jogButtons.update();
     find('stop').disabled = Boolean(state.replay);
     find('choose-fallback').disabled = Boolean(refusal('fallback'));
   };
-  onState((came) => {
-    if (came.fixed && known !== came.fixed.modes.join()) {
-      known = came.fixed.modes.join();
-      modes(came.fixed.modes);
+  onState((sections) => {
+    if (sections.fixed && known !== sections.fixed.modes.join()) {
+      known = sections.fixed.modes.join();
+      showModes(sections.fixed.modes);
     }
-    if (came.told) {
-      head(came);
-      if (document.activeElement !== find('choose-fallback')) find('choose-fallback').value = came.told.fallback;
+    if (sections.status) {
+      showHeader(sections);
+      if (document.activeElement !== find('choose-fallback')) find('choose-fallback').value = sections.status.fallback;
     }
-    for (const reply of came.replies || []) {
-      stop.heard(reply);
-      if (reply.error) saying(reply.error, true);
-      if (reply.verb) saying(`${reply.verb}: ${reply.reply}`, !reply.granted);
+    for (const reply of sections.replies || []) {
+      stop.take(reply);
+      if (reply.error) showMessage(reply.error, true);
+      if (reply.verb) showMessage(`${reply.verb}: ${reply.reply}`, !reply.granted);
     }
-    if (came.told || came.replies || !me.open) refresh();
+    if (sections.status || sections.replies || !me.open) refresh();
   });
   setInterval(() => {
     refresh();
-    if (me.stranger) warn('The server was started anew: open the address that it has printed.');
+    if (me.unauthorized) warn('The server was restarted: open the address that it printed.');
   }, 500);
 }

@@ -1,36 +1,36 @@
-// The web socket: what the antenna tells comes in, what the user asks goes out.
+// The web socket: it receives the state of the antenna and sends the commands of the user.
 
-const AGAIN = 1000;  // ms until the next try after the link was lost
-const SILENT = 1000;  // ms without a state after which the page no longer shows the present
-const DRAWN = 50;  // ms between two drawings, as often as a state comes
+const RECONNECT_DELAY_MS = 1000;  // after a loss of the link
+const MAX_STATE_AGE_MS = 1000;  // after which the state on the page is stale
+const DRAW_PERIOD_MS = 50;  // equal to the period of the state
 
-export const state = {now: null, told: null, fixed: null, sky: null, alarms: [], log: [], replay: null};
-export const me = {name: localStorage.getItem('name') || '', role: '', open: false, stranger: false};
+export const state = {now: null, status: null, fixed: null, sky: null, alarms: [], log: [], replay: null};
+export const me = {name: localStorage.getItem('name') || '', role: '', open: false, unauthorized: false};
 
-const takers = [];
+const receivers = [];
 const drawers = [];
-let undrawn = {};  // the sections that came since the last drawing
+let undrawn = {};  // sections received since the last drawing
 let socket = null;
-let heard = 0;
-let newest = 0;  // number of the last message
-let seen = 0;  // that the server knows of
-let number = 0;
+let lastArrival = 0;
+let newest = 0;  // number of the last received message
+let acknowledged = 0;  // number of the last acknowledged message
+let requestNumber = 0;
 
-// take(sections that came, state): called for every message.
-export function onState(take) { takers.push(take); }
+// Call take(received sections, state) for every message.
+export function onState(take) { receivers.push(take); }
 
-// draw(sections that came since the last time, state): called DRAWN apart, while the page is seen.
+// Call draw(sections since the last call, state) every DRAW_PERIOD_MS while the page is visible.
 export function onDraw(draw) { drawers.push(draw); }
 
 function drawNow() {
-  see();
+  acknowledge();
   if (document.hidden || !Object.keys(undrawn).length) return;
-  const came = undrawn;
+  const sections = undrawn;
   undrawn = {};
-  for (const draw of drawers) draw(came, state);
+  for (const draw of drawers) draw(sections, state);
 }
 
-export function late() { return performance.now() - heard > SILENT; }
+export function isStale() { return performance.now() - lastArrival > MAX_STATE_AGE_MS; }
 
 export function send(message) {
   if (!me.open) return false;
@@ -38,17 +38,17 @@ export function send(message) {
   return true;
 }
 
-// Ask the control unit for a verb; its arguments in SI units, as on acu/command.
-export function ask(verb, given = {}) { return send({ask: verb, arguments: given, id: ++number}); }
+// Send a command to the control unit, with arguments in SI units as on acu/command.
+export function request(verb, given = {}) { return send({ask: verb, arguments: given, id: ++requestNumber}); }
 
 export function jog(rates) {
-  see();
+  acknowledge();
   return send({jog: rates});
 }
 
-// Say what was seen, which asks for the next ones.
-function see() {
-  if (seen !== newest && send({seen: newest})) seen = newest;
+// Acknowledge the last message; the server then sends the next one.
+function acknowledge() {
+  if (acknowledged !== newest && send({seen: newest})) acknowledged = newest;
 }
 
 export function rename(name) {
@@ -58,7 +58,7 @@ export function rename(name) {
 }
 
 export function begin() {
-  setInterval(drawNow, DRAWN);
+  setInterval(drawNow, DRAW_PERIOD_MS);
   connect();
 }
 
@@ -66,19 +66,19 @@ function connect() {
   socket = new WebSocket(`ws://${location.host}/socket?name=${encodeURIComponent(me.name)}`);
   socket.onopen = () => {
     me.open = true;
-    seen = newest = 0;
+    acknowledged = newest = 0;
   };
   socket.onclose = async () => {
     me.open = false;
-    for (const take of takers) take({}, state);
-    me.stranger = await fetch('page.css', {method: 'HEAD'}).then((answer) => answer.status === 401, () => false);
-    setTimeout(connect, AGAIN);
+    for (const take of receivers) take({}, state);
+    me.unauthorized = await fetch('page.css', {method: 'HEAD'}).then((answer) => answer.status === 401, () => false);
+    setTimeout(connect, RECONNECT_DELAY_MS);
   };
   socket.onmessage = (event) => {
     const sections = JSON.parse(event.data);
     newest = sections.number;
-    if (document.hidden) see();  // browsers hold up the timers of hidden pages, some for a minute
-    heard = performance.now();
+    if (document.hidden) acknowledge();  // browsers delay the timers of hidden pages, some for a minute
+    lastArrival = performance.now();
     for (const reply of sections.replies || []) {
       if (reply.you) {
         me.name = reply.you;
@@ -88,6 +88,6 @@ function connect() {
     }
     Object.assign(state, sections);
     Object.assign(undrawn, sections);
-    for (const take of takers) take(sections, state);
+    for (const take of receivers) take(sections, state);
   };
 }

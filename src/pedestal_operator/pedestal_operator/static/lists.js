@@ -1,15 +1,15 @@
-// Alarms and events. All texts come in as texts, never as HTML.
-import {ask, me, onDraw} from './link.js';
-import {find, make, say, time} from './text.js';
+// Alarms and events. All texts are inserted as text, never as HTML.
+import {me, onDraw, request} from './link.js';
+import {find, make, setText, time} from './text.js';
 
-const SHELVES = [600, 3600, 28800];  // s
-const WAITING = ['unacknowledged', 'returned unacknowledged', 'latched unacknowledged'];
+const SHELVE_DURATIONS_S = [600, 3600, 28800];
+const UNACKNOWLEDGED_STATES = ['unacknowledged', 'returned unacknowledged', 'latched unacknowledged'];
 
 function button(text, act) {
   const made = make('button', '', text);
   if (me.role === 'monitor') {
     made.setAttribute('aria-disabled', 'true');
-    made.title = 'this page may only look, and stop';
+    made.title = 'the role monitor may send stop only';
   } else {
     made.onclick = act;
   }
@@ -20,18 +20,18 @@ function shelf(alarm) {
   const choice = make('select');
   choice.setAttribute('aria-label', `shelve ${alarm.name}`);
   choice.appendChild(make('option', '', 'shelve'));
-  for (const seconds of SHELVES) {
+  for (const seconds of SHELVE_DURATIONS_S) {
     const option = make('option', '', seconds < 3600 ? `${seconds / 60} min` : `${seconds / 3600} h`);
     option.value = seconds;
     choice.appendChild(option);
   }
-  choice.onchange = () => ask('shelve', {alarm: alarm.name, seconds: choice.value, reason: 'from the page'});
+  choice.onchange = () => request('shelve', {alarm: alarm.name, seconds: choice.value, reason: 'from the page'});
   choice.disabled = me.role === 'monitor';
   return choice;
 }
 
 function alarmRow(alarm) {
-  const waits = WAITING.includes(alarm.state);
+  const waits = UNACKNOWLEDGED_STATES.includes(alarm.state);
   const shelved = alarm.state === 'shelved';
   const row = make('div', `alarm ${alarm.priority}${waits ? ' waits' : ''}${shelved ? ' shelved' : ''}`
                           + (alarm.cause ? ' under' : ''));
@@ -46,18 +46,18 @@ function alarmRow(alarm) {
   row.appendChild(name);
   row.appendChild(make('span', 'text', [alarm.detail || alarm.meaning, `→ ${alarm.action}`].join('  ')));
   const hands = make('span', 'hands');
-  if (waits) hands.appendChild(button('ack', () => ask('acknowledge', {alarm: alarm.name})));
-  hands.appendChild(shelved ? button('unshelve', () => ask('unshelve', {alarm: alarm.name})) : shelf(alarm));
+  if (waits) hands.appendChild(button('ack', () => request('acknowledge', {alarm: alarm.name})));
+  hands.appendChild(shelved ? button('unshelve', () => request('unshelve', {alarm: alarm.name})) : shelf(alarm));
   row.appendChild(hands);
   return row;
 }
 
 function showAlarms(alarms) {
-  const waiting = alarms.filter((alarm) => WAITING.includes(alarm.state));
+  const waiting = alarms.filter((alarm) => UNACKNOWLEDGED_STATES.includes(alarm.state));
   const rest = alarms.filter((alarm) => !waiting.includes(alarm));
   find('alarm-list').replaceChildren(...[...waiting, ...rest].map(alarmRow));
   if (!alarms.length) find('alarm-list').appendChild(make('div', 'none', 'none'));
-  say(find('alarm-count'), alarms.length ? `${waiting.length} of ${alarms.length} unacknowledged` : '',
+  setText(find('alarm-count'), alarms.length ? `${waiting.length} of ${alarms.length} unacknowledged` : '',
       waiting.length ? 'warn' : '');
   find('acknowledge-all').hidden = !waiting.length || me.role === 'monitor';
 }
@@ -73,9 +73,9 @@ function eventRow({t, who, text, bad}) {
 }
 
 export function begin() {
-  find('acknowledge-all').onclick = () => ask('acknowledge');
-  onDraw((came) => {
-    if (came.alarms) showAlarms(came.alarms);
-    if (came.log) find('log-list').replaceChildren(...came.log.slice().reverse().map(eventRow));
+  find('acknowledge-all').onclick = () => request('acknowledge');
+  onDraw((sections) => {
+    if (sections.alarms) showAlarms(sections.alarms);
+    if (sections.log) find('log-list').replaceChildren(...sections.log.slice().reverse().map(eventRow));
   });
 }

@@ -1,4 +1,4 @@
-// The operator's page: each module shows its part of the state, which comes by the link.
+// Page of the operator: each module shows its part of the state, which arrives over the link.
 import * as axes from './axes.js';
 import * as charts from './charts.js';
 import * as hands from './hands.js';

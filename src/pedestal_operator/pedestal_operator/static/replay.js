@@ -1,6 +1,6 @@
-// The slider of a recording.
+// Slider, speed and play button of a recording.
 import {onDraw, send, state} from './link.js';
-import {find, make, say} from './text.js';
+import {find, make, setText} from './text.js';
 
 const SPEEDS = [0.2, 0.5, 1, 2, 5, 10];
 
@@ -17,14 +17,14 @@ export function begin() {
   slider.oninput = () => send({replay: {position: Number(slider.value)}});
   find('play').onclick = () => send({replay: {playing: !state.replay.playing}});
   find('speed').onchange = (event) => send({replay: {rate: Number(event.target.value)}});
-  onDraw((came) => {
-    if (!came.replay) return;
-    const {length, position, playing, rate} = came.replay;
+  onDraw((sections) => {
+    if (!sections.replay) return;
+    const {length, position, playing, rate} = sections.replay;
     find('replay').hidden = false;
     slider.max = length;
     if (!held) slider.value = position;
-    say(find('position'), `${position.toFixed(1)} of ${length.toFixed(1)} s`);
-    say(find('play'), playing ? 'pause' : 'play');
+    setText(find('position'), `${position.toFixed(1)} of ${length.toFixed(1)} s`);
+    setText(find('play'), playing ? 'pause' : 'play');
     find('speed').value = rate;
   });
 }

@@ -1,7 +1,7 @@
 // The sky from above: north up, east to the right, the zenith in the middle.
 import {onDraw} from './link.js';
 import {draw, points, set, show} from './svg.js';
-import {day, find, make, minute, number, say, time} from './text.js';
+import {day, find, make, minute, number, setText, time} from './text.js';
 
 const RADIUS = 96;
 
@@ -27,7 +27,7 @@ function grid(svg) {
   }
 }
 
-// What lies below a line around the horizon, or above one near the zenith.
+// Fill the area below a line around the horizon (edge 0), or above a line near the zenith (edge 90).
 function band(svg, rows, edge, style) {
   if (!rows.length) return;
   const ring = Array.from({length: 73}, (_, i) => [5 * i, edge]);
@@ -58,7 +58,7 @@ function words(pairs) {
   return line;
 }
 
-// What stands still, or moves with the deck once a second.
+// Draw the parts that stand still, or move with the deck once a second.
 function drawSky(svg, sky) {
   svg.replaceChildren();
   band(svg, sky.floor, 0, 'floor');
@@ -83,12 +83,12 @@ function drawSky(svg, sky) {
   }
 }
 
-// The passes, and what the control unit announces, on ship and ashore.
-function tell({passes, coming}, {told, now}) {
+// Show the passes, and the predictions of the control unit.
+function showPasses({passes, coming}, {status, now}) {
   const lines = passes.map(passLine);
   if (!lines.length) lines.push(make('span', 'none', 'no program track'));
   lines.push(...coming.map((pass) => nextLine(pass, now ? now.t : 0)));
-  for (const text of told ? [told.keyhole, told.blockage] : []) if (text) lines.push(make('div', 'note', text));
+  for (const text of status ? [status.keyhole, status.blockage] : []) if (text) lines.push(make('div', 'note', text));
   find('passes').replaceChildren(...lines);
 }
 
@@ -97,17 +97,17 @@ export function begin() {
   const still = draw(svg, 'g', {});
   const past = draw(svg, 'polyline', {class: 'past'});
   const beam = draw(svg, 'circle', {r: 5, class: 'beam'});
-  onDraw((came, state) => {
-    if (came.sky) {
-      drawSky(still, came.sky);
-      say(find('sky-frame'), came.sky.bow.length ? 'earth angles, on a ship' : 'north up');
+  onDraw((sections, state) => {
+    if (sections.sky) {
+      drawSky(still, sections.sky);
+      setText(find('sky-frame'), sections.sky.bow.length ? 'earth angles, on a ship' : 'north up');
     }
-    if (state.sky && (came.sky || came.told)) tell(state.sky, state);
-    if (came.past) set(past, {points: line(came.past)});
-    if (came.now) {
-      show(beam, known(came.now.beam));
-      if (known(came.now.beam)) {
-        const [cx, cy] = place(came.now.beam).map((value) => value.toFixed(1));
+    if (state.sky && (sections.sky || sections.status)) showPasses(state.sky, state);
+    if (sections.past) set(past, {points: line(sections.past)});
+    if (sections.now) {
+      show(beam, known(sections.now.beam));
+      if (known(sections.now.beam)) {
+        const [cx, cy] = place(sections.now.beam).map((value) => value.toFixed(1));
         set(beam, {cx, cy});
       }
     }

@@ -1,4 +1,4 @@
-// Drawing in SVG: every shape is a class of page.css.
+// Drawing in SVG: page.css has a class for every shape.
 
 const NAMESPACE = 'http://www.w3.org/2000/svg';
 
@@ -10,13 +10,13 @@ export function draw(parent, tag, attributes, text) {
   return element;
 }
 
-// Set what is not so already.
+// Set the attributes that have changed.
 export function set(element, attributes) {
   for (const [name, value] of Object.entries(attributes)) {
     if (element.getAttribute(name) !== String(value)) element.setAttribute(name, value);
   }
 }
 
-export function show(element, there) { set(element, {visibility: there ? 'visible' : 'hidden'}); }
+export function show(element, visible) { set(element, {visibility: visible ? 'visible' : 'hidden'}); }
 
 export const points = (rows) => rows.map(([x, y]) => `${x.toFixed(1)},${y.toFixed(1)}`).join(' ');

@@ -1,1 +1,1 @@
-"""What viewers of ROS read: frames on demand, and the files that they open (`files`)."""
+"""Data for viewers of ROS: frames on demand, and the files that the viewers open (`files`)."""

@@ -1,4 +1,4 @@
-"""Where the frames of a running antenna are, by its encoders and its INS."""
+"""Frames of a running antenna from its encoders and its INS."""
 import contextlib
 
 from pedestal_common.graph import nodes
@@ -8,7 +8,7 @@ from pedestal_operator.viewers.on_demand import OnDemand
 
 
 class _Latest:
-    """The last message of a stamped topic, taken apart only when it is asked for."""
+    """Last message of a stamped topic, decoded when it is read."""
 
     def __init__(self, node, prefix, topic):
         self._decoder = records.Decoder(topic, records.empty(records.of(topic), 1))
@@ -19,7 +19,7 @@ class _Latest:
         self._data = data
 
     def read(self):
-        """(stamp [ns], numbers) of the last message that could be read; None before the first."""
+        """Return (stamp [ns], numbers) of the last readable message, None before the first."""
         if self._data is not None:
             with contextlib.suppress(ValueError):
                 self._read = self._decoder.decoded(self._data)
@@ -28,27 +28,29 @@ class _Latest:
 
 
 class FrameSource:
-    """Hears joint_states of every beam of a graph, and ship/imu/data, while the frames are wanted. node: the
-    shell.Shell that hears."""
+    """Subscriptions to joint_states of every beam of a graph and to ship/imu/data, while active. node: a shell.Shell.
+    """
 
     def __init__(self, node):
         self._attitude = _Latest(node, '', 'ship/imu/data')
         self._angles = {prefix: _Latest(node, prefix, 'joint_states') for prefix in nodes.prefixes(node.graph.beams)}
 
-    def want(self, wanted):
-        """Begin or cease to hear the antenna."""
+    def set_active(self, active):
+        """Subscribe to the antenna if active, else end the subscriptions."""
         for latest in (self._attitude, *self._angles.values()):
-            latest.topic.want(wanted)
+            latest.topic.set_active(active)
 
     def read(self):
-        """(stamp of the last angles [ns], their frames.Transforms); (0, []) before the first. The deck is ashore until
-        the INS is heard."""
-        heard = {prefix: latest.read() for prefix, latest in self._angles.items()}
-        told = {prefix: read for prefix, read in heard.items() if read}
-        if not told:
+        """Return (stamp of the last angles [ns], their frames.Transforms), (0, []) before the first.
+
+        The deck is ashore before the first message of the INS.
+        """
+        latest = {prefix: latest.read() for prefix, latest in self._angles.items()}
+        known = {prefix: read for prefix, read in latest.items() if read}
+        if not known:
             return 0, []
         attitude = self._attitude.read()
         deck = frames.of_deck(attitude[1][:4]) if attitude else frames.of_deck()
-        return max(stamp for stamp, _ in told.values()), [deck, *(
-            transform for prefix, (_, numbers) in told.items()
+        return max(stamp for stamp, _ in known.values()), [deck, *(
+            transform for prefix, (_, numbers) in known.items()
             for transform in frames.of_pedestal(numbers[:2], prefix))]

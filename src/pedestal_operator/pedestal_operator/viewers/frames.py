@@ -1,12 +1,13 @@
-"""The frames of the pedestal, from the earth to the beam: right-handed, z up, x ahead (REP 103, REP 105). No ROS here.
+"""Frames of the pedestal from the earth to the beam: right-handed, z up, x ahead (REP 103, REP 105). No ROS here.
 
     earth -> base_link       attitude of the deck; ashore the bow points north
     base_link -> azimuth     turned by the azimuth
     azimuth -> elevation     turned by the elevation
     elevation -> beam        x along the beam
 
-All but the first are the joints of `viewers/pedestal.urdf`, whose names are those of joint_states and whose axes say
-which way an angle turns: the azimuth clockwise seen from above, about -z; the elevation upwards, about -y.
+All frames except the first are joints of `viewers/files/pedestal.urdf`, with the names of joint_states. The axis of a
+joint gives the direction of its angle. The azimuth turns about -z, clockwise from above. The elevation turns about -y,
+upwards.
 """
 import importlib.resources
 import math
@@ -18,14 +19,14 @@ from pedestal_common.graph import topics
 from pedestal_common.wire import messages
 
 VIEWER_FOLDER = importlib.resources.files('pedestal_operator.viewers') / 'files'
-"""The folder of what viewers open: layouts, the model of the pedestal."""
+"""Folder of the files that viewers open: layouts and the model of the pedestal."""
 
 PEDESTAL_URDF = (VIEWER_FOLDER / 'pedestal.urdf').read_text()
-"""The model of the pedestal, as the topic robot_description has it."""
+"""Model of the pedestal, the text of the topic robot_description."""
 
 
 class Transform(typing.NamedTuple):
-    """Where a frame `child` is in its `parent`: place of its origin [m], rotation as quaternion (x, y, z, w)."""
+    """Frame `child` in its `parent`: place of its origin [m], rotation as quaternion (x, y, z, w)."""
     parent: str
     child: str
     translation: tuple
@@ -33,7 +34,7 @@ class Transform(typing.NamedTuple):
 
 
 class Joint(typing.NamedTuple):
-    """A joint of the model. axis: about which it turns, in the frame of its child; None of a fixed one."""
+    """A joint of the model. axis: axis of its turn in the frame of its child, None for a fixed joint."""
     name: str
     parent: str
     child: str
@@ -46,7 +47,7 @@ def _numbers(text):
 
 
 def joints(description=PEDESTAL_URDF) -> tuple:
-    """The Joints of a URDF whose frames are parallel where every angle is 0 (no `rpy`), in its order."""
+    """Return the Joints of a URDF in its order; all frames must be parallel at angle 0 (no `rpy`)."""
     found = []
     for joint in ElementTree.fromstring(description).iter('joint'):
         axis = joint.find('axis')
@@ -59,35 +60,38 @@ def joints(description=PEDESTAL_URDF) -> tuple:
 PEDESTAL_JOINTS = joints()
 
 
-def _turned(axis, angle):
-    """The quaternion of a turn about a unit vector."""
+def _rotation(axis, angle):
+    """Return the quaternion of a turn about a unit vector."""
     sine = math.sin(0.5 * angle)
     return *(sine * part for part in axis), math.cos(0.5 * angle)
 
 
 def of_deck(attitude=ASHORE_ATTITUDE) -> Transform:
-    """The deck in the earth. attitude: quaternion (x, y, z, w) deck -> earth."""
+    """Return the deck in the earth. attitude: quaternion (x, y, z, w) deck -> earth."""
     return Transform('earth', 'base_link', (0.0, 0.0, 0.0), tuple(attitude))
 
 
 def of_pedestal(angles, prefix='') -> list:
-    """The Transforms from the deck to the beam. angles: of joint_states, azimuth and elevation [rad]; prefix: of one
-    beam of several, whose frames are called beam_2/azimuth for example."""
+    """Return the Transforms from the deck to the beam.
+
+    angles: azimuth and elevation of joint_states [rad]; prefix: of one of several beams, for the frame beam_2/azimuth
+    for example.
+    """
     turned = dict(zip(topics.AXES, angles))
     return [Transform(joint.parent if joint.parent == 'base_link' else prefix + joint.parent, prefix + joint.child,
-                      joint.origin, _turned(joint.axis or (0.0, 0.0, 0.0), turned.get(joint.name, 0.0)))
+                      joint.origin, _rotation(joint.axis or (0.0, 0.0, 0.0), turned.get(joint.name, 0.0)))
             for joint in PEDESTAL_JOINTS]
 
 
 def tf_message(stamp, transforms):
-    """The tf2_msgs/msg/TFMessage of Transforms at a stamp [ns]."""
+    """Return the tf2_msgs/msg/TFMessage of Transforms at a stamp [ns]."""
     types = messages.ROS_TYPESTORE.types
     stamped, transform = (types[f'geometry_msgs/msg/{name}'] for name in ('TransformStamped', 'Transform'))
-    of_all = []
+    messages_of_frames = []
     for given in transforms:
         header = messages.header(given.parent)
         messages.put_stamp(header.stamp, stamp)
-        of_all.append(stamped(header=header, child_frame_id=given.child, transform=transform(
+        messages_of_frames.append(stamped(header=header, child_frame_id=given.child, transform=transform(
             translation=messages.vector3(*given.translation),
             rotation=messages.Quaternion(**dict(zip('xyzw', given.rotation))))))
-    return types['tf2_msgs/msg/TFMessage'](transforms=of_all)
+    return types['tf2_msgs/msg/TFMessage'](transforms=messages_of_frames)

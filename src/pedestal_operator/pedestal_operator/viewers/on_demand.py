@@ -1,17 +1,17 @@
-"""A topic of the graph that is heard only as long as somebody wants it."""
+"""Subscription to a topic of the graph while it is needed."""
 from pedestal_common.node import subscriptions
 
 
 class OnDemand:
-    """Hands take(data, info) the CDR bytes of a nodes.Link while it is wanted. node: the shell.Shell that hears."""
+    """Switchable subscription: take(data, info) receives the CDR bytes of a nodes.Link. node: a shell.Shell."""
 
     def __init__(self, node, link, take):
         self._node, self._link, self._take, self._subscriptions = node, link, take, []
 
-    def want(self, wanted):
-        """Begin or cease to hear the topic."""
-        if wanted and not self._subscriptions:
+    def set_active(self, active):
+        """Subscribe if active, else end the subscription."""
+        if active and not self._subscriptions:
             self._subscriptions = subscriptions.subscribe(self._node, self._link, self._link.name, self._take, 'read')
-        elif not wanted:
+        elif not active:
             while self._subscriptions:
                 self._node.destroy_subscription(self._subscriptions.pop())

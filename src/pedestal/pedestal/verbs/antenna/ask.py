@@ -41,7 +41,7 @@ def send_command(options, verb, given, node='acu'):
     if node not in able:
         raise ValueError(f'--node {node}: must be one of {", ".join(able)}')
     with arguments.remote(options, node) as spun:
-        spun.find(options.timeout)
-        reply = spun.ask(verb, given, options.timeout)
+        spun.wait_for_node(options.timeout)
+        reply = spun.request(verb, given, options.timeout)
     print(f'{node}: {reply.text}')
     return 0 if reply.granted else 1

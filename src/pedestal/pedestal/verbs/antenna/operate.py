@@ -19,6 +19,6 @@ def main(options):
         raise ValueError('operate needs a terminal; `pedestal mode` and `pedestal status` do without')
     from pedestal_operator import console
     with arguments.remote(options) as spun:
-        spun.find(options.timeout)
+        spun.wait_for_node(options.timeout)
         console.operate(spun)
     return 0

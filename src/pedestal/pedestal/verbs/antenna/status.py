@@ -19,7 +19,7 @@ def main(options):
 
     from pedestal_operator import state
     with arguments.remote(options) as spun:
-        spun.find(options.timeout)
+        spun.wait_for_node(options.timeout)
         name = spun.remote.beam + 'acu'
         spun.until(lambda: spun.remote.present(name) and spun.remote.present('joint_states'), options.timeout)
         rows, alarms = state.rows(spun.remote), state.alarms(spun.remote)
