@@ -176,8 +176,9 @@ class AcuParameters(SharedParameters):
         for name in ('age', 'beam_age'):
             age = getattr(self.tracker.receiver, name)
             if self.receiver_latency + age > (HISTORY_LENGTH - 4) * self.period:
-                raise ParameterError(f'tracker.receiver.{name} = {age:g} s: must be, with receiver_latency, 0 to '
-                                     f'{HISTORY_LENGTH - 4} periods, {(HISTORY_LENGTH - 4) * self.period:g} s')
+                longest = (HISTORY_LENGTH - 4) * self.period - self.receiver_latency
+                raise ParameterError(f'tracker.receiver.{name} = {age:g} s: must be 0 to {HISTORY_LENGTH - 4} periods '
+                                     f'less receiver_latency, {longest:g} s')
         longest = self.attitude_timeout - self.command_delay - 0.5 * self.period
         if self.attitude_latency >= longest:
             raise ParameterError(f'attitude_latency = {self.attitude_latency:g} s: must be below attitude_timeout - '

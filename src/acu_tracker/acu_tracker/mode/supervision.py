@@ -27,7 +27,7 @@ def axes_obey_commands(s):
 def drive_refusal(ready, moves_unasked, frozen):
     """NONE, or why a drive, ready or not, is not trusted with a mode."""
     if moves_unasked:
-        return Reason.MOVES_UNASKED
+        return Reason.UNCOMMANDED_MOTION
     if frozen:
         return Reason.DRIVE_FROZEN
     return Reason.NONE if ready else Reason.DRIVE_NOT_READY

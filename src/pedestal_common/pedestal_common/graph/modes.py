@@ -8,14 +8,19 @@ import typing
 class Row(typing.NamedTuple):
     """Row of MODE_ROWS.
 
-    doc: what the axes follow; entry: when the mode can be entered; exit: when the mode ends by itself. needs, ends:
-    fields of acu_tracker.modes.Conditions, without which the mode cannot be entered and without which it ends, '' for
-    none. follows: True for a mode that follows a target through the sky, for which the attitude of the deck must be
-    known. by_level: True for a mode that uses the signal level about the expected place of the target. fallback: mode
-    after the end of the target; `program` stands for the mode whose table was followed last. handover: mode that
-    follows by itself as soon as it can be entered. Both are names, '' for none. table: True for a mode that follows a
-    table of directions; pinned: True for a mode in which the stow pins may be in. predicted: method of
-    prediction.Predictor that makes the table; button: True for a mode with a button on the page.
+    doc        what the axes follow
+    entry      when the mode can be entered
+    exit       when the mode ends by itself
+    needs      field of acu_tracker.modes.Conditions without which the mode cannot be entered; '' for none
+    ends       field of acu_tracker.modes.Conditions without which the mode ends; '' for none
+    follows    the mode follows a target through the sky, for which the attitude of the deck must be known
+    by_level   the mode uses the signal level about the expected place of the target
+    fallback   mode after the end of the target, '' for none; `program` stands for the table that was followed last
+    handover   mode that replaces this one as soon as it can be entered, '' for none
+    table      the mode follows a table of directions
+    pinned     the stow pins may be in
+    predicted  method of prediction.Predictor that makes the table
+    button     the page has a button for the mode
     """
     name: str
     doc: str
