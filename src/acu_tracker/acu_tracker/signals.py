@@ -43,8 +43,8 @@ OUTPUTS_DTYPE = np.dtype([
     ('mode', 'i8'), ('reason', 'i8'),                                           # codes of MODES and REASONS
     ('rate', 'f8', (2,)), ('torque', 'f8', (2,)),                               # command [rad/s], feed-forward [Nm]
     ('estimate', 'f8', (2, 3)),                                                 # target at t_k; NaN: no estimate
-    ('reference', 'f8', (2, 3)),                        # deck angle, rate, acceleration at t_k; of a beam: the command,
-                                                        # at t_m
+    ('reference', 'f8', (2, 3)),                        # deck angle, rate, acceleration at t_k; of a beam: the
+                                                        # command at t_m
     ('covariance', 'f8', (2, 3)),                                               # p11, p12, p22 at t_k
     ('probability', 'f8', (2, len(MODEL_NAMES))),                               # of the motion models MODEL_NAMES
     ('innovation', 'f8', (2,)), ('rate_innovation', 'f8', (2,)),                # nu of angle, rate; NaN: no error

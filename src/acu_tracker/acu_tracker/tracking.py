@@ -51,13 +51,13 @@ def used_error(k, c, u, by_level, offset):
 
 
 @compiled
-def take_error(k, c, u, o, at, restart_gap, closed, obeys):
+def take_error(k, c, u, o, at, restart_gap, closed, follows):
     """Filter y = encoder at the instant of the error, displaced by the error, and run the monitors.
 
     at           Pointing of the beam
     restart_gap  as in tracker.observe
     closed       whether the loop is closed on the errors
-    obeys        whether the axes follow their commands
+    follows        whether the axes follow their commands
 
     Return a flag where the error is not accepted, else 0.
     """
@@ -65,7 +65,7 @@ def take_error(k, c, u, o, at, restart_gap, closed, obeys):
     measured = pointing.displaced(at.A, at.E, u.cross_elevation, u.elevation)
     k.error[0], k.error[1] = measured[0] - at.A, measured[1] - at.E
     outcome, innovation = target.take(k.target, c.p, c.tracker, k.attitude, u, at, measured, restart_gap)
-    if outcome != target.OUTCOME_NOISY and obeys:
+    if outcome != target.OUTCOME_NOISY and follows:
         divergence.take(k.divergence, innovation)
     if closed and outcome != target.OUTCOME_NO_ATTITUDE and slope_sign.near(u, receiver.beamwidth):
         _watch_slope(k, c, u, at)

@@ -1,4 +1,4 @@
-"""An outage of the receiver: how long it lasts, and whether a keyhole or a hidden sector explains it."""
+"""Outage of the receiver: its duration, and whether a keyhole or a hidden sector explains it."""
 import math
 from collections import namedtuple
 
@@ -8,16 +8,23 @@ from acu_tracker.modes import Reason
 from pedestal_common.compiled import compiled
 
 OUTAGE_DTYPE = np.dtype([('stamp', 'f8'), ('blocked', 'i8')], align=True)
-"""stamp: when an outage had a reason last [s]; blocked: 1 while the target is hidden."""
+"""Last explanation of an outage.
+
+stamp      last stamp at which a keyhole or a hidden sector explained an outage [s]
+blocked    1 while the target is hidden
+"""
 
 Outage = namedtuple('Outage', 'since coasting permitted')
-"""since: time [s] since the last accepted measurement, beyond the receiver's latency and the age of its errors;
-coasting: whether the estimate has gone without one for coast_after; permitted: whether a keyhole or a hidden sector
-explains that, now or within the last coast_time."""
+"""Outage of the receiver at an instant.
+
+since      time [s] since the last accepted measurement, less the receiver's latency and the age of its errors
+coasting   whether that time is longer than coast_after
+permitted  whether a keyhole or a hidden sector explains the outage, now or within the last coast_time
+"""
 
 
 def initialise(s):
-    """Nothing explains an outage; s: view of OUTAGE_DTYPE."""
+    """Begin without an explained outage; s: view of OUTAGE_DTYPE."""
     s['stamp'] = -math.inf
 
 
@@ -31,9 +38,9 @@ def now(s, accepted, t, p):
 
 @compiled
 def watch(s, hidden, slewing, t):
-    """Return why the receiver may be without signal at t [s], or NONE.
+    """Return the reason why the receiver may be without signal at t [s], or NONE.
 
-    hidden: whether the target is; slewing: whether the beam goes through the keyhole.
+    hidden: whether the target is hidden; slewing: whether the beam slews through the keyhole.
     """
     s.blocked = hidden
     if hidden or slewing:
