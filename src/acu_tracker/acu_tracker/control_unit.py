@@ -115,7 +115,7 @@ def reset(s):
     """Reset the latched faults and alarms between two steps.
 
     Return annunciator.NO_ALARM, or the index of an alarm whose cause is still there; then nothing is changed. A reset
-    also discards a mode that waits to be entered: nothing moves until a mode is commanded.
+    also discards a mode that waits to be entered: in standby nothing moves until a mode is commanded.
     """
     alarms, t, fault = s.supervision.alarms, s.stamp, latched(s) != 0
     if s.unasked.moves and uncommanded_motion.beyond(s.unasked, t):
