@@ -304,8 +304,8 @@ def _wait(s, c, u, o):
 
 @compiled
 def _start_from_actual(s, c, u, begins, silence):
-    """Start both axes from their actual angles where they begin to move, and each axis that does not follow its
-    commands."""
+    """Start both axes from their actual angles where they begin to move, and any axis that does not follow its
+    command."""
     if begins:
         guidance.start_from(s.guidance, u.position[0])
     watched = s.supervision.axis
@@ -337,10 +337,9 @@ def _move(s, c, u, o, program, gap, begins, dt):
 
 @compiled
 def _note_outage_reason(s, c):
-    """Note the reason why the receiver may be without signal: the target is hidden, or the beam slews through the
-    keyhole.
+    """Note the reason why the receiver may be without signal. Return True if there is one.
 
-    Return True if there is such a reason.
+    The target may be hidden, or the beam may slew through the keyhole.
     """
     g, follows = s.guidance, modes.FOLLOWS_TARGET[s.mode.now]
     hidden = follows and blockage.blocked(c.lookahead.sectors, g.target_angles[0], g.target_angles[1])

@@ -19,7 +19,7 @@ UNKNOWN_POINTING = encoders.Pointing(math.nan, math.nan, math.nan, math.nan)
 
 @compiled
 def take_encoders(s, u):
-    """Take the encoders of this step into ENCODERS_DTYPE. Return signals.Flag.ENCODER where they are not valid, else
+    """Take the encoders of this step into ENCODERS_DTYPE. Return signals.Flag.ENCODER if they are not valid, else
     0."""
     return 0 if u.encoder_valid and encoders.take(s, u.stamp, u.position, u.velocity) else signals.Flag.ENCODER
 
@@ -78,12 +78,12 @@ def error_at(s, receiver, u, by_level, offset):
 
 @compiled
 def write_innovation(o, outcome, innovation):
-    """Put the Innovation of an error into the outputs. Return the flag of the outcome of target.take, 0 for
+    """Put the Innovation of an error into the outputs. Return the flag of an outcome of target.take, 0 for
     accepted."""
     for i in range(2):
-        one = innovation.axis[i]
-        o.innovation[i], o.rate_innovation[i], o.nis[i] = one.nu, one.rate, measurement.nis(one)
-        o.innovation_sigma[i] = math.nan if math.isnan(o.nis[0]) else math.sqrt(one.S)
+        axis = innovation.axis[i]
+        o.innovation[i], o.rate_innovation[i], o.nis[i] = axis.nu, axis.rate, measurement.nis(axis)
+        o.innovation_sigma[i] = math.nan if math.isnan(o.nis[0]) else math.sqrt(axis.S)
     if outcome == target.OUTCOME_NO_ATTITUDE:
         return signals.Flag.ATTITUDE
     if outcome == target.OUTCOME_STALE:

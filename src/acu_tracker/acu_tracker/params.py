@@ -113,8 +113,8 @@ class AcuParameters(SharedParameters):
     elevation: ElevationParameters = group(ElevationParameters)
 
     def check_graph(self, beams, lockstep):
-        """Raise ParameterError unless both controllers are `beam` if the drive is an array (beams > 0), or neither
-        is."""
+        """Raise ParameterError unless both controllers are `beam` with an array (beams > 0), or neither is with
+        motors."""
         array = beams > 0
         for axis in ('azimuth', 'elevation'):
             controller = getattr(self, axis).controller

@@ -141,10 +141,9 @@ def beam(k, c, t):
 
 @compiled
 def deck_rates(k, c, t, A, E):
-    """Return the (azimuth, elevation) rate [rad/s] at which the deck moves an earth-fixed direction at deck angles A,
-    E.
+    """Return the (azimuth, elevation) rate [rad/s] at which the deck moves an earth-fixed direction.
 
-    A, E are in rad, at t [s]. The rates are 0 where no axis compensates for them.
+    A, E: deck angles of the direction at t [s], in rad. The rates are 0 where no axis compensates for them.
     """
     compensated = c.axis[0].p.beam.rate_compensation != 0.0 or c.axis[1].p.beam.rate_compensation != 0.0
     if compensated and k.attitude.stabilised:
@@ -156,8 +155,7 @@ def deck_rates(k, c, t, A, E):
 
 @compiled
 def write_outputs(k, c, t, o):
-    """Put the counts of gated measurements and the estimate at t [s], in earth angles of the antenna, into the
-    outputs."""
+    """Put the counts of gated measurements and the estimate at t [s], in earth angles of the antenna, into outputs."""
     filtered = k.target.tracker
     o.gated, o.rates_gated, o.ranges_gated = filtered.gated, filtered.rates_gated, filtered.ranges_gated
     if filtered.running:

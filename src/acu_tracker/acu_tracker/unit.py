@@ -153,8 +153,7 @@ class Acu(Unit):
 
     @property
     def silent(self):
-        """True if the drive is silent. Setting it raises the alarm, because no step comes that could detect the
-        silence."""
+        """True if the drive is silent. Setting it raises the alarm, because no step comes that could detect it."""
         return self._silent
 
     @silent.setter
@@ -188,8 +187,10 @@ class Acu(Unit):
         self._laid = NEVER_DUE_NS, NO_STAMP
 
     def decode(self, topic, message):
-        """Take a program track, two or more points in earth angles, or a preset, one point in deck angles. Raise
-        ValueError."""
+        """Take a program track, two or more points in earth angles, or a preset, one point in deck angles.
+
+        Raise ValueError for a bad message.
+        """
         times, angles = rows(message)
         if len(angles) == 1:
             self.parts['inputs']['preset'], self.parts['inputs']['preset_valid'] = angles[0], 1
@@ -356,7 +357,7 @@ class Acu(Unit):
         return [f'acu/{text}'] if topic == MODE_TOPIC and text in modes.MODES else []
 
     def diagnose(self):
-        """Return the Diagnosis: ERROR for invalid inputs since the last one, WARN for gated errors, overtravel or
+        """Return the Diagnosis since the last one: ERROR for invalid inputs, WARN for gated errors, overtravel or
         coasting."""
         result = diagnosis.of(self)
         self.parts['invalid'] = 0
@@ -380,8 +381,7 @@ class Acu(Unit):
 
     @property
     def urgent(self):
-        """Values whose change is published at once: faults, the mode, silence, the lock, the drive, pins,
-        alignment."""
+        """Values whose change is published at once: faults, mode, silence, lock, drive, pins, alignment."""
         outputs, inputs = self.parts['outputs'], self.parts['inputs']
         return (control_unit.latched(self.parts['state']), outputs['mode'], outputs['reason'] == Reason.SILENCE,
                 outputs['locked'], inputs['drive'], inputs['pins'], inputs['aligning'])

@@ -1,4 +1,4 @@
-"""The whole unit after a silence: of the drive, of the link, or because it was itself held up; and uncommanded motion."""
+"""The whole unit after a silence of the drive, of the link or of the unit itself; and uncommanded motion."""
 import numpy as np
 import pytest
 

@@ -47,8 +47,7 @@ MAX_ACCELERATION_RATIO = 2.0
 """Ratio of the largest acceleration of an axis to the largest commanded acceleration."""
 
 MAX_MISMATCH_RAD = 1e-2
-"""Difference of encoder and motors within MISMATCH_TIME_CONSTANT_S [rad]; five times the lash and wind-up of a
-gear."""
+"""Difference of encoder and motors within MISMATCH_TIME_CONSTANT_S [rad]: five times lash and wind-up of a gear."""
 
 MISMATCH_TIME_CONSTANT_S = 2.0
 """Time constant with which a difference of encoder and motors decays [s]."""
@@ -77,8 +76,7 @@ def beyond(was, x, on, off):
 
 @compiled
 def initialise(d, y, dy):
-    """Begin at the angle of the encoder [rad] and the rate of the motors [rad/s], after a gap or an invalid
-    encoder."""
+    """Begin at the encoder's angle [rad] and the motors' rate [rad/s], after a gap or an invalid encoder."""
     d.y, d.dy, d.turned, d.moved, d.mismatch, d.e, d.area = y, dy, 0.0, 0.0, 0.0, 0.0, 0.0
 
 
@@ -118,8 +116,8 @@ def encoder_stuck(d, y, dy, dt):
 def disagreement(d, x, dt):
     """Return True if encoder and motors have recently moved apart.
 
-    The sum X of the differences x follows X' = x / dt - X / MISMATCH_TIME_CONSTANT_S; the limit of |X| is
-    MAX_MISMATCH_RAD.
+    The sum X of the differences x follows X' = x / dt - X / MISMATCH_TIME_CONSTANT_S. The limit of |X| is
+    MAX_MISMATCH_RAD, and half of it for the end of the condition.
     """
     d.mismatch += x - d.mismatch * dt / MISMATCH_TIME_CONSTANT_S
     d.disagrees = beyond(d.disagrees, abs(d.mismatch), MAX_MISMATCH_RAD, 0.5 * MAX_MISMATCH_RAD)
@@ -167,8 +165,7 @@ def moves(d, dy):
 def opposes_command(dy, high, low, threshold):
     """Return True if a rate opposes its recent commands, which were of one sign.
 
-    high, low: envelope of the commands (servo.uncommanded_motion); threshold: rate that no disturbance explains
-    [rad/s].
+    high, low: envelope of the commands (servo.uncommanded_motion); threshold: rate without an explanation [rad/s].
     """
     return (dy > threshold and high <= 0.0 and low < -STANDSTILL_RATE_RAD_S
             or dy < -threshold and low >= 0.0 and high > STANDSTILL_RATE_RAD_S)

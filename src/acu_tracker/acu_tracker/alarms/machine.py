@@ -37,8 +37,7 @@ STATE_TRANSITIONS = np.array((
 ))
 """STATE_TRANSITIONS[state, event] of an alarm that is not latched.
 
-An active alarm is not suppressed at once. Its condition counts as gone, so that the alarm returns and is acknowledged
-first.
+An active alarm is not suppressed at once. Its condition counts as gone; the alarm returns and is acknowledged first.
 """
 
 IS_ANNUNCIATED = (False, True, True, True, True, True, False, False)
@@ -56,8 +55,8 @@ IS_LATCHED = (False, False, False, False, True, True, False, False)
 
 @compiled
 def next_state(state, event, latched):
-    """Return the state after an event, EVENT_REFUSED where the state does not accept it; latched: 1 for a latched
-    alarm."""
+    """Return the state after an event, or EVENT_REFUSED if the state does not accept it; latched: 1 if the alarm
+    is."""
     if latched and event == Event.CLEAR:
         if state == State.UNACKNOWLEDGED:
             return State.LATCHED_UNACKNOWLEDGED

@@ -11,8 +11,7 @@ from acu_tracker.modes import Mode
 from pedestal_common.compiled import compiled
 
 RESUMPTION_DTYPE = np.dtype([('mode', 'i8'), ('until', 'f8')], align=True)
-"""mode: code of the mode before the silence; until: last stamp at which the mode is resumed [s], -inf: no mode is
-kept."""
+"""mode: code of the mode before the silence; until: last stamp at which the mode is resumed [s], -inf for none."""
 
 DRIVE_RESTART_GAP_S = 0.3
 """Silence after which the drive may have been restarted [s]; a mode that ends because of the restart is resumed."""
@@ -25,8 +24,7 @@ def initialise(s):
 
 @compiled
 def mode_after(s, mode, last, stamp, resume_time):
-    """Return the mode after a silence from the stamp `last` to `stamp` [s]: the same mode, or STANDBY after
-    resume_time."""
+    """Return the mode after a silence from `last` to `stamp` [s]: the same mode, or STANDBY after resume_time."""
     if stamp > last + resume_time:
         return Mode.STANDBY
     if stamp - last > DRIVE_RESTART_GAP_S:

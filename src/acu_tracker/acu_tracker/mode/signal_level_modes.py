@@ -1,7 +1,6 @@
 """Modes that use the signal level: the link between the control unit and the laws of `search`.
 
-a: record of acquisition.ACQUISITION_DTYPE; c: record of control_unit.CONSTANTS_DTYPE; way: the bridge.Way of the
-program.
+a: record of acquisition.ACQUISITION_DTYPE; c: record of control_unit.CONSTANTS_DTYPE; way: bridge.Way of the program.
 """
 import math
 
@@ -25,8 +24,7 @@ On the slopes of a side lobe the filter diverges within 0.4 s.
 def expected(a, way, t):
     """Return the Motion in earth angles of the expected place of the target at t [s].
 
-    The place follows the program, rotated to where the target was last tracked. Without a program it is the last
-    place.
+    The place follows the program, rotated to where the target was last tracked. Without a program the place stays.
     """
     if program_track.status(way.program, t) != Reason.NONE:
         return place.motion_at(a.place, t)
@@ -140,8 +138,7 @@ def remember(a, t, u, du):
 
 @compiled
 def check_slope(a, at, motion, error):
-    """Judge an error (cross-elevation, elevation) [rad] by the offset of the expected place of the target from the
-    beam.
+    """Judge an error (cross-elevation, elevation) [rad] by the offset of the target's expected place from the beam.
 
     at: Pointing of the beam; motion: of the expected place, on the deck.
     """

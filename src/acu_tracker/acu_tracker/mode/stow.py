@@ -24,8 +24,7 @@ REQUEST_PINS_OUT, REQUEST_PINS_IN = _REQUEST_TEXTS.index('out'), _REQUEST_TEXTS.
 
 _PIN_STATE_COUNT = len(topics.PIN_STATE_TEXTS)
 _PIN_OUT, _PIN_IN, _PIN_FAILED = (topics.PIN_STATE_TEXTS.index(state) for state in ('out', 'in', 'failed'))
-"""States of a pin; a code of adu/stow_pins is the state of azimuth times _PIN_STATE_COUNT plus the state of
-elevation."""
+"""States of a pin; a code of adu/stow_pins is the azimuth's state times _PIN_STATE_COUNT plus the elevation's."""
 
 BOTH_PINS_OUT, BOTH_PINS_IN = _PIN_OUT * _PIN_STATE_COUNT + _PIN_OUT, _PIN_IN * _PIN_STATE_COUNT + _PIN_IN
 
@@ -49,8 +48,7 @@ def failed(code, i):
 
 @compiled
 def obstacle(s, fitted, code):
-    """Return the reason why the axes must not move, or NONE. fitted: 1 where there are pins; code: of
-    adu/stow_pins."""
+    """Return the reason why the axes must not move, or NONE. fitted: 1 if there are pins; code: of adu/stow_pins."""
     if not fitted:
         return Reason.NONE
     if failed(code, 0) or failed(code, 1):

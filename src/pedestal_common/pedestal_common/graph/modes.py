@@ -80,8 +80,7 @@ MODE_ROWS = (
         ends='level', follows=True, by_level=True, fallback='search'))
 """Rows of all modes; a new mode is a new row.
 
-A new condition also needs a field of acu_tracker.modes.Conditions. The reference of the axes comes from
-acu_tracker.guidance.
+A new condition also needs a field of acu_tracker.modes.Conditions; the axes' reference is in acu_tracker.guidance.
 """
 
 MODES = tuple(row.name for row in MODE_ROWS)
