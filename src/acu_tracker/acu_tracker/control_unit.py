@@ -304,8 +304,7 @@ def _wait(s, c, u, o):
 
 @compiled
 def _start_from_actual(s, c, u, begins, silence):
-    """Start both axes from their actual angles where they begin to move, and any axis that does not follow its
-    command."""
+    """Start both axes from their actual angles where they begin to move, and each axis that ignores its command."""
     if begins:
         guidance.start_from(s.guidance, u.position[0])
     watched = s.supervision.axis

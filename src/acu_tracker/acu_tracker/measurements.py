@@ -19,8 +19,7 @@ UNKNOWN_POINTING = encoders.Pointing(math.nan, math.nan, math.nan, math.nan)
 
 @compiled
 def take_encoders(s, u):
-    """Take the encoders of this step into ENCODERS_DTYPE. Return signals.Flag.ENCODER if they are not valid, else
-    0."""
+    """Take the encoders of this step into ENCODERS_DTYPE. Return signals.Flag.ENCODER if they are invalid, else 0."""
     return 0 if u.encoder_valid and encoders.take(s, u.stamp, u.position, u.velocity) else signals.Flag.ENCODER
 
 
@@ -78,8 +77,7 @@ def error_at(s, receiver, u, by_level, offset):
 
 @compiled
 def write_innovation(o, outcome, innovation):
-    """Put the Innovation of an error into the outputs. Return the flag of an outcome of target.take, 0 for
-    accepted."""
+    """Put the Innovation of an error into the outputs. Return the flag of its outcome, 0 for accepted."""
     for i in range(2):
         axis = innovation.axis[i]
         o.innovation[i], o.rate_innovation[i], o.nis[i] = axis.nu, axis.rate, measurement.nis(axis)

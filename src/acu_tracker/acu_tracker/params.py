@@ -113,8 +113,7 @@ class AcuParameters(SharedParameters):
     elevation: ElevationParameters = group(ElevationParameters)
 
     def check_graph(self, beams, lockstep):
-        """Raise ParameterError unless both controllers are `beam` with an array (beams > 0), or neither is with
-        motors."""
+        """Raise ParameterError unless both controllers are `beam` for an array (beams > 0), or neither for motors."""
         array = beams > 0
         for axis in ('azimuth', 'elevation'):
             controller = getattr(self, axis).controller

@@ -357,8 +357,8 @@ class Acu(Unit):
         return [f'acu/{text}'] if topic == MODE_TOPIC and text in modes.MODES else []
 
     def diagnose(self):
-        """Return the Diagnosis since the last one: ERROR for invalid inputs, WARN for gated errors, overtravel or
-        coasting."""
+        """Return the Diagnosis: ERROR for invalid inputs since the last one; WARN for gated errors, overtravel,
+        coast."""
         result = diagnosis.of(self)
         self.parts['invalid'] = 0
         return result

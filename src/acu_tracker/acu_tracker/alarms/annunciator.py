@@ -119,8 +119,7 @@ def _delayed(a, on, t, delay):
 
 @compiled
 def update(s, t, conditions, judged):
-    """Run one step at t [s]; conditions: bits of the alarms whose condition is there; judged: bits of the judged
-    ones."""
+    """Run one step at t [s]; conditions: bits of the conditions that are there; judged: bits of the judged alarms."""
     for i in range(ALARM_COUNT):
         a = s.alarm[i]
         on, is_judged = conditions & judged & 1 << i != 0, judged & 1 << i != 0
@@ -168,8 +167,7 @@ def shelve(s, i, t, seconds):
 
 @compiled
 def persisting_alarm(s, without):
-    """Return the index of a latched alarm whose cause is still there, or NO_ALARM; without: bits of excluded
-    alarms."""
+    """Return the index of a latched alarm whose cause is still there, or NO_ALARM; without: bits of alarms to skip."""
     for i in range(ALARM_COUNT):
         alarm = s.alarm[i]
         if table.LATCHED_FLAGS[i] and not without >> i & 1 and alarm.active and machine.IS_ANNUNCIATED[alarm.state]:

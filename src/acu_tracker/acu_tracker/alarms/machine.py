@@ -55,8 +55,7 @@ IS_LATCHED = (False, False, False, False, True, True, False, False)
 
 @compiled
 def next_state(state, event, latched):
-    """Return the state after an event, or EVENT_REFUSED if the state does not accept it; latched: 1 if the alarm
-    is."""
+    """Return the state after an event, or EVENT_REFUSED if the state does not accept it; latched: of the alarm."""
     if latched and event == Event.CLEAR:
         if state == State.UNACKNOWLEDGED:
             return State.LATCHED_UNACKNOWLEDGED

@@ -30,8 +30,7 @@ def initialise(s):
 
 @compiled
 def now(s, accepted, t, p):
-    """Return the Outage at t [s]; accepted: last stamp of an accepted measurement [s]; p: a SharedParameters
-    record."""
+    """Return the Outage at t [s]; accepted: stamp of the last accepted measurement [s]; p: SharedParameters."""
     since = t - accepted - p.receiver_latency - p.tracker.receiver.age
     return Outage(since, since > p.tracker.coast_after, t - s.stamp <= p.tracker.coast_time)
 

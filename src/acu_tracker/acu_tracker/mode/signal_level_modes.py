@@ -24,7 +24,8 @@ On the slopes of a side lobe the filter diverges within 0.4 s.
 def expected(a, way, t):
     """Return the Motion in earth angles of the expected place of the target at t [s].
 
-    The place follows the program, rotated to where the target was last tracked. Without a program the place stays.
+    The place follows the program, rotated to where the target was last tracked. Without a program it is the last
+    place, moved on with a rate that fades.
     """
     if program_track.status(way.program, t) != Reason.NONE:
         return place.motion_at(a.place, t)

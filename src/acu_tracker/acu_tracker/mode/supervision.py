@@ -40,8 +40,7 @@ def drive_refusal(ready, uncommanded, frozen):
 
 @compiled
 def reset(alarms, t):
-    """Reset the latched alarms at t [s] and clear the conditions of LATCHED_FAULT_BITS. Return True if one was
-    reset."""
+    """Reset the latched alarms at t [s], with the conditions of LATCHED_FAULT_BITS. Return True if one was latched."""
     for i in (UNCOMMANDED_MOTION_ALARM, FROZEN_DRIVE_ALARM, DIVERGENCE_ALARM):
         annunciator.set_condition(alarms, i, False, t)
     return annunciator.reset(alarms, t)

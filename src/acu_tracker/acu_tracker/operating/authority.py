@@ -23,8 +23,7 @@ class Authority:
             raise ValueError(f'control is held by {self.holder}')
 
     def take(self, who, role) -> Reply:
-        """Give control to the client `who`. Raise ValueError unless control is free, its own, or taken by a
-        supervisor."""
+        """Give control to the client `who`. Raise ValueError if another holds it, except for a supervisor."""
         if not who:
             raise ValueError('a client that takes control must have a name')
         if self.holder not in ('', who) and role != 'supervisor':
