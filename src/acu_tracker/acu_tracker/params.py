@@ -148,7 +148,7 @@ class AcuParameters(SharedParameters):
             A, E = getattr(self.azimuth, name), getattr(self.elevation, name)
             lowest = floor.at(self.floor, A)
             if lowest > E:
-                raise ParameterError(f'elevation.{name} = {E:g} rad: must be at least the floor, {lowest:g} rad at '
+                raise ParameterError(f'elevation.{name} = {E:g} rad: is below the floor, {lowest:g} rad at '
                                      f'azimuth.{name} = {A:g} rad')
 
     def check(self):

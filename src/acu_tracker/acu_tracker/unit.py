@@ -147,7 +147,7 @@ class Acu(Unit):
         self.segments = segments.Segments([(axis.limits.rate, axis.limits.acceleration) for axis in (
             parameters.azimuth, parameters.elevation)])
         self.predictor, self.predicted = Predictor(parameters.prediction), {}
-        self.offset, self._laid = (0.0, 0.0, 0.0), (NEVER_DUE_NS, NO_STAMP)
+        self.offset, self._tables_valid = (0.0, 0.0, 0.0), (NEVER_DUE_NS, NO_STAMP)
         self.desk = AlarmDesk(self.parts['state'], control_unit.reset)
         self._silent = False
 
@@ -184,7 +184,7 @@ class Acu(Unit):
         """Take new values of the LIVE parameters into the constants; the state stays."""
         super().configure(parameters)
         self.memory.record['constants'] = control_unit.constants(parameters)
-        self._laid = NEVER_DUE_NS, NO_STAMP
+        self._tables_valid = NEVER_DUE_NS, NO_STAMP
 
     def decode(self, topic, message):
         """Take a program track, two or more points in earth angles, or a preset, one point in deck angles.
@@ -208,20 +208,20 @@ class Acu(Unit):
             inputs['turnaround'] = 1
             raise
         inputs['turnaround'] = 0
-        self.lay_tables()
+        self.update_tables()
 
     @property
     def next_due(self):
         """Time [ns] of the next command of the schedule, or of the next update of the tables."""
-        return min(super().next_due, self._laid[1])
+        return min(super().next_due, self._tables_valid[1])
 
     def obey_due(self, stamp):
         """Execute the scheduled commands that are due before the step of a stamp [ns], on the tables for that step."""
         if self.epoch != self.predictor.epoch:
             self._predict_by(Predictor(self.predictor.parameters, self.epoch))
-        since, until = self._laid
+        since, until = self._tables_valid
         if not since <= stamp < until:
-            self.lay_tables(stamp)
+            self.update_tables(stamp)
         super().obey_due(stamp)
 
     @property
@@ -232,9 +232,9 @@ class Acu(Unit):
 
     def _predict_by(self, predictor):
         """Replace the Predictor."""
-        self.predictor, self.predicted, self._laid = predictor, {}, (NEVER_DUE_NS, NO_STAMP)
+        self.predictor, self.predicted, self._tables_valid = predictor, {}, (NEVER_DUE_NS, NO_STAMP)
 
-    def lay_tables(self, stamp=None):
+    def update_tables(self, stamp=None):
         """Bring the tables of the law to a stamp [ns], or to now.
 
         The tables are the due piece of the program and the predictions, all shifted by the offset.
@@ -248,7 +248,7 @@ class Acu(Unit):
             inputs['unpredicted'][place] = known.reason if known else Reason.NONE
         piece, inputs['gap'], ends = self.segments.at(t - self.offset[0])
         until = min(ends + self.offset[0], *(known.until for known in self.predicted.values()))
-        self._laid = stamp, max(math.ceil(until * 1e9), stamp + 1) if until < math.inf else NEVER_DUE_NS
+        self._tables_valid = stamp, max(math.ceil(until * 1e9), stamp + 1) if until < math.inf else NEVER_DUE_NS
         self.memory = self.memory._replace(tables=tables.Tables(*(
             tables.shifted(self.predicted[row.name].track if row.predicted else piece, self.offset)
             for row in tables.TABLE_MODES)))
@@ -289,7 +289,7 @@ class Acu(Unit):
             return Reply(True, f'fallback is {arguments["mode"]}')
         if verb == 'offset':
             self.offset = (arguments['time'], *(arguments[axis] for axis in topics.AXES))
-            self.lay_tables()
+            self.update_tables()
             return Reply(True, 'program track shifted by {:g} s, {:g} and {:g} rad'.format(*self.offset))
         if verb == 'elements':
             self.take_elements(*arguments.values())
@@ -304,13 +304,13 @@ class Acu(Unit):
                 guidance[name] = value
             if self.predictor is not predictor:
                 self._predict_by(predictor)
-                self.lay_tables()
+                self.update_tables()
         return reply
 
     def take_elements(self, line_1, line_2):
         """Predict from other elements, in whose lines _ stands for a blank. Raise ValueError."""
         self._predict_by(self.predictor.by(line_1.replace('_', ' '), line_2.replace('_', ' ')))
-        self.lay_tables()
+        self.update_tables()
 
     def admit(self, command):
         """Raise ValueError for a command of a client that does not hold control."""
@@ -357,8 +357,10 @@ class Acu(Unit):
         return [f'acu/{text}'] if topic == MODE_TOPIC and text in modes.MODES else []
 
     def diagnose(self):
-        """Return the Diagnosis: ERROR for invalid inputs since the last one; WARN for gated errors, overtravel,
-        coast."""
+        """Return the Diagnosis and clear the bits of the invalid inputs.
+
+        ERROR: invalid inputs since the last diagnosis. WARN: gated errors, overtravel or coasting.
+        """
         result = diagnosis.of(self)
         self.parts['invalid'] = 0
         return result

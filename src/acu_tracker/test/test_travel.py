@@ -121,7 +121,7 @@ def test_the_floor_is_the_higher_end_of_a_cell_and_goes_round():
 @pytest.mark.parametrize(('values', 'said'), (
     ({'azimuth.limits.low': -0.1, 'azimuth.limits.high': 0.1}, 'azimuth.limits.braking = 20 rad/s2'),
     ({'elevation.limits.braking': 0.5}, 'elevation.limits.braking = 0.5 rad/s2: from shaper.rate = 1.4'),
-    ({'floor': '0 0.6; 3 0.6'}, 'elevation.preset = 0.5 rad: must be at least the floor, 0.6 rad at azimuth.preset'),
+    ({'floor': '0 0.6; 3 0.6'}, 'elevation.preset = 0.5 rad: is below the floor, 0.6 rad at azimuth.preset = 0 rad'),
     ({'floor': '0 0.1; 0 0.2'}, 'azimuths must grow'), ({'floor': '0 0.1 3'}, 'must be azimuth elevation'),
     ({'floor': '0 north'}, 'must be azimuth elevation'), ({'floor': '0 2'}, 'elevations be within 1.5708 rad'),
     ({'floor': '; '.join(f'{0.01 * i} 0' for i in range(65))}, '65 points; must be at most 64')))
