@@ -99,9 +99,9 @@ def expectation_table():
     for fault, of_modes in FAULT_EXPECTATIONS.items():
         alike = {}
         for mode, expected in of_modes.items():
-            alike.setdefault(expected.sentence('the same mode'), []).append(mode)
-        rows += [(f'`{fault}`', ', '.join(modes), sentence) for sentence, modes in alike.items()]
-    return _table(('fault', 'in', 'expected'), rows)
+            alike.setdefault(expected.texts(mode), []).append(mode)
+        rows += [(f'`{fault}`', ', '.join(modes), *texts) for texts, modes in alike.items()]
+    return _table(('fault', 'in', 'report', 'largest error', 'ends in'), rows)
 
 
 def _argument(argument):
