@@ -23,7 +23,8 @@ _TABLE_ROW = re.compile(r'^\s+\S|\S {2,}\S|^\s*[|>]|^\s*$')
 
 def paths():
     """Return every file whose language is checked."""
-    return [ROOT / 'README.md', ROOT / 'CONTRIBUTING.md', ROOT / 'CHANGELOG.md', *sorted((ROOT / 'docs').glob('**/*.md')),
+    return [*(ROOT / f'{name}.md' for name in ('README', 'CONTRIBUTING', 'CHANGELOG')),
+            *sorted((ROOT / 'docs').glob('**/*.md')),
             *(path for folder in ('src', 'tools') for path in sorted((ROOT / folder).glob('**/*.py'))
               if 'test' not in path.parts and path.name != 'setup.py')]
 
@@ -54,8 +55,9 @@ def docstrings(tree):
     """Yield (line number, docstring) of a module, its classes, functions and constants."""
     for node in ast.walk(tree):
         for child in getattr(node, 'body', ()) if not isinstance(node, (ast.Lambda, ast.IfExp)) else ():
-            if isinstance(child, ast.Expr) and isinstance(child.value, ast.Constant) and isinstance(child.value.value, str):
-                yield child.value.lineno, child.value.value
+            text = child.value if isinstance(child, ast.Expr) else None
+            if isinstance(text, ast.Constant) and isinstance(text.value, str):
+                yield text.lineno, text.value
 
 
 def python_texts(source):

@@ -281,4 +281,4 @@ def test_study_through_the_command_line(pedestal, tmp_path):
         assert values[case, 'crossover_hz'] > 1.0 and values[case, 'phase_margin_deg'] > 10.0
     figures = {path.stem: path.stat().st_size for path in (tmp_path / 'studies' / 'bode').glob('*.png')}
     assert {'current', 'speed', 'position', 'paper', 'structure'} <= set(figures) and min(figures.values()) > 10000
-    assert 'Linear: half the excitation' in output
+    assert 'with half the excitation no open loop changes' in output

@@ -85,7 +85,7 @@ def test_tuned_kalman_filters_know_their_errors(flyby):
 def test_rows_with_a_target_are_printed_and_doubts_are_said(filters_result):
     assert 0 < len(filters_result.shown) < len(filters_result.rows)
     assert all(row['target'] for row in filters_result.shown)
-    assert any('Not honest under coloured noise' in line for line in filters_result.remarks)
+    assert any('Inconsistent filters under coloured noise' in line for line in filters_result.remarks)
 
 
 def test_figures_of_filters(filters_result, tmp_path):
