@@ -48,7 +48,8 @@ def test_the_budget_is_the_whole_run_within_ten_percent(made, place, mode):
 
 def test_all_of_the_station_is_in_the_budget():
     """Every parameter of a term differs from its default in the scenario, and with none on nothing is left of them."""
-    (whole, none) = (scenario.load(study.SCENARIO_NAME, study.overrides('autotrack', on)) for on in (study.ALL_TERMS, study.NO_TERMS))
+    whole, none = (scenario.load(study.SCENARIO_NAME, study.overrides('autotrack', on))
+                   for on in (study.ALL_TERMS, study.NO_TERMS))
     off = build(type(none.header), {})
     for term in study.ERROR_TERMS:
         for key in study.parameters_of(term):

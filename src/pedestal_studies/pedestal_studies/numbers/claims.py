@@ -128,7 +128,8 @@ PAPER_002_CLAIMS = (
           'largest rate at which the loop keeps the target', 'loss/half-beamwidth/type-1', 'linear_lag_beamwidths')))
 
 PAPER_003_CLAIMS = (
-    Claim('figures 1, 2, 5 to 7: block diagrams, test stand', 'implemented: pedestal_studies/rigs/feedforward_loop.py'),
+    Claim('figures 1, 2, 5 to 7: block diagrams, test stand',
+          'implemented: pedestal_studies/rigs/feedforward_loop.py'),
     Claim('20 deg to and fro at 3.50 deg/s, which represents 30 m/s at 500 m',
           '3.50 deg/s as printed; 30 m/s at 500 m is 3.44 deg/s'),
     *_of('manoeuvre',
