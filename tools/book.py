@@ -20,8 +20,7 @@ LAW_PACKAGES = ('pedestal_common', 'tracking_receiver_sim', 'acu_tracker', 'adu_
 
 
 def parameter_page():
-    """Return the lines of the page of parameters: default, range, unit and meaning of every parameter of every
-    node."""
+    """Return the lines of the page of parameters: default, range, unit and meaning of every parameter."""
     lines = ['# Parameters', '', 'Every parameter of every node, as the node declares it. `pedestal parameters NODE` '
              'prints the same. The units are SI units and radians. A name that ends in `_deg` or `_dbhz` has this '
              'unit instead.']
@@ -40,8 +39,7 @@ def parameter_page():
 
 
 def verb_page():
-    """Return the lines of the page of verbs: purpose and options of every verb of `pedestal`, as its --help prints
-    them."""
+    """Return the lines of the page of verbs: purpose and options of every verb, as its --help prints them."""
     lines = ['# Verbs', '', 'The help texts that `pedestal VERB --help` prints.']
     for name in cli.VERBS:
         verb = cli.module_of(name)
@@ -55,8 +53,7 @@ def verb_page():
 
 
 def law_page(root):
-    """Return the lines of the page of laws: docstring, compiled functions and tests of every module that holds
-    laws."""
+    """Return the lines of the page of laws: docstring, compiled functions and tests of every module with laws."""
     lines = ['# Laws', '', 'Every control law, filter, motor and wave is a compiled function in a small module. This '
              'page is a copy of the docstrings of these modules: equations, symbols, sources.']
     for package in LAW_PACKAGES:
@@ -87,8 +84,7 @@ def _imported(test):
 
 
 def _laws(module):
-    """Return [(signature, first sentence)] of the public compiled functions of a module; None for a module without
-    any."""
+    """Return [(signature, first sentence)] of the public compiled functions of a module, or None."""
     compiled = [node for node in ast.parse(module.read_text()).body if isinstance(node, ast.FunctionDef) and any(
         ast.unparse(decorator) in ('compiled', 'inlined') for decorator in node.decorator_list)]
     return [(f'{node.name}({", ".join(argument.arg for argument in node.args.args)})',

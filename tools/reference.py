@@ -185,8 +185,10 @@ REFERENCE_TABLES = {'nodes': node_table, 'studies': study_table, 'scenarios': sc
 
 
 def with_tables(text, rows):
-    """Return the text of a file with its tables written again; rows: published.Rows. Raises KeyError for an unknown
-    table."""
+    """Return the text of a file with its tables written again; rows: published.Rows.
+
+    Raises KeyError for an unknown table.
+    """
     def table(match):
         name = match[1]
         lines = _table(*published.TABLES[name](rows)) if name in published.TABLES else REFERENCE_TABLES[name]()

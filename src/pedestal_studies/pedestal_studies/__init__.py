@@ -23,7 +23,9 @@ def study(name):
 
 
 def descriptions():
-    """Return {name of a study: its first line}, read from the files, because the import of all studies takes two
-    seconds."""
+    """Return {name of a study: its first line}, read from the files.
+
+    The import of all studies would take two seconds.
+    """
     docstrings = {name: ast.get_docstring(ast.parse(_STUDY_FILES[name].read_text())) for name in STUDY_NAMES}
     return {name: text.partition('\n')[0] for name, text in docstrings.items()}

@@ -21,8 +21,7 @@ from pedestal_studies.rigs.rows import Result
 from pedestal_studies.system import bode
 
 STEP_SIZE_RAD, SINE_AMPLITUDE_RAD, SINE_FREQUENCY_HZ, GUST_TORQUE_SHARE = 0.02, 0.02, 0.1, 0.2
-"""Size of the step [rad]; amplitude [rad] and frequency [Hz] of the sine; wind torque over the limit of both motors
-[-]."""
+"""Size of the step [rad]; amplitude [rad] and frequency [Hz] of the sine; wind torque over both torque limits [-]."""
 
 RUN_DURATION_S, START_ANGLES_RAD, SETTLING_BAND, SINE_PERIODS = 10.0, (0.0, 0.6), 0.02, 3
 """Duration of the step and gust runs [s]; initial angles of the axes [rad]; band of the settling time [-]; periods

@@ -70,8 +70,7 @@ def _filter_steps(state, constants, t, y, R):
 
 
 def unscented_step():
-    """Return the time [us] of one prediction and correction of both Cartesian filters, with azimuth, elevation and
-    range."""
+    """Return the time [us] of one step of both Cartesian filters, with azimuth, elevation and range measured."""
     state, constants = np.zeros(1, unscented.STATE_DTYPE), unscented.constants(UkfParameters())
     noise = np.random.default_rng(1).standard_normal((FILTER_STEPS, 3)) * (5e-4, 5e-4, 1.0)
     measured = noise + np.outer(FILTER_PERIOD_S * np.arange(FILTER_STEPS), (0.001, 0.0, 0.0)) + (0.0, 0.3, 500.0)
@@ -152,8 +151,7 @@ def filter_rows():
 
 
 def drive_rows():
-    """Return the rows of one drive beside the drives on all lanes, in turn, and of whole trials on lanes, in time
-    of one core."""
+    """Return the rows of one drive beside drives on all lanes, and of whole trials on lanes in time of one core."""
     params = AduParameters(initial_elevation=0.7)
     one = np.zeros(1, adu_unit.RECORD_DTYPE)
     one['state'], one['constants'] = drive_unit.initial_state(params), drive_unit.constants(params)

@@ -25,8 +25,7 @@ LATENCY_DURATION_S = 10.0
 
 
 def bare_lap():
-    """Return the lap time [us] of the bare ring: the same number of processes and the same messages without any
-    work."""
+    """Return the lap time [us] of the bare ring: as many processes and the same messages, without any work."""
     processes = {role: subprocess.Popen([sys.executable, '-m', bare_ring.__name__, role, str(RING_STEPS)],
                                         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
                  for role in bare_ring.RING_NODES}
@@ -51,8 +50,7 @@ def graph_run(folder, number, pacing, seconds):
 
 
 def latencies(path):
-    """Return the wall-clock times [s] from publication of joint_states(t_k) to that of rate_command(t_k), of a
-    realtime bag."""
+    """Return the wall-clock times [s] from joint_states(t_k) to rate_command(t_k), both at publication, of a bag."""
     sent = {topic: {log: published for _, log, published, _ in bag.read(path).raw(topic)}
             for topic in ('joint_states', 'acu/rate_command')}
     return np.array([(published - sent['joint_states'][stamp]) * 1e-9

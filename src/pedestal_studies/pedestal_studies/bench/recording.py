@@ -24,8 +24,10 @@ DISK_TEST_BYTES = 200_000_000
 
 
 def measure_recorder(path, again, rate):
-    """Return (messages/s, lost, CPU time over wall time) of a recorder that receives a bag at `rate` times real
-    time."""
+    """Return (messages/s, lost, CPU time over wall time) of a recorder that receives a bag.
+
+    rate: speed of the messages over real time.
+    """
     with open(pathlib.Path(again).with_suffix('.log'), 'w+') as log:
         recorder = subprocess.Popen([sys.executable, '-m', 'pedestal_recording.recorder_node', '--ros-args',
                                      '--params-file', str(path.with_name(path.name + '.log') / 'parameters.yaml'),

@@ -1,5 +1,4 @@
-"""One axis of the drive through scipy's solve_ivp, which a user would run otherwise: the floor of `pedestal bench
-core`.
+"""One axis of the drive through scipy's solve_ivp, the usual tool of a user: the floor of `pedestal bench core`.
 
 The equations of the plant are written a second time in the form for scipy. They measure speed only and are not part of
 the product.
@@ -36,8 +35,10 @@ def right_hand_side(t, x, p, v_q):
 
 
 def run(p, ticks, period, v_q):
-    """Return the state after `ticks` control ticks of `period` [s] from rest with voltages v_q, by RK45 at scipy's
-    tolerances."""
+    """Return the state after `ticks` control ticks of `period` [s] from rest with voltages v_q.
+
+    RK45 has scipy's own tolerances.
+    """
     x = np.zeros(11)
     for _ in range(ticks):
         x = solve_ivp(right_hand_side, (0.0, period), x, 'RK45', args=(p, v_q)).y[:, -1]

@@ -114,8 +114,10 @@ def _target_text(row):
 
 
 def _spread(row):
-    """Return the mean of a row and half its interval to two digits, 'a +- b'; the mean alone if all runs give the
-    same."""
+    """Return the mean of a row and half its interval to two digits, 'a +- b'.
+
+    Return the mean alone if all runs give the same value.
+    """
     half = 0.5 * (row['ci_high'] - row['ci_low']) if 'runs' in row else 0.0
     if half <= 1e-9 * abs(row['value']):
         return console.number(row['value'])
@@ -208,8 +210,7 @@ def pareto_numbers(rows):
 
 
 def flyby_numbers(rows):
-    """Return the table of the errors on the 60 m flyby with a measured rate and with a rate differenced from the
-    angles."""
+    """Return the table of the errors on the 60 m flyby with a measured rate and with a differenced rate."""
     lines = [(name, *(_spread(rows['rate-measurement', f'{rate_measurement.FLYBY_PROFILE}/{name}', metric])
                       for metric in ('angle_rms_deg', 'rate_rms_deg_s'))) for name in rate_measurement.FLYBY_CASES]
     return ('source of the rate', 'angle rms deg', 'rate rms deg/s'), lines
@@ -251,8 +252,7 @@ ARRAY_LOOPS = ('paper', 'paper-delta', 'type-2', 'type-2-delta', 'tracked-10ms',
 
 
 def array_numbers(rows):
-    """Return the table of the true errors of the loops of paper 002's plant without noise, and of the jitter due to
-    noise."""
+    """Return the table of the loops of paper 002's plant: true errors without noise, and jitter due to noise."""
     lines = []
     for case in (*(f'{loop}/{target}' for loop in ARRAY_LOOPS for target in ('ramp', 'sine', 'sway')
                    if target == 'sway' or not loop.endswith('-delta')),
@@ -293,8 +293,7 @@ def budget_table(mode):
 
 
 def direction_table(mode):
-    """Return the function rows -> table of the systematic contributions of a mode along the pass, both axes with
-    their signs."""
+    """Return the function rows -> table of the signed systematic contributions of a mode along the pass."""
     def table(rows):
         cases = [f'{mode}/{time}s' for time in budget.TABLE_TIMES_S]
         head = [f'az {rows["budget", case, "azimuth_deg"]["value"]:.0f}, '

@@ -206,8 +206,7 @@ def simulate(sensors, normals, velocity, out):
 
 @compiled
 def align(state, constants, angle, force, dt, every, estimates):
-    """Run a navigator on increments (n, 3) of dt [s]; estimates: ALIGNMENT_ESTIMATE after every `every`-th
-    increment."""
+    """Run a navigator on increments (n, 3) of dt [s]; estimates: an ALIGNMENT_ESTIMATE every `every` increments."""
     aid = np.zeros(3)
     for k in range(len(angle)):
         navigator.step(state[0], constants[0], angle[k], force[k], dt, aid)
@@ -277,8 +276,7 @@ def simulated_run(batch, run):
 
 
 def errors(estimated, attitude):
-    """Return the errors (n, 3) about east, north, up [rad] of an estimated attitude (n, 4) against the true one (n,
-    4)."""
+    """Return the errors (n, 3) about east, north, up [rad] of an estimated attitude (n, 4) against the true one."""
     x, y, z, w = product(estimated.T, (attitude * (-1.0, -1.0, -1.0, 1.0)).T)
     size = np.sqrt(x * x + y * y + z * z)
     angle = 2.0 * np.arctan2(size, np.abs(w)) * np.sign(np.where(w == 0.0, 1.0, w))

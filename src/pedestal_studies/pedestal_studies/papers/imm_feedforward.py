@@ -49,8 +49,7 @@ DEFAULT_RUNS = 50
 """Runs of each case, with independent noise."""
 
 DRIVE_DURATION_S, DRIVE_EVALUATION_START_S, DRIVE_ELEVATION_RAD = 36.0, 6.0, 0.5
-"""Duration of a run through the product [s], start of its evaluation, after the hand-over to autotrack [s], and
-elevation [rad]."""
+"""Duration of a run through the product [s], start of its evaluation in autotrack [s], and elevation [rad]."""
 
 CV_NOISES = (0.1, 0.2, 0.3, 0.5, 4.0)
 """Process noises of the conventional filter [deg/s2/sqrt(Hz)]."""
@@ -150,8 +149,10 @@ def at_rate_noise(misses, axis, rate_noise):
 
 
 def rows(misses):
-    """Return the rows of {case: MissStatistics} of all cases; a ratio is that of two filters under the noise of one
-    run."""
+    """Return the rows of {case: MissStatistics} of all cases.
+
+    A ratio is that of two filters under the noise of one run.
+    """
     table = []
     for name, case in misses.items():
         axis, miss = case.axis, case.of('miss_rms_deg')

@@ -47,7 +47,7 @@ RATE_RATIO_TARGET = '>= 3'
 
 
 def motion():
-    """Return (times (n,) [s], truth (angle, rate, acceleration), each (n,), {reversal: mask (n,) of it}) of all
+    """Return (times (n,) [s], truth (angle, rate, acceleration), each (n,), {reversal: mask (n,)}) of the
     reversals."""
     stroke, rate = profiles.S_MOTION_STROKE_RAD, profiles.S_MOTION_RATE_RAD_S
     begin, legs, starts = LEAD_TIME_S, [], {}
@@ -65,10 +65,10 @@ def motion():
 
 
 def batch(item):
-    """Return (MOMENTS (n,) over the runs, rms (count, len(REVERSAL_DURATIONS_S), 2)) of an item (filter, first run,
-    count).
+    """Return (MOMENTS (n,) over the runs, rms (count, len(REVERSAL_DURATIONS_S), 2)) of an item.
 
-    The rms are those of rate [deg/s] and acceleration [deg/s2] of every run inside the reversals.
+    An item is (filter, first run, number of runs). The rms are those of rate [deg/s] and acceleration [deg/s2] of
+    every run inside the reversals.
     """
     name, first, count = item
     t, truth, reversals = motion()
@@ -136,8 +136,7 @@ def remarks(values):
 
 
 def moments_figure(sums_of, what, label):
-    """Draw truth and mean estimates through the reversals above, mean errors +-1 sigma below (paper 003, figures 3 and
-    4).
+    """Draw truth and mean estimates above, mean errors +-1 sigma below (paper 003, figures 3 and 4).
 
     sums_of: {filter: MOMENTS (n,)}; what: 'rate' or 'acceleration'.
     """

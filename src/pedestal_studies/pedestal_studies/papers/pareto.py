@@ -72,8 +72,7 @@ def run(progress, runs=DEFAULT_RUNS, pool=None) -> Result:
 
 
 def measured(statistics):
-    """Return (noise of a uniform rate [deg/s], miss rms [deg]) of every run of a MissStatistics, an array (2,
-    runs)."""
+    """Return (noise of a uniform rate [deg/s], miss rms [deg]) of every run of MissStatistics, an array (2, runs)."""
     return np.array([statistics.of(metric) for metric in ('rate_noise_deg_s', 'miss_rms_deg')])
 
 

@@ -36,8 +36,7 @@ DEFAULT_RUNS, FIRST_SEED = 40, 1
 
 STEP_SIZE_RAD = math.radians(1.0)
 ALPHA_GAINS, LOOP_PERIODS_MS, LOOP_DELAYS_MS = (0.05, 0.1, 0.2, 0.3), (10, 5), (0, 20, 50, 80)
-"""Gains alpha [-], periods and delays of the loop [ms] in figures 3 to 5 and in the search for the largest stable
-delay."""
+"""Gains alpha [-], periods and delays of the loop [ms] in figures 3 to 5 and in the limits of stability."""
 SLOPE_RATIOS = 0.5, 0.7, 1.0, 1.5, 2.0
 """True slope over assumed slope of the receiver [-]."""
 RAMP_RATES_DEG_S = (10, 20, 30, 40)
@@ -91,8 +90,7 @@ INS_LOOPS = {
     'best/sway-ins': FilterLoop(jerk(1e-3), RECEIVER_NOISE_RAD, ins=True, late=INS_STAMP_ERROR_MS),
     'best/sway-ins/exact-stamps': FilterLoop(jerk(1e-3), RECEIVER_NOISE_RAD, ins=True),
     'best/sway-ins/rate-only': FilterLoop(jerk(1e-3), RECEIVER_NOISE_RAD, ins=True, tau=0.0)}
-"""Loops whose filter works in the earth frame: with an error of the stamps, with exact stamps, and without
-acceleration."""
+"""Loops with a filter in the earth frame: with an error of the stamps, with exact stamps, without acceleration."""
 
 METRIC_TARGETS = {
     ('step/alpha=0.1/T=10ms/S0', 'overshoot_percent'): '19.7 +- 0.5',
@@ -178,8 +176,7 @@ def name(loop):
 
 
 def steps():
-    """Return {PaperLoop: step response (n,) of the beam from rest, over the size of the step}; the step is at
-    sample 0."""
+    """Return {PaperLoop: step response (n,) of the beam from rest, over the size of the step at sample 0}."""
     loops = [PaperLoop(alpha, T, smoothing=S) for alpha in ALPHA_GAINS for T in LOOP_PERIODS_MS
              for S in SMOOTHING_CODES]
     loops += [PaperLoop(delay=delay, smoothing=S) for delay in LOOP_DELAYS_MS[1:] for S in SMOOTHING_CODES]
@@ -202,8 +199,10 @@ def step_rows(done):
 
 
 def eigenvalue_limit(loop, near):
-    """Return the largest delay [ms] with all eigenvalues of a PaperLoop inside the unit circle; near: start of the
-    search [ms]."""
+    """Return the largest delay [ms] with all eigenvalues of a PaperLoop inside the unit circle.
+
+    near: start of the search [ms].
+    """
     def inside(delay):
         return spectral_radius(dataclasses.replace(loop, delay=delay)) < 1.0
 
@@ -341,8 +340,7 @@ def compared_rows(done, jitters):
 RECEIVER_LOSS_POWERS = {
     'half-beamwidth': 0.5,
     'pattern': 10.0**(0.1 * (ReceiverParameters().lose_level_dbhz - ReceiverParameters().cn0_dbhz))}
-"""Power over the power on axis at which a receiver loses the signal: at half a beamwidth, and at ours with its
-defaults."""
+"""Power over the power on axis at which the signal is lost: at half a beamwidth, and at our receiver's default."""
 
 
 def signal_loss_loop(kind, form):
@@ -351,8 +349,7 @@ def signal_loss_loop(kind, form):
 
 
 def sine_from_rest(rate):
-    """Return the angle (n,) [rad] of the sine target of a largest rate [deg/s], which starts at rest from one of
-    its ends."""
+    """Return the angle (n,) [rad] of the sine target of a largest rate [deg/s], from rest at one of its ends."""
     w = SINE_ACCELERATION_DEG_S2 / SINE_RATE_DEG_S
     return math.radians(rate) / w * (1.0 - np.cos(w * np.maximum(instants(RECORD_DURATION_S), 0.0)))
 
@@ -373,8 +370,7 @@ def max_kept_rate(loop):
 
 
 def loss_rows():
-    """Return the rows of the largest rate of the sine that a loop keeps, and of the error with a linear receiver at
-    that rate."""
+    """Return the rows of the largest rate of the sine that a loop keeps, and of the linear receiver's error at it."""
     rows = []
     for form in ('type_1', 'type_2'):
         for kind in RECEIVER_LOSS_POWERS:
@@ -392,8 +388,7 @@ PAPER_LOOP_PARAMETERS = {f'acu.{axis}.beam.{key}': value for axis in ('azimuth',
 
 GRAPH_CASES = {'graph/T=10ms': {}, 'graph/T=1ms': {'adu.period': 0.001},
                'graph/T=10ms/paper-delta': PAPER_LOOP_PARAMETERS}
-"""{case: parameters of the scenario phased_array_sway}: the scenario, the scenario steered every 1 ms, and the
-paper's loop."""
+"""{case: parameters of the scenario phased_array_sway}: unchanged, steered every 1 ms, and with the paper's loop."""
 
 NOISELESS_PARAMETERS = {'tracking_receiver.receiver.cn0_dbhz': 110.0, 'ins.tilt_noise': 0.0, 'ins.heading_noise': 0.0,
                         'ins.rate_noise': 0.0}
@@ -418,8 +413,7 @@ GRAPH_EVALUATION_START_S = 10.0
 
 
 def graph_error(case, quiet=False, seed=None):
-    """Return the true error (n, 2) [rad] of one of GRAPH_CASES at the ends of the intervals, after the start of the
-    evaluation.
+    """Return the true error (n, 2) [rad] of one of GRAPH_CASES at the ends of the evaluated intervals.
 
     Arguments as of `graph_case`.
     """
@@ -444,8 +438,7 @@ def graph_rows(jitters):
 
 
 def readings(loops, target, rate=None):
-    """Return {label: {S: (error that the receiver measures, true error), each (n,) [rad]}} of loops {label:
-    PaperLoop}."""
+    """Return {label: {S: (error that the receiver measures, true error), each (n,) [rad]}} of {label: PaperLoop}."""
     errors = {}
     for label, loop in loops.items():
         errors[label] = {}

@@ -126,8 +126,7 @@ def responses(A, B, frequency):
 
 
 def bandwidth(G):
-    """Return the frequency [Hz] at which |G| (n,) over RESPONSE_FREQUENCIES_HZ first falls below -3 dB; NaN if it
-    never does."""
+    """Return the frequency [Hz] at which |G| (n,) over RESPONSE_FREQUENCIES_HZ first falls below -3 dB, or NaN."""
     gain = np.log(np.abs(G)) - 0.5 * math.log(0.5)
     below = np.flatnonzero(gain < 0.0)
     if below.size == 0:
@@ -163,10 +162,9 @@ def differenced_rate(y, steps):
 
 
 def filtered(t, target, y, y_rate, R_rate):
-    """Return the ESTIMATE (n,) of the filter for a target (n, 3), from angles and rates (n,) measured at times (n,)
-    [s].
+    """Return the ESTIMATE (n,) of the filter for a target (n, 3), from measured angles and rates (n,).
 
-    R_rate: variance of the rates [rad2/s2].
+    t: times (n,) [s]. R_rate: variance of the rates [rad2/s2].
     """
     c = axis_filter.constants(filter_of(MAX_ACCELERATION_RATIO * np.abs(target[:, 2]).max(), MIN_SIGMA_RATIO))
     out = np.zeros(len(t), axis_filter.ESTIMATE_DTYPE)
@@ -216,8 +214,10 @@ METRIC_TARGETS = {('position-rate', 'rate_bandwidth_ratio'): '>= 1.5',
 
 
 def rows(measured, errors):
-    """Return the rows of measured {case: as of `measures`} and errors {name of FLYBY_CASES: rms (runs, 2) [deg,
-    deg/s]}."""
+    """Return the rows of measured {case: as of `measures`} and errors {name of FLYBY_CASES: rms (runs, 2)}.
+
+    The rms are in [deg, deg/s].
+    """
     table = []
     for name, values in measured.items():
         table += [row(name, metric, value, unit, target='< 1' if metric == 'largest_eigenvalue' else None)

@@ -35,8 +35,7 @@ BATCH_RUNS = 5
 """Flights that one worker makes at a time."""
 
 TARGET_SPEED_M_S, MIN_GROUND_DISTANCE_M, TARGET_HEIGHT_M, CULMINATION_TIME_S = 300.0, 3000.0, 2500.0, 42.0
-"""Speed of the target [m/s], its least distance over ground [m], its height [m], and the time of its least distance
-[s]."""
+"""Speed [m/s], least distance over ground [m] and height [m] of the target; time of its least distance [s]."""
 
 FLIGHT_START_S, FLIGHT_END_S = 20.0, 100.0
 """Times of the paper's figures [s]; the filter begins at the first."""

@@ -1,5 +1,4 @@
-"""The angle loop of a phased array on one axis, on a grid of 1 ms: the loop of paper 002, and a loop with a target
-filter.
+"""The angle loop of a phased array on one axis, on a grid of 1 ms: paper 002's loop, and a loop with a target filter.
 
 Each loop is one compiled kernel of the laws that the nodes run: the smoothing and the pattern of the receiver, the
 loop of the beam or a target filter, and the electronic beam. Sample i of the grid is measured over the millisecond
@@ -201,8 +200,7 @@ def _paper_loop(constants, receiver, target, smoothers, plant, beam, errors):
 
 @compiled
 def _filter_loop(constants, target, smoothers, filters, plant, beam, errors):
-    """Run the loop with a target filter over a Target into beam and innovations `errors` (n,) [rad]; plant: the
-    Beam."""
+    """Run the loop with a target filter over a Target into beam and innovations (n,) [rad]; plant: the Beam."""
     s, f, c = smoothers[0].error, filters[0], constants.filter[0]
     period, hold, rate = constants.period, constants.hold, target.rate
     running, aimed, acceleration = False, 0.0, 0.0
@@ -245,8 +243,7 @@ def is_stable(loop, size=1e-9, seconds=20.0):
 
 
 def delay_limit(loop, highest=400):
-    """Return the largest delay at which a PaperLoop is stable, in samples of the grid up to `highest`, by
-    bisection."""
+    """Return the largest delay at which a PaperLoop is stable, in samples up to `highest`, by bisection."""
     low, high = 0, highest
     while high - low > 1:
         middle = (low + high) // 2

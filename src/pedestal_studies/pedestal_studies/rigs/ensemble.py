@@ -39,8 +39,7 @@ Series = namedtuple('Series', 't y R y_rate R_rate')
 """
 
 RangedSeries = namedtuple('RangedSeries', 'azimuth elevation R ranges R_range')
-"""Measurements for the Cartesian filter: angles (runs, n) [rad] of variance R, ranges (runs, n) [m] of variance
-R_range."""
+"""Measurements for the Cartesian filter: angles (runs, n) [rad] and ranges (runs, n) [m] with their variances."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -70,8 +69,7 @@ def coloured_noise(white, bandwidth):
 
 
 def records(truth, noise, seed, first, count):
-    """Return measured angles [rad] and rates [rad/s], each (count, n), of a truth (angle, rate, acceleration), each
-    (n,).
+    """Return measured angles [rad] and rates [rad/s], each (count, n), of a truth (angle, rate, acceleration).
 
     The rates are NaN without a sensor.
     """
@@ -84,8 +82,7 @@ def records(truth, noise, seed, first, count):
 
 
 def moments(params, t, truth, noise, measured):
-    """Return MOMENTS (runs, n) of a filter (FilterParameters) at times t (n,) [s], for measured records as of
-    `records`.
+    """Return MOMENTS (runs, n) of a filter (FilterParameters) at times t (n,) [s], for measured `records`.
 
     The filter knows sigma and rate_sigma. It assumes white noise if it does not know the bandwidth.
     """
@@ -150,8 +147,7 @@ def unscented_moments(params, truth, distance, noise, range_sigma, runs):
 
 @compiled
 def _add_unscented_runs(c, T, truth, measured, rate_variance, sums):
-    """Add the errors in azimuth over RangedSeries, every T [s], to MOMENTS (runs, n); truth: AxisMotion of arrays
-    (n,)."""
+    """Add the errors in azimuth over RangedSeries, every T [s], to MOMENTS (runs, n); truth: AxisMotion of arrays."""
     R, R_range = measured.R, measured.R_range
     out = np.zeros(1, axis_filter.ESTIMATE_DTYPE)
     o = out[0]
@@ -201,6 +197,8 @@ def _summed(sums, axis):
 
 
 def rms(sums, name):
-    """Return the rms error (n,) [rad, rad/s, rad/s2] of MOMENTS (n,); name: 'angle', 'rate', 'acceleration' or
-    'raw'."""
+    """Return the rms error (n,) of MOMENTS (n,) [rad, rad/s, rad/s2].
+
+    name: 'angle', 'rate', 'acceleration' or 'raw'.
+    """
     return np.sqrt(sums[f'{name}2'] / sums['runs'])

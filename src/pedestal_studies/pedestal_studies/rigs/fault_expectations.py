@@ -65,8 +65,10 @@ LEVEL_INDEPENDENT_MODES = (*STILL_MODES, *MOVING_MODES, *FOLLOWING_MODES)
 
 
 def _in_every_mode(expected):
-    """Return one expectation for every mode, with at least half a beamwidth in standby, where the antenna does not
-    point."""
+    """Return one expectation for every mode.
+
+    In standby the antenna does not point, so at least half a beamwidth is permitted.
+    """
     resting = expected._replace(error=max(expected.error or HALF_BEAMWIDTH_DEG, HALF_BEAMWIDTH_DEG))
     return {**dict.fromkeys(LEVEL_INDEPENDENT_MODES, expected), 'standby': resting}
 
@@ -115,8 +117,7 @@ look around; it then has the limit of acquire.
 MODES_TO_AUTOTRACK = ('search', 'acquire', 'autotrack')
 
 SIGNAL_LOSS_FAULTS, WRONG_ERROR_FAULTS = ('drop', 'freeze', 'nan', 'clock_step'), ('wrong_slope', 'phase_180')
-"""Faults of the receiver that remove its signal, and faults that give its errors a wrong sign. No target is found
-with either."""
+"""Faults of the receiver that remove its signal, or give its errors a wrong sign; no target is found with them."""
 
 
 def _signal_level_modes(node, fault, of_modes):
@@ -136,8 +137,10 @@ def _signal_level_modes(node, fault, of_modes):
 
 
 def _unstow_expectation(fault, of_modes):
-    """Return the expectation in unstow: the antenna stands on its brakes as in standby, so a trip need not end the
-    mode."""
+    """Return the expectation in unstow, where the antenna stands on its brakes as in standby.
+
+    A trip need not end the mode.
+    """
     expected = of_modes['standby']
     expected = expected._replace(end=expected.end and _STANDBY_OR_SAME_MODE['unstow'])
     # An inverter that is off has no effect until the drive commands torque.

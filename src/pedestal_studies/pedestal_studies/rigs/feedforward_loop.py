@@ -52,8 +52,10 @@ BATCH_RUNS, NOISE_SEED = 25, 1
 
 
 def feedforward_gains(w, zeta):
-    """Return (k_v [-], k_a [s]) of 1 / W(s) = 1 + 2 zeta s / w + s^2 / w^2: paper 003's c1, c2, corrected, for this
-    W."""
+    """Return (k_v [-], k_a [s]) of 1 / W(s) = 1 + 2 zeta s / w + s^2 / w^2.
+
+    They are paper 003's c1, c2, corrected, for this W.
+    """
     return 1.0, 2.0 * zeta / w
 
 
@@ -150,8 +152,7 @@ def imm(q_ca, predicted):
 
 
 def motion(axis):
-    """Return (t (n,) [s], target (n, 3), its period [s]) of the S motion of an axis, over half a period and
-    EVALUATED_PERIODS."""
+    """Return (t (n,) [s], target (n, 3), period [s]) of an axis, over half a period and EVALUATED_PERIODS."""
     reversal = REVERSAL_S_BY_AXIS[axis]
     period = 2.0 * (S_MOTION_STROKE_RAD / S_MOTION_RATE_RAD_S + reversal * (1.0 - 2.0 / math.pi))
     t = T * np.arange(round((0.5 + EVALUATED_PERIODS) * period / T))
@@ -180,8 +181,7 @@ def steps_of(axis, source, first, count):
 
 METRIC_UNITS = {'miss_rms_deg': 'deg', 'miss_worst_second_deg': 'deg', 'miss_peak_deg': 'deg',
                 'rate_noise_deg_s': 'deg/s'}
-"""{metric of a run: unit}: rms, rms of the worst second and peak of the miss; noise of the rate while it is
-uniform."""
+"""{metric of a run: unit}: rms, rms of the worst second and peak of the miss; noise of a uniform rate."""
 
 
 def measures(axis, steps):
@@ -227,8 +227,7 @@ class MissStatistics:
 
 
 def statistics(cases, count, pool, progress=lambda share, text: None):
-    """Return {name: MissStatistics} of `count` runs of each of cases {name: (axis, Source)}; pool:
-    monte_carlo.Pool."""
+    """Return {name: MissStatistics} of `count` runs of each of {name: (axis, Source)}; pool: monte_carlo.Pool."""
     pieces = monte_carlo.batches(count, BATCH_RUNS)
     items = [(axis, source, *piece) for axis, source in cases.values() for piece in pieces]
     done = pool.map(batch, items, progress)

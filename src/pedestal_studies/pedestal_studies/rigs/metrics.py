@@ -15,8 +15,7 @@ def overshoot_percent(y, size):
 
 
 def settling_time(t, y, size, band=0.02):
-    """Return the time after which y stays within +-band * size of size, linear between samples; NaN if it never
-    does."""
+    """Return the time after which y stays within +-band * size of size, linear between samples, or NaN."""
     excess = np.abs(y / size - 1.0) - band
     outside = np.flatnonzero(excess > 0.0)
     if outside.size == 0:
@@ -28,8 +27,7 @@ def settling_time(t, y, size, band=0.02):
 
 
 def crossings(y, size, band=0.005):
-    """Return the number of crossings of y through its final value `size`, without motion within +-band * size of
-    it."""
+    """Return the number of crossings of y through its final value `size`; motion within +-band * size is ignored."""
     side = np.sign(y - size)[np.abs(y - size) > band * abs(size)]
     return int(np.sum(side[1:] != side[:-1]))
 
@@ -53,8 +51,7 @@ def harmonic_fit(t, y, w):
 
 
 def amplitude_and_period(t, y, period):
-    """Return amplitude and period of a sine fitted to y by least squares (Gauss-Newton), from a `period` near the
-    result."""
+    """Return amplitude and period of a sine fitted to y by least squares (Gauss-Newton); period: first guess."""
     w = 2.0 * math.pi / period
     middle = 0.5 * (t[0] + t[-1])
     t = t - middle

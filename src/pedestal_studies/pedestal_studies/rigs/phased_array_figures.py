@@ -1,5 +1,4 @@
-"""Figures of the study phased-array: those of paper 002 with S0, S1 and S2 side by side, and of the loop with a
-filter."""
+"""Figures of the study phased-array: those of paper 002 with S0, S1 and S2 side by side, and loops with a filter."""
 import numpy as np
 
 from pedestal_analysis.report.figures import (
@@ -42,8 +41,7 @@ def steps(done, label, title, seconds):
 
 
 def lags(done, title, seconds):
-    """Draw errors {label: {S: (measured by the receiver, true error (n,)) [rad]}}: above the measured, below the
-    true error."""
+    """Draw errors {label: {S: (measured error, true error (n,)) [rad]}}: above the measured, below the true error."""
     figure, axes = side_by_side(2, y=('measured error [deg]', 'true error [deg]'))
     for (label, by_smoothing), colour in zip(done.items(), LINE_COLOURS):
         for column, S in zip(axes.T, SMOOTHING_TITLES):
@@ -56,8 +54,7 @@ def lags(done, title, seconds):
 
 
 def stability(limits):
-    """Draw the largest stable delays {PaperLoop: (by bisection, by eigenvalues) [ms]} over alpha and over the
-    slope."""
+    """Draw the largest stable delays {PaperLoop: (by bisection, by eigenvalues) [ms]} over alpha and over slope."""
     figure, axes = new_panels(1, 3, height=3.6, width=9.6, x=('alpha', 'alpha', 'true slope over assumed'),
                               y='largest stable delay [ms]')
     for panel, T in zip(axes[0], (10, 5)):

@@ -48,8 +48,10 @@ def distance(name, t):
 
 
 def flyby(t, w):
-    """Return (angle, rate, acceleration) (n,) of a straight line, nearest at t = 0; w: speed over least distance
-    [rad/s]."""
+    """Return (angle, rate, acceleration) (n,) of a straight line, nearest at t = 0.
+
+    w: speed over least distance [rad/s].
+    """
     u = w * t
     return np.arctan(u), w / (1.0 + u * u), -2.0 * u * w * w / (1.0 + u * u) ** 2
 

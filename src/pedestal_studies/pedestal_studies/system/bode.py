@@ -137,11 +137,11 @@ def degrees(x):
 
 
 def bode_figure(title, curves, design):
-    """Draw Bode diagrams of the open and the closed loop: {label: (Response, colour)}, design(s) the open loop or
-    None.
+    """Draw Bode diagrams of the open and the closed loop.
 
-    Crosses mark the crossover in gain and phase, and the legend gives the margins. The first of two or more curves is
-    drawn wide, so that it remains visible behind a curve that coincides with it.
+    curves: {label: (Response, colour)}; design(s): the open loop, or None. Crosses mark the crossover in gain and
+    phase, and the legend gives the margins. The first of two or more curves is drawn wide, so that it remains visible
+    behind a curve that coincides with it.
     """
     figure, axes = new_panels(2, 2, height=5.4, x='frequency [Hz]', y=('gain [dB]', 'phase [deg]'), sharex=True)
     figure.suptitle(title)

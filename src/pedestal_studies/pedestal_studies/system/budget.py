@@ -189,8 +189,7 @@ class Budget:
 
     @property
     def random(self):
-        """Random contributions {name: (runs, n, 2)}: deviations from their mean, scaled to their size about the
-        true mean."""
+        """Random contributions {name: (runs, n, 2)}: deviations from their mean, with the size about the true mean."""
         off = {'noise': self.base} if len(self.base) > 1 else {}
         return {name: (e - e.mean(axis=0)) * np.sqrt(len(e) / (len(e) - 1.0))
                 for name, e in (off | self.seeded).items()}
@@ -272,8 +271,7 @@ def run(progress, runs=DEFAULT_RUNS, pool=None, duration=None) -> Result:
 
 
 def figure(made, place):
-    """Draw the contributions of every mode, rms, and the systematic sum over the pass beside the run with every
-    term."""
+    """Draw the contributions of every mode, rms, and the systematic sum beside the run with every term."""
     drawn, axes = new_panels(len(made), 2, height=7.0, x='')
     for (left, right), (mode, of_mode) in zip(axes, made.items()):
         sizes = {name: np.mean(rms(e)) for name, e in (*of_mode.systematic.items(), *of_mode.random.items())}

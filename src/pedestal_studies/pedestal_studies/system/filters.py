@@ -158,8 +158,7 @@ def batch(item):
 
 
 def run(progress, runs=DEFAULT_RUNS, pool=None, on=profiles.PROFILES, noises=tuple(NOISE_CASES)) -> Result:
-    """Compare all filters; `on`: names of profiles, `noises`: names of NOISE_CASES, fewer than all for a quick
-    look."""
+    """Compare all filters; on: names of profiles, noises: names of NOISE_CASES, fewer for a quick look."""
     pool = pool or monte_carlo.Pool(1)
     applicable = {noise: [name for name in FILTERS if NOISE_CASES[noise].bandwidth
                           or name not in NOISE_AWARE_FILTERS] for noise in noises}
@@ -221,8 +220,10 @@ def _cell(measured):
 
 
 def remarks(values, tuned, runs):
-    """Return the sentences that explain the rows, with a table of the profiles; values {case: {metric: mean over
-    the runs}}."""
+    """Return the sentences that explain the rows, with a table of the profiles.
+
+    values: {case: {metric: mean over the runs}}.
+    """
     lines = [f'{runs} runs of each case. The columns are angle rms [deg] (reduction), rate rms [deg/s], and the error '
              f'over own sigma of angle and rate, for the noise {SHOWN_NOISE} deg. --json gives the rows of all cases.']
     on = [profile for profile, noise in tuned if noise == SHOWN_NOISE]
@@ -299,8 +300,7 @@ def errors_figure(over_time, on, what='angle'):
 
 
 def profile_panels(on):
-    """Return (figure, panels (n,)) with a panel for each profile, two in a row, and room for a line for each
-    filter."""
+    """Return (figure, panels (n,)) with a panel for each profile, two in a row, with a line for each filter."""
     rows = (len(on) + 1) // 2
     figure, axes = new_panels(rows, 2, x='', height=0.8 + rows * (0.5 + 0.2 * len(SHOWN_FILTERS)), sharey=True)
     for panel in axes.flat[len(on):]:
@@ -309,8 +309,10 @@ def profile_panels(on):
 
 
 def bars(values, on, metric, label, colour, text):
-    """Return (figure, panels (n,)) with a panel of bars for each profile; metric, text(filter, metrics),
-    colour(filter)."""
+    """Return (figure, panels (n,)) with a panel of bars for each profile.
+
+    metric, text: functions of filter and metrics; colour: function of a filter.
+    """
     figure, panels = profile_panels(on)
     for panel, profile in zip(panels, on):
         measured = {name: values.get((profile, name, SHOWN_NOISE)) for name in SHOWN_FILTERS}
@@ -365,8 +367,7 @@ def probabilities_figure(over_time, on):
 
 
 def noise_figure(values, on):
-    """Draw the reduction of every filter under each noise, which shows its dependence on the bandwidth of the
-    receiver."""
+    """Draw the reduction of every filter under each noise: its dependence on the bandwidth of the receiver."""
     figure, panels = profile_panels(on)
     for panel, profile in zip(panels, on):
         for noise, colour, marker in zip(NOISE_CASES, (RAW_COLOUR, RAW_COLOUR, FILTERED_COLOUR, FILTERED_COLOUR),

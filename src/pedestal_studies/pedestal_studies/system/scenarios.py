@@ -75,8 +75,7 @@ EXTRA_METRIC_UNITS = {'loss_to_predicted': '', 'keyhole_loss_predicted_s': 's', 
 
 
 def extra_results(values, run):
-    """Return {name: value} of results that a recording does not give: of a slew through a keyhole, of the time
-    after alignment."""
+    """Return {name: value} of results that a recording does not give: slew through a keyhole, time after alignment."""
     more = {}
     slew = run.units['acu'].parts['state']['guidance']['lookahead']['slew']
     if slew['loss'] > 0.0:
@@ -129,8 +128,7 @@ def run(progress, runs=DEFAULT_RUNS, pool=None) -> Result:
 
 
 def flyby_figure():
-    """Draw paper 000's figures 7 to 11 for uav_flyby: error and angle before and after the filter, and the azimuth
-    flown."""
+    """Draw paper 000's figures 7 to 11 for uav_flyby: error and angle before and after the filter, azimuth flown."""
     figure, axes = new_panels(3, height=7.2, y=('error [deg]', 'elevation [deg]', 'azimuth [deg]'))
     case = CASES['uav_flyby'].with_seed(FIRST_SEED)
     flown = tracking.read(MemoryRecording(case.loaded(), case.run()))

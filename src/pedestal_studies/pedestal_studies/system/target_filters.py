@@ -72,8 +72,7 @@ MAX_POINTING_RATIO = 1.15
 
 
 def pointing(case):
-    """Return the rms of the true pointing error [deg] of one run of a Case, both axes; NaN if the run left
-    autotrack."""
+    """Return the rms of the true pointing error [deg] of one run of a Case, both axes; NaN if it left autotrack."""
     flown = tracking.read(memory_recording.record(case.loaded()))
     begun = np.flatnonzero(flown.mode == 'autotrack')
     if not begun.size or np.any(flown.mode[begun[0]:] != 'autotrack'):
