@@ -78,8 +78,7 @@ def standstill(record):
 
 
 def steady_residual(record, amplitude, w):
-    """Return (times [s], error without its fundamental w [rad/s], (n,) [rad]) over the whole periods after the
-    first."""
+    """Return (times [s], error without its fundamental w [rad/s], (n,) [rad]) over whole periods after the first."""
     t, period = record.t, 2.0 * math.pi / w
     error = amplitude * np.sin(w * t) - record['adu/truth']['position'][:, 0]
     steady = metrics.whole_periods(t, period, period)

@@ -47,8 +47,7 @@ RATE_RATIO_TARGET = '>= 3'
 
 
 def motion():
-    """Return (times (n,) [s], truth (angle, rate, acceleration), each (n,), {reversal: mask (n,)}) of the
-    reversals."""
+    """Return (times (n,) [s], truth (angle, rate, acceleration) (n,), {reversal: mask (n,)}) of all reversals."""
     stroke, rate = profiles.S_MOTION_STROKE_RAD, profiles.S_MOTION_RATE_RAD_S
     begin, legs, starts = LEAD_TIME_S, [], {}
     for reversal in REVERSAL_DURATIONS_S:
