@@ -34,12 +34,14 @@ SOLVE_IVP_TICKS = 100
 
 @compiled
 def _drive_steps(state, constants, inputs, outputs, count):
+    """Run `count` steps of one drive."""
     for _ in range(count):
         drive_unit.step(state[0], constants[0], inputs[0], outputs[0])
 
 
 @compiled
 def _steps_on_lanes(drives, count):
+    """Run `count` steps of the drives on all lanes."""
     moving = adu_unit.DRIVE_LANES(drives)
     for _ in range(count):
         drive_unit.step(moving.state, moving.constants, moving.inputs, moving.outputs)
@@ -62,6 +64,7 @@ def filter_step(**parameters):
 
 @compiled
 def _filter_steps(state, constants, t, y, R):
+    """Run a filter over angles y (n,) [rad] of variance R (n,) at times t (n,) [s]."""
     f, c = state[0], constants[0]
     axis_filter.start(f, c, y[0], R[0], 0.1)
     for k in range(1, len(y)):
@@ -80,6 +83,7 @@ def unscented_step():
 
 @compiled
 def _unscented_steps(state, constants, measured):
+    """Run the Cartesian filters over measured azimuth, elevation [rad] and range [m] (n, 3)."""
     s, c = state[0], constants[0]
     R = 2.5e-7
     known = AxisVariances(R, 0.0, 0.01)

@@ -94,6 +94,7 @@ DRIVE_CASES = {
     f'{axis}/drive-{name}': drive_case(axis, tuned) for axis in REVERSAL_S_BY_AXIS for name, tuned in {
         'kalman-cv': cv(PAPER_CV_NOISES[axis]).filter, 'imm': FEEDFORWARD_SOURCES['imm'].filter,
         'imm-default': filter_of('imm')}.items()}
+"""{name: Case} of the product."""
 
 
 def drive_error(item):

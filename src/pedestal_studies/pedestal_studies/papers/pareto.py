@@ -35,11 +35,13 @@ REFERENCE_SOURCE = feedforward_loop.imm(40.0, True)
 
 
 def _current_statistical(a_max):
+    """Return the Source of a 'current' statistical filter; a_max [deg/s2]."""
     return Source(feedforward_loop.filter_of('current_statistical', current_statistical={
         'alpha': 0.5, 'a_max': math.radians(a_max)}))
 
 
 def _logarithmic(low, high, points):
+    """Return `points` values from low to high at equal ratios, rounded to three digits."""
     return [float(f'{value:.3g}') for value in np.geomspace(low, high, points)]
 
 

@@ -92,6 +92,7 @@ def _settle(f, c, rate, R_rate, steps):
 
 @compiled
 def _step(f, c, y, y_rate, R_rate):
+    """Run one step of the filter with a measured angle [rad] and rate [rad/s]."""
     axis_filter.predict(f[0], c[0], T)
     axis_filter.correct(f[0], c[0], AxisMeasurement(y, ANGLE_SIGMA_RAD * ANGLE_SIGMA_RAD, y_rate, R_rate))
 

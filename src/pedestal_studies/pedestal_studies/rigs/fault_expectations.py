@@ -2,9 +2,9 @@
 
 The expectations were written without regard to the behaviour of the product. Half a beamwidth (0.5 deg) off the target
 the link is 3 dB down, and the error signal still leads back to the target. A tenth of the beamwidth (0.1 deg) costs
-0.12 dB and counts as on target. In standby the antenna stays where it stood, within half a beamwidth. A trip or a
-missing input must be reported within 0.1 s, a fault that shows only in motion within 1 s. Nothing moves by itself
-after a fault that ended in standby.
+0.12 dB and counts as on target. In standby the antenna stays where it stood, within half a beamwidth. A step is 5 ms.
+The drive must report a trip or missing commands within 0.1 s. A fault that shows only in motion must be reported
+within 1 s. Nothing moves by itself after a fault that ended in standby.
 
 The modes that use the signal level (search, acquire, steptrack) lead to autotrack. They are judged by the permitted
 places of their beam: the searched area, the look-around, or half a beamwidth. They point by the attitude as program
@@ -156,13 +156,15 @@ _LEVEL_INDEPENDENT_EXPECTATIONS = {
                                              TENTH_BEAMWIDTH_DEG) for mode in (*MOVING_MODES, *FOLLOWING_MODES)}},
     'adu.lost_tooth': {mode: Expectation(None, end, HALF_PITCH_DEG) for mode, end in _STANDBY_OR_SAME_MODE.items()},
     'adu.gust': _in_every_mode(EXPECT_NO_EFFECT),
-    'adu.pin_stuck': _in_every_mode(EXPECT_NO_EFFECT),                      # the antenna of the study has no stow pins
+    # Only unstow has stow pins; their timeout is longer than the run.
+    'adu.pin_stuck': _in_every_mode(EXPECT_NO_EFFECT),
     'adu.drop': _when_moving(Expectation(20, SAME_MODE, None), Expectation(20, SAME_MODE, TENTH_BEAMWIDTH_DEG)),
     'adu.delay': _when_moving(EXPECT_IN_BEAM),
     'adu.freeze': _when_moving(Expectation(100, STANDBY_MODE, HALF_BEAMWIDTH_DEG)),
     'adu.bias': {mode: Expectation(200, end, HALF_BEAMWIDTH_DEG) for mode, end in _STANDBY_OR_SAME_MODE.items()},
     'adu.nan': {**_in_every_mode(EXPECT_TRIP),
-                'rate': EXPECT_TRIP._replace(end=('standby', 'rate'))},     # the rate commands continue
+                # The rate commands continue, so mode rate may begin again.
+                'rate': EXPECT_TRIP._replace(end=('standby', 'rate'))},
     'adu.noise': _in_every_mode(EXPECT_IN_BEAM),
     'tracking_receiver.drop': _in_autotrack(100, HALF_BEAMWIDTH_DEG),
     'tracking_receiver.delay': _in_autotrack(None, TENTH_BEAMWIDTH_DEG),
@@ -188,6 +190,7 @@ _LEVEL_INDEPENDENT_EXPECTATIONS = {
     'ins.ins_jump': _heading_fault(),
     'ins.clock_step': _attitude_fault(60, HALF_BEAMWIDTH_DEG),
 }
+"""{'NODE.FAULT': {mode: Expectation}} of LEVEL_INDEPENDENT_MODES; the other modes and unstow are derived from them."""
 FAULT_EXPECTATIONS = {name: {**of_modes, **_signal_level_modes(*name.split('.'), of_modes),
                              'unstow': _unstow_expectation(name, of_modes)}
                       for name, of_modes in _LEVEL_INDEPENDENT_EXPECTATIONS.items()}

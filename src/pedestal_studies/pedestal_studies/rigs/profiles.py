@@ -9,6 +9,7 @@ import math
 import numpy as np
 
 PROFILES = ('flyby-500m', 'flyby-60m', 's-turn-500m', 's-20deg')
+"""Names of the motions."""
 
 RECORD_DURATION_S = 60.0
 """Duration of a record [s]."""

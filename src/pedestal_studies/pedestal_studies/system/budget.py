@@ -137,6 +137,7 @@ class Pass:
 
 
 def _run(mode, on, seed, duration):
+    """Return the run of a mode with one term on, every EVALUATION_PERIOD_S from EVALUATION_START_S on."""
     chosen = scenario.load(SCENARIO_NAME, [*overrides(mode, on), f'adu.wind.field.seed={seed}'], seed=seed,
                            duration=duration)
     run = closed_loop.Loop(chosen).run()

@@ -329,6 +329,7 @@ def bars(values, on, metric, label, colour, text):
 
 
 def _colour(name):
+    """Return the colour of a filter in a figure."""
     return TRUTH_COLOUR if name in UNTUNED_FILTERS else FILTERED_COLOUR if name in RATE_SIGMAS_RAD_S else RAW_COLOUR
 
 
