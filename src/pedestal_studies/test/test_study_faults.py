@@ -1,4 +1,4 @@
-"""The study faults: its table of expectations, what it measures, its verdicts."""
+"""The study faults: its table of expectations, its measurements, its verdicts."""
 import math
 
 import numpy as np
@@ -10,7 +10,7 @@ from pedestal_studies.rigs.fault_expectations import FAULT_EXPECTATIONS, LEVEL_M
 from pedestal_studies.system import faults as study
 
 
-def test_something_is_expected_of_every_fault_in_every_mode_of_the_study():
+def test_every_fault_has_an_expectation_in_every_mode_of_the_study():
     assert set(FAULT_EXPECTATIONS) == {f'{node}.{fault.name}' for node, faults in table.INJECTED_FAULTS.items()
                                        for fault in faults}
     assert all(set(of_modes) == set(study.MODE_PARAMETERS) for of_modes in FAULT_EXPECTATIONS.values())
@@ -47,7 +47,7 @@ def test_a_trip_is_seen_in_its_step_with_its_text_and_the_mode_it_ends_in():
 
 
 @pytest.mark.parametrize(('heading', 'let_in', 'rel'), ((0.002, 0.002, 0.3), (0.01, 0.005, 0.1)))
-def test_what_a_fault_of_the_heading_costs_is_the_angle_that_is_let_in(heading, let_in, rel):
+def test_the_error_of_a_heading_fault_is_the_angle_that_is_let_in(heading, let_in, rel):
     """A heading error beyond 3 mrad is let in at 1 mrad/s."""
     found = study.fault_outcome('slave', f'ins.inject=10 ins_jump heading={heading} duration=5',
                                 study.baseline_reports('slave'))
@@ -59,7 +59,7 @@ def test_what_a_fault_of_the_heading_costs_is_the_angle_that_is_let_in(heading, 
     'tracking_receiver.noise/autotrack',
     'ins.freeze/slave', 'ins.noise/autotrack', 'ins.ins_jump/autotrack',
     'ins.ins_jump/acquire'))
-def test_what_an_input_that_lies_leads_to_is_what_an_operator_needs(case):
+def test_a_wrong_input_leads_to_the_expected_mode_and_error(case):
     [(mode, inject, expected)] = [rest for name, *rest in study.cases() if name == case]
     found = study.fault_outcome(mode, inject, frozenset())
     end = [row for row in study.rows(case, found, mode, expected) if row['metric'] != 'told_after_steps']
