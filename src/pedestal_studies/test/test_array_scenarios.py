@@ -1,4 +1,4 @@
-"""Scenarios of an electronic array: what the composed loop reaches, what is said once, what is refused."""
+"""Scenarios of an electronic array: accuracy of the composed loop, messages that are published once, refusals."""
 import math
 
 import numpy as np
@@ -101,7 +101,7 @@ def test_every_beam_knows_the_age_of_its_own_errors():
 
 @pytest.mark.parametrize('delta, reading', [(0.0, 0.1408), (0.85, 0.0211)])
 def test_the_papers_loop_through_the_cores_reads_what_its_kernel_does(delta, reading):
-    """Figure 9: v T of the sway, and what the compensation leaves of it."""
+    """Figure 9: v T of the sway, and the rest of it with compensation."""
     of_axes = [f'acu.{axis}.beam.{key}={value}' for axis in ('azimuth', 'elevation')
                for key, value in (('form', 'type_1'), ('rate_compensation', delta))]
     run = composed(*QUIET, *of_axes, 'adu.transport_delay=0', duration=14.0)
