@@ -101,7 +101,7 @@ def test_every_node_of_a_beam_recomputes_identically(runs, name, beam):
 
 def test_report_and_export_of_one_beam(runs, tmp_path):
     page = write_report(runs['four'].bag, tmp_path / 'report.html', beam='beam_2').read_text()
-    assert f'Tracking run: {FOUR}/beam_2' in page and 'Not compared' not in page
+    assert f'Tracking run: {FOUR}/beam_2' in page and 'No comparison' not in page
     name = 'beam_3/tracking_receiver/angle_error'
     [(file, rows, _)] = export.export(runs['four'].bag, output=tmp_path, names=[name])
     assert rows == 301 and file.read_text().splitlines()[0] == 't [s],stamp [ns],x [rad],y [rad],z [dB-Hz]'
