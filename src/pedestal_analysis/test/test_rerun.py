@@ -106,7 +106,7 @@ def test_a_recording_that_breaks_off_is_equal_up_to_its_end(tmp_path):
 
 @pytest.fixture
 def recorded(tmp_path):
-    """recorded(scenario, change of its parameters) -> Bag that says it was made so."""
+    """recorded(scenario, change of its parameters) -> Bag with this configuration."""
     def make(chosen, change=lambda values: None, **metadata):
         texts = configuration.recorder_parameters(chosen)
         values = yaml.safe_load(texts['parameters_yaml'])
