@@ -231,12 +231,12 @@ def test_a_topic_that_has_a_writer_is_refused(run, connect, run_process, one_lin
 
 
 def test_a_topic_without_subscriber_is_named(run, run_process, one_line, domain):
-    for options, who in ((['--node', 'acu'], 'acu'), (['--topics', 'joint_states'], 'any node')):
+    for options, node in ((['--node', 'acu'], 'acu'), (['--topics', 'joint_states'], 'any node')):
         done = run_process([*PEDESTAL, 'replay', run.bag, *options, '--deadline', '1'], 60.0,
                            ROS_DOMAIN_ID=str(domain))
         assert done.returncode == 1 and done.stdout == ''
-        assert one_line(done.stderr) == (f'pedestal: error: no subscriber of joint_states after 1 s; waited for {who}; '
-                                         'present: no node')
+        assert one_line(done.stderr) == (f'pedestal: error: no subscriber of joint_states after 1 s; waited for '
+                                         f'{node}; present: no node')
 
 
 def test_a_reader_that_goes_ends_it(run, connect, start_process, one_line, domain):

@@ -109,8 +109,8 @@ REFUSED = {
     'duration': (['--duration', '0'], '--duration 0: must be above 0'),
     'deadline': (['--deadline', '-2'], '--deadline -2: must be above 0'),
     'node': (['--node', 'acuu'], "--node acuu: unknown node; did you mean 'acu'? must be one of ship_motion, ins,"),
-    'lockstep without a node': (['--lockstep'], '--lockstep: set --node to a node that answers the steps; must be one of'),
-    'lockstep with the INS': (['--lockstep', '--node', 'ins'], '--lockstep: ins does not answer steps at their stamps'),
+    'lockstep without a node': (['--lockstep'], '--lockstep: set --node to a node that answers the steps; must be'),
+    'lockstep with the INS': (['--lockstep', '--node', 'ins'], '--lockstep: ins does not answer steps at their stamp'),
     'paused for ever': (['--paused'], '--paused: standard input must be a terminal'),
     'past the end': (['--start', '7'], 'no message from 7 s on; the recording is 0.015 s long'),
 }

@@ -141,7 +141,7 @@ def test_a_topic_that_the_recording_could_not_have_is_not_there(recorded):
 def test_what_cannot_be_made_again_is_refused(tmp_path, recorded):
     with pytest.raises(bag.BagError, match='a_0.mcap: contains no configuration, so it cannot be rerun'):
         rerun.configured(write(tmp_path / 'a', rows()))
-    with pytest.raises(bag.BagError, match="recorded by a version with other parameters: acu: unknown parameter 'gone'"):
+    with pytest.raises(bag.BagError, match="by a version with other parameters: acu: unknown parameter 'gone'"):
         rerun.configured(recorded(scenario.load('leo_pass'), lambda values: values['acu'].update(gone=1.0)))
 
 
