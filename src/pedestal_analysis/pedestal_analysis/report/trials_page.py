@@ -70,7 +70,7 @@ def _varying(table, names):
 
 
 def histograms(trials):
-    """How the results are spread over the trials, two a row; the median dashed."""
+    """Return the figure of the histograms of the results, two in a row; dashed: the median."""
     shown = _varying(trials.table, [name for name in trials.table.there if nodes.plain(name) in HISTOGRAM_RESULTS])
     rows = max(1, -(-len(shown) // 2))
     figure, panels = new_panels(rows, 2, height=0.5 + 1.7 * rows, x='')

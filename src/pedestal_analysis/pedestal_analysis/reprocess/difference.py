@@ -163,7 +163,7 @@ def compare(topic, was: Output, now: Output, tolerance=Tolerance(), data=None, t
 
 
 def _order(was, now):
-    """Return texts on what is wrong with the recorded stamps (n,) [ns], compared with the expected stamps."""
+    """Return texts on the problems of the recorded stamps (n,) [ns], compared with the expected stamps."""
     problems = []
     if len(was) != len(now):
         problems.append(f'{len(was)} messages recorded, {len(now)} recomputed')

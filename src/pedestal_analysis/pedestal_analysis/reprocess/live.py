@@ -83,10 +83,10 @@ class Live:
         for node in (feeder, *feeder.readers):
             self.executor.add_node(node)
 
-    def until(self, condition, limit, what):
+    def until(self, condition, limit, missing):
         """Spin until condition() is true.
 
-        Raises RunError if the node dies, or after `limit` [s]; what() -> name of the missing message.
+        Raises RunError if the node dies, or after `limit` [s]; missing() -> name of the missing message.
         """
         deadline = time.monotonic() + limit
         while not condition():
@@ -94,7 +94,7 @@ class Live:
                 raise RunError(f'{self.feeder.node} exited with code {self.process.returncode}: '
                                f'{" ".join(self.log.read_text(errors="replace").split())}')
             if time.monotonic() > deadline:
-                raise RunError(f'{self.feeder.node}: no {what()} within {limit:g} s')
+                raise RunError(f'{self.feeder.node}: no {missing()} within {limit:g} s')
             self.executor.spin_once(timeout_sec=0.1)
 
     def send_command(self, command):

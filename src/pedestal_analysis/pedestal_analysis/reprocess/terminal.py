@@ -1,7 +1,10 @@
 """Keys of a terminal without waiting, and a status line.
 
-No library needs fewer lines. readchar waits for a key. blessed (22,000 lines with wcwidth) reads keys only if standard
-output is a terminal too. rich has no keys, and its status line needs a thread and wraps.
+No library needs fewer lines:
+
+readchar  waits for a key
+blessed   has 22,000 lines with wcwidth and reads keys only if standard output is a terminal too
+rich      has no keys, and its status line needs a thread and wraps
 """
 import os
 import re

@@ -123,7 +123,7 @@ class RecordedSource:
         return _mean(-log_density(innovation, sigma)[self.parts[0]])
 
     def score(self, params) -> Score:
-        """The Score of AcuParameters."""
+        """Return the Score of AcuParameters."""
         unit, steps = self._run(params)
         innovation, sigma, nis = self._innovations(steps)
         density = log_density(innovation, sigma)
@@ -142,7 +142,8 @@ class SimulatedSource:
     criterion_name, unit, kept = 'pointing error rms', 'deg', 'on the reserved seed'
 
     def __init__(self, load, seed, runs, any_mode):
-        """load(seed) -> Scenario; seed: None for that of the scenario; any_mode: True for any mode except standby."""
+        """Load the scenarios; load(seed) -> Scenario; seed: None for its own; any_mode: True for all modes except
+        standby."""
         chosen = load(seed)
         self.any_mode = any_mode
         self.of_beams = chosen.prefixes != ('',)
@@ -171,7 +172,7 @@ class SimulatedSource:
         return np.degrees(np.sqrt(_mean(self.runs(params, self.seeds)[1]['error']**2)))
 
     def score(self, params) -> Score:
-        """The Score of AcuParameters."""
+        """Return the Score of AcuParameters."""
         kept, truth = self.runs(params, self.kept_seeds)
         rms = np.degrees(np.sqrt(_mean(truth['error']**2)))
         difference = kept['acu/reference']['position'] - kept['joint_states']['position']
@@ -259,8 +260,8 @@ def main(options, command, progress):
     """
     is_bag = pathlib.Path(options.source).is_dir() or options.source.endswith('.mcap')
     axes = AXES if options.axis == 'both' else (options.axis,)
-    what = options.filter or 'feedforward'
-    file = options.output or pathlib.Path(f'{pathlib.Path(options.source).stem}-{what}.yaml')
+    target = options.filter or 'feedforward'
+    file = options.output or pathlib.Path(f'{pathlib.Path(options.source).stem}-{target}.yaml')
     _check(options, is_bag, file)
     progress(0.0, 'reading' if is_bag else 'compiling the laws (first time only)')
     if is_bag:
