@@ -50,7 +50,7 @@ def test_what_ships_tracks_within_a_twentieth_of_its_beam(name):
 
 @pytest.mark.parametrize('name', SHIPPED)
 def test_what_ships_is_made_by_the_commands_in_its_head(pedestal, tmp_path, name):
-    """`pedestal new`, then `tune --loops`: the same antenna, and the loops with the margins that are asked."""
+    """`pedestal new`, then `tune --loops`: the same antenna, and the loops with the required margins."""
     _, text = scenario.text(name)
     made, _, tuned, *_ = (line.removeprefix('# ') for line in text.splitlines())
     assert pedestal(*shlex.split(made.removeprefix('made by: '))[1:])[0] == 0
@@ -67,7 +67,7 @@ def test_what_ships_is_made_by_the_commands_in_its_head(pedestal, tmp_path, name
     (('--mirror', '400'), 'mirror = 400 m: must be 0.1 to 40'),
     (('--like', 'leo_pas'), "like = 'leo_pas': must be one of leo_pass, uav_flyby, ship_pass"),
     (('--motor-torque', '0.2'), 'adu.azimuth: motor_1.resistance = 128.706 ohm: must be 0.01 to 100'),
-    (('--motor-torque', '1', '--inertia-azimuth', '40000'), 'adu.azimuth: the motors cannot move it'),
+    (('--motor-torque', '1', '--inertia-azimuth', '40000'), 'adu.azimuth: the motors cannot move the axis'),
 ])
 def test_a_sheet_that_cannot_be_is_refused(pedestal, tmp_path, arguments, expected):
     code, output, errors = pedestal('new', 'my.yaml', *arguments)
