@@ -210,14 +210,14 @@ class Acu(Unit):
         """Time [ns] of the next command of its schedule, or of the next laying of tables."""
         return min(super().next_due, self._laid[1])
 
-    def obey_due(self, stamp):
+    def execute_due(self, stamp):
         """Obey what is due before the step of a stamp [ns], on the tables for it."""
         if self.epoch != self.predictor.epoch:
             self._predict_by(Predictor(self.predictor.parameters, self.epoch))
         since, until = self._laid
         if not since <= stamp < until:
             self.lay_tables(stamp)
-        super().obey_due(stamp)
+        super().execute_due(stamp)
 
     @property
     def now(self):
@@ -268,7 +268,7 @@ class Acu(Unit):
         """[(at [ns], Command)] of the parameter `commands`."""
         return schedule('commands', self.parameters.commands, ACU_COMMANDS)
 
-    def obey(self, command, arguments):
+    def execute(self, command, arguments):
         """The Reply to one of VERBS; a refusal names the reason and changes nothing."""
         verb, state = command.verb, self.parts['state']
         if verb in ALARM_COMMAND_NAMES:

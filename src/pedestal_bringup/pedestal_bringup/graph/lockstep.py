@@ -63,4 +63,4 @@ def failure(graph, stuck, unheard=None):
     else:
         reason = f'ended before the run did, with exit code {early[culprit]}'
     others = ''.join(f'\n  {node}: {lines[node][-1]}' for node in early if node != culprit and lines[node])
-    return RunError(graph.obituary(culprit, reason) + others)
+    return RunError(graph.exit_report(culprit, reason) + others)

@@ -55,7 +55,7 @@ class Operator(Shell):
             if name not in self._writers:
                 self._writers[name] = self.writer(name)
 
-    def refuse_company(self):
+    def check_domain_free(self):
         """Raise RunError when the nodes of another graph are on this domain: they would hear this one."""
         deadline = time.monotonic() + DISCOVERY_TIME_S
         while time.monotonic() < deadline:

@@ -71,13 +71,13 @@ class Graph:
         self.file = self.log / 'parameters.yaml'
         self.processes = {}
         self._log_starts = {}
-        with self._beside_the_bag():
+        with self._disk_errors_named():
             self.log.mkdir(parents=True, exist_ok=True)
             for left in (*self.log.glob('*.log'), *self.log.glob('*.state')):
                 left.unlink()
 
     @contextlib.contextmanager
-    def _beside_the_bag(self):
+    def _disk_errors_named(self):
         try:
             yield
         except OSError as error:
@@ -98,7 +98,7 @@ class Graph:
 
     def write(self, parameters):
         """The text of the ROS 2 parameter file with which every node starts."""
-        with self._beside_the_bag():
+        with self._disk_errors_named():
             self.file.write_text(parameters)
 
     def begin(self, parameters):
@@ -183,7 +183,7 @@ class Graph:
         """{node: exit code} of the processes that have ended."""
         return {node: process.returncode for node, process in self.processes.items() if process.poll() is not None}
 
-    def obituary(self, node, reason):
+    def exit_report(self, node, reason):
         """A text that says what became of a node, with the last lines of its log."""
         log = '\n'.join(f'  | {line}' for line in self.last_lines(node)) or '  | (it logged nothing)'
         return f'{node} {reason}; its last log lines ({self._log_of(node)}):\n{log}'

@@ -16,7 +16,7 @@ class Restarts:
         self._deaths = collections.defaultdict(collections.deque)
         self._due = {}
 
-    def died(self, node, now):
+    def note_death(self, node, now):
         """A node has died; which start within the window is its next, 0 where it has died too often."""
         deaths = self._deaths[node]
         while deaths and deaths[0] <= now - self.within:
@@ -45,7 +45,7 @@ class Losses:
         self.count = 0
         self._last, self._until = 0, -math.inf
 
-    def died(self, now):
+    def note_death(self, now):
         """Some node has died."""
         self._until = now + self.RECOVERY
 
@@ -72,7 +72,7 @@ class Silence:
         """A node was heard at the time now [s]."""
         self._latest[node] = now
 
-    def forget(self, node):
+    def remove(self, node):
         """A node has died: it is silent again only after it has been heard again."""
         self._latest.pop(node, None)
 

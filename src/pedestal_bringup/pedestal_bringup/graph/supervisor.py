@@ -73,12 +73,12 @@ class Supervisor:
         executor = SingleThreadedExecutor()
         executor.add_node(self._operator)
         self._operator.send(tracks)
-        while self._goes_on():
+        while self._is_running():
             executor.spin_once(timeout_sec=0.1)
             progress(min(max(time.time_ns() - self._start, 0), self._end - self._start) / NS_PER_SECOND)
             self.look(time.monotonic())
 
-    def _goes_on(self):
+    def _is_running(self):
         """Until the drive ends at the end of the run; where it is not there to do so, or does not, nobody waits."""
         now, drive_runs = time.time_ns(), self._graph.processes[nodes.DRIVE_NODE].poll() is None
         if now < self._end:
@@ -100,23 +100,23 @@ class Supervisor:
                 self._graph.kill(node)
         for node, code in self._graph.ended().items():
             if node not in self._dead and not self._is_nearly_over():
-                self._bury(node, code, now)
+                self._handle_exit(node, code, now)
         for node in self.restarts.due(now):
             self._dead.discard(node)
             self._graph.start(node)
 
-    def _bury(self, node, code, now):
+    def _handle_exit(self, node, code, now):
         """A node has died: it is started again, or the run is given up."""
         limits = self._limits
         reason = ('was silent and was killed' if node in self._called and code == -signal.SIGKILL
                   else exit_description(code))
         self._dead.add(node)
         self._called.discard(node)
-        self._silence.forget(node)
-        self.losses.died(now)
-        number = self.restarts.died(node, now)
+        self._silence.remove(node)
+        self.losses.note_death(now)
+        number = self.restarts.note_death(node, now)
         if not number:
-            raise RunError(self._graph.obituary(node, f'{reason}, after {limits.attempts} starts within '
+            raise RunError(self._graph.exit_report(node, f'{reason}, after {limits.attempts} starts within '
                                                 f'{limits.within:g} s'))
         report(f'{node} {reason}{self._graph.cause(node, code)}: starting it again, {number} of {limits.attempts} '
                f'within {limits.within:g} s')

@@ -21,7 +21,7 @@ def run(graph, tracks, progress):
         operator = Operator(graph.scenario.header.graph_beams, graph.scenario.nodes)
         try:
             with sole_run(operator.context.get_domain_id()):
-                operator.refuse_company()
+                operator.check_domain_free()
                 realtime = graph.scenario.header.pacing == 'realtime'
                 return (_in_realtime if realtime else _in_lockstep)(graph, operator, tracks, progress)
         finally:

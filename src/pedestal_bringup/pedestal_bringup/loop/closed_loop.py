@@ -156,16 +156,16 @@ class Loop:
         self.period_ns = round(period * NS_PER_SECOND)
         self.steps = round(scenario.header.duration / period) + 1
 
-    def attend(self, first, forecasts):
+    def before_step(self, first, forecasts):
         """Before step `first`: add to forecasts where a second begins, obey what the units' schedules say."""
         stamp = first * self.period_ns
         if stamp // NS_PER_SECOND > (stamp - self.period_ns) // NS_PER_SECOND:
             forecasts.append((stamp, announcement.numbers(self.units['acu'].parts['state']['guidance']['lookahead'])))
         for unit in self.units.values():
-            unit.obey_due(stamp)
+            unit.execute_due(stamp)
 
     def free_until(self, first):
-        """The step after `first` before which to `attend` again."""
+        """The step after `first` before which to `before_step` again."""
         due = min((first * self.period_ns // NS_PER_SECOND + 1) * NS_PER_SECOND,
                   *(unit.next_due for unit in self.units.values()))
         return min(-(-due // self.period_ns), self.steps)
@@ -179,7 +179,7 @@ class Loop:
         before, forecasts = records.empty(STEP_DTYPE, 1), []
         first = 0
         while first < self.steps:
-            self.attend(first, forecasts)
+            self.before_step(first, forecasts)
             last = min(first + (watch(first) if watch else MAX_BLOCK_STEPS), first + MAX_BLOCK_STEPS,
                        self.free_until(first))
             part = slice(first, last)

@@ -150,7 +150,7 @@ def runs(loops, names, kept=None):
     first = 0
     while first < count:
         for loop, told in zip(loops, forecasts):
-            loop.attend(first, told)
+            loop.before_step(first, told)
         last = min(first + MAX_STEPS_PER_CALL, *(loop.free_until(first) for loop in loops))
         blocks = [unit.block(last - first) for unit in receivers]
         tables, ends = zip(*map(_joined_tracks, zip(*(unit.memory.tables for unit in acus))))

@@ -26,7 +26,7 @@ class Plan:
     def _parameters(self, prefix):
         return self.scenario.node_parameters(prefix + 'tracking_receiver').target
 
-    def _believed(self, prefix):
+    def _nominal_target(self, prefix):
         """The target of a beam as the operator knows it, who does not know UT1."""
         true = self._parameters(prefix)
         believed = dataclasses.replace(true, leo_pass=dataclasses.replace(true.leo_pass, ut1_offset=0.0))
@@ -47,7 +47,7 @@ class Plan:
         times = nanoseconds // 1e9 + nanoseconds % 1e9 * 1e-9
         tables = {}
         for prefix in self.scenario.prefixes:
-            built = self._believed(prefix)
+            built = self._nominal_target(prefix)
             known = np.clip(times - program.time_offset, built.breaks[0], built.breaks[-1])
             azimuth, elevation, _ = target.look_angles(built, known)
             if program.refractivity > 0.0:

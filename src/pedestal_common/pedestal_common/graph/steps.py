@@ -78,7 +78,7 @@ class Steps:
             while awaited and awaited[0] <= stamp - self._latency[name]:
                 self._due[name] = awaited.popleft()
 
-    def begin_anew(self, topic):
+    def reset_after_gap(self, topic):
         """Realtime: the next message of this topic does not continue those before; of the trigger, no message does."""
         for name in (topic,) if topic != self.trigger else self._last:
             self._last[name] = None
@@ -109,7 +109,7 @@ class Steps:
                              f'is its latency what this node was told ({self._latency[topic] / NS_PER_SECOND:.6f} s)?')
         return arrived[0][0] >= due
 
-    def give_up(self):
+    def answer_incomplete(self):
         """Realtime: answer the step that waits, if one does, without what has not come."""
         if self._pending is not None:
             self._close()

@@ -14,7 +14,7 @@ class Simulated(Unit):
         """[(at [ns], Command)] of the parameter `inject`."""
         return table.due(self.NODE.name, self.parameters.inject)
 
-    def obey(self, command, arguments):
+    def execute(self, command, arguments):
         """Inject a fault, from the next step on; the Reply names the stamp of the step before."""
         part, node = self.parts['schedule'], self.NODE.name
         since = '' if part['stamp'] == NO_STAMP else f' from the step after {part["stamp"] / NS_PER_SECOND:.6f} s on'

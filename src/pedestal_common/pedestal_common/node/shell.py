@@ -225,7 +225,7 @@ class Shell(Node):
             self.listeners.append(listener)
             listener.open(lambda: subscribe(self, link, ros_name, self._guarded(listener.callback), 'read'))
 
-    def writers_of(self, ros_name):
+    def publishers_of(self, ros_name):
         """Names of the nodes that write a topic now."""
         return [node_of(info, self._root) for info in self.get_publishers_info_by_topic(ros_name)]
 

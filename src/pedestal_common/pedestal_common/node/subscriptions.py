@@ -78,11 +78,11 @@ class TopicSubscriber:
         self._expected = any(writer in node.graph.members for writer in link.writers)
         text = link.rate in topics.EVENT_RATES and self._expected
         self.intake = publisher_gate.PublisherGate(decode, round(node.graph.future * 1e9), None if everybodys
-                                                   else self._count,
+                                                   else self._unexpected_count,
                                                    paced=not text, oldest=MAX_COMMAND_AGE_NS
                                                    if link.rate == 'command' else None)
         self._held, self._missed = collections.deque(maxlen=MAX_HELD_TEXTS), 0
-        self.callback = self._hold if text else self._hear
+        self.callback = self._hold if text else self._receive
         if text:
             node.every(DISCOVERY_POLL_S, self._look)
 
@@ -99,18 +99,18 @@ class TopicSubscriber:
         """Hear the texts that wait, once every writer has a name. What was said beside a stranger is not taken; once
         it has gone a subscription anew brings the last text again."""
         while self._held and (not self._undiscovered() or self._node.clock()[0] - self._held[0][0] > MAX_DISCOVERY_NS):
-            self._hear(*self._held.popleft()[1:])
+            self._receive(*self._held.popleft()[1:])
         missed = self.intake.dropped[publisher_gate.DROP_OTHER_PUBLISHER]
-        if missed > self._missed and not self.strangers():
+        if missed > self._missed and not self.unexpected_publishers():
             self._missed = missed
             for subscription in self._subscriptions:
                 self._node.destroy_subscription(subscription)
             self._subscriptions = self._subscribe()
 
     def _undiscovered(self):
-        return any(UNDISCOVERED_NODE_NAME in name for name in self._node.writers_of(self._ros_name))
+        return any(UNDISCOVERED_NODE_NAME in name for name in self._node.publishers_of(self._ros_name))
 
-    def _hear(self, data, info):
+    def _receive(self, data, info):
         taker = self.intake
         now, utc = self._node.clock()
         message = taker.take(data, info['publication_sequence_number'], info['source_timestamp'], now, utc)
@@ -119,16 +119,16 @@ class TopicSubscriber:
         elif taker.reason in publisher_gate.WARNING_DROP_REASONS:
             self._node.diagnose_now()
 
-    def strangers(self):
+    def unexpected_publishers(self):
         """Names of the nodes that write this topic and should not; none in a graph without those that should."""
         if not self._expected:
             return []
-        return [name for name in self._node.writers_of(self._ros_name)
+        return [name for name in self._node.publishers_of(self._ros_name)
                 if name not in self.link.writers and name != nodes.REPLAY_NODE]
 
-    def _count(self):
+    def _unexpected_count(self):
         """As Intake wants it. Who is not discovered yet may be a stranger."""
-        return len(self.strangers()) if self._expected else None
+        return len(self.unexpected_publishers()) if self._expected else None
 
     def finding(self, now):
         """(level, text) of what was dropped lately; None where nothing was."""
@@ -138,7 +138,7 @@ class TopicSubscriber:
         reason, count = taker.reason, taker.dropped[taker.reason]
         if reason not in publisher_gate.WARNING_DROP_REASONS:
             return LEVEL_WARN, f'{self.link.name}: {count} dropped: {reason}: {taker.detail}'
-        who = ', '.join(self.strangers() if self._expected else self._node.writers_of(self._ros_name)) or 'it has gone'
+        who = ', '.join(self.unexpected_publishers() if self._expected else self._node.publishers_of(self._ros_name)) or 'it has gone'
         return LEVEL_ERROR, f'{self.link.name}: {count} dropped: {reason}: {who}'
 
     def values(self):

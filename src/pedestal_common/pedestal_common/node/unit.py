@@ -89,7 +89,7 @@ class Unit(typing.Protocol):
         values = as_dict(parameters)
         self.writes = tuple(name for name in self.NODE.writes if values.get(topics.TOPIC_BY_NAME[name].measured, True))
         self.messages = {name: messages.template(name) for name in self.writes if not records.is_text(name)}
-        self.answered = collections.deque(maxlen=1000)
+        self.pending_replies = collections.deque(maxlen=1000)
         self._due = collections.deque(self.schedule())
 
     @classmethod
@@ -132,7 +132,7 @@ class Unit(typing.Protocol):
         _, law_of_many = self.LAWS[type(self.memory)]
         first = 0
         while first < len(stamps):
-            self.obey_due(stamps[first])
+            self.execute_due(stamps[first])
             last = min(first + MAX_BLOCK_STEPS, len(stamps), int(np.searchsorted(stamps, self.next_due)))
             part = slice(first, last)
             law_of_many(self.block(last - first), stamps[part], inputs[part], outputs[part])
@@ -147,7 +147,7 @@ class Unit(typing.Protocol):
         """Time [ns] of the next command of its schedule."""
         return self._due[0][0] if self._due else NEVER_DUE_NS
 
-    def obey_due(self, stamp):
+    def execute_due(self, stamp):
         """Obey what its schedule says for the step of a stamp [ns] and before. A unit that begins later than its
         schedule leaves out what it has missed."""
         while self._due and self._due[0][0] <= stamp:
@@ -163,16 +163,16 @@ class Unit(typing.Protocol):
             if command.verb in self.REQUESTS:
                 reply = self.request(command.verb)
             else:
-                reply = self.obey(command, commands.values(self.VERBS, command))
+                reply = self.execute(command, commands.values(self.VERBS, command))
         except ValueError as error:
             reply = Reply(False, f'refused: {error}')
-        self.answered.append((command, reply))
+        self.pending_replies.append((command, reply))
         return reply
 
     def admit(self, command):
         """Raise ValueError where a Command is not to be heard; overridden by a unit that knows who is in control."""
 
-    def obey(self, command, arguments) -> Reply:
+    def execute(self, command, arguments) -> Reply:
         """Obey a Command of VERBS with its arguments {name: number or text}; overridden where there are verbs. Raises
         ValueError where it cannot be."""
         raise KeyError(command.verb)

@@ -52,7 +52,7 @@ class Port:
         self.stamps[0] = stamp - self._epoch
         self.unit.step(self.stamps, self.unit.inputs, self.unit.outputs)
 
-    def begin_anew(self):
+    def reset_after_gap(self):
         """Forget what the unit knows of the steps so far, not what it was told once."""
         self.unit.memory.record[...] = self._initial
         self.unit.configure(self.unit.parameters)
@@ -65,8 +65,8 @@ class Port:
 
     def reply(self):
         """Tell what came of what was asked."""
-        while self.unit.answered:
-            answer = commands.reply_message(*self.unit.answered.popleft())
+        while self.unit.pending_replies:
+            answer = commands.reply_message(*self.unit.pending_replies.popleft())
             if self._reply:
                 self._announce(self._reply, answer)
 
@@ -220,10 +220,10 @@ class UnitNode(shell.Shell):
 
         def take(message, anew):
             if anew:
-                steps.begin_anew(name)
+                steps.reset_after_gap(name)
                 if name == steps.trigger and message[0] <= self._stamp:
                     for port in self.ports:
-                        port.begin_anew()
+                        port.reset_after_gap()
             steps.take(name, message[0], message)
         return take
 
@@ -245,9 +245,9 @@ class UnitNode(shell.Shell):
         self.begin_step(stamp)
         for port in self.ports:
             port.publish()
-        self.look_after()
+        self.after_step()
 
-    def look_after(self):
+    def after_step(self):
         """Realtime, after a step: tell what has become wrong, call for what a unit wants of others."""
         if self.graph.lockstep:
             return
@@ -273,7 +273,7 @@ class UnitNode(shell.Shell):
             # Its trigger was the last one. Left until the others are back it would be a step of before the silence
             # that meets what they say after it.
             answered = self._answered
-            self.steps.give_up()
+            self.steps.answer_incomplete()
             self._answered = answered
         if silent != self.unit.silent:
             for port in self.ports:

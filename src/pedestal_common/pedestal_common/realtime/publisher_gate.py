@@ -67,7 +67,7 @@ class PublisherGate:
         if not self._paced:
             if self._strangers():
                 return self._drop(DROP_OTHER_PUBLISHER, '', now)
-        elif self._strangers and not self._of_charge(self.writers.of(number, source, now), now):
+        elif self._strangers and not self._is_active(self.writers.of(number, source, now), now):
             return None
         if self._oldest is not None and utc - source > self._oldest:
             return self._drop(DROP_STALE, f'{(utc - source) * 1e-9:.3f} s on its way', now)
@@ -80,14 +80,14 @@ class PublisherGate:
         self._note_offset(utc - source)
         return message
 
-    def _of_charge(self, stream, now):
+    def _is_active(self, stream, now):
         """Whether the writer of a message, which may be unclear, is in charge."""
         if stream is not None and stream is self.in_charge and self._may_be_another(stream, now):
             self.in_charge = None
         if stream is None:
             self._drop(DROP_UNCLEAR_PUBLISHER, '', now)
         elif stream is self.in_charge:
-            for other in self._speaking_beside(stream, now):
+            for other in self._other_active(stream, now):
                 other.known = True
             self._obeyed = now
             return True
@@ -104,7 +104,7 @@ class PublisherGate:
         """Whether the writer in charge, silent until now, left out numbers and the graph shows a stranger that was not
         heard yet: this node was held up perhaps, and what comes first is the stranger's."""
         return (now - self._obeyed >= SILENCE_LIMIT_NS and stream.skipped[1] == stream.last
-                and (self._strangers() or 0) > sum(other.known for other in self._speaking_beside(stream, now)))
+                and (self._strangers() or 0) > sum(other.known for other in self._other_active(stream, now)))
 
     def _may_take_over(self, stream, now):
         """Whether a writer that is not in charge is from now on."""
@@ -117,7 +117,7 @@ class PublisherGate:
         if stream.looked is not None and now - stream.looked < PUBLISHER_POLL_NS:
             return False
         stream.looked = now
-        strangers, speaking = self._strangers(), self._speaking_beside(stream, now)
+        strangers, speaking = self._strangers(), self._other_active(stream, now)
         if stream.known:
             free = (not strangers and not speaking and silent >= (UNCONFIRMED_TAKEOVER_NS if strangers is None
                                                                   else CONFIRMED_TAKEOVER_NS))
@@ -126,7 +126,7 @@ class PublisherGate:
         stream.known = stream.known and not free
         return free
 
-    def _speaking_beside(self, stream, now):
+    def _other_active(self, stream, now):
         """The other streams that speak."""
         return [other for other in self.writers.streams if other is not stream and now
                 - other.arrival < SILENCE_LIMIT_NS]

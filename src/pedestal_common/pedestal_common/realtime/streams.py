@@ -140,9 +140,9 @@ class Streams:
             near = [other for other in speaking
                     if other is not stream and other not in close and other.near(stream)]
             if close or near:
-                stream = self._confuse(stream, close + near if close else [stream, *near], now)
+                stream = self._mark_unclear(stream, close + near if close else [stream, *near], now)
         if stream.unclear:
-            self._tell_apart(now)
+            self._resolve_unclear(now)
         return None if stream.unclear else stream
 
     def several(self, now):
@@ -164,14 +164,14 @@ class Streams:
         self.streams.append(stream)
         return stream
 
-    def _confuse(self, latest, streams, now):
+    def _mark_unclear(self, latest, streams, now):
         """Note that these streams are not told apart. What the latest has said just now begins a new one."""
         self._close += tuple(stream for stream in streams if not stream.unclear)
         self._parted = min(stream.last for stream in streams), now
         self.streams = [stream for stream in self.streams if stream is not latest and stream not in streams]
         return self._begun(latest.last, latest.source, now)
 
-    def _tell_apart(self, now):
+    def _resolve_unclear(self, now):
         """Streams that were close, once two have parted and are known by their pace, or one of them has gone."""
         for stream in self._close:
             stream.arrival = now
