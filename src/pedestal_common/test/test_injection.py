@@ -33,7 +33,7 @@ def test_every_node_of_the_table_hears_and_tells_of_its_faults():
 
 
 @pytest.mark.parametrize(('text', 'said'), (
-    ('12 encodr_jump', "unknown verb 'encodr_jump'; did you mean 'encoder_jump'?"),
+    ('12 encodr_jump', "unknown command 'encodr_jump'; did you mean 'encoder_jump'?"),
     ('12 encoder_jump size=4', 'encoder_jump: size = 4 rad: must be -3.2 to 3.2'),
     ('12 encoder_jump axis=z', 'encoder_jump: axis = z: must be one of azimuth, elevation'),
     ('12 encoder_jump length=4', "encoder_jump: unknown argument 'length'; there are axis, size, duration"),

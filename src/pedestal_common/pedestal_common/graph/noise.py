@@ -5,5 +5,5 @@ from pedestal_common.graph import nodes
 
 
 def generator(seed, node) -> np.random.Generator:
-    """The stream of a node (a name of nodes.NODES) for a run's seed."""
+    """Return the stream of a node (a name of nodes.NODES) for a run's seed."""
     return np.random.default_rng((seed, nodes.NODE_NAMES.index(node)))

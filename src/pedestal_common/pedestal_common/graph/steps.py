@@ -1,15 +1,15 @@
-"""Step matching: which messages belong to step t_k. No ROS here: a recorded run is matched as its nodes were."""
+"""Step matching: the messages that belong to step t_k. No ROS here: a recorded run is matched as in its nodes."""
 import collections
 
 NS_PER_SECOND = 1_000_000_000
-"""[ns]"""
+"""Nanoseconds in a second [ns]."""
+
 SECONDS_PER_DAY = 86_400
-"""[s]"""
+"""Seconds in a day [s]."""
 
 
 class GraphError(RuntimeError):
-    """The graph around a node is not what it must be; one line that names topic, stamp or node. silent: the nodes that
-    were waited for."""
+    """Defect of the graph around a node; one line that names topic, stamp or node. silent: the silent nodes."""
 
     def __init__(self, message, silent=()):
         super().__init__(message)
@@ -20,14 +20,14 @@ class GraphError(RuntimeError):
 
 
 class Steps:
-    """Brings a node's inputs together: the trigger stamped t_k and, of each follower, the message due at t_k.
+    """Matcher of a node's inputs: the trigger stamped t_k and, of each follower, the message due at t_k.
 
-    followers: {topic: latency in ns}; due is the newest trigger stamp <= t_k - latency (none at the start).
-    Lockstep waits for exactly that message; triggers that come meanwhile wait their turn, for who makes them may be
-    ahead by as much as others look back. Realtime answers t_k at the latest when the trigger of the next step arrives,
-    with whatever newest message is there and None for a follower that sent nothing new; prompt: at once. It waits for
-    none of the followers that are `held`.
-    `answer(stamp_ns, trigger_message, {topic: message or None})` is called once per step, in order.
+    followers: {topic: latency in ns}; the message due has the newest trigger stamp <= t_k - latency (none at the
+    start). In lockstep a step waits for exactly that message. Triggers that arrive meanwhile are queued, because their
+    publisher may run ahead by as much as other latencies reach back. In realtime the step t_k is answered at the
+    latest when the trigger of the next step arrives, with the newest messages, and None for a follower without a new
+    message; prompt: at once. A realtime step waits for none of the followers that are `held`. `answer(stamp_ns,
+    trigger_message, {topic: message or None})` is called once per step, in order.
     """
 
     def __init__(self, trigger, followers, lockstep, answer, prompt=False, held=frozenset()):
@@ -46,7 +46,7 @@ class Steps:
         self.refusal = ''
 
     def take(self, topic, stamp, message):
-        """One input has come; stamp in ns. Raises GraphError in lockstep when the stamp is not the next one."""
+        """Take one input; stamp in ns. Raises GraphError in lockstep when the stamp is not the next one."""
         last = self._last[topic]
         if last is not None and stamp <= last:
             self._refuse(f'{topic} stamp went back from {last / NS_PER_SECOND:.6f} to {stamp / NS_PER_SECOND:.6f} s')
@@ -55,8 +55,9 @@ class Steps:
         if topic == self.trigger:
             if self._lockstep and last is not None:
                 if self._period is not None and stamp - last != self._period:
-                    raise GraphError(f'{topic} stamp jumped from {last / NS_PER_SECOND:.6f} to {stamp / NS_PER_SECOND:.6f} s; '
-                                     f'the period is {self._period / NS_PER_SECOND:.6f} s')
+                    raise GraphError(f'{topic} stamp jumped from {last / NS_PER_SECOND:.6f} to '
+                                     f'{stamp / NS_PER_SECOND:.6f} s; the period is '
+                                     f'{self._period / NS_PER_SECOND:.6f} s')
                 self._period = stamp - last
             self._ahead.append((stamp, message))
             if self._pending is not None and not self._lockstep:
@@ -79,7 +80,8 @@ class Steps:
                 self._due[name] = awaited.popleft()
 
     def reset_after_gap(self, topic):
-        """Realtime: the next message of this topic does not continue those before; of the trigger, no message does."""
+        """Realtime: reset the state of a topic whose next message does not continue the earlier ones, with the trigger
+        that of all topics."""
         for name in (topic,) if topic != self.trigger else self._last:
             self._last[name] = None
             for queue in (self._awaited, self._arrived):
@@ -105,12 +107,13 @@ class Steps:
         if not arrived:
             return False
         if self._lockstep and arrived[0][0] != due:
-            raise GraphError(f'{topic} is stamped {arrived[0][0] / NS_PER_SECOND:.6f} s where {due / NS_PER_SECOND:.6f} s is due; '
-                             f'is its latency what this node was told ({self._latency[topic] / NS_PER_SECOND:.6f} s)?')
+            raise GraphError(f'{topic} is stamped {arrived[0][0] / NS_PER_SECOND:.6f} s where '
+                             f'{due / NS_PER_SECOND:.6f} s is due; is its latency the one of this node '
+                             f'({self._latency[topic] / NS_PER_SECOND:.6f} s)?')
         return arrived[0][0] >= due
 
     def answer_incomplete(self):
-        """Realtime: answer the step that waits, if one does, without what has not come."""
+        """Realtime: answer the pending step, if there is one, without its missing inputs."""
         if self._pending is not None:
             self._close()
 
@@ -135,5 +138,5 @@ class Steps:
 
     @property
     def waiting_for(self):
-        """Topics the pending step still waits for."""
+        """Topics that the pending step still waits for."""
         return [topic for topic in self._due if self._pending is not None and not self._ready(topic)]
