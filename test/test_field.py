@@ -248,14 +248,14 @@ def test_the_other_nodes_may_be_killed_too(moving):
 
 @pytest.mark.parametrize('node', ['acu', 'adu'])
 def test_after_a_freeze_the_axes_do_not_jump(moving, node):
-    """And the node says that it was held up."""
+    """And the node reports its stall."""
     moving.until(lambda: moving.mode in ('program', 'autotrack') and moving.state == 'enabled')
     moving.wait(0.5)
     moving.station.signal(node, signal.SIGSTOP)
     time.sleep(2.5)
     count = len(moving.heard['joint_states'])
     moving.station.signal(node, signal.SIGCONT)
-    moving.status(node, 'was held up for')
+    moving.status(node, 'stalled for')
     moving.fresh('acu/rate_command')
     moving.wait(1.0)
     rates = np.array([message.velocity for message in moving.heard['joint_states'][count:]])
