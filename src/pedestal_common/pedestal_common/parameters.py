@@ -1,6 +1,6 @@
 """Parameters as frozen dataclasses: one declaration gives default, unit, range and description.
 
-The ROS side (declare, refuse, read) is in shell.py; this file knows no ROS.
+The ROS side (declare, refuse, read) is in shell.py. No ROS here.
 """
 import dataclasses
 import difflib
@@ -13,33 +13,33 @@ import numpy as np
 
 
 class ParameterError(ValueError):
-    """A parameter is unknown or outside its range; the message names it, its value and what is allowed."""
+    """Unknown parameter, or value outside its range; the message gives its name, its value and the allowed range."""
 
 
 def parameter(default, low, high, unit, doc, grid=None):
-    """A number (float or int, as annotated) between low and high inclusive. grid: (lowest, highest, points), even in
-    its logarithm, on which a search for its best value begins; None: it is not searched for."""
+    """Declare a number (float or int, as annotated) between low and high inclusive. grid: (lowest, highest, points),
+    spaced evenly in the logarithm, at which a search for its best value begins; None: no search."""
     return dataclasses.field(default=default, metadata={'low': low, 'high': high, 'unit': unit, 'doc': doc,
                                                         'grid': grid})
 
 
 def choice(default, options, doc):
-    """A string out of options."""
+    """Declare a string out of options."""
     return dataclasses.field(default=default, metadata={'options': tuple(options), 'doc': doc})
 
 
 def flag(default, doc):
-    """A bool."""
+    """Declare a bool."""
     return dataclasses.field(default=default, metadata={'doc': doc})
 
 
 def text(default, doc):
-    """A string that only its reader can judge (a file, a TLE line)."""
+    """Declare a string that only the code that uses it can check (a file, a TLE line)."""
     return dataclasses.field(default=default, metadata={'doc': doc})
 
 
 def group(cls, **changes):
-    """A nested dataclass, its defaults changed where named."""
+    """Declare a nested dataclass, with some of its defaults changed."""
     return dataclasses.field(default_factory=lambda: cls(**changes), metadata={'group': True})
 
 
@@ -47,7 +47,7 @@ def group(cls, **changes):
 class Parameters:
     """Base of every parameter dataclass; checks each field's range when it is made.
 
-    A subclass adds its cross-checks in `check`, raising ParameterError.
+    A subclass adds its checks between fields in `check`, which raises ParameterError.
     """
 
     def __post_init__(self):
@@ -56,11 +56,11 @@ class Parameters:
         self.check()
 
     def check(self):
-        """Cross-checks between fields; overridden where two fields limit each other."""
+        """Check fields that limit each other; overridden where there are any."""
 
     def check_graph(self, beams, lockstep):
-        """Overridden where parameters must fit the graph; beams as in nodes.links, lockstep: its pacing. Raises
-        ParameterError."""
+        """Raise ParameterError where parameters do not fit the graph; overridden where there are such parameters.
+        beams: as in nodes.links; lockstep: its pacing."""
 
 
 def _check_field(field, value):
@@ -82,12 +82,12 @@ def _check_field(field, value):
 
 @functools.cache
 def _group_type(field):
-    """The dataclass of a group."""
+    """Return the dataclass of a group."""
     return type(field.default_factory())
 
 
 def flatten(cls, prefix=''):
-    """Every leaf of a parameter dataclass as (dotted name, field); groups are walked."""
+    """Yield (dotted name, field) of every leaf of a parameter dataclass, with the fields of its groups."""
     for field in dataclasses.fields(cls):
         name = prefix + field.name
         if field.metadata.get('group'):
@@ -98,36 +98,36 @@ def flatten(cls, prefix=''):
 
 @functools.cache
 def _default(cls):
-    """An instance of a parameter dataclass with every default."""
+    """Return an instance of a parameter dataclass with every default."""
     return cls()
 
 
 def defaults(cls):
-    """{dotted name: default} of a parameter dataclass, a group's own defaults included."""
+    """Return {dotted name: default} of a parameter dataclass, with the changed defaults of its groups."""
     return as_dict(_default(cls))
 
 
 @functools.cache
 def _readers(cls):
-    """[(dotted name, function that reads it from an instance)] of every leaf of a parameter dataclass."""
+    """Return [(dotted name, function that reads it from an instance)] of every leaf of a parameter dataclass."""
     return [(name, operator.attrgetter(name)) for name, _ in flatten(cls)]
 
 
 def as_dict(instance, prefix=''):
-    """{dotted name: value} of an instance."""
+    """Return {dotted name: value} of an instance."""
     return {prefix + name: read(instance) for name, read in _readers(type(instance))}
 
 
 def did_you_mean(name, known):
-    """' did you mean ...?' with the known name most like one that is not known; '' where none is."""
+    """Return ' did you mean ...?' with the known name most like an unknown name; '' without a similar name."""
     near = difflib.get_close_matches(name, known, n=1)
     return f' did you mean {near[0]!r}?' if near else ''
 
 
 def build(cls, values, prefix=''):
-    """An instance from {dotted name: value}, every name beginning with `prefix`; names left out keep their default.
+    """Return an instance of {dotted name: value}, every name beginning with `prefix`; other fields keep their default.
 
-    Raises ParameterError for an unknown name (with the nearest known one) or a refused value.
+    Raises ParameterError for an unknown name (with the nearest known name) or a refused value.
     """
     known = [name for name, _ in flatten(cls, prefix)]
     for name in values:
@@ -138,7 +138,7 @@ def build(cls, values, prefix=''):
 
 
 def _number(value):
-    """An int, or text such as 2e-3 that YAML 1.1 does not take for a number, as a float; anything else as it is."""
+    """Return an int, or a text such as 2e-3 that is no number in YAML 1.1, as a float; any other value unchanged."""
     try:
         return float(value)
     except (TypeError, ValueError):
@@ -164,8 +164,8 @@ def _replace(instance, values, prefix):
 
 @functools.cache
 def record_type(cls) -> np.dtype:
-    """The numpy record of a parameter dataclass: float -> f8, int and bool -> i8, a choice -> i8 (its
-    index among the options), a group -> nested record; free text is left out."""
+    """Return the numpy record of a parameter dataclass: float -> f8, int and bool -> i8, a choice -> i8 (its index
+    among the options), a group -> nested record; other texts are left out."""
     fields = []
     hints = typing.get_type_hints(cls)
     for field in dataclasses.fields(cls):
@@ -192,7 +192,7 @@ def _record_values(instance, cls):
 
 
 def record(instance, cls=None) -> np.ndarray:
-    """An instance as a record array of shape (1,): the form the compiled steps take. cls: only the fields of this
+    """Return an instance as a record array of shape (1,), the form of the compiled steps. cls: only the fields of this
     base class, where the instance has more."""
     cls = cls or type(instance)
     return np.array([_record_values(instance, cls)], record_type(cls))

@@ -79,7 +79,7 @@ class TopicSubscriber:
         is_shared = len(link.writers) > 1 or link.rate in ('once', 'command')
         self._expected = any(writer in node.graph.members for writer in link.writers)
         text = link.rate in topics.EVENT_RATES and self._expected
-        self.intake = publisher_gate.PublisherGate(
+        self.gate = publisher_gate.PublisherGate(
             decode, round(node.graph.future * 1e9), None if is_shared else self._unexpected_count, paced=not text,
             oldest=MAX_COMMAND_AGE_NS if link.rate == 'command' else None)
         self._held, self._missed = collections.deque(maxlen=MAX_HELD_TEXTS), 0
@@ -101,7 +101,7 @@ class TopicSubscriber:
         present is dropped. After that publisher has left, a new subscription brings the last text again."""
         while self._held and (not self._undiscovered() or self._node.clock()[0] - self._held[0][0] > MAX_DISCOVERY_NS):
             self._receive(*self._held.popleft()[1:])
-        missed = self.intake.dropped[publisher_gate.DROP_OTHER_PUBLISHER]
+        missed = self.gate.dropped[publisher_gate.DROP_OTHER_PUBLISHER]
         if missed > self._missed and not self.unexpected_publishers():
             self._missed = missed
             for subscription in self._subscriptions:
@@ -112,12 +112,12 @@ class TopicSubscriber:
         return any(UNDISCOVERED_NODE_NAME in name for name in self._node.publishers_of(self._ros_name))
 
     def _receive(self, data, info):
-        taker = self.intake
+        gate = self.gate
         now, utc = self._node.clock()
-        message = taker.take(data, info['publication_sequence_number'], info['source_timestamp'], now, utc)
+        message = gate.take(data, info['publication_sequence_number'], info['source_timestamp'], now, utc)
         if message is not None:
-            self._take(message, taker.anew)
-        elif taker.reason in publisher_gate.WARNING_DROP_REASONS:
+            self._take(message, gate.after_gap)
+        elif gate.reason in publisher_gate.WARNING_DROP_REASONS:
             self._node.diagnose_now()
 
     def unexpected_publishers(self):
@@ -135,12 +135,12 @@ class TopicSubscriber:
 
     def finding(self, now):
         """Return (level, text) of the messages dropped lately; None without any."""
-        taker = self.intake
-        if taker.dropped_at is None or now - taker.dropped_at > DROP_REPORT_NS:
+        gate = self.gate
+        if gate.dropped_at is None or now - gate.dropped_at > DROP_REPORT_NS:
             return None
-        reason, count = taker.reason, taker.dropped[taker.reason]
+        reason, count = gate.reason, gate.dropped[gate.reason]
         if reason not in publisher_gate.WARNING_DROP_REASONS:
-            return LEVEL_WARN, f'{self.link.name}: {count} dropped: {reason}: {taker.detail}'
+            return LEVEL_WARN, f'{self.link.name}: {count} dropped: {reason}: {gate.detail}'
         names = self.unexpected_publishers() if self._expected else self._node.publishers_of(self._ros_name)
         who = ', '.join(names) or 'it has left'
         return LEVEL_ERROR, f'{self.link.name}: {count} dropped: {reason}: {who}'
@@ -148,8 +148,8 @@ class TopicSubscriber:
     def values(self):
         """Return [(key, text)] for the diagnostics: the number of dropped messages, the smallest time from sending to
         reception."""
-        taker = self.intake
-        values = [(f'dropped {self.link.name}: {reason}', str(count)) for reason, count in taker.dropped.items()]
-        if taker.offset is not None:
-            values.append((f'offset {self.link.name}_ms', f'{taker.offset * 1e-6:.3f}'))
+        gate = self.gate
+        values = [(f'dropped {self.link.name}: {reason}', str(count)) for reason, count in gate.dropped.items()]
+        if gate.offset is not None:
+            values.append((f'offset {self.link.name}_ms', f'{gate.offset * 1e-6:.3f}'))
         return values

@@ -221,8 +221,8 @@ class UnitNode(shell.Shell):
     def _step_taker(self, name):
         steps = self.steps
 
-        def take(message, anew):
-            if anew:
+        def take(message, after_gap):
+            if after_gap:
                 steps.reset_after_gap(name)
                 if name == steps.trigger and message[0] <= self._stamp:
                     for port in self.ports:
