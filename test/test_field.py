@@ -163,7 +163,7 @@ def test_a_second_writer_of_the_command_moves_nothing_and_is_named(standing, con
 
     def said():
         return [status.level for array in standing.heard['diagnostics'][first:] for status in array.status
-                if status.name == 'adu' and 'another writer: stranger' in status.message]
+                if status.name == 'adu' and 'another publisher: stranger' in status.message]
     stranger_writes(standing, connect, 'acu/rate_command', time.time_ns, 1.5, said, velocity=(0.5, 0.5))
     assert set(said()) == {2}
     np.testing.assert_allclose(standing.joints.position, before, atol=1e-4)

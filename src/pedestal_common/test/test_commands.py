@@ -37,7 +37,7 @@ def test_a_reply_without_its_verdict_is_refused():
     ({f'a{i}': '1' for i in range(21)}, '21 arguments: must be at most 20'),
     ({'azimuth': 'x' * 201}, 'a text of 201 characters'),
     ({'azimuth': 'one\ntwo'}, 'all of them printable'),
-    ({'granted': 'true'}, 'none be called granted')))
+    ({'granted': 'true'}, 'none may be named granted')))
 def test_what_is_no_command_is_refused(arguments, said):
     with pytest.raises(ValueError, match=said):
         commands.of_message(commands.message(ASKED._replace(arguments=arguments)))

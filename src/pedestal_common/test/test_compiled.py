@@ -237,7 +237,7 @@ class Unit:
         while True:
             law(2.0)
 
-for number in shell.STOPS:
+for number in shell.STOP_SIGNALS:
     signal.signal(number, shell._on_signal)
 try:
     shell.Shell.prepare(None, Unit())

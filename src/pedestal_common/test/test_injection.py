@@ -46,7 +46,7 @@ def test_a_wrong_text_is_refused_with_name_value_and_range(text, said):
 
 
 def test_where_a_message_stays_away_lockstep_is_refused():
-    with pytest.raises(ParameterError, match='drop of ins: its attitude does not come; in lockstep everybody'):
+    with pytest.raises(ParameterError, match='drop of ins: the INS publishes no attitude; every lockstep node'):
         table.check_pacing('ins', '1 nan; 3 drop', True)
     table.check_pacing('ins', '1 nan; 3 drop', False)
     table.check_pacing('adu', '3 drop; 4 clear', True)

@@ -21,7 +21,7 @@ def decode(data):
 
 
 class Writer:
-    """Sends every `period` from `begin` on, its first number `number`; the content of its message is its stamp, ahead by `ahead`."""
+    """Publisher of a message every `period` from `begin`, its first number `number`, its stamp ahead by `ahead`."""
 
     def __init__(self, name, begin=0, end=10 * S, period=T, number=1, ahead=0, jitter=0.0, seed=1):
         self.name, self.ahead, self.number = name, ahead, number
@@ -35,7 +35,7 @@ class Writer:
 
 
 def run(*writers, strangers=lambda: 0):
-    """(PublisherGate, {writer: times at which it was taken}, times at which a stream began resets) of writers together."""
+    """(PublisherGate, {publisher: times of its accepted messages}, times of the resets) of publishers together."""
     taken = {writer.name: [] for writer in writers}
     resets = []
     gate = PublisherGate(decode, FUTURE, strangers)

@@ -15,7 +15,7 @@ import typing
 AXES = ('azimuth', 'elevation')
 MOTOR_NAMES = tuple(f'{axis}_motor_{i}' for axis in AXES for i in (1, 2))
 MOTION_MODELS = ('cv', 'ca', 'singer', 'current_statistical')
-"""Motion models of the target that the ACU's filters know."""
+"""Motion models of the target in the ACU's filters."""
 
 FILTER_UNITS = {'innovation': 'rad', 'rate_innovation': 'rad/s', 'nis': '', 'sigma': 'rad', 'rate_sigma': 'rad/s',
                 'correlation': '', 'innovation_sigma': 'rad', **dict.fromkeys(MOTION_MODELS, '')}
@@ -40,11 +40,13 @@ class Qos(typing.NamedTuple):
     latched     True if a late joiner receives the last message
     lockstep    queue depth of publishers and subscribers in lockstep; 0: all messages
     written     queue depth of a publisher in realtime, which never waits for a subscriber
-    read        queue depth of a subscriber in realtime, a few steps. It keeps the newest messages, so a late node skips
-                stale data. It is deep enough that a second, faster publisher cannot evict the messages of the first.
+    read        queue depth of a subscriber in realtime, a few steps. It keeps the newest messages, so a late node
+                skips stale data. It is deep enough that a second, faster publisher cannot evict the messages of the
+                first.
     reliable    True if this subscriber has lost messages sent again
     recorded    queue depth of a recorder, some seconds, because its disk may delay it
-    unlatched   True if realtime subscribers also accept volatile publishers (`ros2 topic pub`), by a second subscription
+    unlatched   True if realtime subscribers also accept volatile publishers (`ros2 topic pub`), by a second
+                subscription
     """
     latched: bool
     lockstep: int

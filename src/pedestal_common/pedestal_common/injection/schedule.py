@@ -20,12 +20,21 @@ MAX_ACTIVE_FAULTS = 16
 
 FAULT_DTYPE = np.dtype([('used', 'i8'), ('fault', 'i8'), ('end', 'i8'), ('duration', 'i8'),
                         ('values', 'f8', (table.MAX_FAULT_VALUES,))], align=True)
-"""Row of a fault. used: 1 for a fault in force; fault: table.code; end: stamp [ns] of the first step without it,
-NO_STAMP before its first step; duration [ns]; values: its arguments, an option as its index."""
+"""Row of a fault.
+
+used      1 for a fault in force
+fault     table.code
+end       stamp [ns] of the first step without the fault, NO_STAMP before its first step
+duration  duration [ns]
+values    its arguments, an option as its index
+"""
 
 SCHEDULE_DTYPE = np.dtype([('stamp', 'i8'), ('pending', 'i8'), ('row', FAULT_DTYPE, (MAX_ACTIVE_FAULTS,))], align=True)
-"""Faults of a node. stamp: stamp [ns] of the last step, NO_STAMP before the first; pending: 1 while the law must check
-the rows, because a fault is in force or was in the last step."""
+"""Faults of a node.
+
+stamp    stamp of the last step [ns], NO_STAMP before the first
+pending  1 while the law must check the rows, because a fault is in force or was in the last step
+"""
 
 
 def empty() -> np.ndarray:

@@ -70,8 +70,8 @@ class Diagnostics:
         if since is not None and now - since < CLOCK_STEP_REPORT_NS:
             findings.append((LEVEL_WARN, f'the clock of this host was stepped by {utc.last_step * 1e-9:+.3f} s'))
         if utc.ahead > self._node.graph.future * NS_PER_SECOND:
-            findings.append((LEVEL_WARN, f'is {utc.ahead * 1e-9:.3f} s ahead of UTC, because the clock of this host was '
-                             'set back: nodes that start now refuse its stamps until this node is started again'))
+            findings.append((LEVEL_WARN, f'is {utc.ahead * 1e-9:.3f} s ahead of UTC, because the clock of this host '
+                             'was set back: nodes that start now refuse its stamps until this node is started again'))
         if diagnosis.level != LEVEL_OK or not findings:
             findings.insert(0, diagnosis[:2])
         findings.sort(key=lambda finding: -finding[0])

@@ -217,7 +217,8 @@ class Shell(Node):
     def reader(self, name, decode, take):
         """Call take(message, after_gap) for every message on a topic of the graph. decode(CDR bytes) -> (stamp [ns] or
         None, message) raises ValueError for other bytes, which end a lockstep node. In realtime they are dropped, like
-        the messages that a PublisherGate refuses; after_gap: True for a message that does not continue the one before."""
+        the messages that a PublisherGate refuses; after_gap: True for a message that does not continue the one
+        before."""
         link, ros_name = self._link(name)
 
         if self.graph.lockstep:
@@ -297,7 +298,7 @@ class Shell(Node):
         lockstep the silent subscriber is then the recorder, because all other nodes have answered the step before."""
         for link, publisher in self.publishers_by_link.items():
             if not publisher.wait_for_all_acked(Duration(seconds=self.graph.deadline)):
-                raise GraphError(f'a subscriber of {link.name} took no message for {self.graph.deadline:g} s',
+                raise GraphError(f'a subscriber of {link.name} took no message in {self.graph.deadline:g} s',
                                  ('recorder',))
 
     def announce(self, publish, message):
@@ -319,7 +320,8 @@ class Shell(Node):
             wanted = nodes.readers(link, self.graph.members)
             while missing := self._missing(publisher, wanted):
                 if time.monotonic() > deadline:
-                    raise GraphError(f'{link.name} has no subscriber {", ".join(missing)} after {START_DEADLINE_S:g} s')
+                    raise GraphError(f'{link.name} lacks the subscribers {", ".join(missing)} after '
+                                     f'{START_DEADLINE_S:g} s')
                 if _stop:
                     raise Stopped
                 time.sleep(0.01)

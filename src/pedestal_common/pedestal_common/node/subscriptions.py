@@ -62,7 +62,8 @@ def subscribe(node, link, ros_name, take, role):
             take(data, info)
     volatile = middleware.qos(link.rate, role)
     volatile.durability = DurabilityPolicy.VOLATILE
-    unmatched = SubscriptionEventCallbacks(use_default_callbacks=False)  # rclpy's callback warns of each volatile publisher
+    # Because rclpy's default callback would warn of each volatile publisher.
+    unmatched = SubscriptionEventCallbacks(use_default_callbacks=False)
     return [open_with(latched, take_once, event_callbacks=unmatched), open_with(volatile, take_once)]
 
 

@@ -53,20 +53,20 @@ class Unit(typing.Protocol):
     REQUESTS     names of its services
     VERBS        commands.CommandDefinition of each command on NODE.obeys
     CALLS        names of services of other nodes that it may call
-    MOMENTARY    text outputs that `encode` knows only in the step that produced them; a recomputation of many steps
-                 omits them
+    MOMENTARY    text outputs that `encode` can make only in the step that produced them; a recomputation of many
+                 steps omits them
 
     parameters   instance of the parameter class of NODE
     reads        topics that it reads in its graph, a part of NODE.reads
     writes       topics that it writes with these parameters, a part of NODE.writes
-    memory       named tuple of arrays, with all data that a step reads or changes beside its records: `record` (1,) with
-                 the records of its law, then data that are no record (noise, a track)
+    memory       named tuple of arrays, with all data that a step reads or changes beside its records: `record` (1,)
+                 with the records of its law, then data that are no record (noise, a track)
     inputs, outputs     records (1,) of one step in a node
     messages     {topic: message} of its stamped topics, of which only the numbers change
     epoch        UTC [ns] of stamp 0, 0 where stamps are not UTC; set by its node
     silent       True while its trigger is absent; set by a realtime node
     lockstep     True if its graph runs in lockstep; set by its node
-    pending_replies    (Command, Reply) of the last commands, the newest last, which its node removes to publish them
+    pending_replies    (Command, Reply) of the last commands, the newest last; its node publishes and removes them
     """
     NODE: nodes.Node
     LAWS: typing.Mapping

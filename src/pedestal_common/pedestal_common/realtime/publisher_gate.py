@@ -3,8 +3,8 @@
 The first publisher becomes active. Messages of any other publisher are dropped and reported. A publisher that restarts
 becomes active once the active one was silent for SILENCE_LIMIT_NS. A publisher that overlapped with the active one, or
 whose sequence numbers are higher than this silence allows, is a different node. It becomes active only after it was
-the only publisher for CONFIRMED_TAKEOVER_NS and the graph shows no unexpected publisher. Where the publishers cannot
-be told apart, every message is dropped, so the motion that the topic commands stops. No ROS and no clock here.
+the only publisher for CONFIRMED_TAKEOVER_NS and the graph shows no unexpected publisher. While the publishers are
+unclear every message is dropped, so the motion that the topic commands stops. No ROS and no clock here.
 """
 import collections
 
@@ -23,7 +23,7 @@ PUBLISHER_POLL_NS = 50_000_000
 """Time between two checks of the graph for unexpected publishers, for each candidate [ns]."""
 
 DROP_UNDECODABLE, DROP_STALE, DROP_FUTURE, DROP_OTHER_PUBLISHER, DROP_UNCLEAR_PUBLISHER = (
-    'undecodable', 'stale', 'future', 'another writer', 'writers not told apart')
+    'undecodable', 'stale', 'future', 'another publisher', 'publishers unclear')
 """Reasons to drop a message."""
 
 WARNING_DROP_REASONS = DROP_OTHER_PUBLISHER, DROP_UNCLEAR_PUBLISHER
@@ -33,13 +33,13 @@ WARNING_DROP_REASONS = DROP_OTHER_PUBLISHER, DROP_UNCLEAR_PUBLISHER
 class PublisherGate:
     """Gate of one topic.
 
-    decode      decode(data) -> (stamp [ns], None of a topic without stamps; message); raises ValueError for invalid data
+    decode      decode(data) -> (stamp [ns], None of a topic without stamps; message); ValueError for invalid data
     future      largest accepted lead of a stamp over this node's UTC [ns]
-    unexpected  unexpected() -> number of unexpected publishers in the graph, None where it is unknown. It is called when a
-                candidate may become active: as many publishers must be known by their messages, because the candidate may
-                be one of them. None in its place: every publisher is accepted.
-    paced       True if the messages have a pace, which distinguishes publishers. Without a pace every message is dropped
-                while the graph shows an unexpected publisher; the last accepted message stays valid.
+    unexpected  unexpected() -> number of unexpected publishers in the graph, None where it is unknown. It is called
+                when a candidate may become active. As many publishers must be known by their messages, because the
+                candidate may be one of them. None in its place: every publisher is accepted.
+    paced       True if the messages have a pace, which distinguishes publishers. Without a pace every message is
+                dropped while the graph shows an unexpected publisher; the last accepted message stays valid.
     oldest      largest accepted time from sending to reception [ns]; None: any
 
     dropped     {reason: count}; reason: of the last dropped message, detail: in numbers; dropped_at: its time [ns]

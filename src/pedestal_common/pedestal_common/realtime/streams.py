@@ -43,19 +43,25 @@ EXPIRY_LIMIT_NS = 30_000_000_000
 
 
 class Stream:
-    """Messages of one publisher. last: number of the last one; source: its time of sending, arrival: its time of
-    arrival [ns]; begun: arrival of the first message [ns]; interval: mean time between two messages [ns]; owed:
-    backlog, in messages, against its pace; lost: numbers left out; skipped: (before, after) the last gap; unclear:
-    True for a stream that cannot be told from another.
+    """Messages of one publisher.
 
-    A PublisherGate adds: known, True if it was active together with the active publisher; looked, time of the last
-    check for other publishers [ns].
+    last      sequence number of the last message; source: its time of sending, arrival: its time of arrival [ns]
+    begun     time of arrival of the first message [ns]
+    interval  mean time between two messages [ns]
+    owed      backlog against its pace [messages]
+    lost      number of messages left out; skipped: (before, after) the last gap
+    unclear   True if the stream cannot be distinguished from another
+
+    A PublisherGate adds:
+
+    known     True if it was active together with the active publisher
+    looked    time of the last check for other publishers [ns]
     """
-    __slots__ = ('_heard', 'arrival', 'begun', 'interval', 'known', 'last', 'looked', 'lost', 'owed', 'skipped',
+    __slots__ = ('_messages', 'arrival', 'begun', 'interval', 'known', 'last', 'looked', 'lost', 'owed', 'skipped',
                  'source', 'unclear')
 
     def __init__(self, number, source, now):
-        self._heard = collections.deque([(number, source)], PACE_WINDOW_MESSAGES)
+        self._messages = collections.deque([(number, source)], PACE_WINDOW_MESSAGES)
         self.begun = now
         self.last, self.source, self.arrival = number, source, now
         self.interval = self.looked = None
@@ -89,24 +95,24 @@ class Stream:
             self.interval = step if self.interval is None else self.interval + 0.05 * (step - self.interval)
         if gap > 1:
             self.skipped = self.last, number
-        self._heard.append((number, source))
+        self._messages.append((number, source))
         self.last, self.source, self.arrival = number, source, now
         self.lost += gap - 1
         return gap - 1
 
     def pace(self):
         """Return the time per number [ns], None for a stream with too few messages."""
-        heard = list(self._heard)
-        if len(heard) < 3 * PACE_STRIDE_MESSAGES:
+        messages = list(self._messages)
+        if len(messages) < 3 * PACE_STRIDE_MESSAGES:
             return None
         paces = sorted((source - earlier_source) / (number - earlier)
-                       for (earlier, earlier_source), (number, source) in zip(heard, heard[PACE_STRIDE_MESSAGES:],
+                       for (earlier, earlier_source), (number, source) in zip(messages, messages[PACE_STRIDE_MESSAGES:],
                                                                               strict=False))
         return paces[len(paces) // 2]
 
     def revive(self, stream):
         """Continue as a stream that turned out to be this one."""
-        self._heard = stream._heard
+        self._messages = stream._messages
         self.last, self.source, self.arrival = stream.last, stream.source, stream.arrival
         self.interval, self.owed, self.skipped = stream.interval, stream.owed, stream.skipped
 
@@ -119,16 +125,16 @@ class Streams:
         self.lost = 0
         self._close = ()                # unclear streams; later messages belong to new, unclear streams
         self._parted = 0, -EXPIRY_LIMIT_NS    # (lowest number, time [ns]) of the last unclear streams
-        self._heard = -ACTIVE_LIMIT_NS
+        self._previous = -ACTIVE_LIMIT_NS
 
     def of(self, number, source, now):
         """Return the Stream of a message, a new one where it continues none; None where it may be of several. number:
         its sequence number; source: time of sending, now: time of arrival [ns]."""
-        heard, self._heard = self._heard, now
-        recent = [stream for stream in self.streams if heard - stream.arrival < RECENT_LIMIT_NS]
-        speaking = [stream for stream in recent if heard - stream.arrival < ACTIVE_LIMIT_NS]
+        previous, self._previous = self._previous, now
+        recent = [stream for stream in self.streams if previous - stream.arrival < RECENT_LIMIT_NS]
+        active = [stream for stream in recent if previous - stream.arrival < ACTIVE_LIMIT_NS]
         fitting = [stream for stream in recent
-                   if stream.fits(number, source) and (stream in speaking or number - stream.last <= CLOSE_NUMBER_GAP)]
+                   if stream.fits(number, source) and (stream in active or number - stream.last <= CLOSE_NUMBER_GAP)]
         if len(fitting) == 1 or not fitting and (fitting := self._silent(number, source)):
             stream = fitting[0]
             self.lost += stream.follow(number, source, now)
@@ -138,7 +144,7 @@ class Streams:
             close = fitting or [other for other in recent if other.skipped[0] < number < other.skipped[1]]
             stream = self._begun(number, source, now)
         if len(self.streams) > 1:
-            near = [other for other in speaking
+            near = [other for other in active
                     if other is not stream and other not in close and other.near(stream)]
             if close or near:
                 stream = self._mark_unclear(stream, close + near if close else [stream, *near], now)
@@ -176,12 +182,12 @@ class Streams:
         """Identify unclear streams, once two have moved apart and are known by their pace, or one of them has left."""
         for stream in self._close:
             stream.arrival = now
-        speaking = [stream for stream in self.streams if stream.unclear and now - stream.arrival < ACTIVE_LIMIT_NS]
-        if len(speaking) == 1 and now - speaking[0].begun >= ACTIVE_LIMIT_NS:
-            speaking[0].known = True    # because this may be the publisher that was active beside the active one
-            self._cleared(speaking)
-        elif len(speaking) == len(self._close) == 2:
-            before, after = (_by_pace(pair) for pair in (self._close, speaking))
+        active = [stream for stream in self.streams if stream.unclear and now - stream.arrival < ACTIVE_LIMIT_NS]
+        if len(active) == 1 and now - active[0].begun >= ACTIVE_LIMIT_NS:
+            active[0].known = True    # because this may be the publisher that was active beside the active one
+            self._cleared(active)
+        elif len(active) == len(self._close) == 2:
+            before, after = (_by_pace(pair) for pair in (self._close, active))
             if before and after and all(_same_pace(was, pace) for (was, _), (pace, _) in zip(before, after,
                                                                                              strict=True)):
                 for (_, stream), (_, found) in zip(before, after, strict=True):

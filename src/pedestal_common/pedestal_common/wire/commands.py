@@ -13,7 +13,7 @@ from pedestal_common.parameters import ParameterError, did_you_mean
 from pedestal_common.wire import messages
 
 SERVICE_CLIENT, SCHEDULE_CLIENT = 'service', 'scenario'
-"""Clients of a command by service, which does not know its caller, and of a command by schedule."""
+"""Clients of a command by service, whose caller is unknown, and of a command by schedule."""
 
 RESERVED_KEYS = ('granted', 'reply')
 """Keys of a reply beside the arguments."""

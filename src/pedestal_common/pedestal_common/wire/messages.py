@@ -1,8 +1,8 @@
 """Messages as rosbags builds them: the same classes in a node, a bag and a test.
 
-Nodes publish bytes that rosbags serialised. rclpy's own serialiser leaves the alignment padding of CDR undefined
-(measured: stale bytes of earlier messages, in 297 of 300 diagnostics), so its recordings are never identical. rosbags
-writes zeros there, and reads a JointState in half the time.
+Nodes publish bytes that rosbags serialised. Because rclpy's own serialiser leaves the alignment padding of CDR
+undefined, its recordings are never identical (measured: stale bytes of earlier messages, in 297 of 300 diagnostics).
+The serialiser of rosbags writes zeros there. It also reads a JointState in half the time.
 """
 import struct
 
