@@ -105,9 +105,9 @@ class Stream:
         messages = list(self._messages)
         if len(messages) < 3 * PACE_STRIDE_MESSAGES:
             return None
+        pairs = zip(messages, messages[PACE_STRIDE_MESSAGES:], strict=False)
         paces = sorted((source - earlier_source) / (number - earlier)
-                       for (earlier, earlier_source), (number, source) in zip(messages, messages[PACE_STRIDE_MESSAGES:],
-                                                                              strict=False))
+                       for (earlier, earlier_source), (number, source) in pairs)
         return paces[len(paces) // 2]
 
     def revive(self, stream):
