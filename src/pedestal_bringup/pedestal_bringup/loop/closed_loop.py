@@ -180,7 +180,8 @@ class Loop:
         if injected is None:
             injected = np.zeros((self.steps, 2))
         steps, truth = records.empty(STEP_DTYPE, self.steps), np.zeros(self.steps, TRUTH_DTYPE)
-        before, forecasts = records.empty(STEP_DTYPE, 1), []
+        before = records.empty(STEP_DTYPE, 1)
+        forecasts: list[tuple] = []
         first = 0
         while first < self.steps:
             self.before_step(first, forecasts)

@@ -10,6 +10,8 @@ import functools
 import importlib.resources
 import json
 import pathlib
+import typing
+from collections.abc import Iterable, Iterator, Mapping
 
 import numpy as np
 import yaml
@@ -18,7 +20,19 @@ from pedestal_bringup.scenario import parameter_file
 from pedestal_common import parameters
 from pedestal_common.graph import nodes, topics
 from pedestal_common.graph.graph_parameters import GraphParameters
+from pedestal_common.graph.nodes import Node
 from pedestal_common.text_files import files, plain_yaml
+
+if typing.TYPE_CHECKING:
+    from importlib.abc import Traversable
+
+    from pedestal_common.node.unit import Unit
+
+Sections = dict[str, dict[str, typing.Any]]
+"""Values of each node and of `scenario`: {section: {dotted name: value}}."""
+
+
+P = typing.TypeVar('P', bound=parameters.Parameters)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -46,7 +60,7 @@ class RestartParameters(parameters.Parameters):
                                           'killed and started again; 0: never')
 
 
-def _of_graph(name):
+def _of_graph(name: str) -> typing.Any:
     """Return the parameter graph.NAME, which a scenario gives to every node."""
     field = GraphParameters.__dataclass_fields__[name]
     return dataclasses.field(default=field.default, metadata=field.metadata)
@@ -69,13 +83,13 @@ class ScenarioParameters(parameters.Parameters):
     program: ProgramParameters = parameters.group(ProgramParameters)
     restart: RestartParameters = parameters.group(RestartParameters)
 
-    def check(self):
+    def check(self) -> None:
         """Raise ParameterError for several beams of a drive with motors."""
         if self.beams > 1 and not self.beam:
             raise parameters.ParameterError(f'beams = {self.beams}: must be 1 unless beam = true')
 
     @property
-    def graph_beams(self):
+    def graph_beams(self) -> int:
         """Number of beams of the graph as in nodes.links: 0 for a drive with motors."""
         return self.beams if self.beam else 0
 
@@ -107,7 +121,7 @@ value."""
 
 
 MEASUREMENT_FLAGS = tuple((node.name, topic.measured, topic.flag) for node in nodes.NODES if node.name != 'acu'
-                          for topic in map(topics.TOPIC_BY_NAME.get, node.writes) if topic.measured)
+                          for topic in map(topics.TOPIC_BY_NAME.__getitem__, node.writes) if topic.measured)
 """(node, its parameter, the parameter of its subscribers) that is true if one of its topics exists."""
 
 
@@ -123,10 +137,10 @@ class Scenario:
     """
     name: str
     header: ScenarioParameters
-    values: dict
+    values: Sections
 
     @property
-    def nodes(self):
+    def nodes(self) -> tuple[str, ...]:
         """Nodes that take part, in the order of nodes.NODES and of the beams; the operator where there is a program
         track."""
         ship = ('ship_motion', 'ins') if self.header.ship else ()
@@ -135,39 +149,39 @@ class Scenario:
                               self.header.graph_beams)
 
     @property
-    def prefixes(self):
+    def prefixes(self) -> tuple[str, ...]:
         """Prefix of the names of each beam's nodes; ('',) for a single beam."""
         return nodes.prefixes(self.header.graph_beams)
 
-    def row(self, node):
+    def row(self, node: str) -> Node:
         """Return the nodes.Node of one of its nodes."""
         return nodes.row(node, self.header.beam)
 
-    def given(self, node):
+    def given(self, node: str) -> dict[str, typing.Any]:
         """Return {dotted name: value} of the values of this scenario for a node."""
         return _whole(self.values, node)
 
-    def node_parameters(self, node):
+    def node_parameters(self, node: str) -> typing.Any:
         """Return the parameter dataclass of one node with the values of this scenario."""
         return _built(self.row(node).parameters_type(), self.given(node))
 
-    def unit(self, node, parameters=None):
+    def unit(self, node: str, parameters: parameters.Parameters | None = None) -> 'Unit':
         """Return the unit of one of its nodes; parameters: they replace those of the scenario."""
         row, chosen = self.row(node), parameters or self.node_parameters(node)
         flags = [flag for flag in topics.TOPIC_FLAGS if getattr(chosen, flag, False)]
         return row.unit_type()(chosen, nodes.reads(row, self.nodes, flags))
 
-    def as_yaml(self):
+    def as_yaml(self) -> str:
         """Return the scenario as a ROS 2 parameter file."""
         sections = {'scenario': parameters.as_dict(self.header), **self.values}
         return yaml.safe_dump({node: {'ros__parameters': values} for node, values in sections.items()}, sort_keys=True)
 
 
-def _folder():
+def _folder() -> 'Traversable':
     return importlib.resources.files('pedestal_bringup') / 'scenarios'
 
 
-def available():
+def available() -> dict[str, str]:
     """Return {name: title} of the scenarios that come with the product."""
     titles = {}
     for entry in sorted(_folder().iterdir(), key=lambda entry: entry.name):
@@ -177,7 +191,7 @@ def available():
     return titles
 
 
-def text(name_or_path):
+def text(name_or_path: str | pathlib.Path) -> tuple[str, str]:
     """Return (name, YAML text) of a scenario that comes with the product, or of a .yaml file. Raises ScenarioError."""
     path = pathlib.Path(name_or_path)
     if path.suffix in ('.yaml', '.yml'):
@@ -185,24 +199,25 @@ def text(name_or_path):
             return path.stem, files.read_text(path, plain_yaml.MAX_YAML_BYTES)
         except (OSError, UnicodeDecodeError) as error:
             raise ScenarioError(f'scenario file {path}: {plain_yaml.problem(error)}') from None
-    entry = _folder() / f'{name_or_path}.yaml'
+    name = str(name_or_path)
+    entry = _folder() / f'{name}.yaml'
     if not entry.is_file():
         names = list(available())
-        raise ScenarioError(f'unknown scenario {name_or_path!r};{parameters.did_you_mean(name_or_path, names)} there '
-                            f'are {", ".join(names)} (or give a path that ends in .yaml)')
-    return name_or_path, entry.read_text()
+        raise ScenarioError(f'unknown scenario {name!r};{parameters.did_you_mean(name, names)} there are '
+                            f'{", ".join(names)} (or give a path that ends in .yaml)')
+    return name, entry.read_text()
 
 
-def _whole(sections, node):
+def _whole(sections: Sections, node: str) -> dict[str, typing.Any]:
     """Return the values of a node, with those for every beam first."""
     return {**sections.get(nodes.plain(node), {}), **sections.get(node, {})}
 
 
-def _is_node(name):
+def _is_node(name: str) -> bool:
     return nodes.plain(name) in (BEAM_NODES if nodes.beam_of(name) else SECTION_NODES)
 
 
-def _sections(name, content):
+def _sections(name: str, content: str) -> Sections:
     try:
         tree = plain_yaml.parse(content)
     except yaml.YAMLError as error:
@@ -222,7 +237,7 @@ def _sections(name, content):
     return sections
 
 
-def parameters_of(node):
+def parameters_of(node: str) -> type[parameters.Parameters]:
     """Return the parameter dataclass of a node, of the header `scenario`, or of the array `beam_steering`. Raises
     ScenarioError for any other name."""
     if node in ('scenario', 'beam_steering'):
@@ -232,7 +247,7 @@ def parameters_of(node):
     return nodes.row(node).parameters_type()
 
 
-def parse_override(text):
+def parse_override(text: str) -> tuple[str, str, typing.Any]:
     """Return (node, key, value) of 'node.key=value'; the value is read as YAML. Raises ScenarioError."""
     left, equals, right = text.partition('=')
     node, dot, key = left.partition('.')
@@ -246,7 +261,7 @@ def parse_override(text):
         raise ScenarioError(f'--param {text!r}: {plain_yaml.problem(error)}') from None
 
 
-def override(name, value):
+def override(name: str, value: typing.Any) -> str:
     """Return 'node.key=value' of a value; a text is without quotes where YAML reads it as the same text."""
     with contextlib.suppress(yaml.YAMLError):
         if isinstance(value, str) and plain_yaml.parse(value) == value:
@@ -254,7 +269,7 @@ def override(name, value):
     return f'{name}={json.dumps(value, ensure_ascii=False)}'
 
 
-def file_overrides(path):
+def file_overrides(path: str | pathlib.Path) -> list[str]:
     """Return texts 'node.key=value' of a ROS 2 parameter file."""
     return [override(f'{node}.{key}', value)
             for node, values in parameter_file.read(path).items() for key, value in values.items()]
@@ -264,9 +279,9 @@ def file_overrides(path):
 class Draft:
     """Scenario before the check of the whole: sections {node or `scenario`: {dotted name: value}}."""
     name: str
-    sections: dict
+    sections: Sections
 
-    def changed(self, overrides):
+    def changed(self, overrides: Iterable[str]) -> 'Draft':
         """Return the Draft changed by texts 'node.key=value'. Raises ScenarioError."""
         sections = {node: dict(values) for node, values in self.sections.items()}
         for override in overrides:
@@ -275,29 +290,31 @@ class Draft:
         return Draft(self.name, sections)
 
     @property
-    def header(self):
+    def header(self) -> ScenarioParameters:
         """ScenarioParameters of the draft."""
         return _checked(self.name, 'scenario', ScenarioParameters, self.sections['scenario'])
 
     @property
-    def target(self):
+    def target(self) -> typing.Any:
         """Target of a single receiver."""
         return _checked(self.name, 'tracking_receiver', nodes.row('tracking_receiver').parameters_type(),
                         self.sections.get('tracking_receiver', {})).target
 
 
-def draft(name_or_path):
+def draft(name_or_path: str | pathlib.Path) -> Draft:
     """Return the Draft of a name or a YAML path. Raises ScenarioError."""
     name, content = text(name_or_path)
     return Draft(name, _sections(name, content))
 
 
-def load(name_or_path, overrides=(), seed=None, duration=None, pacing=None):
+def load(name_or_path: str | pathlib.Path, overrides: Iterable[str] = (), seed: int | None = None,
+         duration: float | None = None, pacing: str | None = None) -> Scenario:
     """Return the Scenario of a name or a YAML path; see checked."""
     return checked(draft(name_or_path).changed(overrides), seed, duration, pacing)
 
 
-def parse(name, content, overrides=(), seed=None, duration=None, pacing=None):
+def parse(name: str, content: str, overrides: Iterable[str] = (), seed: int | None = None,
+          duration: float | None = None, pacing: str | None = None) -> Scenario:
     """Return the Scenario of a YAML text; parse(name, Scenario.as_yaml()) returns the same scenario.
 
     overrides: texts 'node.key=value'; see checked.
@@ -305,7 +322,8 @@ def parse(name, content, overrides=(), seed=None, duration=None, pacing=None):
     return checked(Draft(name, _sections(name, content)).changed(overrides), seed, duration, pacing)
 
 
-def checked(changed, seed=None, duration=None, pacing=None):
+def checked(changed: Draft, seed: int | None = None, duration: float | None = None,
+            pacing: str | None = None) -> Scenario:
     """Return the Scenario of a new Draft, which is changed in place. seed, duration and pacing replace the header's
     where given.
 
@@ -340,7 +358,7 @@ def checked(changed, seed=None, duration=None, pacing=None):
     return Scenario(name, header, sections)
 
 
-def _follow_flight(name, receiver_values, header_values):
+def _follow_flight(name: str, receiver_values: dict[str, typing.Any], header_values: dict[str, typing.Any]) -> None:
     """Derive station, reference range and duration from the file of a recorded flight, where the scenario does not
     give them. Raises ScenarioError, TableError."""
     target = _checked(name, 'tracking_receiver', nodes.row('tracking_receiver').parameters_type(),
@@ -354,12 +372,12 @@ def _follow_flight(name, receiver_values, header_values):
             (header_values if key == 'duration' else receiver_values).setdefault(key, value)
 
 
-def _spread(name, sections, header, seed):
+def _spread(name: str, sections: Sections, header: ScenarioParameters, seed: int | None) -> None:
     """Give every node the parameters that several share: length and period of the run, seeds, ship, latencies, beam.
 
     Raises ScenarioError where the section of a node has another value.
     """
-    def share(node, key, value):
+    def share(node: str, key: str, value: typing.Any) -> None:
         sections[node].setdefault(key, value)
         for section in [section for section in sections if nodes.plain(section) == node]:
             own = sections[section].get(key, value)
@@ -379,7 +397,7 @@ def _spread(name, sections, header, seed):
         if key.startswith('ship.'):
             share('ins', key, value)
 
-    def value_of(node, key, otherwise=None):
+    def value_of(node: str, key: str, otherwise: typing.Any = None) -> typing.Any:
         default = parameters.defaults(nodes.row(node, header.beam).parameters_type()).get(key, otherwise)
         return sections[node].get(key, default)
 
@@ -413,7 +431,7 @@ def _spread(name, sections, header, seed):
                     sections[f'{prefix}acu'].setdefault(f'tracker.receiver.{key}', value)
 
 
-def _spread_to_beam(name, node, sections, header, seed):
+def _spread_to_beam(name: str, node: str, sections: Sections, header: ScenarioParameters, seed: int | None) -> None:
     """Give a node of one beam the parameters of its own receiver, and a seed for its own noise."""
     values, beam = sections[node], nodes.beam_of(node)
     own_receiver = f'{beam}/tracking_receiver'
@@ -430,25 +448,27 @@ def _spread_to_beam(name, node, sections, header, seed):
                                 'tracking_receiver')
 
 
-def _checked(name, section, parameters_type, values):
+def _checked(name: str, section: str, parameters_type: type[P], values: Mapping[str, typing.Any]) -> P:
     with _named(name, section):
         return _built(parameters_type, values)
 
 
-def _built(parameters_type, values):
+def _built(parameters_type: type[P], values: Mapping[str, typing.Any]) -> P:
     """Return parameters.build, cached for equal values, because trials of a scenario share most of their values."""
     key = tuple((name, type(value), value) for name, value in values.items())
     hashable = all(isinstance(value, int | float | str | None) for value in values.values())
-    return _built_once(parameters_type, key) if hashable else parameters.build(parameters_type, values)
+    if not hashable:
+        return parameters.build(parameters_type, values)
+    return _built_once(parameters_type, key)  # type: ignore[arg-type]  # mypy takes a class of fields for unhashable
 
 
 @functools.lru_cache(256)
-def _built_once(parameters_type, key):
+def _built_once(parameters_type: type[P], key: tuple[tuple[str, type, typing.Any], ...]) -> P:
     return parameters.build(parameters_type, {name: value for name, _, value in key})
 
 
 @contextlib.contextmanager
-def _named(name, section):
+def _named(name: str, section: str) -> Iterator[None]:
     """Turn a ParameterError into a ScenarioError that names the section."""
     try:
         yield

@@ -1,5 +1,6 @@
 """Parameters of every node about its graph (ROS parameters `graph.*`). No ROS here."""
 import dataclasses
+from collections.abc import Iterable
 
 from pedestal_common import parameters
 from pedestal_common.graph import nodes, topics
@@ -7,10 +8,10 @@ from pedestal_common.graph.nodes import MAX_BEAMS
 from pedestal_common.graph.steps import NS_PER_SECOND
 
 
-def topic_flags(names):
+def topic_flags(names: Iterable[str]) -> type[parameters.Parameters]:
     """Return the base of a parameter dataclass with the flag of each of these topics that has one."""
-    flagged = {}
-    for topic in map(topics.TOPIC_BY_NAME.get, names):
+    flagged: dict[str, list[str]] = {}
+    for topic in map(topics.TOPIC_BY_NAME.__getitem__, names):
         if topic.flag:
             flagged.setdefault(topic.flag, []).append(topic.name)
     return dataclasses.make_dataclass('TopicFlags', [
@@ -37,7 +38,7 @@ class GraphParameters(parameters.Parameters):
     priority: int = parameters.parameter(0, 0, 98, '', 'realtime: priority (SCHED_RR) of the nodes with a unit, where '
                                          'the system allows it, one more for the drive; 0: the default scheduling')
 
-    def check(self):
+    def check(self) -> None:
         """Raise ParameterError for a name in `nodes` that is no node."""
         for name in self._names:
             if name not in nodes.NODE_NAMES:
@@ -45,15 +46,15 @@ class GraphParameters(parameters.Parameters):
                                                 f'{", ".join(nodes.NODE_NAMES)}')
 
     @property
-    def members(self):
+    def members(self) -> tuple[str, ...]:
         """`nodes` as a tuple, with the nodes of every beam."""
         return nodes.members(self._names, self.beams)
 
     @property
-    def _names(self):
+    def _names(self) -> tuple[str, ...]:
         return tuple(name for name in self.nodes.replace(' ', '').split(',') if name)
 
     @property
-    def lockstep(self):
+    def lockstep(self) -> bool:
         """True if every step waits for all its inputs."""
         return self.pacing == 'lockstep'

@@ -5,6 +5,9 @@ nodes, the tables of a bag, the comparison of recordings and the export all take
 """
 import re
 import typing
+from collections.abc import Mapping
+
+import numpy as np
 
 from pedestal_common.graph import topics
 
@@ -22,7 +25,7 @@ class Field(typing.NamedTuple):
     """
     name: str
     path: str
-    components: tuple | None
+    components: tuple[str, ...] | None
     column: str
     unit: str = ''
     tolerance: float = 1e-9
@@ -74,21 +77,21 @@ class Column(typing.NamedTuple):
     tolerance: float
 
 
-def fields(topic) -> tuple:
+def fields(topic: str) -> tuple[Field, ...]:
     """Return the Fields of a topic of the table, whose numbers make its record; () for a text."""
     row = topics.TOPIC_BY_NAME[topic]
     return tuple(field for field in LAYOUTS.get(row.type, ())
                  if field.recorded and field.name in (row.only or (field.name,)))
 
 
-def _names(field, row):
+def _names(field: Field, row: topics.Topic) -> tuple[str, ...]:
     """Return the text for {} of each column of a field."""
     if field.components is None:
         return row.names
     return tuple('xyz'[int(c) // 4] if c.isdigit() else c for c in field.components)
 
 
-def columns(topic) -> tuple:
+def columns(topic: str) -> tuple[Column, ...]:
     """Return the Columns of a topic of the table, in the order of its record."""
     row = topics.TOPIC_BY_NAME[topic]
     return tuple(Column(name := field.column.format(part), field.name, row.units.get(name, field.unit),
@@ -96,7 +99,7 @@ def columns(topic) -> tuple:
                  for field in fields(topic) for part in _names(field, row))
 
 
-def column(type_name, path, texts):
+def column(type_name: str, path: str, texts: Mapping[str, str]) -> str | None:
     """Return the name of the column of a number at a path in a message of any type; None for header and covariances,
     which have no column. texts: {path: text} of the message."""
     for field in LAYOUTS.get(type_name, ()):
@@ -111,7 +114,7 @@ def column(type_name, path, texts):
     return path
 
 
-def unit(topic, type_name, column) -> str:
+def unit(topic: str, type_name: str, column: str) -> str:
     """Return the unit of a column of a topic of this type, '' without or with an unknown unit."""
     row = topics.TOPIC_BY_NAME.get(topic)
     if row is None or row.type != type_name:
@@ -125,7 +128,7 @@ def unit(topic, type_name, column) -> str:
     return 's' if column.endswith('time_from_start') else ''
 
 
-def of_filter(steps, name):
+def of_filter(steps: np.ndarray, name: str) -> np.ndarray:
     """Return (n, 2): a number of topics.FILTER_UNITS for both axes, in records (n,) that hold acu/filter."""
     numbers = steps['acu/filter']['position'].reshape(len(steps), len(topics.AXES), len(topics.FILTER_UNITS))
     return numbers[:, :, list(topics.FILTER_UNITS).index(name)]

@@ -7,8 +7,12 @@ import functools
 import importlib
 import re
 import typing
+from collections.abc import Collection, Iterable
 
 from pedestal_common.graph.topics import TOPIC_BY_NAME, TOPICS
+
+if typing.TYPE_CHECKING:
+    from pedestal_common.node.unit import Unit
 
 MAX_BEAMS = 16
 
@@ -38,8 +42,8 @@ class Node(typing.NamedTuple):
     module: str = ''
     parameters: str = ''
     unit: str = ''
-    reads: tuple = ()
-    writes: tuple = ()
+    reads: tuple[str, ...] = ()
+    writes: tuple[str, ...] = ()
     answer: str = ''
     obeys: str = ''
     replies: str = ''
@@ -49,25 +53,25 @@ class Node(typing.NamedTuple):
     optional: bool = False
 
     @property
-    def package(self):
+    def package(self) -> str:
         """ROS package of the node."""
         return self.module.partition('.')[0]
 
     @property
-    def executable(self):
+    def executable(self) -> str:
         """Name of its executable in that package."""
         return self.module.rpartition('.')[2]
 
-    def parameters_type(self):
+    def parameters_type(self) -> type[typing.Any]:
         """Return its parameter dataclass."""
         return _named(self.parameters)
 
-    def unit_type(self):
+    def unit_type(self) -> 'type[Unit]':
         """Return the class of its unit."""
         return _named(self.unit)
 
 
-def _named(path):
+def _named(path: str) -> typing.Any:
     module, _, name = path.partition(':')
     return getattr(importlib.import_module(module), name)
 
@@ -134,7 +138,7 @@ BEAM_TOPICS = frozenset(('joint_states', 'adu/truth', 'acu/program_track',
 beam."""
 
 
-def row(name, array=False) -> Node:
+def row(name: str, array: bool = False) -> Node:
     """Return the Node of a name, 'beam_2/acu' as well as 'acu'; array: True for a graph whose drive is an electronic
     array."""
     if array and name == DRIVE_NODE:
@@ -142,28 +146,28 @@ def row(name, array=False) -> Node:
     return NODES[NODE_NAMES.index(plain(name))]
 
 
-def of_executable(module) -> Node:
+def of_executable(module: str) -> Node:
     """Return the Node of an executable."""
     return next(node for node in (*NODES, ARRAY_DRIVE) if node.module == module)
 
 
-def beam_of(name):
+def beam_of(name: str) -> str:
     """Return 'beam_2' of a node or topic 'beam_2/...'; '' of a name without a beam."""
     match = re.match(r'beam_[1-9]\d*(?=/)', name)
     return match[0] if match else ''
 
 
-def plain(name):
+def plain(name: str) -> str:
     """Return the name of a node or topic without its beam."""
     return name[len(beam_of(name)) + 1:] if beam_of(name) else name
 
 
-def prefixes(beams):
+def prefixes(beams: int) -> tuple[str, ...]:
     """Return the prefix of each beam's nodes and topics; ('',) for at most one beam."""
     return tuple(f'beam_{i}/' for i in range(1, beams + 1)) if beams > 1 else ('',)
 
 
-def members(names, beams):
+def members(names: Iterable[str], beams: int) -> tuple[str, ...]:
     """Return the nodes of a graph, each node `of_beam` once per beam."""
     return tuple(prefix + name for name in names for prefix in (prefixes(beams) if row(name).of_beam else ('',)))
 
@@ -174,12 +178,12 @@ class Link(typing.NamedTuple):
     type: str
     rate: str
     flag: str
-    writers: tuple
-    readers: tuple
+    writers: tuple[str, ...]
+    readers: tuple[str, ...]
 
 
 @functools.cache
-def links(beams=0) -> dict:
+def links(beams: int = 0) -> dict[str, Link]:
     """Return {name: Link} of a graph, in the order of TOPICS; beams: number of beams of an electronic array, 0 for a
     drive with motors."""
     rows = [row(node.name, beams > 0) for node in NODES]
@@ -198,7 +202,7 @@ def links(beams=0) -> dict:
     return links
 
 
-def recorded(names, flags=(), beams=0) -> list:
+def recorded(names: Collection[str], flags: Collection[str] = (), beams: int = 0) -> list[Link]:
     """Return the Links that have a publisher in a graph of these nodes, or that any client may publish; flags: those
     of topics.TOPIC_FLAGS that are set."""
     return [link for link in links(beams).values()
@@ -206,17 +210,17 @@ def recorded(names, flags=(), beams=0) -> list:
             and (not link.flag or link.flag in flags)]
 
 
-def held(names) -> frozenset:
+def held(names: Iterable[str]) -> frozenset[str]:
     """Return the topics among these of a graph whose messages hold (see Topic)."""
     return frozenset(name for name in names if TOPIC_BY_NAME[plain(name)].holds)
 
 
-def readers(link, names):
+def readers(link: Link, names: Iterable[str]) -> list[str]:
     """Return the nodes of a graph that must read a topic before it may start; the recorder reads every topic."""
     return [name for name in names if name in link.readers or name == 'recorder']
 
 
-def reads(node, names, flags=()) -> tuple:
+def reads(node: Node, names: Iterable[str], flags: Collection[str] = ()) -> tuple[str, ...]:
     """Return the topics that a Node subscribes to in a graph of these nodes, in the order of its row, its trigger
     first.
 
@@ -225,7 +229,7 @@ def reads(node, names, flags=()) -> tuple:
     """
     plain_names = {plain(name) for name in names}
 
-    def is_read(topic):
+    def is_read(topic: str) -> bool:
         writers = [other for other in NODES if topic in other.writes]
         absent = all(other.optional and other.name not in plain_names for other in writers)
         flag = TOPIC_BY_NAME[topic].flag

@@ -1,5 +1,7 @@
 """Step matching: the messages that belong to step t_k. No ROS here: a recorded run is matched as in its nodes."""
 import collections
+import typing
+from collections.abc import Callable, Collection, Iterable, Mapping
 
 NS_PER_SECOND = 1_000_000_000
 """Nanoseconds in a second [ns]."""
@@ -11,11 +13,11 @@ SECONDS_PER_DAY = 86_400
 class GraphError(RuntimeError):
     """Defect of the graph around a node; one line that names topic, stamp or node. silent: the silent nodes."""
 
-    def __init__(self, message, silent=()):
+    def __init__(self, message: str, silent: Iterable[str] = ()) -> None:
         super().__init__(message)
         self.silent = tuple(silent)
 
-    def __str__(self):
+    def __str__(self) -> str:
         return super().__str__() + (f'; silent: {", ".join(self.silent)}' if self.silent else '')
 
 
@@ -30,22 +32,24 @@ class Steps:
     trigger_message, {topic: message or None})` is called once per step, in order.
     """
 
-    def __init__(self, trigger, followers, lockstep, answer, prompt=False, held=frozenset()):
+    def __init__(self, trigger: str, followers: Mapping[str, int], lockstep: bool,
+                 answer: Callable[[int, typing.Any, dict[str, typing.Any]], object], prompt: bool = False,
+                 held: Collection[str] = frozenset()) -> None:
         self.trigger, self._lockstep, self._answer = trigger, lockstep, answer
         self._prompt = prompt and not lockstep
-        self._passed_over = frozenset() if lockstep else held
+        self._passed_over: Collection[str] = frozenset() if lockstep else held
         self._latency = dict(followers)
-        self._awaited = {topic: collections.deque() for topic in followers}
-        self._due = dict.fromkeys(followers)
-        self._arrived = {topic: collections.deque() for topic in followers}
-        self._last = dict.fromkeys((trigger, *followers))
-        self._pending = None
-        self._ahead = collections.deque()
-        self._period = None
+        self._awaited: dict[str, collections.deque[int]] = {topic: collections.deque() for topic in followers}
+        self._due: dict[str, int | None] = dict.fromkeys(followers)
+        self._arrived: dict[str, collections.deque] = {topic: collections.deque() for topic in followers}
+        self._last: dict[str, int | None] = dict.fromkeys((trigger, *followers))
+        self._pending: tuple[int, typing.Any] | None = None
+        self._ahead: collections.deque[tuple[int, typing.Any]] = collections.deque()
+        self._period: int | None = None
         self.refused = 0
         self.refusal = ''
 
-    def take(self, topic, stamp, message):
+    def take(self, topic: str, stamp: int, message: typing.Any) -> None:
         """Take one input; stamp in ns. Raises GraphError in lockstep when the stamp is not the next one."""
         last = self._last[topic]
         if last is not None and stamp <= last:
@@ -71,7 +75,7 @@ class Steps:
                 break
             self._close()
 
-    def _begin(self, stamp, message):
+    def _begin(self, stamp: int, message: typing.Any) -> None:
         self._pending = (stamp, message)
         for name, awaited in self._awaited.items():
             awaited.append(stamp)
@@ -79,26 +83,25 @@ class Steps:
             while awaited and awaited[0] <= stamp - self._latency[name]:
                 self._due[name] = awaited.popleft()
 
-    def reset_after_gap(self, topic):
+    def reset_after_gap(self, topic: str) -> None:
         """Realtime: reset the state of a topic whose next message does not continue the earlier ones, with the trigger
         that of all topics."""
         for name in (topic,) if topic != self.trigger else self._last:
             self._last[name] = None
-            for queue in (self._awaited, self._arrived):
-                if name in queue:
-                    queue[name].clear()
             if name in self._due:
+                self._awaited[name].clear()
+                self._arrived[name].clear()
                 self._due[name] = None
         if topic == self.trigger:
             self._pending = None
 
-    def _refuse(self, reason):
+    def _refuse(self, reason: str) -> None:
         if self._lockstep:
             raise GraphError(reason)
         self.refused += 1
         self.refusal = reason
 
-    def _ready(self, topic):
+    def _ready(self, topic: str) -> bool:
         due, arrived = self._due[topic], self._arrived[topic]
         if due is None or topic in self._passed_over:
             return True
@@ -112,15 +115,16 @@ class Steps:
                              f'({self._latency[topic] / NS_PER_SECOND:.6f} s)?')
         return arrived[0][0] >= due
 
-    def answer_incomplete(self):
+    def answer_incomplete(self) -> None:
         """Realtime: answer the pending step, if there is one, without its missing inputs."""
         if self._pending is not None:
             self._close()
 
-    def _close(self):
+    def _close(self) -> None:
+        assert self._pending is not None
         stamp, message = self._pending
         self._pending = None
-        inputs = {}
+        inputs: dict[str, typing.Any] = {}
         for topic, arrived in self._arrived.items():
             inputs[topic] = None
             if self._lockstep:
@@ -132,11 +136,11 @@ class Steps:
         self._answer(stamp, message, inputs)
 
     @property
-    def pending_stamp(self):
+    def pending_stamp(self) -> int | None:
         """Stamp of the step that waits for its inputs [ns], or None."""
         return None if self._pending is None else self._pending[0]
 
     @property
-    def waiting_for(self):
+    def waiting_for(self) -> list[str]:
         """Topics that the pending step still waits for."""
         return [topic for topic in self._due if self._pending is not None and not self._ready(topic)]

@@ -86,16 +86,16 @@ class Topic(typing.NamedTuple):
     type: str
     rate: str
     doc: str
-    names: tuple = AXES
+    names: tuple[str, ...] = AXES
     frame: str = ''
     child: str = ''
-    units: typing.Mapping = {}
-    texts: tuple = ()
+    units: typing.Mapping[str, str] = {}
+    texts: tuple[str, ...] = ()
     measured: str = ''
     flag: str = ''
     holds: bool = False
-    only: tuple = ()
-    inputs: typing.Mapping = {}
+    only: tuple[str, ...] = ()
+    inputs: typing.Mapping[str, str | tuple[str, ...]] = {}
     latency: str = ''
 
 

@@ -6,11 +6,12 @@ receives another record. No ROS here.
 """
 import collections
 import typing
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 
 from pedestal_common.graph import nodes, topics
-from pedestal_common.parameters import as_dict
+from pedestal_common.parameters import Parameters, as_dict
 from pedestal_common.wire import commands, messages, records
 from pedestal_common.wire.commands import Reply
 
@@ -27,10 +28,10 @@ class Diagnosis(typing.NamedTuple):
     """State of a node: level LEVEL_OK, LEVEL_WARN or LEVEL_ERROR; one line for people; values [(key, text)]."""
     level: int
     message: str
-    values: list
+    values: list[tuple[str, str]]
 
 
-def joined(record_type, **parts) -> np.ndarray:
+def joined(record_type: np.dtype, **parts: np.ndarray) -> np.ndarray:
     """Return a record (1,) of these parts, arrays (1,)."""
     record = np.zeros(1, record_type)
     for name, part in parts.items():
@@ -70,19 +71,26 @@ class Unit(typing.Protocol):
     """
     NODE: nodes.Node
     LAWS: typing.Mapping
-    LIVE: tuple = ()
-    REQUESTS: tuple = ()
+    LIVE: tuple[str, ...] = ()
+    REQUESTS: tuple[str, ...] = ()
     VERBS: tuple = ()
-    CALLS: tuple = ()
-    MOMENTARY: tuple = ()
-    parameters: object
-    memory: tuple
+    CALLS: tuple[str, ...] = ()
+    MOMENTARY: tuple[str, ...] = ()
+    parameters: typing.Any
+    reads: tuple[str, ...]
+    writes: tuple[str, ...]
+    memory: typing.Any
+    inputs: np.ndarray
+    outputs: np.ndarray
+    messages: dict[str, typing.Any]
+    pending_replies: collections.deque[tuple[commands.Command, Reply]]
     epoch: int = 0
     silent: bool = False
     lockstep: bool = False
     _last: int | None = None
+    _due: collections.deque[tuple[int, commands.Command]]
 
-    def __init__(self, parameters, reads):
+    def __init__(self, parameters: Parameters, reads: Iterable[str]) -> None:
         self.parameters, self.reads = parameters, tuple(reads)
         self.inputs = records.empty(self.inputs_type(), 1)
         self.outputs = records.empty(self.outputs_type(), 1)
@@ -108,25 +116,25 @@ class Unit(typing.Protocol):
         return self.NODE.reads[0]
 
     @property
-    def latencies(self) -> dict:
+    def latencies(self) -> dict[str, float]:
         """{topic: s} of the topics that a step waits for beside its trigger: their age at the step."""
         return {name: self.latency(name) for name in self.reads
                 if name != self.trigger and topics.TOPIC_BY_NAME[name].rate == 'step'}
 
-    def latency(self, topic) -> float:
+    def latency(self, topic: str) -> float:
         """Return the age of a topic at the step [s]."""
         return getattr(self.parameters, topics.TOPIC_BY_NAME[topic].latency, 0.0)
 
     @property
-    def parts(self):
+    def parts(self) -> np.void:
         """Records of its law by name, views: self.parts['outputs']['status']."""
         return self.memory.record[0]
 
-    def block(self, steps) -> tuple:
+    def block(self, steps: int) -> tuple:
         """Return the memory for the next `steps` (at most MAX_BLOCK_STEPS); overridden by a unit with noise."""
         return self.memory
 
-    def step(self, stamps, inputs, outputs):
+    def step(self, stamps: np.ndarray, inputs: np.ndarray, outputs: np.ndarray) -> None:
         """Make the steps of stamps (n,) [ns], from inputs (n,) to outputs (n,), with the commands due before each."""
         _, law_of_many = self.LAWS[type(self.memory)]
         first = 0
@@ -137,17 +145,17 @@ class Unit(typing.Protocol):
             law_of_many(self.block(last - first), stamps[part], inputs[part], outputs[part])
             first = last
 
-    def schedule(self) -> list:
+    def schedule(self) -> list[tuple[int, commands.Command]]:
         """Return [(at [ns], Command)] of its scheduled commands, in order; overridden by a unit with such
         parameters."""
         return []
 
     @property
-    def next_due(self):
+    def next_due(self) -> int:
         """Time of the next scheduled command [ns]."""
         return self._due[0][0] if self._due else NEVER_DUE_NS
 
-    def execute_due(self, stamp):
+    def execute_due(self, stamp: int) -> None:
         """Execute the scheduled commands for the step of a stamp [ns] and before. A unit that starts later than its
         schedule skips the earlier commands."""
         while self._due and self._due[0][0] <= stamp:
@@ -156,7 +164,7 @@ class Unit(typing.Protocol):
                 self.command(command)
         self._last = stamp
 
-    def command(self, command) -> Reply:
+    def command(self, command: commands.Command) -> Reply:
         """Return the Reply to a Command between two steps, which acts in the next. The Reply is also added to
         `pending_replies`."""
         try:
@@ -170,37 +178,37 @@ class Unit(typing.Protocol):
         self.pending_replies.append((command, reply))
         return reply
 
-    def admit(self, command):
+    def admit(self, command: commands.Command) -> None:
         """Raise ValueError where the client of a Command may not command; overridden by a unit with a client in
         control."""
 
-    def execute(self, command, arguments) -> Reply:
+    def execute(self, command: commands.Command, arguments: dict[str, typing.Any]) -> Reply:
         """Execute a Command of VERBS with its arguments {name: number or text} and return the Reply; overridden by a
         unit with commands. Raises ValueError for a refusal."""
         raise KeyError(command.verb)
 
-    def decode(self, topic, message):
+    def decode(self, topic: str, message: typing.Any) -> None:
         """Take a message of a topic of rate `once`. Raises ValueError for a refused message."""
         raise ValueError(f'{topic} is not read')
 
-    def take_text(self, topic, text):
+    def take_text(self, topic: str, text: str) -> None:
         """Take the new text of a text topic."""
         self.inputs[topic] = records.code_of(topic, text)
 
-    def encode(self, topic, code):
+    def encode(self, topic: str, code: int) -> typing.Any:
         """Return the text of a code of one of its text topics, or the message of a list of texts."""
         return topics.TOPIC_BY_NAME[topic].texts[code]
 
-    def configure(self, parameters):
+    def configure(self, parameters: Parameters) -> None:
         """Take new values of the LIVE parameters."""
         self.parameters = parameters
 
-    def request(self, name) -> Reply:
+    def request(self, name: str) -> Reply:
         """Execute one of REQUESTS between two steps, which acts in the next, and return the Reply. Clients use
         `command`."""
         raise KeyError(name)
 
-    def requests_for(self, topic, text) -> list:
+    def requests_for(self, topic: str, text: str) -> list[str]:
         """Return the requests after which it publishes `text` on a text topic."""
         return []
 
@@ -213,19 +221,19 @@ class Unit(typing.Protocol):
         return ()
 
     @property
-    def calls(self) -> tuple:
+    def calls(self) -> tuple[str, ...]:
         """Services among CALLS that it calls now."""
         return ()
 
     @staticmethod
-    def idle(numbers) -> str:
+    def idle(numbers: Mapping[str, typing.Any]) -> str:
         """Return why a recording did not exercise it, '' if it did.
 
         numbers: {topic: (n, columns)} of its stamped topics, {topic: texts} of the others, as far as recorded.
         """
         return ''
 
-    def prepare(self):
+    def prepare(self) -> None:
         """Compile all functions that a node calls, without a change of the unit."""
         arrays = self.memory.record, self.inputs, self.outputs
         before = [array.copy() for array in arrays]
@@ -236,12 +244,13 @@ class Unit(typing.Protocol):
         for array, values in zip(arrays, before):
             array[...] = values
 
-    def prepare_ahead(self):
+    def prepare_ahead(self) -> None:
         """Compile the last laws of `prepare`, in a process beside the one that runs `prepare`, which then finds them
         in the cache. The unit cannot be used afterwards. Overridden where a second process saves time."""
 
 
-def announced(unit, topic, stamps, outputs):
+def announced(unit: Unit, topic: str, stamps: np.ndarray,
+              outputs: np.ndarray) -> tuple[np.ndarray, list[typing.Any]]:
     """Return (stamps [ns] (m,), texts) of a text topic of a unit at its changes in outputs (n,), for steps of stamps
     (n,).
 
@@ -249,7 +258,9 @@ def announced(unit, topic, stamps, outputs):
     """
     answers = next(outputs[name]['stamp'] for name in unit.NODE.writes if not records.is_text(name))
     stamps = np.where(answers != records.NO_STAMP, answers, stamps)
-    codes, rows, texts = outputs[topic], [], []
+    codes = outputs[topic]
+    rows: list[int] = []
+    texts: list[typing.Any] = []
     for row in np.flatnonzero(np.diff(codes, prepend=topics.NO_TEXT_CODE)).tolist():
         text = unit.encode(topic, int(codes[row]))
         if not texts or text != texts[-1]:

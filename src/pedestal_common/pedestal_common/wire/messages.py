@@ -91,17 +91,17 @@ def since(message, epoch):
     return message
 
 
-def header(frame_id) -> Header:
+def header(frame_id):
     """Return a Header at stamp 0."""
     return Header(stamp=Time(sec=0, nanosec=0), frame_id=frame_id)
 
 
-def vector3(x=0.0, y=0.0, z=0.0) -> Vector3:
+def vector3(x=0.0, y=0.0, z=0.0):
     """Return a Vector3."""
     return Vector3(x=x, y=y, z=z)
 
 
-def trajectory_point(size) -> JointTrajectoryPoint:
+def trajectory_point(size):
     """Return a point of `size` joints, all zero, without effort."""
     return JointTrajectoryPoint(positions=np.zeros(size), velocities=np.zeros(size), accelerations=np.zeros(size),
                                 effort=np.zeros(0), time_from_start=Duration(sec=0, nanosec=0))
@@ -155,7 +155,7 @@ def template(topic):
     return _TEMPLATES[row.type](row)
 
 
-def program_track(points) -> JointTrajectory:
+def program_track(points):
     """Return an acu/program_track of JointTrajectoryPoints."""
     message = template('acu/program_track')
     message.points = points
