@@ -155,7 +155,7 @@ def runs(loops, names, kept=None):
     all_words = np.arange(STEP_DTYPE.itemsize // lanes.WORD_BYTES).view(STEP_DTYPE)
     words = all_words[list(names)].astype(kept.dtype).view(np.int64)
     keeps = KeptSteps(words, _words(steps), _words(kept))
-    forecasts: list[list] = [[] for _ in loops]
+    forecasts = [[] for _ in loops]
     first = 0
     while first < count:
         for loop, forecast in zip(loops, forecasts):
