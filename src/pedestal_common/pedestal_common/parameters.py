@@ -65,14 +65,14 @@ class Parameters:
         beams: as in nodes.links; lockstep: its pacing."""
 
 
-P = typing.TypeVar('P', bound=Parameters)
-F = typing.TypeVar('F', bound=Callable)
+_P = typing.TypeVar('_P', bound=Parameters)
+_F = typing.TypeVar('_F', bound=Callable)
 
 
-def _cached(function: F) -> F:
+def _cached(function: _F) -> _F:
     """Return functools.cache of a function with its own type, because mypy takes the class of a dataclass for
     unhashable."""
-    return typing.cast(F, functools.cache(function))
+    return typing.cast(_F, functools.cache(function))
 
 
 def _check_field(field: dataclasses.Field, value: typing.Any) -> None:
@@ -110,7 +110,7 @@ def flatten(cls: type[Parameters], prefix: str = '') -> Iterator[tuple[str, data
 
 
 @_cached
-def _default(cls: type[P]) -> P:
+def _default(cls: type[_P]) -> _P:
     """Return an instance of a parameter dataclass with every default."""
     return cls()
 
@@ -137,7 +137,7 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
     return f' did you mean {near[0]!r}?' if near else ''
 
 
-def build(cls: type[P], values: Mapping[str, typing.Any], prefix: str = '') -> P:
+def build(cls: type[_P], values: Mapping[str, typing.Any], prefix: str = '') -> _P:
     """Return an instance of {dotted name: value}, every name beginning with `prefix`; other fields keep their default.
 
     Raises ParameterError for an unknown name (with the nearest known name) or a refused value.
@@ -158,7 +158,7 @@ def _number(value: typing.Any) -> typing.Any:
         return value
 
 
-def _replace(instance: P, values: Mapping[str, typing.Any], prefix: str) -> P:
+def _replace(instance: _P, values: Mapping[str, typing.Any], prefix: str) -> _P:
     changes = {}
     for field in dataclasses.fields(instance):
         name = prefix + field.name

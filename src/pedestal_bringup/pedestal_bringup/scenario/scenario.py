@@ -32,7 +32,7 @@ Sections = dict[str, dict[str, typing.Any]]
 """Values of each node and of `scenario`: {section: {dotted name: value}}."""
 
 
-P = typing.TypeVar('P', bound=parameters.Parameters)
+_P = typing.TypeVar('_P', bound=parameters.Parameters)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -448,12 +448,12 @@ def _spread_to_beam(name: str, node: str, sections: Sections, header: ScenarioPa
                                 'tracking_receiver')
 
 
-def _checked(name: str, section: str, parameters_type: type[P], values: Mapping[str, typing.Any]) -> P:
+def _checked(name: str, section: str, parameters_type: type[_P], values: Mapping[str, typing.Any]) -> _P:
     with _named(name, section):
         return _built(parameters_type, values)
 
 
-def _built(parameters_type: type[P], values: Mapping[str, typing.Any]) -> P:
+def _built(parameters_type: type[_P], values: Mapping[str, typing.Any]) -> _P:
     """Return parameters.build, cached for equal values, because trials of a scenario share most of their values."""
     key = tuple((name, type(value), value) for name, value in values.items())
     hashable = all(isinstance(value, int | float | str | None) for value in values.values())
@@ -463,7 +463,7 @@ def _built(parameters_type: type[P], values: Mapping[str, typing.Any]) -> P:
 
 
 @functools.lru_cache(256)
-def _built_once(parameters_type: type[P], key: tuple[tuple[str, type, typing.Any], ...]) -> P:
+def _built_once(parameters_type: type[_P], key: tuple[tuple[str, type, typing.Any], ...]) -> _P:
     return parameters.build(parameters_type, {name: value for name, _, value in key})
 
 

@@ -173,7 +173,7 @@ def members(names: Iterable[str], beams: int) -> tuple[str, ...]:
 
 
 class Link(typing.NamedTuple):
-    """Topic in a graph: its name there, its type, rate and flag (see Topic), the nodes that write and read it."""
+    """Topic in a graph: its name there, its type, rate and flag (see Topic), its publishers and subscribers."""
     name: str
     type: str
     rate: str

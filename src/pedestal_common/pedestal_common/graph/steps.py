@@ -24,12 +24,15 @@ class GraphError(RuntimeError):
 class Steps:
     """Matcher of a node's inputs: the trigger stamped t_k and, of each follower, the message due at t_k.
 
-    followers: {topic: latency in ns}; the message due has the newest trigger stamp <= t_k - latency (none at the
-    start). In lockstep a step waits for exactly that message. Triggers that arrive meanwhile are queued, because their
+    followers  {topic: latency in ns}; the message due has the newest trigger stamp <= t_k - latency (none at the start)
+    answer     answer(stamp_ns, trigger_message, {topic: message or None}), called once per step, in order
+    prompt     True if a realtime step is answered at once
+    held       followers for which a realtime step does not wait
+
+    In lockstep a step waits for exactly the messages due. Triggers that arrive meanwhile are queued, because their
     publisher may run ahead by as much as other latencies reach back. In realtime the step t_k is answered at the
     latest when the trigger of the next step arrives, with the newest messages, and None for a follower without a new
-    message; prompt: at once. A realtime step waits for none of the followers that are `held`. `answer(stamp_ns,
-    trigger_message, {topic: message or None})` is called once per step, in order.
+    message.
     """
 
     def __init__(self, trigger: str, followers: Mapping[str, int], lockstep: bool,
@@ -84,8 +87,8 @@ class Steps:
                 self._due[name] = awaited.popleft()
 
     def reset_after_gap(self, topic: str) -> None:
-        """Realtime: reset the state of a topic whose next message does not continue the earlier ones, with the trigger
-        that of all topics."""
+        """Reset the state of a topic whose next realtime message does not continue the earlier ones. The trigger
+        resets all topics."""
         for name in (topic,) if topic != self.trigger else self._last:
             self._last[name] = None
             if name in self._due:
@@ -116,7 +119,7 @@ class Steps:
         return arrived[0][0] >= due
 
     def answer_incomplete(self) -> None:
-        """Realtime: answer the pending step, if there is one, without its missing inputs."""
+        """Answer the pending realtime step, if there is one, without its missing inputs."""
         if self._pending is not None:
             self._close()
 

@@ -86,7 +86,7 @@ class TopicSubscriber:
         self._held, self._missed = collections.deque(maxlen=MAX_HELD_TEXTS), 0
         self.callback = self._hold if text else self._receive
         if text:
-            node.every(DISCOVERY_POLL_S, self._look)
+            node.every(DISCOVERY_POLL_S, self._take_held)
 
     def open(self, subscribe):
         """Subscribe. subscribe() makes the subscriptions with `callback`."""
@@ -95,9 +95,9 @@ class TopicSubscriber:
 
     def _hold(self, data, info):
         self._held.append((self._node.clock()[0], data, info))
-        self._look()
+        self._take_held()
 
-    def _look(self):
+    def _take_held(self):
         """Take the held texts once every publisher has a name. A text that arrived while an unexpected publisher was
         present is dropped. After that publisher has left, a new subscription brings the last text again."""
         while self._held and (not self._undiscovered() or self._node.clock()[0] - self._held[0][0] > MAX_DISCOVERY_NS):

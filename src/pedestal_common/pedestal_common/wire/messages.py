@@ -150,7 +150,7 @@ _TEMPLATES = {'sensor_msgs/msg/JointState': _joint_state, 'trajectory_msgs/msg/J
 
 
 def template(topic):
-    """Return the template of a stamped topic of the table: names and frames set, numbers zero."""
+    """Return a message of a stamped topic of the table, with its names and frames set and its numbers zero."""
     row = topics.TOPIC_BY_NAME[topic]
     return _TEMPLATES[row.type](row)
 
