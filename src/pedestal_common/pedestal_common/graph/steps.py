@@ -24,7 +24,8 @@ class GraphError(RuntimeError):
 class Steps:
     """Matcher of a node's inputs: the trigger stamped t_k and, of each follower, the message due at t_k.
 
-    followers  {topic: latency in ns}; the message due has the newest trigger stamp <= t_k - latency (none at the start)
+    followers  {topic: latency in ns}; the message due has the newest trigger stamp <= t_k - latency, none at the
+               start
     answer     answer(stamp_ns, trigger_message, {topic: message or None}), called once per step, in order
     prompt     True if a realtime step is answered at once
     held       followers for which a realtime step does not wait
