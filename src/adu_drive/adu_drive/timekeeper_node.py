@@ -88,7 +88,7 @@ class Timekeeper(unit_node.UnitNode):
             self.await_acknowledged()
         for port in self.ports:
             port.publish()
-        self.look_after()
+        self.after_step()
 
     def spin(self, executor):
         """Realtime: hear what arrives until the next step, then make it.
