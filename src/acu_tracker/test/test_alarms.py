@@ -206,9 +206,9 @@ def test_a_runaway_is_the_first_and_what_it_leads_to_stands_under_it(moving):
         moving.velocity[0] = -0.3
         moving.angle[0] -= 0.3 * T
         moving.step()
-    assert annunciated(moving) == ['azimuth runaway'] and 'moves unasked' in told(moving)
+    assert annunciated(moving) == ['azimuth runaway'] and 'uncommanded motion' in told(moving)
     assert (moving.mode, moving.reason) == ('standby', 'uncommanded motion')
-    assert table.ALARM_NAMES[control_unit.reset(moving.state[0])] == 'moves unasked'
+    assert table.ALARM_NAMES[control_unit.reset(moving.state[0])] == 'uncommanded motion'
     moving.velocity[:] = 0.0
     moving.run(0.5)
     # its time off is not over
