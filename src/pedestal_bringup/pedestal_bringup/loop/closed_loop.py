@@ -144,10 +144,11 @@ class Loop:
 
     beam: one of several, '' for the first; changed: {node: parameters} that replace those of the scenario.
     """
+    units: dict[str, Unit]
 
     def __init__(self, scenario, beam='', changed=()):
         prefix = f'{beam}/' if beam else scenario.prefixes[0]
-        self.units: dict[str, Unit] = {}
+        self.units = {}
         for name in UNIT_ORDER:
             full = prefix + name if nodes.row(name).of_beam else name
             if full in scenario.nodes:
