@@ -77,5 +77,5 @@ def test_a_sheet_that_cannot_be_is_refused(pedestal, tmp_path, arguments, expect
 
 def test_no_file_is_overwritten(pedestal, tmp_path):
     (tmp_path / 'my.yaml').write_text('mine')
-    assert 'is there already' in pedestal('new', 'my.yaml')[2] and (tmp_path / 'my.yaml').read_text() == 'mine'
+    assert 'already exists' in pedestal('new', 'my.yaml')[2] and (tmp_path / 'my.yaml').read_text() == 'mine'
     assert 'must end in .yaml' in pedestal('new', 'my.txt')[2]
