@@ -1,4 +1,4 @@
-"""The faults that can be injected into the drive and its plant: what each of them breaks."""
+"""Injected faults of the drive and its plant: their effects on the records of the drive."""
 import numpy as np
 
 from adu_drive import axis
@@ -10,18 +10,21 @@ DRIVE_MESSAGE_FAULT_CODES = message_faults.codes('adu')
 Fault = codes([fault.name for fault in table.INJECTED_FAULTS['adu']])
 
 STUCK_BRAKE_CONDITIONS = axis.BRAKE_STUCK_ON, axis.BRAKE_STUCK_OFF
-"""By the option of brake_stuck."""
+"""Conditions of a stuck brake, in the order of the options of fault brake_stuck."""
 
 DRIVE_INJECTED_DTYPE = np.dtype([('bias', 'f8', (2,)), ('said', message_faults.MESSAGE_FAULT_DTYPE)], align=True)
-"""bias: of the rates on joint_states [rad/s]; said: what spoils joint_states and, frozen, adu/motor_states; said.drop
-is 1 while no command is heard."""
+"""Active faults of messages.
+
+bias    bias of the rates in joint_states [rad/s]
+said    fault of joint_states and, for a frozen drive, of adu/motor_states; `drop` is 1 while commands are lost
+"""
 
 JOINT_STATES_TOPIC, MOTOR_STATES_TOPIC = 'joint_states', 'adu/motor_states'
 
 
 @compiled
 def _clear_faults(s):
-    """Nothing of an axis is broken."""
+    """Clear the injected faults of an axis."""
     s.motor_lost[0] = s.motor_lost[1] = s.stuck = s.toothless = 0
     s.jump = s.gust = s.teeth[0] = s.teeth[1] = 0.0
     s.brake_stuck = axis.BRAKE_WORKING
@@ -29,7 +32,7 @@ def _clear_faults(s):
 
 @compiled
 def _apply_fault(m, fault, values):
-    """What a fault does to the records of the drive (unit.RECORD)."""
+    """Apply a fault to the record of the drive (unit.RECORD_DTYPE)."""
     i = int(values[0])
     s, c = (m.state.azimuth, m.constants.azimuth) if i == 0 else (m.state.elevation, m.constants.elevation)
     message_faults.apply(m.injected.said, DRIVE_MESSAGE_FAULT_CODES, fault, values)
@@ -55,7 +58,7 @@ def _apply_fault(m, fault, values):
 
 @compiled
 def apply_due_faults(m, stamp):
-    """Mend everything, then break what is broken in the step of a stamp [ns]."""
+    """Clear all faults, then apply the faults that are active at a stamp [ns]."""
     e = m.injected
     _clear_faults(m.state.azimuth)
     _clear_faults(m.state.elevation)
@@ -71,7 +74,7 @@ def apply_due_faults(m, stamp):
 
 @compiled
 def corrupt_messages(e, stamp, outputs):
-    """What the drive says of a step, spoilt."""
+    """Apply the active message faults to the messages of a step."""
     joints, motors = outputs[JOINT_STATES_TOPIC], outputs[MOTOR_STATES_TOPIC]
     for i in range(2):
         joints.velocity[i] += e.bias[i]
