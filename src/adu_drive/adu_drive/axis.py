@@ -120,9 +120,9 @@ def _motor_at_rest(m, g, T, total, theta, per_rad):
 def initial_state(p, theta, external):
     """Return the state of an axis at rest at theta [rad], in balance with an external torque [Nm]: nested dictionary.
 
-    reading                      counts of the load encoder at t_k
-    external                     torque on the load [Nm], constant over a control period
-    asked_rate, asked_torque     command that is executed in a speed-loop period [rad/s, Nm]
+    reading        counts of the load encoder at t_k
+    external       torque on the load [Nm], constant over a control period
+    commanded_rate, commanded_torque    command that is executed in a speed-loop period [rad/s, Nm]
 
     Fields of injected faults:
 
@@ -142,7 +142,7 @@ def initial_state(p, theta, external):
             'motor_2': _motor_at_rest(p.motor_2, p.gear_train, T - T_b, total, theta, per_rad),
             'theta': theta, 'omega': 0.0, 'z': 0.0, 'h_J': 0.0, 'q_B': 0.0, 'h_J_dish': 0.0,
             'dish': theta + external / k_dish if k_dish else theta, 'omega_dish': 0.0, 'external': external,
-            'deck': 0.0, 'asked_rate': 0.0, 'asked_torque': 0.0,
+            'deck': 0.0, 'commanded_rate': 0.0, 'commanded_torque': 0.0,
             'bias': T_b, 'rate': 0.0, 'omega_hat': 0.0, 'd_hat': -T if observed else 0.0,
             'torque_limited': 0, 'voltage_limited': 0, 'end_stop': 0, 'stopping': 0,
             'faults': 0, 'present': 0, 'late': 0, 'slewing': 0, 'braked': 0, 'reading': 0.0,

@@ -174,27 +174,27 @@ def _external(s, c, u):
         T_azimuth, T_elevation = T_azimuth + of_field[0], T_elevation + of_field[1]
     T_azimuth += s.azimuth.gust - c.azimuth.unbalance * math.cos(azimuth)
     T_elevation += s.elevation.gust - c.elevation.unbalance * math.cos(elevation)
-    believed = _plausible(x) and _plausible(y) and _plausible(z)
-    if not believed:
+    valid = _plausible(x) and _plausible(y) and _plausible(z)
+    if not valid:
         x = y = z = 0.0
     if c.bodies.rigid:
         _apply_rigid_body_torques(s, c, u.base_rate, (x, y, z))
     else:
         s.azimuth.deck, s.elevation.deck = inertial_torques(azimuth, c.azimuth.J, c.elevation.J, x, y, z)
-    return T_azimuth + s.azimuth.deck, T_elevation + s.elevation.deck, believed
+    return T_azimuth + s.azimuth.deck, T_elevation + s.elevation.deck, valid
 
 
 @compiled
-def _receive(s, u, disturbance_believed):
+def _receive(s, u, disturbance_valid):
     """Put the command of step k into the ring. Return True if it is valid."""
     slot = s.k % COMMAND_RING_SIZE
-    believed = (disturbance_believed and _plausible(u.azimuth.rate) and _plausible(u.azimuth.torque)
-                and _plausible(u.elevation.rate) and _plausible(u.elevation.torque))
-    s.enable[slot] = 1 if believed and u.enable == 1 else 0
-    if believed:
+    valid = (disturbance_valid and _plausible(u.azimuth.rate) and _plausible(u.azimuth.torque)
+             and _plausible(u.elevation.rate) and _plausible(u.elevation.torque))
+    s.enable[slot] = 1 if valid and u.enable == 1 else 0
+    if valid:
         s.rate[slot, 0], s.rate[slot, 1] = u.azimuth.rate, u.elevation.rate
         s.torque[slot, 0], s.torque[slot, 1] = u.azimuth.torque, u.elevation.torque
-    return believed
+    return valid
 
 
 @compiled
@@ -229,8 +229,8 @@ def request(s, c, y, what):
 @compiled
 def _begin_period(s, c, u, y):
     """Begin a period: external torques, command, brakes and windings."""
-    s.azimuth.external, s.elevation.external, believed = _external(s, c, u)
-    y.invalid_command = 0 if _receive(s, u, believed) else 1
+    s.azimuth.external, s.elevation.external, valid = _external(s, c, u)
+    y.invalid_command = 0 if _receive(s, u, valid) else 1
     s.braked = drive_state.advance(s, c, u.pins)
     axis.begin_period(s.azimuth, c.azimuth, s.braked)
     axis.begin_period(s.elevation, c.elevation, s.braked)
@@ -245,14 +245,14 @@ def _apply_command(s, c, u, j):
     slot = (s.tick // c.speed_ticks) % COMMAND_RING_SIZE     # An empty slot, before the first command, has rate 0.
     s.following = s.enable[slot] if s.phase == drive_state.PHASE_ENABLED and u.enable == 1 else 0
     az, el = s.azimuth, s.elevation
-    az.asked_rate, az.asked_torque = s.rate[slot, 0], s.torque[slot, 0]
-    el.asked_rate, el.asked_torque = s.rate[slot, 1], s.torque[slot, 1]
+    az.commanded_rate, az.commanded_torque = s.rate[slot, 0], s.torque[slot, 0]
+    el.commanded_rate, el.commanded_torque = s.rate[slot, 1], s.torque[slot, 1]
 
 
 @inlined
 def _speed_control(s, a, c):
     """Run one speed-loop period of axis a of a drive s."""
-    axis.speed_control(a, c, a.asked_rate, a.asked_torque, s.following, s.phase != drive_state.PHASE_DISABLED,
+    axis.speed_control(a, c, a.commanded_rate, a.commanded_torque, s.following, s.phase != drive_state.PHASE_DISABLED,
                        not s.braked)
 
 

@@ -1,9 +1,12 @@
 """Lanes: the laws of the drive on many drives at once, from the same source.
 
 A record of 8-byte numbers becomes rows of a flat array: word r of the record in lane i is at r LANE_COUNT + i (a
-structure of arrays). A law on the attributes of a record, `s.omega += c.h * a`, compiles for one Lane without changes.
-Inlined into a loop over the lanes, it becomes vector instructions of LLVM, which give the bits of the scalar code. A
-function for records and for Lanes loops by
+structure of arrays). For a record (theta, omega) the array holds theta of all lanes, then omega of all lanes, and
+`s.omega` of lane i is its word LANE_COUNT + i.
+
+A law on the attributes of a record, `s.omega += c.h * a`, compiles for one Lane without changes. Inlined into a loop
+over the lanes, it becomes vector instructions of LLVM, which give the bits of the scalar code. A function for records
+and for Lanes loops by
 
     for i in range(count(s)):
         law(at(s, i), at(c, i))

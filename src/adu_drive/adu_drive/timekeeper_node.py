@@ -44,7 +44,7 @@ class Timekeeper(unit_node.UnitNode):
         self.k, self.made = -1, 0
         self.lost_steps = self.missed_steps = self.late_ticks = 0
         self.newest, self.command_stamps = {}, {}
-        self.begun = self.ticked = time.monotonic_ns()
+        self.begun = self.last_step_time = time.monotonic_ns()
         self.stopping = False
         latencies = {port.named(name): latency for port in self.ports
                      for name, latency in port.unit.latencies.items()}
@@ -53,7 +53,7 @@ class Timekeeper(unit_node.UnitNode):
             self.follow(self.unit.trigger, latencies)
             self.timer = self.every(0.001, self.start)
         else:
-            self.wait, self.guarded_tick = 0.0, self._guarded(self.tick)
+            self.wait, self.guarded_step = 0.0, self._guarded(self.make_due_step)
             for port in self.ports:
                 for name, decoder in port.decoders.items():
                     if name != self.unit.trigger:
@@ -109,35 +109,35 @@ class Timekeeper(unit_node.UnitNode):
         while self.failure is None and (left := end - time.monotonic()) > 0.0:
             executor.spin_once(timeout_sec=left)
         if self.failure is None:
-            self.guarded_tick()
+            self.guarded_step()
 
-    def tick(self):
+    def make_due_step(self):
         """Make the due step of realtime, unless it was made, and set the wait for the next step [s]."""
         now, utc = self.clock()
         start = self.epoch(utc)
-        k, least = (utc - start) // self.period_ns, 0.0
+        k, min_wait = (utc - start) // self.period_ns, 0.0
         if k >= 0 and k > self.k:
-            self._tick(k, start + k * self.period_ns, now)
-            least = MIN_RECEIVE_FRACTION * self.parameters.period
+            self._make_realtime_step(k, start + k * self.period_ns, now)
+            min_wait = MIN_RECEIVE_FRACTION * self.parameters.period
         _, utc = self.clock()
         wait = (start + (max(k, self.k) + 1) * self.period_ns - utc) / NS_PER_SECOND
-        self.wait = min(max(wait, least), MAX_WAIT_S)
+        self.wait = min(max(wait, min_wait), MAX_WAIT_S)
 
-    def _tick(self, k, stamp, now):
+    def _make_realtime_step(self, k, stamp, now):
         """Make step k of a stamp [ns] at the time now of the monotonic clock [ns].
 
         Earlier steps that were not made are not published; they count as missed and lost.
         """
         before = stamp - self.period_ns
         if self.made:
-            periods = (now - self.ticked) / self.period_ns
+            periods = (now - self.last_step_time) / self.period_ns
             missed = max(round(periods) - 1, 0)
             self.missed_steps += missed
             self.late_ticks += periods > 1.5
             self.lost_steps += missed + any(before > stamp for stamp in self.command_stamps.values())
         else:
             self.begun = now
-        self.k, self.ticked = k, now
+        self.k, self.last_step_time = k, now
         values, self.newest = self.newest, {}
         self._make(stamp, values)
         if self.last_step is not None and k >= self.last_step:

@@ -88,8 +88,8 @@ def decode(u, m, dropped, command, ship):
 def record_invalid_topic(u, m):
     """Store the topic with the invalid input."""
     deck = u.base_acceleration
-    believed = max(abs(deck[0]), abs(deck[1]), abs(deck[2])) <= drive_unit.MAX_PLAUSIBLE_INPUT
-    m.invalid = 1 if believed else 2
+    valid = max(abs(deck[0]), abs(deck[1]), abs(deck[2])) <= drive_unit.MAX_PLAUSIBLE_INPUT
+    m.invalid = 1 if valid else 2
 
 
 @compiled
@@ -114,7 +114,7 @@ def receive(m, stamp, inputs):
     if m.link.stamp == NO_STAMP:
         m.state.k = stamp // m.link.period
         return False
-    decode(m.inputs, m.link, m.injected.said.drop, inputs[RATE_COMMAND_TOPIC], inputs[SHIP_TRUTH_TOPIC])
+    decode(m.inputs, m.link, m.injected.message_fault.drop, inputs[RATE_COMMAND_TOPIC], inputs[SHIP_TRUTH_TOPIC])
     m.inputs.pins = inputs[PIN_COMMAND_TOPIC]
     return True
 
