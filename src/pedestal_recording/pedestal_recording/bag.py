@@ -1,13 +1,16 @@
-"""Reads a bag: a rosbag2 directory with its MCAP files, or one file. No ROS here."""
+"""Reading of a bag: a rosbag2 directory with its MCAP files, or one file. No ROS here."""
 import contextlib
 import copy
 import functools
 import pathlib
 import re
+import typing
+from collections.abc import Iterable, Iterator, Mapping
 
 import numpy as np
 import yaml
 from mcap.opcode import Opcode
+from mcap.records import Channel
 
 from pedestal_common.graph import nodes
 from pedestal_common.parameters import did_you_mean
@@ -18,38 +21,42 @@ from pedestal_recording import columns, mcap_file
 from pedestal_recording.mcap_file import MESSAGE_HEAD, BagError, McapFile
 
 MAX_CACHE_BYTES = 64_000_000
-"""Bytes of unpacked chunks that are kept."""
+"""Largest size of the cache of unpacked chunks [bytes]."""
 
 MAX_SEARCHED_DIAGNOSTICS = 100
-"""Diagnostics at the end of a bag among which the last of a node is looked for."""
+"""Number of messages at the end of a bag in which the last diagnostics of a node are searched."""
 
 MAX_CHANNELS = 2000
-"""Channels of a file at the most."""
+"""Largest number of channels of a file."""
 
 INDEX_BLOCK_ROWS = 65_536
-"""Rows of the index that are made at once."""
+"""Number of rows of a block of the index."""
 
 INDEX_FIELDS = [(name, 'i8') for name in ('channel', 'sequence', 'log', 'publish', 'stamp', 'chunk', 'start', 'stop')]
 _DECLARED = (Opcode.HEADER, Opcode.SCHEMA, Opcode.CHANNEL, Opcode.STATISTICS, Opcode.METADATA)
+Content = typing.TypeVar('Content')
+MetadataRecords = Mapping[str, Mapping[str, str]]
+"""Metadata records of a bag, {name: {text: text}}."""
+
 _NUMBERED = re.compile(r'(.+)_(\d+)\.mcap')
 
 
-def read(path, beam=None):
-    """The Bag in a directory or an .mcap file; of several beams the view of one, '' for the first; None: all.
+def read(path: str | pathlib.Path, beam: str | None = None) -> 'Bag':
+    """Return the Bag in a directory or an .mcap file. beam: view of one beam, '' for the first, None for all beams.
 
-    Raises BagError when it is missing, empty, damaged or foreign, or has no such beam.
+    Raises BagError if the bag is missing, empty, damaged or foreign, or has no such beam.
     """
     bag = load(path)
     if bag.damage:
         where = bag.file if len(bag.files) == 1 else bag.path
-        raise BagError(f'{where}: {bag.damage}; `pedestal recover` makes a bag of what is there')
+        raise BagError(f'{where}: {bag.damage}; `pedestal recover` recovers its readable messages')
     return bag if beam is None else bag.view(beam)
 
 
-def chosen_topics(bag, names):
-    """The topics of a Bag with these names, without the leading '/', each once.
+def chosen_topics(bag: 'Bag', names: Iterable[str]) -> list[str]:
+    """Return the topics of a Bag with these names, without the leading '/', each once.
 
-    Raises BagError, with the most similar name, for a topic that is not in it.
+    Raises BagError with the most similar name for a missing topic.
     """
     chosen = list(dict.fromkeys(name.lstrip('/') for name in names))
     for name in chosen:
@@ -59,9 +66,12 @@ def chosen_topics(bag, names):
     return chosen
 
 
-def load(path):
-    """The Bag in a directory or an .mcap file as far as it can be read: `damage` is a line on where and why it ends,
-    '' if it is whole. Raises BagError when there is nothing to read."""
+def load(path: str | pathlib.Path) -> 'Bag':
+    """Return the readable part of the Bag in a directory or an .mcap file.
+
+    `damage` is a line with place and reason of its early end, '' for a whole bag. Raises BagError if nothing is
+    readable.
+    """
     opened = [McapFile(file) for file in locate(path)]
     try:
         return Bag(pathlib.Path(path), opened)
@@ -69,11 +79,11 @@ def load(path):
         raise BagError(f'{path}: {mcap_file.reason(error)}') from None
 
 
-def locate(path) -> list:
-    """The MCAP files of a bag in their order, a directory or a file itself.
+def locate(path: str | pathlib.Path) -> list[pathlib.Path]:
+    """Return the MCAP files of a bag in their order; the bag is a directory or one file.
 
-    A bag that was recorded on by several recorders, one after the other, has NAME_0.mcap, NAME_1.mcap and so on.
-    Raises BagError when there is none, or when there are several that are not numbered so.
+    Each restart of the recorder begins a new file: NAME_0.mcap, NAME_1.mcap and so on. Raises BagError for no file,
+    or for several files with other names.
     """
     path = pathlib.Path(path)
     try:
@@ -84,58 +94,67 @@ def locate(path) -> list:
         raise BagError(f'{path}: {mcap_file.reason(error)}') from None
     if len(files) == 1:
         return files
-    numbered = {file: _NUMBERED.fullmatch(file.name) for file in files}
-    if not files or not all(numbered.values()) or len({match[1] for match in numbered.values()}) > 1:
-        raise BagError(f'{path}: {len(files)} .mcap files in it where one belongs, or NAME_0.mcap, NAME_1.mcap ...')
+    numbered = {file: match for file in files if (match := _NUMBERED.fullmatch(file.name))}
+    if not files or len(numbered) < len(files) or len({match[1] for match in numbered.values()}) > 1:
+        raise BagError(f'{path}: {len(files)} .mcap files in it, must be one, or NAME_0.mcap, NAME_1.mcap ...')
     return sorted(files, key=lambda file: int(numbered[file][2]))
 
 
-def start(metadata_records) -> int:
-    """Where the time of the scenario is 0 in the stamps [ns] of a bag, by its metadata records: UTC in realtime."""
+def start(metadata_records: MetadataRecords) -> int:
+    """Return time 0 of the scenario in the stamps of a bag [ns], UTC in realtime, from its metadata records."""
     return _nanoseconds(metadata_records.get('pedestal', {}).get('start')) or 0
 
 
-def planned_end(metadata_records):
-    """When a run was to end, a stamp [ns], by the metadata records of its bag; None where they do not say."""
+def planned_end(metadata_records: MetadataRecords) -> int | None:
+    """Return the planned end of a run, a stamp [ns], from the metadata records of its bag; None if unknown."""
     planned = _nanoseconds(metadata_records.get('pedestal', {}).get('planned_end_ns'))
-    if planned is None:  # recordings made before that was noted
+    if planned is None:  # older recordings have the parameter only
         with contextlib.suppress(KeyError, TypeError, ValueError, OverflowError, yaml.YAMLError):
             planned = round(plain_yaml.parse(metadata_records['parameters']['recorder'])['duration'] * 1e9) or None
     return None if planned is None else start(metadata_records) + planned
 
 
-def _nanoseconds(text):
-    """The time in a text of a bag's metadata, None where it is none."""
+def _nanoseconds(text: str | None) -> int | None:
+    """Return a text of the metadata as a time [ns], None if it is none."""
     return int(text) if text and text.isdecimal() and len(text) < 20 else None
 
 
-def foreign_encoding(file, channel):
-    """The BagError for a channel that is not encoded as ROS 2 messages are."""
+def foreign_encoding(file: pathlib.Path, channel: Channel) -> BagError:
+    """Return the BagError for a channel with another encoding than CDR."""
     return BagError(f'{file}: {channel.topic} is encoded as {channel.message_encoding!r}: not a ROS 2 recording')
 
 
 class Bag:
     """A recording.
 
-    files: its MCAP files in their order, paths; file: the first of them; topics: {name without the leading '/': type};
-    metadata_records: {name: {text: text}} of the first file;
-    index: record array (n,) in the order of the files, one row per message: channel (its number, plus 65536 times that
-    of its file), sequence, log, publish, stamp [ns] (of its header; its log time where it has none), chunk, start,
-    stop (where its bytes are);
-    statistics: {name: count} in the summaries, None where a file has none;
-    breaks: lines on files that end without a summary while another follows: their recorder was killed, and one was
-    started again; damage: the file that is broken or ends before its end, where and why, ''; beam: the prefix of the
-    beam that it is a view of, ''.
+    files, file        paths of its MCAP files in their order; the first of them
+    topics             {name without the leading '/': type}
+    metadata_records   {name: {text: text}} of the first file
+    index              record array (n,) in the order of the files, one row per message: channel (its number plus
+                       65536 times the number of its file), sequence, log, publish, stamp [ns] (of its header; its log
+                       time without a header), chunk, start, stop (place of its bytes)
+    statistics         {name: count} in the summaries, None if a file has none
+    breaks             lines about files without a summary before the last file: their recorder was killed
+    damage             broken or early ended file, with place and reason, ''
+    beam               prefix of the beam of a view, ''
     """
 
-    def __init__(self, path, opened):
+    def __init__(self, path: pathlib.Path, opened: list[McapFile]) -> None:
         self.path, self.beam = path, ''
         self.files = [file.path for file in opened]
         self.file = self.files[0]
-        self.topics, self.metadata_records, self.statistics = {}, {}, {}
-        self.breaks, self.damage = [], ''
-        self._opened, self._cache, self._chunks = opened, {}, []
-        self._schemas, self._channels, self._stamped = {}, {}, []
+        self.topics: dict[str, str] = {}
+        self.metadata_records: dict[str, dict[str, str]] = {}
+        self.statistics: dict[str, int] | None = None
+        self.breaks: list[str] = []
+        self.damage = ''
+        self._opened = opened
+        self._cache: dict[int, bytes] = {}
+        self._chunks: list[tuple[McapFile, int, int]] = []
+        self._schemas: dict[int, str] = {}
+        self._channels: dict[int, str] = {}
+        self._stamped: list[int] = []
+        self._counts: dict[str, int] = {}
         blocks, ended = [np.zeros(0, INDEX_FIELDS)], True
         for number, file in enumerate(opened):
             try:
@@ -147,11 +166,12 @@ class Bag:
                     self.damage = text
                     break
                 self.breaks.append(text)
-        self.statistics = self.statistics if ended and self.statistics else None
+        if ended and self._counts:
+            self.statistics = self._counts
         self.index = np.concatenate(blocks).view(np.recarray)
 
-    def _scan(self, number, file, blocks):
-        """Add the messages of a file to the blocks of the index. Raises EOFError where it ends before its end."""
+    def _scan(self, number: int, file: McapFile, blocks: list[np.ndarray]) -> None:
+        """Add the messages of a file to the blocks of the index. Raises EOFError if the file ends early."""
         for opcode, start, stop in file.pieces():
             try:
                 if opcode == Opcode.CHUNK:
@@ -164,12 +184,13 @@ class Bag:
                     self._declare(number, opcode, file.read(start + 9, stop))
             except BagError:
                 raise
-            except Exception as error:  # whatever a decoder makes of broken bytes
+            except Exception as error:  # a decoder may raise anything on broken bytes
                 raise EOFError(f'broken record at byte {start}: {error}') from None
 
-    def _walk(self, number, data, offset, chunk):
-        """Iterator of blocks of the index: the messages in the records `data`, which begin at this offset."""
-        unpack, base, at, rows = MESSAGE_HEAD.unpack_from, number << 16, 0, []
+    def _walk(self, number: int, data: bytes, offset: int, chunk: int) -> Iterator[np.ndarray]:
+        """Yield blocks of the index for the messages in the records `data`, which begin at an offset of the file."""
+        unpack, base, at = MESSAGE_HEAD.unpack_from, number << 16, 0
+        rows: list[tuple[int, ...]] = []
         add, file = rows.append, self._opened[number]
         while at < len(data):
             if data[at] == Opcode.MESSAGE:
@@ -184,17 +205,17 @@ class Bag:
                 self._declare(number, opcode, data[at + 9:stop])
                 at = stop
         if at > len(data):
-            raise ValueError('a message longer than its chunk')
+            raise ValueError('a message that is longer than its chunk')
         if rows:
             yield self._block(file, rows, data, offset)
 
-    def _block(self, file, rows, data, offset):
-        """Rows as a block of the index, each stamped where its header says when."""
+    def _block(self, file: McapFile, rows: list[tuple[int, ...]], data: bytes, offset: int) -> np.ndarray:
+        """Return rows as a block of the index; a row with a header takes its stamp."""
         file.count(len(rows))
         block = np.array(rows, INDEX_FIELDS)
         unknown = set(np.unique(block['channel']).tolist()) - set(self._channels)
         if unknown:
-            raise ValueError(f'channel {min(unknown) & 0xffff} is declared nowhere')
+            raise ValueError(f'channel {min(unknown) & 0xffff} is not declared')
         if (block['stop'] < block['start']).any():
             raise ValueError('a message that is shorter than its head')
         stamped = np.isin(block['channel'], self._stamped) & (block['stop'] - block['start'] >= 12)
@@ -205,7 +226,7 @@ class Bag:
         block['stop'] += offset
         return block
 
-    def _declare(self, number, opcode, content):
+    def _declare(self, number: int, opcode: int, content: bytes) -> None:
         record, base = mcap_file.parsed(opcode, content), number << 16
         if opcode == Opcode.SCHEMA:
             self._schemas[base | record.id] = record.name
@@ -214,9 +235,9 @@ class Bag:
                 raise foreign_encoding(self.files[number], record)
             name = record.topic.lstrip('/')
             if not name.isprintable() or not name:
-                raise ValueError(f'a topic of the name {record.topic!r}')
+                raise ValueError(f'a topic with the name {record.topic!r}')
             if len(self._channels) >= MAX_CHANNELS * len(self.files):
-                raise ValueError(f'more than {MAX_CHANNELS} channels')
+                raise ValueError(f'more than {MAX_CHANNELS} channels in a file')
             self._channels[base | record.id] = name
             self.topics[name] = self._schemas[base | record.schema_id]
             if self.topics[name] in STAMPED_TYPES:
@@ -227,28 +248,28 @@ class Bag:
             for channel, name in self._channels.items():
                 if channel >> 16 == number:
                     count = record.channel_message_counts.get(channel & 0xffff, 0)
-                    self.statistics[name] = self.statistics.get(name, 0) + count
+                    self._counts[name] = self._counts.get(name, 0) + count
 
-    def _bytes(self, chunk, start, stop):
-        """The bytes of a message, of a row of the index."""
+    def _bytes(self, chunk: int, start: int, stop: int) -> bytes:
+        """Return the bytes of a message from the place in its row of the index."""
         if chunk < 0:
             return self._opened[-1 - chunk].read(start, stop)
         if chunk not in self._cache:
-            file, *place = self._chunks[chunk]
-            data = file.chunk(*place, again=True)
+            file, first, last = self._chunks[chunk]
+            data = file.chunk(first, last, again=True)
             while self._cache and sum(map(len, self._cache.values())) + len(data) > MAX_CACHE_BYTES:
                 del self._cache[next(iter(self._cache))]
             self._cache[chunk] = data
         return self._cache[chunk][start:stop]
 
     @property
-    def metadata(self):
-        """{text: text} of the run (the record `pedestal`); empty in a foreign bag."""
+    def metadata(self) -> dict[str, str]:
+        """Metadata {text: text} of the run (record `pedestal`); empty in a foreign bag."""
         return self.metadata_records.get('pedestal', {})
 
     @property
-    def beams(self):
-        """Beams of the array that was recorded; 0: a drive with motors."""
+    def beams(self) -> int:
+        """Number of beams of the recorded array; 0 for a drive with motors."""
         several = sum(1 for name in self.topics if nodes.plain(name) == 'joint_states' != name)
         beams = self.metadata.get('beams', '0')
         if not (beams.isdecimal() and max(several, int(beams[:9])) <= nodes.MAX_BEAMS):
@@ -256,38 +277,41 @@ class Bag:
         return several or int(beams)
 
     @property
-    def start(self):
-        """Where the time of the scenario is 0 in the stamps [ns]: UTC in realtime, else 0."""
+    def start(self) -> int:
+        """Time 0 of the scenario in the stamps [ns]: UTC in realtime, else 0."""
         return start(self.metadata_records)
 
     @property
-    def end(self):
-        """Log time of its last message [s]."""
+    def end(self) -> float:
+        """Log time of the last message [s]."""
         return self.index.log.max() / 1e9
 
     @property
-    def planned_end(self):
-        """When the run was to end, a stamp [ns]; None when the bag does not say."""
+    def planned_end(self) -> int | None:
+        """Planned end of the run, a stamp [ns]; None if unknown."""
         return planned_end(self.metadata_records)
 
     @property
-    def graph(self):
-        """{name: Link} of the graph that was recorded."""
+    def graph(self) -> dict[str, nodes.Link]:
+        """Links {name: Link} of the recorded graph."""
         return nodes.links(self.beams)
 
-    def view(self, beam=''):
-        """The Bag of one beam of several, '' for the first: the beam's own topics under their plain names and those
-        that all beams share. A Bag of one beam is its own view. Raises BagError for a beam that is not in it."""
+    def view(self, beam: str = '') -> 'Bag':
+        """Return the Bag of one of several beams, '' for the first.
+
+        It has the topics of the beam under their plain names, and the topics that all beams share. A Bag of one beam
+        is its own view. Raises BagError for a missing beam.
+        """
         prefixes = nodes.prefixes(self.beams)
         if prefixes == ('',) and beam:
-            raise BagError(f'{self.path}: beam {beam!r}: there is only one in it')
+            raise BagError(f'{self.path}: beam {beam!r}: the bag has one beam only')
         prefix = f'{beam}/' if beam else prefixes[0]
         if prefix not in prefixes:
             raise BagError(f'{self.path}: beam {beam!r}: must be one of {", ".join(name[:-1] for name in prefixes)}')
         if not prefix:
             return self
 
-        def own(content):
+        def own(content: Mapping[str, Content]) -> dict[str, Content]:
             return {nodes.plain(name): value for name, value in content.items()
                     if nodes.beam_of(name) in ('', prefix[:-1])}
 
@@ -296,7 +320,7 @@ class Bag:
         view.topics = own(self.topics)
         view._channels = {channel: nodes.plain(name) for channel, name in self._channels.items()
                           if nodes.beam_of(name) in ('', prefix[:-1])}
-        view.index = self.index[np.isin(self.index.channel, list(view._channels))]
+        view.index = self.index[np.isin(self.index.channel, list(view._channels))].view(np.recarray)
         view.statistics = None if self.statistics is None else own(self.statistics)
         view.metadata_records = {**self.metadata_records, 'pedestal': {**self.metadata, 'beams': '1'}}
         if 'parameters' in self.metadata_records:
@@ -308,10 +332,13 @@ class Bag:
         return view
 
     @functools.cached_property
-    def configuration(self):
-        """How the run was made: {'scenario': its YAML, 'parameters': {node: {dotted name: value}}}; '' and {} in a bag
-        without a configuration. Raises BagError where that is no YAML, or no section of parameters."""
-        parameters = {}
+    def configuration(self) -> dict[str, typing.Any]:
+        """Configuration of the run: {'scenario': its YAML, 'parameters': {node: {dotted name: value}}}.
+
+        The values are '' and {} in a bag without a configuration. Raises BagError for invalid YAML, or for a node
+        without a section of parameters.
+        """
+        parameters: dict[str, dict[str, typing.Any]] = {}
         for node, text in self.metadata_records.get('parameters', {}).items():
             try:
                 parameters[node] = plain_yaml.parse(text)
@@ -321,20 +348,20 @@ class Bag:
                 raise BagError(f'{self.file}: its record `parameters`: {node} must hold a value for each parameter')
         return {'scenario': self.metadata_records.get('scenario', {}).get('yaml', ''), 'parameters': parameters}
 
-    def where(self, topic):
-        """Where in `index` the rows (m,) of one topic are. Raises BagError for a topic that is not in the bag."""
+    def where(self, topic: str) -> np.ndarray:
+        """Return the positions (m,) in `index` of the rows of a topic. Raises BagError for a missing topic."""
         name = topic.lstrip('/')
         if name not in self.topics:
             raise BagError(f'{self.path}: no topic {name} in it; there are {", ".join(self.topics)}')
         channels = [channel for channel, channel_name in self._channels.items() if channel_name == name]
         return np.flatnonzero(np.isin(self.index.channel, channels))
 
-    def rows(self, topic):
-        """The rows of `index` of one topic."""
+    def rows(self, topic: str) -> np.recarray:
+        """Return the rows of `index` of a topic."""
         return self.index[self.where(topic)]
 
-    def last_values(self, node):
-        """{key: value} of the last diagnostics of a node; {} where there is none that can be read."""
+    def last_values(self, node: str) -> dict[str, str]:
+        """Return {key: value} of the last readable diagnostics of a node, {} without any."""
         rows = self.rows('diagnostics') if 'diagnostics' in self.topics else self.index[:0]
         for _, _, _, data in self.take(rows[:-MAX_SEARCHED_DIAGNOSTICS - 1:-1]):
             with contextlib.suppress(ValueError):
@@ -343,21 +370,21 @@ class Bag:
                         return {value.key: value.value for value in status.values}
         return {}
 
-    def raw(self, topic=None):
-        """Iterator of (topic, log time, publish time [ns], CDR bytes) in the order of the file."""
+    def raw(self, topic: str | None = None) -> Iterator[tuple[str, int, int, bytes]]:
+        """Yield (topic, log time, publish time [ns], CDR bytes) in the order of the file."""
         return self.take(self.index if topic is None else self.rows(topic))
 
-    def take(self, rows):
-        """Iterator of (topic, log time, publish time [ns], CDR bytes) of any rows of `index`, in their order."""
+    def take(self, rows: np.ndarray) -> Iterator[tuple[str, int, int, bytes]]:
+        """Yield (topic, log time, publish time [ns], CDR bytes) of any rows of `index`, in their order."""
         names, take = self._channels, self._bytes
         for begin in range(0, len(rows), INDEX_BLOCK_ROWS):
             for channel, _, log, publish, _, *place in rows[begin:begin + INDEX_BLOCK_ROWS].tolist():
                 yield names[channel], log, publish, take(*place)
 
-    def messages(self, topic=None):
-        """Iterator of (topic, log time, publish time [ns], message) in the order of the file.
+    def messages(self, topic: str | None = None) -> Iterator[tuple[str, int, int, typing.Any]]:
+        """Yield (topic, log time, publish time [ns], message) in the order of the file.
 
-        Raises BagError for bytes that are no message of the topic's type.
+        Raises BagError for bytes that are no message of the type.
         """
         for name, log, publish, data in self.raw(topic):
             try:
@@ -366,10 +393,10 @@ class Bag:
                 raise BagError(f'{self.path}: {name} at {log / 1e9:.6f} s: {error}') from None
             yield name, log, publish, message
 
-    def table(self, topic):
-        """{column: array (n,)} of a topic, one row per message; columns.table says their names.
+    def table(self, topic: str) -> dict[str, np.ndarray]:
+        """Return {column: array (n,)} of a topic, one row per message; for the names see columns.table.
 
-        Raises BagError for bytes that are no message of the topic's type.
+        Raises BagError for bytes that are no message of the type.
         """
         rows = self.rows(topic)
         try:
