@@ -38,8 +38,8 @@ def add_vector(parser: argparse.ArgumentParser) -> None:
 
 def add_new_bag(parser: argparse.ArgumentParser) -> None:
     """Add --bag DIR for the recording of a run."""
-    parser.add_argument('--bag', type=pathlib.Path, metavar='DIR', help='output directory of the recording; default: '
-                        'bags/runs/SCENARIO-N')
+    parser.add_argument('--bag', type=pathlib.Path, metavar='DIR', help='output directory of the new recording; '
+                        'default: bags/runs/SCENARIO-N')
 
 
 def add_namespace(parser: argparse.ArgumentParser) -> None:

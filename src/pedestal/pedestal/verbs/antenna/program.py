@@ -13,7 +13,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     arguments.add_scenario(parser)
     arguments.add_duration(parser, 'the program track')
     parser.add_argument('--start', type=_utc, metavar='UTC', help='UTC at the beginning of the track: for example '
-                        '2026-11-22T12:00:00, now, or file (start time of the target in its file or of its TLE); '
+                        '2026-11-22T12:00:00, now, or file (start time in the file or TLE of the target); '
                         'default: start of the running graph')
     arguments.add_param(parser)
     arguments.add_namespace(parser)

@@ -36,9 +36,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         'several')
     parser.add_argument('--station', metavar='LAT,LON,H', help='place of the antenna: latitude [deg], longitude '
                         '[deg], height [m]')
-    parser.add_argument('--pass', dest='which', metavar='WHICH', help='satellite pass to track from rise to set: '
-                        'next; its number in the list; or a UTC such as 2019-12-10T12:35 for the pass at or after '
-                        'this time; list: print the passes; default with --tle: next')
+    parser.add_argument('--pass', dest='which', metavar='WHICH', help='pass to track from rise to set: next, a number '
+                        'of the list, or a UTC such as 2019-12-10T12:35 for the pass at or after that time; list: '
+                        'print the passes; default with --tle: next')
     arguments.add_params_file(parser)
     from pedestal_bringup.graph import operator_servers
     operator_servers.add_arguments(parser)
