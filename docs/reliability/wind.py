@@ -35,7 +35,7 @@ def loop_of(name, torque, intensity, seed, seconds):
 
 
 def watched(t, enabled, rates):
-    """Of rates (n, 2) [rad/s] at t (n,) [s] the largest that stayed for MIN_EXCESS_TIME_S while the alarm was watching."""
+    """Return the largest of rates (n, 2) [rad/s] at t (n,) [s] that lasted for the alarm's time while the alarm was armed."""
     ready = np.maximum.accumulate(np.where(enabled, -np.inf, t))
     stay = round(uncommanded_motion.MIN_EXCESS_TIME_S / (t[1] - t[0])) + 1
     windows = np.lib.stride_tricks.sliding_window_view(np.abs(rates).max(axis=1), stay).min(axis=1)
