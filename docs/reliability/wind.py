@@ -35,7 +35,7 @@ def loop_of(name, torque, intensity, seed, seconds):
 
 
 def watched(t, enabled, rates):
-    """Return the largest of rates (n, 2) [rad/s] at t (n,) [s] that lasted for the alarm's time while the alarm was armed."""
+    """Return the largest of rates (n, 2) [rad/s] at t (n,) [s] that lasted as long as the alarm needs while armed."""
     ready = np.maximum.accumulate(np.where(enabled, -np.inf, t))
     stay = round(uncommanded_motion.MIN_EXCESS_TIME_S / (t[1] - t[0])) + 1
     windows = np.lib.stride_tricks.sliding_window_view(np.abs(rates).max(axis=1), stay).min(axis=1)
