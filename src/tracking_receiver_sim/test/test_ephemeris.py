@@ -266,7 +266,7 @@ REFUSED = {
     'no segment': (lambda: 'CCSDS_OEM_VERS = 2.0\n', 'META_START is missing'),
     'no object': (lambda: swapped(oem_text(), 'OBJECT_NAME = ISS\n', ''), 'OBJECT_NAME is missing in the metadata'),
     'no keyword': (lambda: swapped(oem_text(), 'OBJECT_NAME = ISS', 'OBJECT_NAME: ISS'), 'must be KEYWORD = '),
-    'binary': (lambda: oem_text().encode() + b'\xff\xfe\x00' * 9, r'line 50, column 1: byte 0xff: must be ASCII'),
+    'binary': (lambda: oem_text().encode() + b'\xff\xfe\x00' * 9, 'line 50: byte 0x00: must be text in UTF-8, UTF-16'),
     'long line': (lambda: oem_text() + '1' * 2_000_000, 'line 50: longer than 1024 characters'),
     'useable': (lambda: oem_text(USEABLE_START_TIME='2019-12-09T16:31:00', USEABLE_STOP_TIME='2019-12-09T16:44:00'),
                 'must be inside the usable time of the file, 2019-12-09T16:31:00.000Z to 2019-12-09T16:44'),

@@ -27,10 +27,11 @@ class Log:
         dated, offset   True if the time plus `offset` [s] is UTC since 1970
         remarks         sentences about the numbers
         passed_over     {kind of row or sentence: its number}
+        nothing         reason if the file has no fix
     """
 
     def __init__(self):
-        self.form, self.time_name, self.dated, self.offset = '', '', False, 0.0
+        self.form, self.time_name, self.dated, self.offset, self.nothing = '', '', False, 0.0, ''
         self.remarks, self.passed_over = [], collections.Counter()
 
 
@@ -64,14 +65,25 @@ def read(track, rows) -> Fixes:
         numbers.extend((line, number, *fix))
     table = np.array(numbers).reshape(-1, 6)
     aircraft, number = _chosen(track, names)
-    line, time, *position = table[table[:, 1] == number][:, (0, 2, 3, 4, 5)].T
+    line, time, *position = _fresh(table[table[:, 1] == number][:, (0, 2, 3, 4, 5)], log).T
     if len(line) < MIN_FIXES:
-        raise csv_table.TableError(f'{track.path}: {len(line)} fixes, must be at least {MIN_FIXES}{_passed_over(log)}')
+        reason = f': {log.nothing}' if log.nothing and not len(line) else ''
+        raise csv_table.TableError(f'{track.path}: {len(line)} fixes, must be at least {MIN_FIXES}{reason}'
+                                   f'{_passed_over(log)}')
     fixes = Fixes(track.path, line.astype(int), time + log.offset, *position, log.dated,
                   f'{pathlib.Path(track.path).name}: {log.form}{aircraft}'
                   + ''.join(f', {remark}' for remark in log.remarks) + _passed_over(log))
     _check_order(fixes, track, log)
     return fixes
+
+
+def _fresh(table, log):
+    """Return the rows (line, time, place) without those that repeat time and place of the row before, which are
+    counted."""
+    repeated = np.append(False, (np.diff(table[:, 1:], axis=0) == 0.0).all(axis=1))[:len(table)]
+    if repeated.any():
+        log.passed_over['row that repeats time and place'] = int(repeated.sum())
+    return table[~repeated]
 
 
 def _chosen(track, names):

@@ -3,6 +3,7 @@ import datetime
 import re
 
 from pedestal_common.text_files import csv_table
+from tracking_receiver_sim.track import dates
 
 UNIX_TIME_LIMITS_S = (0.0, 4102444800.0)
 """Range of an instant, in seconds since 1970: until 2100."""
@@ -12,9 +13,9 @@ ISO_TIME_PATTERN = re.compile(
 
 
 def seconds(path, line, name, text):
-    """Return UTC seconds since 1970 of a text: ISO 8601 (without a zone: UTC) or the number itself. Raises
+    """Return UTC seconds since 1970 of a text: a date, see `dates` (without a zone: UTC), or the number itself. Raises
     TableError."""
-    text = (text or '').strip()
+    text = dates.iso(text)
     match = ISO_TIME_PATTERN.fullmatch(text)
     try:
         if not match:
@@ -25,7 +26,7 @@ def seconds(path, line, name, text):
             value = datetime.datetime.fromisoformat(f'{date}T{time}{zone}').timestamp() + float(f'0.{fraction or 0}')
     except ValueError:
         raise csv_table.TableError(f'{path}: line {line}: {name} = {text!r:.60}: must be UTC as ISO 8601, for example '
-                                   '2018-07-23T10:00:00Z, or as seconds since 1970') from None
+                                   f'{dates.DATE_EXAMPLES}, or as seconds since 1970') from None
     return csv_table.number(path, line, name, value, *UNIX_TIME_LIMITS_S)
 
 
