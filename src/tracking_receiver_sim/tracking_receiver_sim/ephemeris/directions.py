@@ -23,8 +23,6 @@ ANGLE_LIMITS_DEG = {'azimuth': (-720.0, 720.0), 'elevation': (-90.0, 90.0)}
 """{angle: (lowest, highest)} [deg]."""
 JULIAN_DATE_LIMITS = 2_400_000.5, 2_536_000.0
 """Range of Julian dates: until 2231."""
-UNIX_EPOCH_JULIAN_DATE = 2_440_587.5
-"""Julian date of 1970-01-01T00:00 UTC."""
 MIN_ROWS = 4
 """Least number of rows of a table."""
 MAX_STEP_DEG = 20.0
@@ -38,7 +36,7 @@ class Directions(typing.NamedTuple):
         line                (n,) line in the file
         t                   (n,) [s] after midnight, growing
         azimuth, elevation  (n,) [rad]
-        midnight            UTC since 1970 [s] of t = 0, None if the file has no date
+        midnight            instant (see track.instant) of t = 0, None if the file has no date
         description         format and number of rows
     """
     path: str
@@ -75,8 +73,8 @@ def read_program(path, _wanted='') -> Directions:
         if text:
             _, azimuth, elevation = lines.numbers(path, line, text, limits)
             day, _, fraction = text.split()[0].partition('.')
-            t = 86400.0 * (float(day) - UNIX_EPOCH_JULIAN_DATE) + 86400.0 * float(f'0.{fraction or 0}')
-            rows.extend((line, t, azimuth, elevation))
+            t = 86400.0 * (float(day) - instant.UNIX_EPOCH_JULIAN_DATE) + 86400.0 * float(f'0.{fraction or 0}')
+            rows.extend((line, instant.of_unix_time(t), azimuth, elevation))
     return _directions(path, rows, True, 'sat-nms program')
 
 
