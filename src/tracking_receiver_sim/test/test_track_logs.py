@@ -108,8 +108,8 @@ def test_lines_are_those_of_the_file(tmp_path):
 
 def test_rows_without_a_position_are_counted(tmp_path):
     assert read(tmp_path, traffic()).description == (
-        'flight.log: ADS-B of 4b1812 RGA3, columns timestamp in UTC, latitude in deg, longitude in deg, geoaltitude in ft, '
-        'passed over 1 x row without time, position or aircraft')
+        'flight.log: ADS-B of 4b1812 RGA3, columns timestamp in UTC, latitude in deg, longitude in deg, geoaltitude in '
+        'ft, passed over 1 x row without time, position or aircraft')
 
 
 def test_barometric_altitude_is_said(tmp_path):

@@ -11,8 +11,10 @@ UTC, JULIAN_DATE, MODIFIED_JULIAN_DATE = 'UTC', 'JD', 'MJD'
 """Units of a time with a date: a calendar date (or seconds since 1970), a Julian date, a modified Julian date."""
 
 _UNIT_NAMES = {
-    's': {'s': ('s', 'sec', 'secs', 'second', 'seconds'), 'ms': ('ms', 'msec', 'millis', 'millisecond', 'milliseconds'),
-          'us': ('us', 'µs', 'μs', 'usec', 'micros', 'microsecond', 'microseconds'), 'ns': ('ns', 'nsec', 'nanoseconds'),
+    's': {'s': ('s', 'sec', 'secs', 'second', 'seconds'),
+          'ms': ('ms', 'msec', 'millis', 'millisecond', 'milliseconds'),
+          'us': ('us', 'µs', 'μs', 'usec', 'micros', 'microsecond', 'microseconds'),
+          'ns': ('ns', 'nsec', 'nanos', 'nanosecond', 'nanoseconds'),
           'min': ('min', 'mins', 'minute', 'minutes'), 'h': ('h', 'hr', 'hrs', 'hour', 'hours'),
           'd': ('d', 'day', 'days'), JULIAN_DATE: ('jd', 'jdut', 'jdutc', 'juliandate', 'juliandateutc'),
           MODIFIED_JULIAN_DATE: ('mjd', 'mjdut', 'mjdutc')},
@@ -90,9 +92,9 @@ def find(names, wanted, required=True):
         raise ColumnError(f'columns {found[0].name!r:.60} and {found[1].name!r:.60}: only one of them may be '
                           f'the {wanted.label}: rename or remove the other')
     if others and not found:
-        raise ColumnError(f'column {others[0]!r:.60}: must be a known quantity with a known unit, one of '
-                          f'{", ".join(_UNIT_NAMES[wanted.unit])}{" or UTC" if wanted.unit == "s" else ""}, '
-                          f'to be taken as {wanted.label}')
+        units = [*_UNIT_NAMES[wanted.unit], *([UTC] if wanted.unit == 's' else [])]
+        raise ColumnError(f'column {others[0]!r:.60}: must end with a known unit to be taken as {wanted.label}: '
+                          f'{", ".join(units[:-1])} or {units[-1]}')
     return found[0] if found else None
 
 

@@ -6,7 +6,7 @@ ENCODINGS_BY_MARK = ((codecs.BOM_UTF8, 'utf-8-sig'), (codecs.BOM_UTF32_LE, 'utf-
                      (codecs.BOM_UTF16_LE, 'utf-16'), (codecs.BOM_UTF16_BE, 'utf-16'))
 """(byte order mark, encoding); the mark of UTF-32 begins with that of UTF-16."""
 FALLBACK_ENCODING = 'cp1252'
-"""Encoding of a text without a mark that is not UTF-8: that of spreadsheets on Windows, like latin-1 in every letter."""
+"""Encoding of a text without a mark that is not UTF-8: Windows-1252, with all letters of latin-1."""
 
 PACKED_FORMATS = (
     (b'\x1f\x8b', 'compressed by gzip: unpack it with gunzip'),
@@ -32,7 +32,7 @@ def marked_encoding(beginning):
 
 
 def xml_parser(stream):
-    """Return an expat parser for a seekable stream: its byte order mark decides, else the encoding that it declares."""
+    """Return an expat parser for a seekable stream, in the encoding of the byte order mark or of the declaration."""
     marked = marked_encoding(stream.read(MAX_MARK_BYTES))
     stream.seek(0)
     return expat.ParserCreate({'utf-8-sig': 'UTF-8', 'utf-16': 'UTF-16'}.get(marked))

@@ -1,8 +1,8 @@
 """Tables of numbers in CSV files: named columns, each with its range, the first of them increasing.
 
-Separators are comma, semicolon, tab, bar and blanks; with another separator than the comma, numbers may have a decimal comma.
-Blank lines and lines that begin with a comment mark are passed over, `sep=` is read, the case of a name does not
-matter. Of a file of JPL Horizons, the rows between $$SOE and $$EOE are read.
+Separators are comma, semicolon, tab, bar and blanks; with another separator than the comma, numbers may have a decimal
+comma. Blank lines and lines that begin with a comment mark are passed over, `sep=` is read, the case of a name does
+not matter. Of a file of JPL Horizons, the rows between $$SOE and $$EOE are read.
 """
 import array
 import contextlib
@@ -56,7 +56,8 @@ def read(path, columns, least_rows=2, max_step=np.inf, step_name='its greatest s
     with opened(path) as table:
         there = {name: table.column(_columns.quantity(name), name in columns) for name in limits}
         for row in table:
-            rows.extend(table.number(there[name], row[there[name].name], *limits[name]) if there[name] else 0.0 for name in limits)
+            rows.extend(table.number(column, row[column.name], *limits[name]) if column else 0.0
+                        for name, column in there.items())
             step = rows[-width] - rows[-2 * width] if len(rows) > width else max_step
             if len(rows) > MAX_CSV_ROWS * width:
                 raise too_long(path, table.line_num)
@@ -92,7 +93,8 @@ def text(path):
     except UnicodeDecodeError as error:
         line = 1 + read_bytes.count(b'\n', 0, error.start)
         byte = f'byte {read_bytes[error.start]:#04x}' if error.start < len(read_bytes) else 'the end'
-        raise TableError(f'{path}: line {line}: {byte}: must be text in UTF-8, UTF-16 or Windows-1252 (latin-1)') from None
+        raise TableError(f'{path}: line {line}: {byte}: must be text in UTF-8, UTF-16 or Windows-1252 '
+                         '(latin-1)') from None
 
 
 READ_ERRORS = (TableError, csv.Error)
@@ -191,8 +193,8 @@ class Table:
                 self._decimal.setdefault(sign, (self.line_num, name, cell))
         if len(self._decimal) == 2:
             line, other, was = next(iter(self._decimal.values()))
-            raise TableError(f'{self.path}: line {self.line_num}: {name} = {cell!r:.60}: a decimal comma and a decimal '
-                             f'point in one file (line {line}: {other} = {was!r:.60})')
+            raise TableError(f'{self.path}: line {self.line_num}: {name} = {cell!r:.60}: must have the decimal sign '
+                             f'of line {line}, {other} = {was!r:.60}')
         return cell.replace(',', '.') if _DECIMAL_COMMA_PATTERN.fullmatch(cell) else cell
 
 

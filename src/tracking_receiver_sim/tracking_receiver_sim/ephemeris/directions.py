@@ -34,7 +34,7 @@ class Directions(typing.NamedTuple):
         line                (n,) line in the file
         t                   (n,) [s] after midnight, growing
         azimuth, elevation  (n,) [rad]
-        midnight            UTC since 1970 [s] of t = 0, None if the file has no date
+        midnight            instant (see track.instant) of t = 0, None if the file has no date
         description         format and number of rows
     """
     path: str

@@ -7,6 +7,7 @@ import io
 import re
 
 from pedestal_common.text_files import csv_table
+from tracking_receiver_sim.track import instant as instants
 
 MAX_LINE_CHARS = 1024
 """Largest number of characters of a line; the CCSDS books allow 254."""
@@ -67,14 +68,12 @@ def instant(path, line, column, name, text):
     match = CCSDS_TIME_PATTERN.fullmatch(text)
     try:
         date, hours, minutes, seconds, fraction = match.groups() if match else [''] * 5
-        clock = int(hours), int(minutes), int(seconds)
-        if clock[0] > 23 or clock[1] > 59 or clock[2] > 60:
-            raise ValueError
+        second = instants.second_of_day(int(hours), int(minutes), int(seconds))
         days = _days(date)
     except ValueError:
         raise wrong(path, line, column, f'{name} = {text!r:.60}: must be a time such as 2026-11-22T05:00:00.5 or '
                     f'2026-326T05:00:00.5, from {YEAR_LIMITS[0]} to {YEAR_LIMITS[1]}') from None
-    return days, 3600.0 * clock[0] + 60.0 * clock[1] + clock[2] + float(f'0.{fraction or 0}')
+    return days, second + float(f'0.{fraction or 0}')
 
 
 @functools.lru_cache(64)

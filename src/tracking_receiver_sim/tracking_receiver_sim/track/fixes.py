@@ -24,22 +24,23 @@ class Log:
 
         form            name of the format
         time_name       name of the time in the file
-        dated, offset   True if the time plus `offset` [s] is UTC since 1970
+        dated           True if the time is an instant (see track.instant)
         remarks         sentences about the numbers
         passed_over     {kind of row or sentence: its number}
         nothing         reason if the file has no fix
     """
 
     def __init__(self):
-        self.form, self.time_name, self.dated, self.offset, self.nothing = '', '', False, 0.0, ''
+        self.form, self.time_name, self.dated, self.nothing = '', '', False, ''
         self.remarks, self.passed_over = [], collections.Counter()
 
 
 class Fixes(typing.NamedTuple):
     """The fixes of one aircraft, n of them.
 
-    line: (n,) in the file; time: (n,) [s], growing, UTC since 1970 if `dated`; latitude, longitude: (n,) WGS84 [deg];
-    altitude: (n,) above the ellipsoid [m]; description: format, remarks and the number of rows passed over.
+    line: (n,) in the file; time: (n,) [s], growing, instants (see track.instant) if `dated`; latitude, longitude: (n,)
+    WGS84 [deg]; altitude: (n,) above the ellipsoid [m]; description: format, remarks and the number of rows passed
+    over.
     """
     path: str
     line: np.ndarray
@@ -70,7 +71,7 @@ def read(track, rows) -> Fixes:
         reason = f': {log.nothing}' if log.nothing and not len(line) else ''
         raise csv_table.TableError(f'{track.path}: {len(line)} fixes, must be at least {MIN_FIXES}{reason}'
                                    f'{_passed_over(log)}')
-    fixes = Fixes(track.path, line.astype(int), time + log.offset, *position, log.dated,
+    fixes = Fixes(track.path, line.astype(int), time, *position, log.dated,
                   f'{pathlib.Path(track.path).name}: {log.form}{aircraft}'
                   + ''.join(f', {remark}' for remark in log.remarks) + _passed_over(log))
     _check_order(fixes, track, log)

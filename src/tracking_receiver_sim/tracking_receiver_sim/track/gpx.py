@@ -2,8 +2,8 @@
 
 expat gives the line of a point and keeps no parsed data in memory. The reader stops at a document type declaration.
 This avoids the expansion of entities and access to other files. ele is above mean sea level. The height above the
-ellipsoid is ele + geoidheight; without geoidheight ele is taken instead, with a remark in the log. The encoding is that
-of the file: its byte order mark, or the encoding that its XML declaration names.
+ellipsoid is ele + geoidheight; without geoidheight ele is taken instead, with a remark in the log. The encoding is the
+one of the byte order mark, or of the XML declaration.
 """
 import collections
 from xml.parsers import expat

@@ -5,6 +5,7 @@ passed over: the time of a logger, a tag block, `NMEA,` and the time of Android.
 checksum, and GGA without fix, time or altitude (2D) are passed over and counted.
 """
 import collections
+import contextlib
 import datetime
 import io
 import re
@@ -13,11 +14,13 @@ import pynmea2
 
 from pedestal_common.graph.steps import SECONDS_PER_DAY
 from pedestal_common.text_files import content, csv_table
+from tracking_receiver_sim.track import fixes, instant
 
 SENTENCE_PATTERN = re.compile(r'\$[A-Z]{2}([A-Z]{3}),[^$*]*(\*[0-9A-Fa-f]{2})?', re.ASCII)
 """A sentence with its type and its checksum."""
 CUT_SENTENCE_PATTERN = re.compile(r'[^$!]*,[^$!]*\*[0-9A-Fa-f]{2}', re.ASCII)
 """The end of a sentence whose beginning is missing."""
+TIME_PATTERN = re.compile(r'(\d\d)(\d\d)(\d\d(?:\.\d*)?)', re.ASCII)
 MIN_GGA_FIELDS = 11
 """Least number of fields of a GGA: up to the geoidal separation."""
 MAX_LISTED_TYPES = 8
@@ -29,24 +32,25 @@ MAX_LINE_CHARS = 1024
 def rows(path, log):
     """Yield the fixes (line, (), time [s], latitude, longitude [deg], altitude [m]) of a log.
 
-    log: fixes.Log, which receives the description of the file. The time is since midnight; with the offset in `log`,
-    from the date of an RMC, it becomes UTC since 1970. Raises TableError.
+    log: fixes.Log, which receives the description of the file. The time is an instant if an RMC has a date, otherwise
+    it is since midnight. Raises TableError.
     """
-    log.form, log.time_name, log.dated = 'NMEA', 'time', False
-    days, last, without_separation = 0, None, False
+    begins = _begin(path)
+    log.form, log.time_name, log.dated = 'NMEA', 'time', begins is not None
+    clock, without_separation = _Clock(begins), False
     for line, sentence in _sentences(path, log):
         if sentence.sentence_type == 'RMC':
-            if sentence.status == 'A' and isinstance(sentence.datestamp, datetime.date) and not log.dated:
-                log.dated, midnight = True, datetime.datetime.combine(sentence.datestamp, datetime.time())
-                log.offset = midnight.replace(tzinfo=datetime.timezone.utc).timestamp() - SECONDS_PER_DAY * days
+            with contextlib.suppress(ValueError):
+                clock.read(_second_of_day(sentence), _day(sentence))
             continue
-        time = _time_of_day(path, line, sentence)
-        if last is not None and time < last - 0.5 * SECONDS_PER_DAY:
-            days += 1
-        last = time
+        try:
+            time = clock.read(_second_of_day(sentence))
+        except ValueError:
+            raise csv_table.TableError(f'{path}: line {line}: time = {sentence.data[0]!r:.60}: must be hhmmss.ss, '
+                                       '235960 only for a leap second') from None
         without_separation = without_separation or not sentence.geo_sep
         separation = csv_table.number(path, line, 'geoidal separation', sentence.geo_sep or '0', -150.0, 150.0)
-        yield (line, (), time + SECONDS_PER_DAY * days,
+        yield (line, (), time,
                _angle(path, line, 'latitude', sentence.lat, sentence.lat_dir, 'NS', 90.0),
                _angle(path, line, 'longitude', sentence.lon, sentence.lon_dir, 'EW', 180.0),
                separation + csv_table.number(path, line, 'altitude', sentence.altitude, -1000.0, 1e8))
@@ -60,8 +64,8 @@ def is_log(beginning):
 
 
 def _sentences(path, log):
-    """Yield (line, sentence) of each RMC, and of each GGA with fix, time and altitude; count the other GGA in a
-    fixes.Log."""
+    """Yield (line, sentence) of each RMC and GGA with a fix; a GGA also has time and altitude. Count the other GGA in
+    a fixes.Log."""
     types, with_checksum = collections.Counter(), False
     for line, text in _lines(path):
         if CUT_SENTENCE_PATTERN.fullmatch(text) and not text.startswith('#'):
@@ -79,7 +83,8 @@ def _sentences(path, log):
                     match[1] == 'GGA' and len(sentence.data) < MIN_GGA_FIELDS):
                 log.passed_over['damaged sentence'] += 1
             elif match[1] == 'RMC':
-                yield line, sentence
+                if sentence.status == 'A':
+                    yield line, sentence
             elif missing := _missing(sentence):
                 log.passed_over[f'GGA without {missing}'] += 1
             else:
@@ -91,8 +96,8 @@ def _sentences(path, log):
 
 def _missing(gga):
     """Return the part that a GGA lacks, '' if it has all."""
-    parts = (('a fix', gga.gps_qual and gga.lat and gga.lon), ('time', gga.data[0]), ('altitude', gga.altitude is not None))
-    return next((name for name, there in parts if not there), '')
+    there = {'a fix': gga.gps_qual and gga.lat and gga.lon, 'time': gga.data[0], 'altitude': gga.altitude is not None}
+    return next((name for name, value in there.items() if not value), '')
 
 
 def _lines(path):
@@ -108,12 +113,62 @@ def _lines(path):
             yield number, line.strip()
 
 
-def _time_of_day(path, line, sentence):
-    """Return the seconds since midnight of a GGA; raises TableError."""
-    time = sentence.timestamp
-    if not isinstance(time, datetime.time):
-        raise csv_table.TableError(f'{path}: line {line}: time = {sentence.data[0]!r:.60}: must be hhmmss.ss')
-    return 3600.0 * time.hour + 60.0 * time.minute + time.second + 1e-6 * time.microsecond
+class _Clock:
+    """Time of consecutive sentences, which hold only the time of day. The midnight between two sentences is the one
+    that makes them less than half a day apart.
+
+        first   day since 1970 of the first sentence, None if it is unknown
+        days    midnights since the first sentence
+        leaps   leap seconds (235960) since the first sentence, for a log without a date
+    """
+
+    def __init__(self, first=None):
+        self.first, self.days, self.leaps, self._last = first, 0, 0, None
+
+    def read(self, second, day=None):
+        """Return the instant of a sentence (see track.instant), without a date the time since midnight [s].
+
+        second: of the day; day: since 1970, if the sentence has a date. A date moves the time only forward. Raises
+        ValueError for a leap second on a day that has none.
+        """
+        if self._last is not None:
+            passed = round((self._last - second) / SECONDS_PER_DAY)
+            self.leaps += passed > 0 and self._last >= SECONDS_PER_DAY
+            self.days += passed
+        self._last = second
+        if self.first is None:
+            return SECONDS_PER_DAY * self.days + second + self.leaps
+        if day is not None:
+            self.days = max(self.days, day - self.first)
+        return instant.of_day(self.first + self.days, second)
+
+
+def _begin(path):
+    """Return the day since 1970 of the first sentence with a fix, None if no RMC has a date.
+
+    The date of an RMC belongs to the time of the same RMC, which may lie on the other side of midnight.
+    """
+    clock = _Clock()
+    for _, sentence in _sentences(path, fixes.Log()):
+        with contextlib.suppress(ValueError):
+            clock.read(_second_of_day(sentence))
+            if sentence.sentence_type == 'RMC' and _day(sentence) is not None:
+                return _day(sentence) - clock.days
+    return None
+
+
+def _day(sentence):
+    """Return the day since 1970 of an RMC, None without a valid date."""
+    date = sentence.datestamp
+    return (date - datetime.date(1970, 1, 1)).days if isinstance(date, datetime.date) else None
+
+
+def _second_of_day(sentence):
+    """Return the seconds since midnight of a sentence. Raises ValueError."""
+    match = TIME_PATTERN.fullmatch(sentence.data[0])
+    if not match:
+        raise ValueError(sentence.data[0])
+    return instant.second_of_day(int(match[1]), int(match[2]), float(match[3]))
 
 
 def _angle(path, line, name, text, side, sides, limit):

@@ -111,8 +111,8 @@ def rows(path, log):
 def _layout(table):
     """Return the layout of a Table: the first that matches; else the one that its column of time names."""
     names = [name.lower() for name in table.fieldnames]
-    return (next((layout for layout in CSV_LAYOUTS if layout.matches(table)), None)
-            or next((layout for layout in CSV_LAYOUTS[1:] if layout.adsb and layout.time.label in names), CSV_LAYOUTS[-1]))
+    return next((layout for layout in CSV_LAYOUTS if layout.matches(table)), None) or next(
+        (layout for layout in CSV_LAYOUTS[1:] if layout.adsb and layout.time.label in names), CSV_LAYOUTS[-1])
 
 
 def _position(table, row, column):

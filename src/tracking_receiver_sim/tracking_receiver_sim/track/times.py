@@ -1,4 +1,5 @@
 """Times in a column of a table: UTC as a date, Julian dates, or numbers in the unit of the column, from any origin."""
+from pedestal_common.graph.steps import SECONDS_PER_DAY
 from pedestal_common.text_files import columns, csv_table
 from tracking_receiver_sim.track import dates, instant
 
@@ -9,8 +10,8 @@ TIME = columns.Quantity('time', {
     **dict.fromkeys(('jd', 'jdut', 'jdutc', 'jd ut', 'jd utc', 'julian date', 'julian day'), columns.JULIAN_DATE),
     **dict.fromkeys(('mjd', 'mjd ut', 'mjd utc'), columns.MODIFIED_JULIAN_DATE)}, 's')
 """Names of the time in a table."""
-UNIX_EPOCH_JULIAN_DATE, MODIFIED_JULIAN_DATE_ZERO = 2_440_587.5, 2_400_000.5
-"""Julian dates of 1970-01-01T00:00 UTC and of the modified Julian date 0."""
+MODIFIED_JULIAN_DATE_ZERO = 2_400_000.5
+"""Julian date of the modified Julian date 0."""
 JULIAN_DATE_LIMITS = 2_400_000.5, 2_536_000.0
 """Range of Julian dates: until 2231."""
 FIRST_EXPECTED_JULIAN_DATE = 2_440_000.5
@@ -24,7 +25,7 @@ MIN_SPAN_S = 3.0
 class Times:
     """The times of a column of a csv_table.Table, all with a date or all without.
 
-        dated       True: UTC since 1970; False: seconds from any origin; None before the first row
+        dated       True: instants, see track.instant; False: seconds from any origin; None before the first row
     """
 
     def __init__(self, table, column):
@@ -55,9 +56,9 @@ class Times:
             return table.number(column, cell, -1e12, 1e12)
         value = instant.seconds(*place, cell)
         if value < MIN_UNIX_TIME_S and ':' not in cell:
-            raise csv_table.TableError(f'{table.path}: line {table.line_num}: {column.name} = {cell!r:.60}: must be UTC, '
-                                       f'for example {dates.DATE_EXAMPLES}, or at least {MIN_UNIX_TIME_S:g} s since '
-                                       '1970; for seconds from another origin, name the column time_s')
+            raise csv_table.TableError(f'{table.path}: line {table.line_num}: {column.name} = {cell!r:.60}: must be '
+                                       f'UTC, for example {dates.DATE_EXAMPLES}, or at least {MIN_UNIX_TIME_S:g} s '
+                                       'since 1970; for seconds from another origin, name the column time_s')
         return value
 
     def described(self):
@@ -77,11 +78,12 @@ class Times:
 
 
 def julian(path, line, name, text, modified=False):
-    """Return UTC seconds since 1970 of a Julian date, or a modified one, in days. Raises TableError."""
+    """Return the instant, see track.instant, of a Julian date, or a modified one, in days. Raises TableError."""
     zero = MODIFIED_JULIAN_DATE_ZERO if modified else 0.0
     low, high = JULIAN_DATE_LIMITS
     csv_table.number(path, line, name, text, low - zero, high - zero)
     day, _, fraction = text.partition('.')
     if not (day.isdecimal() and (fraction or '0').isdecimal()):
         raise csv_table.TableError(f'{path}: line {line}: {name} = {text!r:.60}: must be a number of days')
-    return 86400.0 * (float(day) + zero - UNIX_EPOCH_JULIAN_DATE) + 86400.0 * float(f'0.{fraction or 0}')
+    return instant.of_unix_time(SECONDS_PER_DAY * (float(day) + zero - instant.UNIX_EPOCH_JULIAN_DATE)
+                                + SECONDS_PER_DAY * float(f'0.{fraction or 0}'))
