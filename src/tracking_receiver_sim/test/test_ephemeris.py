@@ -141,6 +141,13 @@ def test_lagrange_agrees_with_beyond_and_both_with_a_polynomial_orbit(tmp_path):
             curve.deriv()(between), abs=1e-6)
 
 
+@pytest.mark.parametrize('encoding', ['utf-8', 'utf-8-sig', 'cp1252', 'utf-16'])
+def test_a_mark_and_accents_in_comments_are_read(encoding, tmp_path):
+    for name, text in (('iss.oem', oem_text(interpolation=CONSISTENT).replace('made by a test', 'fait à Zürich')),
+                       ('iss.e', stk_text().replace('a test', 'à Zürich'))):
+        assert apart(flown(tmp_path / name, text.encode(encoding)), TIMES) < 0.1, name
+
+
 @pytest.mark.parametrize('system, ahead', [('TAI', 37.0), ('TT', 69.184), ('GPS', 18.0)])
 def test_the_time_system_is_that_of_the_file(system, ahead, tmp_path):
     built = flown(tmp_path / 'iss.oem', oem_text('ITRF2014', interpolation=CONSISTENT, system=system, ahead=ahead))

@@ -33,6 +33,7 @@ MAX_HEAD_LINES = 2000
 SNIFFED_LINES = 10
 """Number of lines by which the separator is found."""
 
+_DIGIT_FIRST_PATTERN = re.compile(r'[-+]?\.?\d', re.ASCII)
 _DECIMAL_COMMA_PATTERN = re.compile(r'[-+]?\d+,\d+(?:[eE][-+]?\d+)?', re.ASCII)
 
 
@@ -234,12 +235,15 @@ def _separator(begin, sample):
 
 
 def _is_row(cells):
-    """Return True if cells are those of a row and not names: the last cell is a number, the first has a digit."""
-    try:
-        float(cells[-1].replace(',', '.'))
-    except (IndexError, ValueError):
-        return False
-    return any(map(str.isdigit, cells[0]))
+    """Return True if cells are those of a row and not names: the first begins with a digit, another is a number."""
+    return bool(cells) and bool(_DIGIT_FIRST_PATTERN.match(cells[0])) and any(map(_is_number, cells[1:]))
+
+
+def _is_number(cell):
+    with contextlib.suppress(ValueError):
+        float(cell.replace(',', '.'))
+        return True
+    return False
 
 
 def require(table, names):
