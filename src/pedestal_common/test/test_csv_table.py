@@ -34,6 +34,7 @@ DIALECTS = {
     'columns of blanks': PLAIN.replace(',', '   '), 'comma': EUROPEAN, 'comma and tab': EUROPEAN.replace(';', '\t'),
     'sep': 'sep=;\n' + EUROPEAN, 'capitals': PLAIN.upper(), 'quotes': '"time_s", "roll_deg","note"\n' + PLAIN[21:],
     'comment': '# a logger; of mine\n\n' + PLAIN, 'percent': '% a\n' + PLAIN, 'end': PLAIN + '\n,,\n  \n# the end\n',
+    'title': 'Report of a ship\n\n' + PLAIN, 'camel': PLAIN.replace('time_s', 'timeSec').replace('roll_deg', 'RollDeg'),
     'trailing comma': PLAIN.replace('\n', ',\n'), 'names in a comment': '# made by numpy\n# ' + PLAIN,
     'units': PLAIN.replace('time_s', 'Time [s]').replace('roll_deg', 'Roll (°)'),
     'utf-16': PLAIN.encode('utf-16'), 'utf-16 big': b'\xfe\xff' + PLAIN.encode('utf-16-be'),

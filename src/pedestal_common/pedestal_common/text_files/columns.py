@@ -36,6 +36,7 @@ _UTC_PATTERN = re.compile(r'(ut|utc|utcg|gmt|z|zulu|utciso8601|iso8601|iso)?(hrm
 _APPARENT_NAMES = ('aapp', 'aappr', 'rapp')
 """Words of JPL Horizons behind an apparent angle in degrees."""
 _BETWEEN_PATTERN = re.compile(r'[\s_\[\](){}<>|,:;.\-"\']+')
+_CAMEL_CASE_PATTERN = re.compile(r'(?<=[a-z])(?=[A-Z])')
 _DERIVED_WORDS = ('rate', 'vel', 'speed', 'acc', 'err', 'sigma', 'std', 'qual', 'valid')
 """Beginnings of words that make another quantity of the quantity before them."""
 MAX_LISTED_NAMES = 20
@@ -116,10 +117,11 @@ def listed(names):
 
 def _known(name, wanted):
     """Return (known name of the quantity, rest without blanks and brackets) of a column; None for another quantity."""
-    text = ' '.join(name.lower().replace('_', ' ').split())
-    for known in sorted(wanted.names, key=len, reverse=True):
-        if text.startswith(known) and not text[len(known):len(known) + 1].isalnum():
-            return known, _BETWEEN_PATTERN.sub('', text[len(known):]).removeprefix('/')
+    for spaced in (name, _CAMEL_CASE_PATTERN.sub(' ', name)):
+        text = ' '.join(spaced.lower().replace('_', ' ').split())
+        for known in sorted(wanted.names, key=len, reverse=True):
+            if text.startswith(known) and not text[len(known):len(known) + 1].isalnum():
+                return known, _BETWEEN_PATTERN.sub('', text[len(known):]).removeprefix('/')
     return None
 
 

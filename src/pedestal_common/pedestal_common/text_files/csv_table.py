@@ -1,8 +1,8 @@
 """Tables of numbers in CSV files: named columns, each with its range, the first of them increasing.
 
 Separators are comma, semicolon, tab, bar and blanks; with another separator than the comma, numbers may have a decimal
-comma. Blank lines and lines that begin with a comment mark are passed over, `sep=` is read, the case of a name does
-not matter. Of a file of JPL Horizons, the rows between $$SOE and $$EOE are read.
+comma. Blank lines, titles and lines that begin with a comment mark are passed over, `sep=` is read, the case of a name
+does not matter. Of a file of JPL Horizons, the rows between $$SOE and $$EOE are read.
 """
 import array
 import contextlib
@@ -217,11 +217,18 @@ def _beginning(lines):
         bare = line.strip()
         if bare.lower().startswith('sep=') and len(line.strip('\r\n').lstrip()) == 5:
             separator = line.strip('\r\n').lstrip()[4]
-        elif bare and not bare.startswith(COMMENT_MARKS):
+        elif bare and not bare.startswith(COMMENT_MARKS) and not _is_title(bare, before[i + 1:]):
             lines.seek(sum(map(len, before[:i + 1])))
             return before[:i], line, separator
     lines.seek(0, io.SEEK_END)
     return before, '', separator
+
+
+def _is_title(line, after):
+    """Return True if a line has no separator of cells and the next line with text has one."""
+    following = next((text.strip() for text in after if text.strip()), '')
+    separators = set(''.join(SEPARATORS))
+    return separators.isdisjoint(line) and not separators.isdisjoint(following)
 
 
 def _separator(begin, sample):

@@ -24,4 +24,4 @@ def iso(text):
     found = match.groupdict()
     month = found.get('month') or 1 + MONTH_NAMES.index(found['name'].lower())
     return (f'{found["year"]}-{int(month):02}-{int(found["day"]):02}T{int(found["hour"]):02}:{found["minute"]}:'
-            f'{found["second"] or "00"}{"." + found["fraction"] if found["fraction"] else ""}{found["zone"] or ""}')
+            f'{found["second"] or "00"}{"." + found["fraction"] if found["fraction"] else ""}{(found["zone"] or "").upper()}')
