@@ -34,7 +34,8 @@ DIALECTS = {
     'columns of blanks': PLAIN.replace(',', '   '), 'comma': EUROPEAN, 'comma and tab': EUROPEAN.replace(';', '\t'),
     'sep': 'sep=;\n' + EUROPEAN, 'capitals': PLAIN.upper(), 'quotes': '"time_s", "roll_deg","note"\n' + PLAIN[21:],
     'comment': '# a logger; of mine\n\n' + PLAIN, 'percent': '% a\n' + PLAIN, 'end': PLAIN + '\n,,\n  \n# the end\n',
-    'title': 'Report of a ship\n\n' + PLAIN, 'camel': PLAIN.replace('time_s', 'timeSec').replace('roll_deg', 'RollDeg'),
+    'title': 'Report of a ship\n\n' + PLAIN,
+    'camel': PLAIN.replace('time_s', 'timeSec').replace('roll_deg', 'RollDeg'),
     'trailing comma': PLAIN.replace('\n', ',\n'), 'names in a comment': '# made by numpy\n# ' + PLAIN,
     'units': PLAIN.replace('time_s', 'Time [s]').replace('roll_deg', 'Roll (°)'),
     'utf-16': PLAIN.encode('utf-16'), 'utf-16 big': b'\xfe\xff' + PLAIN.encode('utf-16-be'),
@@ -117,6 +118,14 @@ def test_the_whole_name_of_a_time_is_read(name, unit):
 def test_other_quantities_do_not_hide_the_wanted_one():
     wanted = columns.Quantity('azimuth', {'azimuth': 'deg', 'az': 'deg'}, 'deg')
     assert columns.find(['az_rate', 'az_error', 'AZ', 'azimuth_command'], wanted) == ('AZ', 'deg', 1.0)
+
+
+@pytest.mark.parametrize('comment, names', [
+    ('# az el time', ('az', 'el', 'time')), ('az el time', ('az', 'el', 'time')),
+    ('# a list', ('time', 'azimuth', 'elevation')), ('#time,el,az', ('time', 'el', 'az'))])
+def test_names_above_the_rows_count(comment, names):
+    bare = 'time', 'azimuth', 'elevation'
+    assert csv_table.Table('', f'{comment}\n0,1,2\n', bare).fieldnames == names
 
 
 def test_the_beginning_of_a_text():

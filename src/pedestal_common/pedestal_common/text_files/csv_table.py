@@ -17,9 +17,10 @@ from pedestal_common.text_files import columns as _columns
 from pedestal_common.text_files import content, files
 
 MAX_CSV_BYTES = 64_000_000
-"""Bytes of a file."""
+"""Largest size of a file [bytes]."""
 
 MAX_CSV_ROWS = 1_000_000
+"""Largest number of rows of a file."""
 
 SEPARATORS = ('\t;|', ',')
 """Characters that may separate cells; the comma comes last, because it may be a decimal comma."""
@@ -38,16 +39,16 @@ _DECIMAL_COMMA_PATTERN = re.compile(r'[-+]?\d+,\d+(?:[eE][-+]?\d+)?', re.ASCII)
 
 
 class TableError(ValueError):
-    """A file is no such table; one line naming file, line, column, value and allowed range."""
+    """Error of a file that is no such table; one line with file, line, column, value and allowed range."""
 
 
 def read(path, columns, least_rows=2, max_step=np.inf, step_name='its greatest step', optional=None) -> np.ndarray:
-    """The rows of a CSV file with a header, (n, k) in the order of columns {name: (low, high)}, then of the optional
-    ones, which are 0 where the file has none.
+    """Return the rows of a CSV file with a header, (n, k) in the order of columns {name: (low, high)}, then of the
+    optional columns, which are 0 where the file has none.
 
     A name ends with the unit of the values, as in time_s; the file may have another known unit, as in `time [min]`.
     The first column grows from row to row, by at most max_step (called step_name in the error). Columns of other
-    names are passed over. Raises TableError.
+    names are ignored. Raises TableError.
     """
     first, *_ = columns
     unit = first.partition('_')[2]
@@ -72,8 +73,8 @@ def read(path, columns, least_rows=2, max_step=np.inf, step_name='its greatest s
 
 @contextlib.contextmanager
 def stream(path):
-    """Context with the bytes of a file of at most MAX_CSV_BYTES. What cannot be read, and a packed file, raise
-    TableError."""
+    """Yield the bytes of a file of at most MAX_CSV_BYTES, as a context. Raises TableError for a file that cannot be
+    read, and for a packed file."""
     try:
         with files.open_regular(path, MAX_CSV_BYTES) as file:
             packed = content.packed(file.read(content.MAX_MARK_BYTES))
@@ -86,7 +87,7 @@ def stream(path):
 
 
 def text(path):
-    """The text of a file, see `content.decode`. Raises TableError."""
+    """Return the text of a file, see `content.decode`. Raises TableError."""
     with stream(path) as file:
         read_bytes = file.read(MAX_CSV_BYTES)
     try:
@@ -104,7 +105,7 @@ READ_ERRORS = (TableError, csv.Error)
 
 @contextlib.contextmanager
 def opened(path, bare=()):
-    """Context with the Table of a file, see `stream` and `Table`."""
+    """Yield the Table of a file, as a context, see `text` and `Table`. Raises TableError."""
     try:
         yield Table(path, text(path), bare)
     except csv.Error as error:
@@ -133,8 +134,7 @@ class Table:
         first = self._cells() or []
         self.fieldnames = tuple(first)
         if _is_row(first):
-            comment = next((line.strip().lstrip('#%/ \t') for line in reversed(before) if line.strip()), '')
-            names = next(csv.reader([comment], delimiter=self.separator, skipinitialspace=True), [])
+            names = _names_above(before, self.separator, bare) if before else []
             if len(names) == len(first) and not _is_row(names):
                 self.fieldnames, self._again = tuple(map(str.strip, names)), first
             elif len(bare) == len(first):
@@ -224,6 +224,17 @@ def _beginning(lines):
     return before, '', separator
 
 
+def _names_above(before, separator, bare):
+    """Return the cells of the last line with text before the first row, which may be names in a comment.
+
+    Names between blanks count if one of them begins like one of `bare`, the names of a text without names.
+    """
+    line = next((line.strip().lstrip('#%/ \t') for line in reversed(before) if line.strip()), '')
+    cells, words = next(csv.reader([line], delimiter=separator, skipinitialspace=True), []), line.split()
+    named = any(word.lower().startswith(name[:2]) for word in words for name in bare)
+    return words if named and len(cells) < 2 else cells
+
+
 def _is_title(line, after):
     """Return True if a line has no separator of cells and the next line with text has one."""
     following = next((text.strip() for text in after if text.strip()), '')
@@ -261,7 +272,7 @@ def require(table, names):
 
 
 def number(path, line, name, cell, low, high):
-    """The number in a cell of text, between low and high. Raises TableError."""
+    """Return the number in a cell of text, between low and high. Raises TableError."""
     try:
         value = float(cell)
     except (TypeError, ValueError):
@@ -272,11 +283,11 @@ def number(path, line, name, cell, low, high):
 
 
 def too_long(path, line):
-    """The TableError of a file with more than MAX_CSV_ROWS rows."""
+    """Return the TableError of a file with more than MAX_CSV_ROWS rows."""
     return TableError(f'{path}: line {line}: must be at most {MAX_CSV_ROWS} rows')
 
 
 def bad_step(path, line, value, step, unit, max_step, step_name):
-    """The TableError of a row whose `value` does not grow from that of the row before by at most max_step."""
+    """Return the TableError of a row whose `value` does not grow from that of the row before by at most max_step."""
     limit = f' and at most {step_name} = {max_step:g} {unit}' if np.isfinite(max_step) else ''
     return TableError(f'{path}: line {line}: {value}: {step:g} {unit} after the row before, must be above 0{limit}')

@@ -23,5 +23,6 @@ def iso(text):
         return words
     found = match.groupdict()
     month = found.get('month') or 1 + MONTH_NAMES.index(found['name'].lower())
+    fraction, zone = found['fraction'], (found['zone'] or '').upper()
     return (f'{found["year"]}-{int(month):02}-{int(found["day"]):02}T{int(found["hour"]):02}:{found["minute"]}:'
-            f'{found["second"] or "00"}{"." + found["fraction"] if found["fraction"] else ""}{(found["zone"] or "").upper()}')
+            f'{found["second"] or "00"}{"." + fraction if fraction else ""}{zone}')

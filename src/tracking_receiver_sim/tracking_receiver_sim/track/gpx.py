@@ -107,7 +107,7 @@ class _Points:
             self.others[name] += 1
 
     def text(self, text):
-        *_, parent, name = ('', '', *self.path_of_elements)
+        parent, name = ['', '', *self.path_of_elements][-2:]
         if name in TEXT_ELEMENTS and parent == ('trk' if name == 'name' else 'trkpt'):
             self.texts[name] = (self.texts.get(name, '') + text[:MAX_TEXT_CHARS])[:MAX_TEXT_CHARS]
 
