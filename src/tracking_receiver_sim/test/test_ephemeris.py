@@ -34,7 +34,7 @@ def instants(seconds):
 
 
 def states(frame, step=60.0, count=30):
-    """(seconds (n,), positions, velocities (n, 3) [km], [km/s]) of the ISS in a frame, as skyfield says."""
+    """(seconds (n,), positions, velocities (n, 3) [km], [km/s]) of the ISS in a frame, from skyfield."""
     seconds = step * np.arange(count)
     at = ISS.at(instants(seconds))
     if FRAMES[frame] is not None:
