@@ -3,6 +3,7 @@
 Without a ut1_offset UT1 equals UTC; tracking_receiver_sim.target gives the resulting error.
 """
 import datetime
+import re
 
 import numpy as np
 from sgp4.api import SGP4_ERRORS, WGS72, Satrec, jday
@@ -18,7 +19,7 @@ TLE_NUMBER_COLUMNS = (
     {'inclination': (8, 16), 'ascending node': (17, 25), 'eccentricity': (26, 33), 'argument of perigee': (34, 42),
      'mean anomaly': (43, 51), 'mean motion': (52, 63)})
 """{field: columns} of the numbers of both TLE lines."""
-
+LEAP_SECOND_PATTERN = re.compile(r'(T\d\d:59:)60\b')
 MAX_TLE_AGE_DAYS = 30.0
 """Largest time from the TLE epoch at which SGP4 is used [days]."""
 
@@ -97,9 +98,13 @@ def julian_date(when):
 
 
 def instant(name, text):
-    """Return UTC as a datetime without a zone, from ISO 8601. Raises TargetError, which calls the text `name`."""
+    """Return UTC as a datetime without a zone, from ISO 8601. Raises TargetError, which calls the text `name`.
+
+    The leap second 23:59:60 counts as the first second of the next day.
+    """
+    leap = LEAP_SECOND_PATTERN.sub(r'\g<1>59', text)
     try:
-        when = datetime.datetime.fromisoformat(text.replace('Z', '+00:00'))
+        when = datetime.datetime.fromisoformat(leap.replace('Z', '+00:00')) + datetime.timedelta(seconds=leap != text)
     except ValueError:
         raise TargetError(f'{name} = {text!r}: must be UTC as ISO 8601, for example 2019-12-10T06:00:00') from None
     return when if when.tzinfo is None else when.astimezone(datetime.timezone.utc).replace(tzinfo=None)
