@@ -10,6 +10,7 @@ import argparse
 import contextlib
 import importlib
 import os
+import re
 import shlex
 import signal
 import sys
@@ -25,6 +26,10 @@ VERBS = {'run': 'antenna', 'scenarios': 'design', 'samples': 'design', 'new': 'd
 """{verb: its room of `verbs`} in the order of the help."""
 
 
+NEGATIVE_NUMBER_PATTERN = re.compile(r'-\.?\d')
+"""Beginning of an argument that is a negative number."""
+
+
 def module_of(verb):
     """Return the module of a verb."""
     return importlib.import_module(f'pedestal.verbs.{VERBS[verb]}.{verb}')
@@ -32,7 +37,7 @@ def module_of(verb):
 
 def main(args=None) -> int:
     """Run a verb: exit code 0; 1 with one line on stderr for an error; 2 for a wrong command line; 130 if stopped."""
-    options = _parser().parse_args(args)
+    options = _parser().parse_args(_joined(sys.argv[1:] if args is None else args))
     options.command = shlex.join(('pedestal', *(sys.argv[1:] if args is None else args)))
     stop.on_stop(signal.default_int_handler)
     alone = getattr(options, 'json', None) == STDOUT_PATH
@@ -51,6 +56,21 @@ def main(args=None) -> int:
     except KeyboardInterrupt:
         print(stop.STOP_MESSAGE, file=sys.stderr)
         return stop.STOP_EXIT_CODE
+
+
+def _joined(args: list[str]) -> list[str]:
+    """Return arguments with each negative number joined to the option before it, as --az=-1e-2.
+
+    argparse takes only plain negative numbers for values, not -1e-2 or -33.9,18.4,10.
+    """
+    joined: list[str] = []
+    for arg in args:
+        option = bool(joined) and joined[-1].startswith('--') and len(joined[-1]) > 2 and '=' not in joined[-1]
+        if option and NEGATIVE_NUMBER_PATTERN.match(arg):
+            joined[-1] += f'={arg}'
+        else:
+            joined.append(arg)
+    return joined
 
 
 def _parser():

@@ -178,7 +178,7 @@ def culmination(params, satrec):
                 best = max(best, highest)
     reached = (f'the highest culmination is {best:.1f} deg' if math.isfinite(best) else
                'the satellite does not rise')
-    raise TargetError(f'satellite {satrec.satnum_str}: no culmination between {low:g} and {high:g} deg within '
+    raise TargetError(f'satellite {satrec.number}: no culmination between {low:g} and {high:g} deg within '
                       f'{leo_pass.search_days:g} days of the TLE epoch ({reached}) at latitude '
                       f'{params.station.latitude_deg:g}, longitude {params.station.longitude_deg:g} deg')
 
@@ -205,7 +205,7 @@ def _start(params, satrec, duration):
     julian, fraction = orbit.julian_date(orbit.instant('start_time', params.leo_pass.start_time))
     age = julian - satrec.jdsatepoch + fraction - satrec.jdsatepochF
     if abs(age) > orbit.MAX_TLE_AGE_DAYS:
-        raise TargetError(f'start_time = {params.leo_pass.start_time!r}: {age:.1f} days from the TLE epoch '
+        raise TargetError(f'start_time = {params.leo_pass.start_time!r}: {age:.1f} days from the {satrec.form} epoch '
                           f'{orbit.iso(satrec.jdsatepoch, satrec.jdsatepochF)}, must be within '
                           f'{orbit.MAX_TLE_AGE_DAYS:g} days')
     return julian, fraction
@@ -218,7 +218,7 @@ def _leo_pass(params, duration):
     knots = np.arange(-RUN_MARGIN_S, duration + RUN_MARGIN_S + SGP4_KNOT_SPACING_S, SGP4_KNOT_SPACING_S)
     position, velocity = orbit.enu(satrec, params.station, julian, fraction, knots, params.leo_pass.ut1_offset)
     if position[:, 2].max() < 0.0:
-        raise TargetError(f'satellite {satrec.satnum_str}: below the horizon from {orbit.iso(julian, fraction)} for '
+        raise TargetError(f'satellite {satrec.number}: below the horizon from {orbit.iso(julian, fraction)} for '
                           f'{duration:g} s at latitude {params.station.latitude_deg:g}, longitude '
                           f'{params.station.longitude_deg:g} deg')
     return knots, _hermite(knots, position, velocity), orbit.iso(julian, fraction)
