@@ -46,10 +46,12 @@ def ros_arguments(options):
     return ['--ros-args', '-r', f'__ns:={name}']
 
 
-def add_remote(parser):
-    """Who asks a running graph, which beam, and how long to wait."""
+def add_remote(parser, commands=True):
+    """Beam of a running graph, time to wait, and the name of the operator for a verb that sends commands."""
     add_namespace(parser)
-    parser.add_argument('--who', metavar='NAME', help='by which name to ask; default: login@host')
+    parser.set_defaults(who=None)
+    if commands:
+        parser.add_argument('--who', metavar='NAME', help='by which name to ask; default: login@host')
     parser.add_argument('--beam', default='', metavar='NAME', help='of an array of several, for example beam_2')
     parser.add_argument('--timeout', type=float, default=5.0, metavar='S', help='to wait for the graph and for its '
                         'reply; default: 5')

@@ -41,6 +41,11 @@ class LoopError(ValueError):
     """A plant whose loops cannot be designed, or closed with the margins that are asked; one line."""
 
 
+REQUIREMENT_OPTIONS = {'speed_bandwidth': 'speed', 'position_bandwidth': 'position', 'phase_margin': 'phase_margin',
+                       'gain_margin': 'gain_margin'}
+"""{option of the verb: field of LoopRequirements}."""
+
+
 @dataclasses.dataclass(frozen=True)
 class LoopRequirements:
     """What the loops are to reach: crossovers of speed and position loop [Hz], None for what follows from the other;
@@ -254,10 +259,10 @@ def _text(value):
 def main(options, progress):
     """Design as the verb's options say and write the parameter file: the lines to print. Raises LoopError."""
     for name in ('filter', 'feedforward', 'runs', 'seed', 'duration'):
-        if getattr(options, name):
+        if not (getattr(options, name) is None or getattr(options, name) is False):
             raise LoopError(f'--{name}: does not go with --loops, which measures the plant')
-    asked = LoopRequirements(options.speed_bandwidth, options.position_bandwidth, options.phase_margin,
-                             options.gain_margin)
+    asked = LoopRequirements(**{field: getattr(options, name) for name, field in REQUIREMENT_OPTIONS.items()
+                                if getattr(options, name) is not None})
     axes = AXES if options.axis == 'both' else (options.axis,)
     loops = Loops(options.source, options.param)
     file = options.output or pathlib.Path(f'{loops.name}-loops.yaml')

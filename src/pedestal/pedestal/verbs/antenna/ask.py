@@ -30,6 +30,8 @@ def pairs(texts) -> dict:
         name, equals, value = text.partition('=')
         if not (name and equals and value):
             raise ValueError(f'{text!r}: must be NAME=VALUE')
+        if name in given:
+            raise ValueError(f'{text!r}: {name} is given twice')
         given[name] = value
     return given
 

@@ -6,11 +6,13 @@ until Ctrl-C. Needs the extra pedestal_operator[live].
 import pathlib
 import shutil
 
+DEFAULT_PORT = 8765
+
 
 def add_arguments(parser):
     """Port, beams, where the layouts go."""
-    parser.add_argument('--port', type=int, default=8765, metavar='PORT', help='on 127.0.0.1; default: 8765')
-    parser.add_argument('--beams', type=int, default=0, metavar='N', help='of an electronic array; default: an '
+    parser.add_argument('--port', type=int, metavar='PORT', help='on 127.0.0.1; default: 8765')
+    parser.add_argument('--beams', type=int, metavar='N', help='of an electronic array; default: an '
                         'antenna with motors')
     parser.add_argument('--layouts', type=pathlib.Path, metavar='DIR', help='write what viewers open into this new '
                         'folder, and end: layouts for Foxglove and PlotJuggler, the URDF, an .rviz file')
@@ -19,12 +21,16 @@ def add_arguments(parser):
 def main(options):
     """Serve until told to end, or write the files; the exit code. Raises FileExistsError where the folder is there."""
     if options.layouts:
+        for name in ('port', 'beams'):
+            if getattr(options, name) is not None:
+                raise ValueError(f'--{name}: has no effect with --layouts, which serves nothing')
         from pedestal_operator.viewers.frames import VIEWER_FOLDER
         shutil.copytree(VIEWER_FOLDER, options.layouts)
         for file in sorted(options.layouts.iterdir()):
             print(file)
         return 0
     from pedestal_operator import live_node
-    print(f'ws://127.0.0.1:{options.port} until Ctrl-C; layouts: pedestal live --layouts DIR', flush=True)
-    return live_node.main(['--ros-args', '--log-level', 'warn', '-p', f'port:={options.port}',
-                           '-p', f'graph.beams:={options.beams}'])
+    port = DEFAULT_PORT if options.port is None else options.port
+    print(f'ws://127.0.0.1:{port} until Ctrl-C; layouts: pedestal live --layouts DIR', flush=True)
+    return live_node.main(['--ros-args', '--log-level', 'warn', '-p', f'port:={port}',
+                           '-p', f'graph.beams:={options.beams or 0}'])

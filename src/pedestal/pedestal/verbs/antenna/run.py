@@ -139,5 +139,5 @@ def _refuse_with_list(options):
     """Raise ValueError for an option of a run beside --pass list, which runs nothing."""
     from pedestal_bringup.graph import operator_servers
     for name in ('bag', 'json', 'explain', *operator_servers.SERVERS):
-        if getattr(options, name) not in (None, False):
+        if not (getattr(options, name) is None or getattr(options, name) is False):
             raise ValueError(f'--{name}: has no effect with --pass list, which runs nothing')

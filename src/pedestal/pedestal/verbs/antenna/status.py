@@ -10,7 +10,7 @@ def add_arguments(parser):
     """Where to write it, how long to listen."""
     from pedestal_analysis import console
     console.add_json(parser)
-    arguments.add_remote(parser)
+    arguments.add_remote(parser, commands=False)
 
 
 def main(options):

@@ -16,8 +16,8 @@ def add_arguments(parser):
                         'times that of the position loop')
     parser.add_argument('--position-bandwidth', type=float, metavar='HZ', help='--loops: crossover; default: an '
                         'eighth of the speed loop')
-    parser.add_argument('--phase-margin', type=float, default=45.0, metavar='DEG', help='--loops: default: 45')
-    parser.add_argument('--gain-margin', type=float, default=6.0, metavar='DB', help='--loops: default: 6')
+    parser.add_argument('--phase-margin', type=float, metavar='DEG', help='--loops: default: 45')
+    parser.add_argument('--gain-margin', type=float, metavar='DB', help='--loops: default: 6')
     parser.add_argument('--axis', choices=('azimuth', 'elevation', 'both'), default='both', help='default: both')
     parser.add_argument('--seed', type=int, metavar='N', help='first seed; default: what the scenario says')
     parser.add_argument('--runs', type=int, metavar='N', help='seeds to tune on, the next one judges; default: 2')

@@ -1,6 +1,8 @@
 """publish a recording into a live graph"""
 import pathlib
 
+DEFAULT_DEADLINE_S = 60.0
+
 
 def add_arguments(parser):
     """Bag, which topics, pace, part of the recording."""
@@ -20,7 +22,7 @@ def add_arguments(parser):
                         metavar='PORT',
                         help="show it on the operator's page with a slider, without a graph; default port: "
                              f"{operator_servers.SERVERS['page'].port}")
-    parser.add_argument('--deadline', type=float, default=60.0, metavar='S',
+    parser.add_argument('--deadline', type=float, metavar='S',
                         help='wall-clock time a reader or an answer is waited for; default: 60')
 
 
@@ -31,7 +33,7 @@ def main(options):
     from pedestal_analysis.reprocess.replay import ReplayOptions, replay
     result = replay(options.bag, ReplayOptions(
         options.node, options.topics, None if options.lockstep else options.rate, options.start, options.duration,
-        options.paused, options.deadline))
+        options.paused, DEFAULT_DEADLINE_S if options.deadline is None else options.deadline))
     print('\n'.join(result.lines()))
     if result.ended == 'stopped':
         raise KeyboardInterrupt
@@ -42,7 +44,8 @@ def _on_the_page(options):
     """Show the recording until Ctrl-C; exit code 0."""
     from pedestal_analysis.reprocess import replay, replay_page
     from pedestal_recording import bag
-    if options.node or options.topics or options.lockstep or options.duration:
+    if options.node or options.topics or options.lockstep or options.duration is not None or (
+            options.deadline is not None):
         raise ValueError('--page: takes --start, --rate and --paused; everything else is for a replay into a graph')
     wanted = replay.ReplayOptions(rate=options.rate, start=options.start, paused=options.paused)
     player = replay_page.Player(replay_page.Recording(bag.read(options.bag, '')), options.page, wanted)
