@@ -110,14 +110,16 @@ def _chosen(options):
     from pedestal import satellite
     from pedestal_common.geometry import orbit
     now = datetime.datetime.now(datetime.timezone.utc).replace(tzinfo=None)
-    started = any(change.startswith(START_TIME_PARAMETER + '=') for change in changes)
+    started = next((change.partition('=')[2].strip('"\'') for change in reversed(changes)
+                    if change.startswith(START_TIME_PARAMETER + '=')), '')
     if options.which and started:
         raise ValueError(f'--pass {options.which}: sets {START_TIME_PARAMETER}, which is also given; leave out one')
     if options.station:
         changes = satellite.station_changes(options.station) + changes
     if options.tle:
         named = options.which and not (options.which in ('list', 'next') or options.which.isdecimal())
-        when = orbit.instant('--pass', options.which) if named else now
+        when = (orbit.instant('--pass', options.which) if named else
+                orbit.instant('start_time', started) if started else now)
         elements, remark = satellite.tle_changes(options.tle, options.satellite, when)
         changes = elements + changes
         if remark:
