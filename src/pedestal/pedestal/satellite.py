@@ -1,4 +1,4 @@
-"""A satellite and a station of the user's own: what --tle, --station and --pass of `pedestal run` change."""
+"""Changes of a scenario by --tle, --station and --pass of `pedestal run`: a satellite and a station of the user."""
 import datetime
 import json
 import math
@@ -7,15 +7,17 @@ import typing
 
 from pedestal_analysis import console
 from pedestal_analysis.report.subject import place
-from pedestal_bringup.scenario import scenario
 from pedestal_common.geometry import orbit, passes
 from pedestal_common.geometry.orbit import TargetError
 from tracking_receiver_sim import elements
 
+if typing.TYPE_CHECKING:
+    from pedestal_bringup.scenario.scenario import Draft
+
 STATION_PARAMETERS = ('latitude_deg', 'longitude_deg', 'height')
 
 
-def tle_changes(path: pathlib.Path, name: str, when: datetime.datetime) -> tuple[list[str], str]:
+def tle_changes(path: str | pathlib.Path, name: str, when: datetime.datetime) -> tuple[list[str], str]:
     """Return (texts 'node.key=value' of a file of TLEs or OMMs, for the target and for mode tle; remark). Raises
     TargetError.
 
@@ -28,7 +30,7 @@ def tle_changes(path: pathlib.Path, name: str, when: datetime.datetime) -> tuple
 
 
 def station_changes(text: str) -> list[str]:
-    """Texts 'node.key=value' of a station 'LATITUDE,LONGITUDE,HEIGHT' in deg, deg, m. Raises ValueError."""
+    """Return texts 'node.key=value' for a station 'LATITUDE,LONGITUDE,HEIGHT' [deg, deg, m]. Raises ValueError."""
     try:
         numbers = [float(part) for part in text.split(',')]
     except ValueError:
@@ -40,22 +42,25 @@ def station_changes(text: str) -> list[str]:
 
 
 class PassSelection:
-    """The satellite and the station of a scenario.Draft, seen at `now` (datetime, UTC). Raises ValueError where its
-    target is no satellite."""
+    """Choice of a pass of the satellite over the station of a scenario.Draft at the time `now` (datetime, UTC).
 
-    def __init__(self, draft: scenario.Draft, now: datetime.datetime) -> None:
+    Raises ValueError for a scenario whose target is no satellite.
+    """
+
+    def __init__(self, draft: 'Draft', now: datetime.datetime) -> None:
         if draft.header.graph_beams > 1:
-            raise ValueError(f'--pass: {draft.name} has {draft.header.beams} beams; it takes a scenario of one')
+            raise ValueError(f'--pass: {draft.name} has {draft.header.beams} beams; must be a scenario of one beam')
         target = draft.target
         if target.kind != 'leo_pass':
-            raise ValueError(f'--tle, --pass: the target of {draft.name} is a {target.kind}, which is no satellite')
+            raise ValueError(f'--tle, --pass: the target of {draft.name} is a {target.kind}, must be a '
+                             'satellite (leo_pass)')
         self.satellite, self.station, self.now = orbit.satellite(target.leo_pass), target.station, now
 
-    def list(self) -> None:
-        """Print the passes that --pass takes by number."""
+    def print_passes(self) -> None:
+        """Print the passes with their numbers for --pass."""
         begin, old = passes.search_start(self.satellite, self.now)
         if old:
-            print(f'{old}: these are the passes of its own time')
+            print(f'{old}: the list begins at its epoch')
         found = passes.passes_after(self.satellite, self.station, begin)
         print(f'satellite {self.satellite.number} over {place(self.station)}, {passes.SEARCH_DAYS:g} days from '
               f'{begin:%Y-%m-%d %H:%M:%S} UTC, passes above {passes.MIN_CULMINATION_DEG:g} deg')
@@ -67,7 +72,7 @@ class PassSelection:
             if p.duration > passes.MAX_RUN_S:
                 print(f'pass {n}: {_extent(p)}; a run of it needs --duration: --pass UTC --duration S')
 
-    def choose(self, which: str, duration: float | None = None) -> tuple[typing.Any, float, str]:
+    def choose(self, which: str, duration: float | None = None) -> tuple[list[str], float, str]:
         """Return (texts 'node.key=value', duration [s], line) of the pass that `which` names, from rise to set, or for
         a duration [s] unless that is None. Raises TargetError."""
         p = passes.chosen_pass(self.satellite, self.station, which, self.now)

@@ -18,6 +18,7 @@ import functools
 import math
 import typing
 from collections import namedtuple
+from collections.abc import Callable
 
 import numpy as np
 
@@ -137,8 +138,8 @@ def build(params, duration, horizon_mask=0.0) -> Target:
 
     Raises TargetError, also if the target stays below the horizon, or below a horizon_mask [rad] under it.
     """
-    builder = {'leo_pass': _leo_pass, 'track_file': _track_file, 'flyby': _flyby}.get(params.kind, _angles)
-    breaks, coefficients, *known = builder(params, duration)
+    builders: dict[str, Callable] = {'leo_pass': _leo_pass, 'track_file': _track_file, 'flyby': _flyby}
+    breaks, coefficients, *known = builders.get(params.kind, _angles)(params, duration)
     constants = np.zeros(1, TARGET_DTYPE)
     constants['kind'], constants['angle'] = TARGET_KINDS.index(params.kind), record(params.angle)
     built = Target(constants, np.ascontiguousarray(breaks), np.ascontiguousarray(coefficients), *known)

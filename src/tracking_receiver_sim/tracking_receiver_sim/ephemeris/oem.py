@@ -31,10 +31,11 @@ def read(path, wanted='') -> states.Ephemeris:
 
     wanted: name or international designator of the object; it may be empty for a file of one object.
     """
-    objects, midnight = {}, None
+    objects: dict[tuple, list] = {}
+    midnight = 0.0
     for meta, rows in _blocks(path):
         names = meta['OBJECT_NAME'].upper(), meta['OBJECT_ID'].upper()
-        if midnight is None:
+        if not objects:
             midnight = instant.of_day(int(rows[0, 1]), 0.0) if len(rows) else 0.0
         objects.setdefault(names, []).append((meta, rows))
     if not objects:
