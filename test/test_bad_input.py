@@ -118,7 +118,7 @@ def test_recorded_ship_is_read_before_the_run(capsys, one_line, tmp_path):
     changes = ('motion=recorded', 'heading_deg=0', 'sea_state=0', 'speed=0', f'recorded.path={tmp_path}/ship.csv')
     line = refused(capsys, one_line, 'run', 'ship_pass', '--bag', tmp_path / 'bag',
                    *(part for change in changes for part in ('--param', f'ship_motion.ship.{change}')))
-    assert f"{tmp_path}/ship.csv: line 1: column 'time_s' is missing" in line
+    assert f"{tmp_path}/ship.csv: line 1: column 'time': must end with a known unit" in line
     assert not (tmp_path / 'bag.log').exists()
 
 

@@ -70,8 +70,8 @@ def upcoming_passes(query):
     except orbit.TargetError:
         known = []
     return [{'aos': _seconds(each.rise) - query.ahead, 'los': _seconds(each.set) - query.ahead,
-             'highest': round(each.elevation, 1), 'from': round(each.rise_azimuth, 1),
-             'to': round(each.set_azimuth, 1)} for each in known if each.rise and each.set]
+             'highest': round(each.elevation, 1), 'from': round(each.rise_azimuth, 1) % 360.0,
+             'to': round(each.set_azimuth, 1) % 360.0} for each in known if each.rise and each.set]
 
 
 def _seconds(utc):

@@ -3,6 +3,7 @@ keep every file from blocking the process or filling its memory."""
 import contextlib
 import datetime
 import functools
+import io
 import re
 
 from pedestal_common.text_files import csv_table
@@ -23,24 +24,19 @@ def wrong(path, line, column, problem):
     return csv_table.TableError(f'{path}: line {line}, column {column}: {problem}')
 
 
-def read(path, encoding='ASCII'):
-    """Yield (number, text) of each line of a file that is not empty. Raises TableError for a line that is too long or
-    in another encoding."""
-    with csv_table.stream(path) as stream:
-        number = 0
-        while line := stream.readline(MAX_LINE_CHARS + 1):
-            number += 1
-            if len(line) > MAX_LINE_CHARS and not line.endswith(b'\n'):
-                raise csv_table.TableError(f'{path}: line {number}: longer than {MAX_LINE_CHARS} characters')
-            if number > csv_table.MAX_CSV_ROWS:
-                raise csv_table.too_long(path, number)
-            try:
-                text = line.decode(encoding).rstrip()
-            except UnicodeDecodeError as error:
-                raise wrong(path, number, error.start + 1,
-                            f'byte {line[error.start]:#04x}: must be {encoding}') from None
-            if text:
-                yield number, text
+def read(path):
+    """Yield (number, text) of each line of a text file that is not empty, see csv_table.text. Raises TableError, also
+    for a line that is too long."""
+    stream = io.StringIO(csv_table.text(path))
+    number = 0
+    while line := stream.readline(MAX_LINE_CHARS + 1):
+        number += 1
+        if len(line) > MAX_LINE_CHARS and not line.endswith('\n'):
+            raise csv_table.TableError(f'{path}: line {number}: longer than {MAX_LINE_CHARS} characters')
+        if number > csv_table.MAX_CSV_ROWS:
+            raise csv_table.too_long(path, number)
+        if text := line.rstrip():
+            yield number, text
 
 
 def numbers(path, line, text, limits):

@@ -9,7 +9,7 @@ from tracking_receiver_sim.ephemeris import frames, lines, states
 from tracking_receiver_sim.track import instant
 
 ENTRY_PATTERN = re.compile(r'([A-Z0-9_]+)( *= *)(.*)', re.ASCII)
-FILE_SIGNATURE = b'CCSDS_OEM_VERS'
+FILE_SIGNATURE = 'CCSDS_OEM_VERS'
 STATE_LIMITS = {**dict.fromkeys('xyz', (-2e6, 2e6)), **dict.fromkeys(('vx', 'vy', 'vz'), (-100.0, 100.0))}
 """{number in a line of data: (lowest, highest)} [km], [km/s]."""
 MAX_SEGMENTS = 1000

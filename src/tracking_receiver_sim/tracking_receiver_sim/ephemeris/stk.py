@@ -11,9 +11,9 @@ import numpy as np
 
 from pedestal_common.text_files import csv_table
 from tracking_receiver_sim.ephemeris import lines, states
-from tracking_receiver_sim.track import instant
+from tracking_receiver_sim.track import dates, instant
 
-FILE_SIGNATURE_PATTERN = re.compile(rb'stk\.v\.\d+', re.IGNORECASE)
+FILE_SIGNATURE_PATTERN = re.compile(r'stk\.v\.\d+', re.IGNORECASE)
 FRAME_NAMES = {'fixed': 'ITRF', 'j2000': 'EME2000', 'icrf': 'ICRF', 'temeofdate': 'TEME', 'trueofdate': 'TOD'}
 """{CoordinateSystem: frame of frames.earth_fixed}."""
 METRES_PER_UNIT = {'meters': 1.0, 'kilometers': 1000.0}
@@ -30,7 +30,6 @@ READ_KEYWORDS = ('numberofephemerispoints', 'scenarioepoch', 'interpolationmetho
 IGNORED_KEYWORDS = ('blockingfactor', 'coordinatesystemepoch', 'messagelevel', 'timeformat')
 MAX_SEGMENTS = 1000
 """Largest number of segments of a file."""
-MONTH_NAMES = 'jan feb mar apr may jun jul aug sep oct nov dec'.split()
 EPOCH_PATTERN = re.compile(r'(\d{1,2}) ([a-z]{3})[a-z]* (\d{4}) (\d{1,2}):(\d\d):(\d\d(?:\.\d*)?)', re.ASCII)
 
 
@@ -108,7 +107,7 @@ def _epoch(path, line, column, text):
     match = EPOCH_PATTERN.fullmatch(' '.join(text.lower().split()))
     try:
         day, month, year, hours, minutes, seconds = match.groups()
-        date = datetime.date(int(year), MONTH_NAMES.index(month) + 1, int(day))
+        date = datetime.date(int(year), dates.MONTH_NAMES.index(month) + 1, int(day))
         if not lines.YEAR_LIMITS[0] <= date.year <= lines.YEAR_LIMITS[1]:
             raise ValueError
         days, second = ((date - datetime.date(1970, 1, 1)).days,

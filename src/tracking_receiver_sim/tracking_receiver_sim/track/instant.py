@@ -12,6 +12,7 @@ import numpy as np
 
 from pedestal_common.graph.steps import SECONDS_PER_DAY
 from pedestal_common.text_files import csv_table
+from tracking_receiver_sim.track import dates
 
 UNIX_TIME_LIMITS_S = (0.0, 4102444800.0)
 """Range of the seconds since 1970 without leap seconds: until 2100."""
@@ -60,9 +61,9 @@ def second_of_day(hours, minutes, seconds):
 
 
 def seconds(path, line, name, text):
-    """Return the instant of a text: ISO 8601 (without a zone: UTC), or a number of seconds since 1970 without leap
-    seconds. Raises TableError."""
-    text = (text or '').strip()
+    """Return the instant of a text: a date, see `dates` (without a zone: UTC), or a number of seconds since 1970
+    without leap seconds. Raises TableError."""
+    text = dates.iso(text)
     match = ISO_TIME_PATTERN.fullmatch(text)
     try:
         if not match:
@@ -72,7 +73,7 @@ def seconds(path, line, name, text):
         raise
     except ValueError:
         raise csv_table.TableError(f'{path}: line {line}: {name} = {text!r:.60}: must be UTC as ISO 8601, for example '
-                                   '2018-07-23T10:00:00Z, or as seconds since 1970') from None
+                                   f'{dates.DATE_EXAMPLES}, or as seconds since 1970') from None
 
 
 def _of_iso(date, hours, minutes, second, fraction, sign, zone_hours, zone_minutes):

@@ -1,20 +1,30 @@
 """Logs of NMEA 0183: GGA for time of day, position and height, RMC for the date. Other sentences are passed over.
 
-The height above the ellipsoid is altitude + geoidal separation. Text before the $ of a line, for example the time of
-a logger, is passed over. Sentences with a wrong checksum and GGA without a fix are passed over and counted.
+The height above the ellipsoid is altitude + geoidal separation. Text before the $ of a line and behind the checksum is
+passed over: the time of a logger, a tag block, `NMEA,` and the time of Android. Cut sentences, sentences with a wrong
+checksum, and GGA without fix, time or altitude (2D) are passed over and counted.
 """
+import collections
 import contextlib
 import datetime
+import io
 import re
 
 import pynmea2
 
 from pedestal_common.graph.steps import SECONDS_PER_DAY
-from pedestal_common.text_files import csv_table
+from pedestal_common.text_files import content, csv_table
 from tracking_receiver_sim.track import fixes, instant
 
-SENTENCE_PATTERN = re.compile(r'\$..(?:GGA|RMC),.*', re.ASCII)
+SENTENCE_PATTERN = re.compile(r'\$[A-Z]{2}([A-Z]{3}),[^$*]*(\*[0-9A-Fa-f]{2})?', re.ASCII)
+"""A sentence with its type and its checksum."""
+CUT_SENTENCE_PATTERN = re.compile(r'[^$!]*,[^$!]*\*[0-9A-Fa-f]{2}', re.ASCII)
+"""The end of a sentence whose beginning is missing."""
 TIME_PATTERN = re.compile(r'(\d\d)(\d\d)(\d\d(?:\.\d*)?)', re.ASCII)
+MIN_GGA_FIELDS = 11
+"""Least number of fields of a GGA: up to the geoidal separation."""
+MAX_LISTED_TYPES = 8
+"""Number of types of sentences that an error lists."""
 MAX_LINE_CHARS = 1024
 """Largest number of characters of a line; the standard allows 82."""
 
@@ -48,34 +58,59 @@ def rows(path, log):
         log.remarks.append('altitude without geoidal separation taken as height above the ellipsoid')
 
 
+def is_log(beginning):
+    """Return True if a text is the beginning of a log: a sentence first, or GGA and the like after other text."""
+    return beginning.startswith(('$', '!')) or bool(SENTENCE_PATTERN.search(beginning))
+
+
 def _sentences(path, log):
-    """Yield (line, sentence) of each GGA and RMC with a fix; count the others in a fixes.Log."""
+    """Yield (line, sentence) of each RMC and GGA with a fix; a GGA also has time and altitude. Count the other GGA in
+    a fixes.Log."""
+    types, with_checksum = collections.Counter(), False
     for line, text in _lines(path):
-        match = SENTENCE_PATTERN.search(text)
-        if not match:
-            continue
-        try:
-            sentence = pynmea2.parse(match[0])
-        except pynmea2.ParseError:
+        if CUT_SENTENCE_PATTERN.fullmatch(text) and not text.startswith('#'):
             log.passed_over['damaged sentence'] += 1
-            continue
-        if sentence.sentence_type == 'RMC':
-            if sentence.status == 'A':
+        for match in SENTENCE_PATTERN.finditer(text):
+            types[match[1]] += 1
+            if match[1] not in ('GGA', 'RMC'):
+                continue
+            with_checksum = with_checksum or bool(match[2])
+            try:
+                sentence = pynmea2.parse(match[0])
+            except pynmea2.ParseError:
+                sentence = None
+            if sentence is None or with_checksum and not match[2] or (
+                    match[1] == 'GGA' and len(sentence.data) < MIN_GGA_FIELDS):
+                log.passed_over['damaged sentence'] += 1
+            elif match[1] == 'RMC':
+                if sentence.status == 'A':
+                    yield line, sentence
+            elif missing := _missing(sentence):
+                log.passed_over[f'GGA without {missing}'] += 1
+            else:
                 yield line, sentence
-        elif not sentence.gps_qual or not sentence.lat or not sentence.lon:
-            log.passed_over['GGA without a fix'] += 1
-        else:
-            yield line, sentence
+    if not types['GGA']:
+        listed = ', '.join(f'{count} {name}' for name, count in sorted(types.items())[:MAX_LISTED_TYPES])
+        log.nothing = f'no GGA in it{f" ({listed})" if listed else ""}'
+
+
+def _missing(gga):
+    """Return the part that a GGA lacks, '' if it has all."""
+    there = {'a fix': gga.gps_qual and gga.lat and gga.lon, 'time': gga.data[0], 'altitude': gga.altitude is not None}
+    return next((name for name, value in there.items() if not value), '')
 
 
 def _lines(path):
+    """Yield (number, text) of each line; noise between the sentences becomes replacement characters."""
     with csv_table.stream(path) as stream:
-        number = 0
-        while line := stream.readline(MAX_LINE_CHARS):
+        encoding = content.marked_encoding(stream.read(content.MAX_MARK_BYTES)) or 'ascii'
+        stream.seek(0)
+        number, lines = 0, io.TextIOWrapper(stream, encoding, errors='replace', newline='')
+        while line := lines.readline(MAX_LINE_CHARS):
             number += 1
-            if len(line) == MAX_LINE_CHARS and not line.endswith(b'\n'):
+            if len(line) == MAX_LINE_CHARS and not line.endswith(('\n', '\r')):
                 raise csv_table.TableError(f'{path}: line {number}: longer than {MAX_LINE_CHARS} characters')
-            yield number, line.decode('ascii', 'replace').strip()
+            yield number, line.strip()
 
 
 class _Clock:
