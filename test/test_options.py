@@ -13,7 +13,7 @@ REPOSITORY = pathlib.Path(__file__).parents[1]
     (['run', 'leo_pass', '--station', '-33.9,18.4,10'], {'station': '-33.9,18.4,10'}),
     (['run', 'leo_pass', '--seed', '-1', '--param', 'a.b=-1'], {'seed': -1, 'param': ['a.b=-1']})])
 def test_a_negative_value_needs_no_equals_sign(arguments, parsed):
-    options = vars(cli._parser().parse_args(cli._joined(arguments)))
+    options = vars(cli._parser().parse_args(arguments))
     assert {name: options[name] for name in parsed} == parsed
 
 
@@ -34,8 +34,9 @@ def test_passes_of_a_station_in_the_south(capsys):
     (['ask', 'offset', 'time=1', 'time=2'], "'time=2': time is given twice"),
     (['study', '--runs', '3'], '--runs: needs the NAME of a study'),
     (['tune', 'leo_pass', '--filter', 'imm', '--gain-margin', '7'], '--gain-margin 7: needs --loops'),
-    (['tune', 'leo_pass', '--loops', '--seed', '0'], '--seed: does not go with --loops'),
-    (['replay', 'bags/reference/leo_pass', '--page', '--deadline', '5'], '--page: takes --start, --rate and --paused'),
+    (['tune', 'leo_pass', '--loops', '--seed', '0'], '--seed: cannot be combined with --loops'),
+    (['replay', 'bags/reference/leo_pass', '--page', '--deadline', '5'],
+     '--page: goes only with --start, --rate and --paused'),
     (['recompute', 'bags/reference/leo_pass', '--node', 'acu', '--node', 'adu', '--param',
       'acu.azimuth.filter.kind=cv'], '--node adu: has no effect, because no --param is of it'),
     (['program', 'leo_pass', '--start', '-10'], "--start = '-10': must be UTC as ISO 8601")])

@@ -42,7 +42,7 @@ def main(args: Sequence[str] | None = None) -> int:
 
     Return its exit code: 0; 1 with a line on stderr for an error; 2 for a wrong command line; 130 after a stop.
     """
-    options = _parser().parse_args(_joined(sys.argv[1:] if args is None else args))
+    options = _parser().parse_args(args)
     options.command = shlex.join(('pedestal', *(sys.argv[1:] if args is None else args)))
     stop.on_stop(signal.default_int_handler)
     json_on_stdout = getattr(options, 'json', None) == STDOUT_PATH
@@ -63,25 +63,25 @@ def main(args: Sequence[str] | None = None) -> int:
         return stop.STOP_EXIT_CODE
 
 
-def _joined(args: Sequence[str]) -> list[str]:
-    """Return arguments with each negative number joined to the option before it, as --az=-1e-2.
+class Parser(argparse.ArgumentParser):
+    """Parser of options whose values may be any negative number: argparse takes only plain ones, not -1e-2 or
+    -33.9,18.4,10."""
 
-    argparse takes only plain negative numbers for values, not -1e-2 or -33.9,18.4,10.
-    """
-    joined: list[str] = []
-    for arg in args:
-        option = bool(joined) and joined[-1].startswith('--') and len(joined[-1]) > 2 and '=' not in joined[-1]
-        if option and NEGATIVE_NUMBER_PATTERN.match(arg):
-            joined[-1] += f'={arg}'
-        else:
-            joined.append(arg)
-    return joined
+    def parse_known_args(self, args=None, namespace=None):  # type: ignore[no-untyped-def,override]
+        """Return (namespace, unknown arguments), with each negative number joined to the option before it."""
+        joined = []
+        for arg in sys.argv[1:] if args is None else args:
+            option = bool(joined) and joined[-1].startswith('--') and len(joined[-1]) > 2 and '=' not in joined[-1]
+            if option and NEGATIVE_NUMBER_PATTERN.match(arg):
+                joined[-1] += f'={arg}'
+            else:
+                joined.append(arg)
+        return super().parse_known_args(joined, namespace)
 
 
 def _parser() -> argparse.ArgumentParser:
     """Return the parser of the command line with all verbs."""
-    parser = argparse.ArgumentParser(prog='pedestal', description='Run, record and analyse the control system of a '
-                                     'tracking antenna.')
+    parser = Parser(prog='pedestal', description='Run, record and analyse the control system of a tracking antenna.')
     verbs = parser.add_subparsers(title='verbs', required=True, metavar='VERB')
     for name in VERBS:
         verb = module_of(name)
