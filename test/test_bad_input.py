@@ -42,7 +42,7 @@ COMMAND_LINES = {
     'seed': (['leo_pass', '--seed', '-1'], ['seed = -1']),
     'no TLE': (['leo_pass', '--tle', '/nowhere/iss.tle'], ['TLE file /nowhere/iss.tle: No such file']),
     'old TLE': (['leo_pass', '--pass', 'next'], ['--pass next: the TLE of satellite 25544 is of 2019-12-09']),
-    'no such pass': (['leo_pass', '--pass', '99'], ['--pass 99: there are 26 passes above 10 deg']),
+    'no such pass': (['leo_pass', '--pass', '99'], ['--pass 99: there are 27 passes above 10 deg']),
     'station': (['leo_pass', '--station', '47.4,8.5'], ["--station '47.4,8.5': must be LATITUDE,LONGITUDE,HEIGHT"]),
     'latitude': (['leo_pass', '--station', '95,8.5,0'], ['target.station.latitude_deg = 95 deg: must be -90 to 90']),
     'pass of a UAV': (['uav_flyby', '--pass', '1'], ['the target of uav_flyby is a flyby, must be a satellite']),

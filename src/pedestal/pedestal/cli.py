@@ -10,6 +10,7 @@ import argparse
 import contextlib
 import importlib
 import os
+import re
 import shlex
 import signal
 import sys
@@ -25,6 +26,10 @@ VERBS = {'run': 'antenna', 'scenarios': 'design', 'samples': 'design', 'new': 'd
          'report': 'recordings', 'study': 'design', 'trials': 'design', 'export': 'recordings',
          'recompute': 'recordings', 'tune': 'design', 'replay': 'recordings', 'bench': 'design'}
 """{verb: its package in `verbs`}, in the order of the help."""
+
+
+NEGATIVE_NUMBER_PATTERN = re.compile(r'-\.?\d')
+"""Beginning of an argument that is a negative number."""
 
 
 def module_of(verb: str) -> types.ModuleType:
@@ -58,10 +63,25 @@ def main(args: Sequence[str] | None = None) -> int:
         return stop.STOP_EXIT_CODE
 
 
+class Parser(argparse.ArgumentParser):
+    """Parser of options whose values may be any negative number: argparse takes only plain ones, not -1e-2 or
+    -33.9,18.4,10."""
+
+    def parse_known_args(self, args=None, namespace=None):  # type: ignore[no-untyped-def,override]
+        """Return (namespace, unknown arguments), with each negative number joined to the option before it."""
+        joined = []
+        for arg in sys.argv[1:] if args is None else args:
+            option = bool(joined) and joined[-1].startswith('--') and len(joined[-1]) > 2 and '=' not in joined[-1]
+            if option and NEGATIVE_NUMBER_PATTERN.match(arg):
+                joined[-1] += f'={arg}'
+            else:
+                joined.append(arg)
+        return super().parse_known_args(joined, namespace)
+
+
 def _parser() -> argparse.ArgumentParser:
     """Return the parser of the command line with all verbs."""
-    parser = argparse.ArgumentParser(prog='pedestal', description='Run, record and analyse the control system of a '
-                                     'tracking antenna.')
+    parser = Parser(prog='pedestal', description='Run, record and analyse the control system of a tracking antenna.')
     verbs = parser.add_subparsers(title='verbs', required=True, metavar='VERB')
     for name in VERBS:
         verb = module_of(name)

@@ -1,12 +1,14 @@
 """Changes of a scenario by --tle, --station and --pass of `pedestal run`: a satellite and a station of the user."""
 import datetime
 import json
+import math
 import pathlib
 import typing
 
 from pedestal_analysis import console
 from pedestal_analysis.report.subject import place
 from pedestal_common.geometry import orbit, passes
+from pedestal_common.geometry.orbit import TargetError
 from tracking_receiver_sim import elements
 
 if typing.TYPE_CHECKING:
@@ -15,15 +17,16 @@ if typing.TYPE_CHECKING:
 STATION_PARAMETERS = ('latitude_deg', 'longitude_deg', 'height')
 
 
-def tle_changes(path: str | pathlib.Path, name: str) -> list[str]:
-    """Return texts 'node.key=value' for the target and for mode tle, from a file of TLEs or OMMs.
+def tle_changes(path: str | pathlib.Path, name: str, when: datetime.datetime) -> tuple[list[str], str]:
+    """Return (texts 'node.key=value' of a file of TLEs or OMMs, for the target and for mode tle; remark). Raises
+    TargetError.
 
-    name: of the satellite, '' for a file of one satellite. Raises TargetError.
+    name: of the satellite, '' if the file holds one; when: datetime, UTC, to which the elements of a history are the
+    nearest.
     """
-    _, line_1, line_2 = elements.read(path, name)
-    return [f'{prefix}.line_{number}={json.dumps(line)}'
-            for prefix in ('tracking_receiver.target.leo_pass', 'acu.prediction')
-            for number, line in enumerate((line_1, line_2), 1)]
+    chosen = elements.read(path, name, when)
+    return [f'{node}.{key}={json.dumps(text)}' for node in ('tracking_receiver.target.leo_pass', 'acu.prediction')
+            for key, text in chosen.values.items()], chosen.remark
 
 
 def station_changes(text: str) -> list[str]:
@@ -34,7 +37,7 @@ def station_changes(text: str) -> list[str]:
         numbers = []
     if len(numbers) != len(STATION_PARAMETERS):
         raise ValueError(f'--station {text!r}: must be LATITUDE,LONGITUDE,HEIGHT in degrees and metres, for example '
-                         '47.4,8.5,500; a negative latitude needs an equals sign: --station=-33.9,18.4,10')
+                         '47.4,8.5,500')
     return [f'tracking_receiver.target.station.{name}={number!r}' for name, number in zip(STATION_PARAMETERS, numbers)]
 
 
@@ -59,22 +62,59 @@ class PassSelection:
         if old:
             print(f'{old}: the list begins at its epoch')
         found = passes.passes_after(self.satellite, self.station, begin)
-        print(f'satellite {self.satellite.satnum_str} over {place(self.station)}, {passes.SEARCH_DAYS:g} days from '
+        print(f'satellite {self.satellite.number} over {place(self.station)}, {passes.SEARCH_DAYS:g} days from '
               f'{begin:%Y-%m-%d %H:%M:%S} UTC, passes above {passes.MIN_CULMINATION_DEG:g} deg')
         console.show_list([('N', 'rises (UTC)', 'azimuth', 'highest', 'at', 'sets', 'azimuth and duration')] + [
-            (str(n), f'{p.rise:%Y-%m-%d %H:%M:%S}', f'{p.rise_azimuth:.0f} deg', f'{p.elevation:.1f} deg',
-             f'{p.top:%H:%M:%S}', f'{p.set:%H:%M:%S}', f'{p.set_azimuth:.0f} deg, {p.duration:.0f} s')
+            (str(n), _utc(p.rise), _azimuth(p.rise_azimuth), f'{p.elevation:.1f} deg', *_times(p),
+             _ending(p))
             for n, p in enumerate(found, 1)])
+        for n, p in enumerate(found, 1):
+            if p.duration > passes.MAX_RUN_S:
+                print(f'pass {n}: {_extent(p)}; a run of it needs --duration: --pass UTC --duration S')
 
-    def choose(self, which: str) -> tuple[list[str], int, str]:
-        """Return (texts 'node.key=value', duration [s], line) of a pass from rise to set. Raises TargetError.
-
-        which: value of --pass: 'next', a number in the list, or a UTC.
-        """
+    def choose(self, which: str, duration: float | None = None) -> tuple[list[str], float, str]:
+        """Return (texts 'node.key=value', duration [s], line) of the pass that `which` names, from rise to set, or for
+        a duration [s] unless that is None. Raises TargetError."""
         p = passes.chosen_pass(self.satellite, self.station, which, self.now)
-        start = p.rise.replace(microsecond=0)
-        line = (f'satellite {self.satellite.satnum_str} over {place(self.station)}: rises {p.rise:%Y-%m-%d %H:%M:%S} '
-                f'UTC in azimuth {p.rise_azimuth:.0f} deg, highest {p.elevation:.1f} deg at {p.top:%H:%M:%S}, sets '
-                f'{p.set:%H:%M:%S} in azimuth {p.set_azimuth:.0f} deg')
-        return [f'tracking_receiver.target.leo_pass.start_time="{start.isoformat()}Z"'], -(
-            (start - p.set) // datetime.timedelta(seconds=1)), line
+        start, where = p.start.replace(microsecond=0), f'satellite {self.satellite.number} over {place(self.station)}'
+        if p.duration > passes.MAX_RUN_S:
+            if duration is None:
+                raise TargetError(f'--pass {which}: {where}: {_extent(p)}, longer than a run of {passes.MAX_RUN_S:g} '
+                                  f's: add --duration S; the run begins at {start:%Y-%m-%d %H:%M:%S} UTC')
+            line = (f'{where}: {_extent(p)}, highest {p.elevation:.1f} deg at {_utc(p.top)}; the run begins at '
+                    f'{start:%Y-%m-%d %H:%M:%S} UTC')
+        else:
+            line = (f'{where}: rises {p.rise:%Y-%m-%d %H:%M:%S} UTC in azimuth {_azimuth(p.rise_azimuth)}, highest '
+                    f'{p.elevation:.1f} deg at {p.top:%H:%M:%S}, sets {p.set:%H:%M:%S} in azimuth '
+                    f'{_azimuth(p.set_azimuth)}{", under way now" if p.under_way and p.begin == self.now else ""}')
+            duration = duration or -((start - (p.set or start)) // datetime.timedelta(seconds=1))
+        return [f'tracking_receiver.target.leo_pass.start_time="{start.isoformat()}Z"'], duration, line
+
+
+def _azimuth(degrees: float) -> str:
+    return '-' if math.isnan(degrees) else f'{round(degrees) % 360} deg'
+
+
+def _utc(when: datetime.datetime | None) -> str:
+    return f'{when:%Y-%m-%d %H:%M:%S}' if when else '-'
+
+
+def _times(p: passes.Pass) -> tuple[str, str]:
+    """Return the texts of top and set, with their dates for a pass that is longer than a run."""
+    long = p.duration > passes.MAX_RUN_S
+    return (_utc(p.top), _utc(p.set)) if long else (f'{p.top:%H:%M:%S}', f'{p.set:%H:%M:%S}')
+
+
+def _ending(p: passes.Pass) -> str:
+    """Return the text of azimuth at the set and duration."""
+    length = f'{p.duration:.0f} s' if math.isfinite(p.duration) else 'never sets' if p.set is None else 'longer'
+    return f'{_azimuth(p.set_azimuth)}, {length}{", under way" if p.under_way else ""}'
+
+
+def _extent(p: passes.Pass) -> str:
+    """Return the text of rise and set of a pass that is longer than a run."""
+    if p.rise is None and p.set is None:
+        return 'above the horizon throughout, the satellite never sets'
+    rise, down = (f'{_utc(when)} UTC' if when else '' for when in (p.rise, p.set))
+    limit = f'for more than {passes.MAX_PASS_DAYS:g} days'
+    return f'above the horizon {f"from {rise}" if rise else limit} {f"to {down}" if down else limit}'

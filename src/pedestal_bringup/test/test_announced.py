@@ -27,3 +27,12 @@ def test_a_run_that_is_longer_than_the_pass_says_when_it_rises_and_sets():
 
 def test_a_target_without_a_date_says_nothing_of_a_sky():
     assert lines('uav_flyby', None) == []
+
+
+def test_a_track_that_rises_and_sets_within_the_run_says_so(tmp_path):
+    path = tmp_path / 'a.csv'
+    path.write_text('t,az,el\n' + ''.join(f'{k},{120 + k},{5 - abs(k - 10)}\n' for k in range(21)))
+    summary, highest, rises, sets = Plan(scenario.load('track_file', [
+        f'tracking_receiver.target.track_file.path={path}'])).announced()
+    assert 'highest 5.0 deg after 10 s' in highest and summary.startswith('a.csv')
+    assert rises.startswith('the target rises after 5.') and sets.startswith('the target sets after 15.0')

@@ -1,5 +1,6 @@
 """Files of orbital elements of many satellites: OMM as sgp4's exporter and CelesTrak write them, in four forms."""
 import csv
+import datetime
 import io
 import json
 import re
@@ -9,6 +10,7 @@ from sgp4 import omm
 from sgp4.api import WGS72, Satrec
 from sgp4.exporter import export_omm
 
+from pedestal_common.geometry import omm as omm_elements
 from pedestal_common.geometry import orbit
 from tracking_receiver_sim import elements
 from tracking_receiver_sim.params import LeoPassParameters
@@ -20,6 +22,19 @@ OTHERS = [{**ISS, 'OBJECT_NAME': f'STARLINK-{number}', 'NORAD_CAT_ID': str(numbe
 NEW = {**ISS, 'OBJECT_NAME': 'NEW ONE', 'NORAD_CAT_ID': '270001', 'EPOCH': '2019-12-09T16:38:29',
        'MEAN_ANOMALY': '-10.5'}
 ALL = [*OTHERS, ISS, NEW]
+
+
+TLE = Satrec.twoline2rv(*LINES)
+
+
+def assert_same(chosen, name, number, theirs):
+    """Elements.read gave this satellite, with the elements of a Satrec."""
+    ours = orbit.satellite(LeoPassParameters(**chosen.values))
+    assert (chosen.name, ours.number, chosen.remark) == (name, number, '')
+    for key in ('no_kozai', 'ecco', 'inclo', 'nodeo', 'argpo', 'bstar'):
+        assert getattr(ours, key) == pytest.approx(getattr(theirs, key), rel=1e-9, abs=1e-15), key
+    assert ours.mo == pytest.approx(theirs.mo % 6.283185307179586)
+    assert ours.jdsatepoch + ours.jdsatepochF == pytest.approx(theirs.jdsatepoch + theirs.jdsatepochF, abs=1e-8)
 
 
 def kvn(objects):
@@ -52,7 +67,8 @@ def table(objects):
 
 FORMS = {'kvn': kvn, 'xml': xml, 'csv': table, 'json': lambda objects: json.dumps(objects, indent=1),
          'numbers.json': lambda objects: json.dumps([
-             {key: json.loads(value) if key in elements.NUMBER_LIMITS else value for key, value in fields.items()}
+             {key: json.loads(value) if key in (*omm_elements.NUMBER_LIMITS, 'NORAD_CAT_ID') else value
+              for key, value in fields.items()}
              for fields in objects])}
 
 
@@ -63,41 +79,83 @@ def test_a_satellite_is_found_by_name_number_or_designator(form, tmp_path):
     for name in ('iss (zarya)', '25544', '1998-067a'):
         if name != '1998-067a' or form == 'kvn':
             path.write_text(FORMS[form](ALL[:-1]))
-        assert elements.read(path, name) == ('ISS (ZARYA)', *LINES)
+        assert_same(elements.read(path, name), 'ISS (ZARYA)', '25544', TLE)
 
 
 @pytest.mark.parametrize('form', FORMS)
 def test_a_number_beyond_five_digits_and_an_epoch_without_a_fraction(form, tmp_path):
     path = tmp_path / f'a.{form}'
     path.write_text(FORMS[form](ALL))
-    name, *lines = elements.read(path, '270001')
-    ours = orbit.satellite(LeoPassParameters(line_1=lines[0], line_2=lines[1]))
     theirs = Satrec()
     omm.initialize(theirs, {**NEW, 'EPOCH': '2019-12-09T16:38:29.0'}, WGS72)
-    assert name == 'NEW ONE' and ours.satnum == 270_001 and ours.mo == pytest.approx(theirs.mo % 6.283185307179586)
-    assert ours.jdsatepoch + ours.jdsatepochF == pytest.approx(theirs.jdsatepoch + theirs.jdsatepochF, abs=1e-8)
+    assert_same(elements.read(path, '270001'), 'NEW ONE', '270001', theirs)
+
+
+WIDE = {'nine digits': {'NORAD_CAT_ID': '799501299'}, 'revolutions': {'REV_AT_EPOCH': '123456'},
+        'set': {'ELEMENT_SET_NO': '123456'}, 'tiny': {'BSTAR': '-1e-12'}, 'large': {'BSTAR': '12.5'},
+        'derivative': {'MEAN_MOTION_DOT': '-4.5'}, 'second': {'MEAN_MOTION_DDOT': '1e-14'},
+        'type': {'EPHEMERIS_TYPE': '2'}, 'Alpha-5': {'NORAD_CAT_ID': 'T0001'},
+        'digits': {'MEAN_MOTION': '15.501034720123', 'ECCENTRICITY': '0.00074171234'}}
+
+
+@pytest.mark.parametrize('case', WIDE)
+@pytest.mark.parametrize('form', ['kvn', 'json', 'csv', 'xml'])
+def test_numbers_that_a_tle_cannot_hold(case, form, tmp_path):
+    fields, path = {**ISS, **WIDE[case]}, tmp_path / 'a'
+    path.write_text(FORMS[form]([fields]))
+    theirs = Satrec()
+    omm.initialize(theirs, {**fields, 'NORAD_CAT_ID': '0', 'REV_AT_EPOCH': '0', 'ELEMENT_SET_NO': '0'}, WGS72)
+    number = {'nine digits': '799501299', 'Alpha-5': '270001'}.get(case, '25544')
+    assert_same(elements.read(path, number), 'ISS (ZARYA)', number, theirs)
+
+
+def test_a_history_of_omm_and_a_satellite_without_a_number(tmp_path):
+    path = tmp_path / 'a.json'
+    later = {**ISS, 'EPOCH': '2019-12-12T00:00:00'}
+    path.write_text(json.dumps([ISS, later]))
+    early, late = (elements.read(path, '25544', datetime.datetime(2019, 12, day)) for day in (10, 20))
+    epochs = [json.loads(each.values['omm'])['EPOCH'][:13] for each in (early, late)]
+    assert epochs == ['2019-12-09T16', '2019-12-12T00']
+    assert early.remark.startswith('a.json: 2 sets of elements of satellite 25544, of 2019-12-09 to 2019-12-12')
+    path.write_text(json.dumps({key: value for key, value in ISS.items() if key != 'NORAD_CAT_ID'}))
+    assert orbit.satellite(LeoPassParameters(**elements.read(path).values)).number == '1998-067A'
+
+
+@pytest.mark.parametrize('text, message', [
+    ('{"EPOCH": ', 'omm: not valid JSON'), ('[]', 'omm: must be an object'),
+    ('{}', 'omm: MEAN_MOTION = None: must be a number'),
+    (json.dumps({**ISS, 'EPOCH': 'today'}), "omm: EPOCH = 'today': must be UTC as ISO 8601"),
+    (json.dumps({**ISS, 'MEAN_MOTION': '99'}), 'omm: MEAN_MOTION = 99: must be 0.05 to 18'),
+    (json.dumps({**ISS, 'EPHEMERIS_TYPE': 4}), 'omm: ephemeris type 4: must be 0 or 2')])
+def test_a_parameter_that_is_no_omm(text, message):
+    with pytest.raises(orbit.TargetError, match=message):
+        orbit.satellite(LeoPassParameters(omm=text))
 
 
 def test_one_satellite_goes_without_a_name(tmp_path):
     path = tmp_path / 'a.json'
     path.write_text(json.dumps(ISS))
-    assert elements.read(path) == ('ISS (ZARYA)', *LINES)
-    path.write_text('{0}\n{1}\nNEXT\n{0}\n{1}\n'.format(*LINES))
-    with pytest.raises(orbit.TargetError, match='satellites: 2 found, 25544, NEXT: name one with --satellite'):
+    assert_same(elements.read(path), 'ISS (ZARYA)', '25544', TLE)
+    other = [line.replace('25544', '25545') for line in LINES]
+    path.write_text('ISS\n{}\n{}\nISS\n{}\n{}\n'.format(*LINES, *other))
+    with pytest.raises(orbit.TargetError, match='satellites: 2 found, ISS, ISS: name one with --satellite'):
         elements.read(path)
-    with pytest.raises(orbit.TargetError, match="'25544' is in it 2 times; name it by its number"):
-        elements.read(path, '25544')
+    with pytest.raises(orbit.TargetError, match="'ISS' is in it 2 times; name it by its number"):
+        elements.read(path, 'ISS')
 
 
 REFUSED = {
     'unknown': (lambda: kvn(ALL), 'STARLINK-4470', "is in it 0 times; did you mean 'STARLINK-44"),
     'theory': (lambda: kvn([{**ISS, 'MEAN_ELEMENT_THEORY': 'SGP4-XP'}]), '', "line 1: MEAN_ELEMENT_THEORY = 'SG"),
+    'type': (lambda: json.dumps([{**ISS, 'EPHEMERIS_TYPE': 4}]), '', 'line 1: ephemeris type 4: .*needs SGP4-XP'),
+    'xp': (lambda: kvn([{**ISS, 'BTERM': '0.02'}]), '', "line 1: BTERM = '0.02': must be absent"),
     'frame': (lambda: table([{**ISS, 'REF_FRAME': 'EME2000'}]), '', "line 2: REF_FRAME = 'EME2000': must be TEME"),
     'nan': (lambda: xml([ISS, {**NEW, 'ECCENTRICITY': 'nan'}]), 'new one', 'line 4: ECCENTRICITY = nan: must'),
     'missing': (lambda: kvn([{key: value for key, value in ISS.items() if key != 'INCLINATION'}]), '',
                 'line 1: INCLINATION = None: must be a number'),
     'epoch': (lambda: json.dumps([{**ISS, 'EPOCH': 'today'}]), '', "EPOCH = 'today': must be a time such as"),
-    'number': (lambda: json.dumps({**ISS, 'NORAD_CAT_ID': 400_000}), '', 'NORAD_CAT_ID = 400000: must be 0 to 339999'),
+    'number': (lambda: json.dumps({**ISS, 'NORAD_CAT_ID': 10**9}), '',
+               "NORAD_CAT_ID = '1000000000': must be 0 to 999999999"),
     'json': (lambda: json.dumps([ISS])[:-20], '', 'line 1, column [0-9]+: not valid JSON: '),
     'json of numbers': (lambda: '[1, 2]', '', 'line 1, column 2: must be an object of an OMM'),
     'json in depth': (lambda: '{"a": ' * 200_000, '', 'JSON nested too deeply|not valid JSON'),

@@ -1,5 +1,6 @@
 """Passes against skyfield's find_events; which pass a text names; TLE files as they come."""
 import datetime
+import re
 
 import numpy as np
 import pytest
@@ -36,7 +37,8 @@ def skyfield_passes(station, days):
 
 @pytest.mark.parametrize('station', [STATION, StationParameters(latitude_deg=-33.9, longitude_deg=18.4, height=10.0)])
 def test_passes_agree_with_skyfield(station):
-    ours = passes.passes_after(SATELLITE, station, EPOCH, 3.0)
+    end = EPOCH + datetime.timedelta(days=3.0)
+    ours = [own for own in passes.passes_after(SATELLITE, station, EPOCH, 3.0) if not own.under_way and own.set < end]
     theirs = [known for known in skyfield_passes(station, 3.0) if known[3] >= passes.MIN_CULMINATION_DEG]
     assert len(ours) == len(theirs) >= 8
     for own, (rise, top, down, elevation) in zip(ours, theirs):
@@ -55,8 +57,11 @@ def test_a_pass_is_named_by_number_by_utc_or_as_next():
         assert abs((named.rise - listed[2].rise).total_seconds()) < 0.01
     before = (listed[2].rise - datetime.timedelta(minutes=5)).isoformat() + 'Z'
     assert abs((passes.chosen_pass(SATELLITE, STATION, before, old).rise - listed[2].rise).total_seconds()) < 0.01
-    fresh = listed[0].rise + datetime.timedelta(seconds=1.0)
-    assert abs((passes.chosen_pass(SATELLITE, STATION, 'next', fresh).rise - listed[1].rise).total_seconds()) < 0.01
+    for late, number in ((1.0, 0), (listed[0].duration - 1.0, 0), (listed[0].duration + 1.0, 1)):
+        fresh = listed[0].rise + datetime.timedelta(seconds=late)
+        named = passes.chosen_pass(SATELLITE, STATION, 'next', fresh)
+        assert abs((named.rise - listed[number].rise).total_seconds()) < 0.01
+        assert named.under_way == (number == 0) and named.start == named.rise
 
 
 @pytest.mark.parametrize('which, days, message', [
@@ -76,10 +81,33 @@ def test_a_satellite_that_stands_or_never_rises():
     [[x, y, _]], _ = orbit.enu(geostationary, StationParameters(latitude_deg=90.0, longitude_deg=0.0),
                                geostationary.jdsatepoch, geostationary.jdsatepochF, np.zeros(1))
     under = float(np.degrees(np.arctan2(x, -y)))     # at the pole east is y of the earth, north is -x
-    for longitude, said in ((under, 'never sets'), ((under + 360.0) % 360.0 - 180.0, 'does not rise')):
-        with pytest.raises(orbit.TargetError, match=f'28884 {said} within'):
-            passes.passes_after(geostationary, StationParameters(latitude_deg=0.0, longitude_deg=longitude), EPOCH,
-                                1.0)
+    with pytest.raises(orbit.TargetError, match='28884 does not rise within'):
+        passes.passes_after(geostationary, StationParameters(latitude_deg=0.0, longitude_deg=(
+            under + 360.0) % 360.0 - 180.0), EPOCH, 1.0)
+    above = StationParameters(latitude_deg=0.0, longitude_deg=under)
+    for which in ('1', 'next', EPOCH.isoformat()):
+        each = passes.chosen_pass(geostationary, above, which, EPOCH)
+        assert (each.rise, each.set, each.start) == (None, None, EPOCH) and each.under_way and each.elevation > 80.0
+    low = StationParameters(latitude_deg=75.0, longitude_deg=under)
+    assert 0.0 < passes.chosen_pass(geostationary, low, 'next', EPOCH).elevation < passes.MIN_CULMINATION_DEG
+
+
+HEO = ('1 90003U 20001A   26328.00000000  .00000000  00000-0  00000-0 0  9996',
+       '2 90003  60.0000  10.0000 8500000 270.0000   0.0000  0.30000000    17')
+
+
+@pytest.mark.parametrize('at, rise, down, start', [
+    ('2026-11-25T18:00', '2026-11-24T01:23', '2026-11-27T07:03', '2026-11-25T18:00'),
+    ('2026-11-24T01:24', '2026-11-24T01:23', '2026-11-27T07:03', '2026-11-24T01:24'),
+    ('2026-11-27T07:02', '2026-11-24T01:23', '2026-11-27T07:03', '2026-11-27T07:02'),
+    ('2026-11-27T07:04', '2026-11-27T12:48', '2026-11-30T13:16', '2026-11-27T12:48')])
+def test_a_pass_of_days_is_found_by_every_utc_inside(at, rise, down, start):
+    heo = orbit.satellite(LeoPassParameters(line_1=HEO[0], line_2=HEO[1]))
+    each = passes.chosen_pass(heo, STATION, at, EPOCH)
+    assert (f'{each.rise:%Y-%m-%dT%H:%M}', f'{each.set:%Y-%m-%dT%H:%M}') == (rise, down)
+    assert f'{each.start:%Y-%m-%dT%H:%M}' == start and each.duration > passes.MAX_RUN_S
+    listed = passes.passes_after(heo, STATION, orbit.instant('at', at))
+    assert listed[0] == each and len(listed) > 1 and all(later.rise > each.set for later in listed[1:])
 
 
 @pytest.mark.parametrize('text, name, title', [
@@ -89,7 +117,32 @@ def test_a_satellite_that_stands_or_never_rises():
 def test_a_tle_file(tmp_path, text, name, title):
     path = tmp_path / 'a.tle'
     path.write_text(text)
-    assert elements.read(path, name) == (title, LINE_1, LINE_2)
+    assert elements.read(path, name) == (title, {'line_1': LINE_1, 'line_2': LINE_2, 'omm': ''}, '')
+
+
+@pytest.mark.parametrize('when, line, epoch', [('2019-12-01', 1, '2019-12-09 16:38:29'), ('2019-12-10T05:00', 3, ''),
+                                               ('2019-12-30', 5, '2019-12-11 12:00:00'), (None, 5, '')])
+def test_of_a_history_the_nearest_elements_are_taken(when, line, epoch, tmp_path):
+    lines = [LINE_1, *(summed(LINE_1.replace('343.69339541', day)) for day in ('344.50000000', '345.50000000'))]
+    path = tmp_path / 'history.tle'
+    path.write_text(''.join(f'{each}\n{LINE_2}\n' for each in lines))
+    chosen = elements.read(path, '', when and orbit.instant('when', when))
+    assert chosen.values['line_1'] == lines[line // 2]
+    assert re.fullmatch(f'history.tle: 3 sets of elements of satellite 25544, of 2019-12-09 to 2019-12-11; taken: the '
+                        f'set of {epoch}.* UTC in line {line}, the nearest to .*', chosen.remark)
+    path.write_text(path.read_text().replace('344.50000000', '34x.50000000'))
+    with pytest.raises(orbit.TargetError, match="line 3, column 19: epoch = '1934x.50000000': must be year and day"):
+        elements.read(path)
+
+
+@pytest.mark.parametrize('kind, theory', [(4, 'SGP4-XP'), (3, 'PPT3'), (1, 'SGP'), (6, 'numerical propagation')])
+def test_elements_of_another_theory_are_refused(kind, theory, tmp_path):
+    path = tmp_path / 'a.tle'
+    line = summed(LINE_1[:62] + str(kind) + LINE_1[63:])
+    path.write_text(f'{line}\n{LINE_2}\n')
+    with pytest.raises(orbit.TargetError, match=f'a.tle: line 1: TLE line 1, column 63: ephemeris type {kind}: must '
+                       rf'be 0 or 2 \(SGP4\); type {kind} needs {theory}$'):
+        elements.read(path)
 
 
 @pytest.mark.parametrize('text, name, message', [

@@ -146,6 +146,36 @@ def test_pass_that_cannot_be(values, message):
         built(**values)
 
 
+@pytest.mark.parametrize('values, message', [
+    ({'kind': 'flyby', 'flyby__height': -100.0}, 'target flyby: below the horizon for 120 s: highest -4.0 deg'),
+    ({'kind': 'ramp', 'angle__elevation': 0.0, 'angle__elevation_rate': -0.01}, ''),
+    ({'kind': 'ramp', 'angle__elevation': 0.0, 'angle__elevation_amplitude': -0.1, 'angle__start': 0.0}, ''),
+    ({'kind': 'step', 'angle__elevation': 0.0, 'angle__elevation_amplitude': -0.1}, 'target step: .* highest -5.7')])
+def test_a_target_below_the_horizon_throughout_is_refused(values, message):
+    if not message:
+        built(**values)
+        return
+    with pytest.raises(orbit.TargetError, match=message):
+        built(**values)
+    params = build(TargetParameters, {name.replace('__', '.'): value for name, value in values.items()})
+    target.build(params, 120.0, horizon_mask=-0.2)      # an antenna on a mountain looks down
+
+
+@pytest.mark.parametrize('content, message', [
+    ('time_s,latitude_deg,longitude_deg,altitude_m\n' + ''.join(f'{k},{47.4 + 1e-3 * k:.4f},8.52,1500\n'
+                                                                for k in range(20)),
+     'a.csv: below the horizon for 3 s at latitude 8.52, longitude 47.4 deg: highest -25.5 deg'),
+    ('utc,az,el\n' + ''.join(f'2026-06-01T12:00:{k:02}Z,{120 + 0.1 * k:.1f},-40\n' for k in range(20)),
+     'a.csv: below the horizon from 2026-06-01T12:00:00.000Z for 3 s at latitude 8.52, .*: highest -40.0 deg')])
+def test_a_file_below_the_horizon_throughout_is_refused(content, message, tmp_path):
+    """The latitude and the longitude of the station were exchanged; the angles of a table are below the horizon."""
+    path = tmp_path / 'a.csv'
+    path.write_text(content)
+    with pytest.raises(orbit.TargetError, match=message):
+        built(3.0, kind='track_file', track_file__path=str(path), station__latitude_deg=8.52,
+              station__longitude_deg=47.4, station__height=1200.0)
+
+
 # track_file
 
 def test_track_file_passes_through_its_fixes(tmp_path):

@@ -1,38 +1,24 @@
 """Orbital elements of many satellites in one file: TLE, and CCSDS OMM (502.0-B) as KVN, XML, JSON or CSV.
 
-The content of a file decides its format. Elements of an OMM become the two lines of a TLE, with the digits of a TLE:
-both are mean elements of SGP4.
+The content of a file decides its format. A file may hold a history: several sets of elements of one satellite.
 """
+import datetime
 import json
+import pathlib
 import re
 import typing
 from xml.parsers import expat
 
-from sgp4 import omm
-from sgp4.api import Satrec
-from sgp4.exporter import export_tle
-
+from pedestal_common.geometry import omm, orbit
 from pedestal_common.geometry.orbit import TargetError
+from pedestal_common.graph.steps import SECONDS_PER_DAY
 from pedestal_common.parameters import did_you_mean
 from pedestal_common.text_files import content, csv_table
 from tracking_receiver_sim.ephemeris import lines
+from tracking_receiver_sim.params import LeoPassParameters
 
 FORMAT_PROBE_BYTES = 4096
 """Number of bytes at the beginning of a file that decide its format."""
-NUMBER_LIMITS = {'MEAN_MOTION': (0.05, 18.0), 'ECCENTRICITY': (0.0, 0.9999999), 'INCLINATION': (0.0, 180.0),
-                 'RA_OF_ASC_NODE': (-360.0, 360.0), 'ARG_OF_PERICENTER': (-360.0, 360.0),
-                 'MEAN_ANOMALY': (-360.0, 360.0), 'BSTAR': (-9.0, 9.0),
-                 'MEAN_MOTION_DOT': (-9.0, 9.0), 'MEAN_MOTION_DDOT': (-9.0, 9.0),
-                 'NORAD_CAT_ID': (0, 339_999), 'ELEMENT_SET_NO': (0, 9999), 'REV_AT_EPOCH': (0, 99_999)}
-"""{keyword: (lowest, highest)} [rev/day], [deg], [1/earth radii], [rev/day^2 / 2], [rev/day^3 / 6]."""
-ANGLE_KEYWORDS = ('RA_OF_ASC_NODE', 'ARG_OF_PERICENTER', 'MEAN_ANOMALY')
-INTEGER_KEYWORDS = ('NORAD_CAT_ID', 'ELEMENT_SET_NO', 'REV_AT_EPOCH')
-DEFAULT_FIELDS = {'MEAN_MOTION_DOT': '0', 'MEAN_MOTION_DDOT': '0', 'ELEMENT_SET_NO': '999', 'REV_AT_EPOCH': '0'}
-"""{keyword that an OMM may omit: default value}."""
-ALLOWED_VALUES = {'CENTER_NAME': ('EARTH',), 'REF_FRAME': ('TEME',), 'TIME_SYSTEM': ('UTC',),
-                  'MEAN_ELEMENT_THEORY': ('SGP4', 'SGP/SGP4')}
-"""{keyword: allowed values}; the first one is the default."""
-OMM_KEYWORDS = ('OBJECT_NAME', 'OBJECT_ID', 'EPOCH', *ALLOWED_VALUES, *NUMBER_LIMITS)
 MAX_SATELLITES = 300_000
 """Largest number of satellites in a file, several times the number of catalogued ones."""
 MAX_COMPARED_NAMES = 40_000
@@ -40,7 +26,16 @@ MAX_COMPARED_NAMES = 40_000
 MAX_XML_DEPTH, MAX_VALUE_CHARS = 100, 200
 """Largest depth of nested XML elements, and the number of characters to which a value is cut."""
 PARSE_CHUNK_BYTES = 1 << 20
-DESIGNATOR_PATTERN = re.compile(r'\d{4}-\d{3}[A-Z]{1,3}')
+TLE_EPOCH_COLUMNS = slice(18, 32)
+"""Columns of the epoch in line 1 of a TLE."""
+
+
+class Elements(typing.NamedTuple):
+    """Elements of a satellite. values: {parameter line_1, line_2 or omm: text}; remark: choice from a history, ''
+    without one."""
+    name: str
+    values: dict
+    remark: str = ''
 
 
 class Satellite(typing.NamedTuple):
@@ -53,43 +48,90 @@ class Satellite(typing.NamedTuple):
     lines: tuple | None
     fields: dict
 
+    @property
+    def identity(self):
+        """Catalogue number, or what stands for it."""
+        return self.number or self.designator or self.name
+
     def is_named(self, name):
         """Return True for the name, catalogue number or international designator of the satellite, in any case."""
         number = self.number.lstrip('0') or '0'
         return name.strip().upper() in (self.name.upper(), number, self.number, self.designator)
 
 
-def read(path, name=''):
-    """Return (name, line 1, line 2) of a satellite in a file of elements, see the module. Raises TargetError.
+def read(path, name='', when=None) -> Elements:
+    """Return the Elements of a satellite in a file, see the module. Raises TargetError.
 
-    name: name, catalogue number or international designator; it may be empty for a file of one satellite.
+    name: name, catalogue number or international designator; it may be empty for a file of one satellite. when:
+    datetime, UTC; of a history the elements nearest to it are taken, without it the last ones.
     """
     try:
         with csv_table.stream(path) as stream:
             beginning = content.beginning(stream.read(FORMAT_PROBE_BYTES)).lstrip()
-        names, found = [], []
+        names, others = [], 0
+        history: list[Satellite] = []
         for satellite in _reader(beginning)(path):
             names.append(satellite.name)
             if len(names) > MAX_SATELLITES:
                 raise csv_table.TableError(f'{path}: line {satellite.line}: must be at most {MAX_SATELLITES} '
                                            'satellites')
             if not name or satellite.is_named(name):
-                found.append(satellite if not found else None)
+                if history and satellite.identity != history[0].identity:
+                    others += 1
+                else:
+                    history.append(satellite)
     except csv_table.TableError as error:
         raise TargetError(f'TLE file {error}') from None
     if not names:
         raise TargetError(f'TLE file {path}: must hold a TLE (a line that begins with "1 ", then one that begins with '
                           '"2 ") or an OMM')
-    if len(found) != 1:
+    if others or not history:
         listed = ', '.join(names[:5]) + (', ...' if len(names) > 5 else '')
         remedy = 'name one with --satellite'
         if name:
-            count = f'satellite {name!r:.60} is in it {len(found)} times'
+            count = f'satellite {name!r:.60} is in it {len(history) + others} times'
             hint = did_you_mean(name.upper(), list(dict.fromkeys(names))[:MAX_COMPARED_NAMES])
-            remedy = f'{count}; name it by its number' if found else f'{count};{hint}'.removesuffix(';')
+            remedy = f'{count}; name it by its number' if history else f'{count};{hint}'.removesuffix(';')
         raise TargetError(f'TLE file {path}: satellites: {len(names)} found, {listed}: {remedy}')
-    satellite = found[0]
-    return (satellite.name, *(satellite.lines or _tle(path, satellite)))
+    satellite, remark = _nearest(path, history, when)
+    line_1, line_2 = satellite.lines or ('', '')
+    values = LeoPassParameters(line_1=line_1, line_2=line_2, omm='' if satellite.lines else _omm_text(path, satellite))
+    try:
+        orbit.satellite(values)
+    except TargetError as error:
+        raise TargetError(f'TLE file {path}: line {satellite.line}: {error}') from None
+    return Elements(satellite.name, {key: getattr(values, key) for key in ('line_1', 'line_2', 'omm')}, remark)
+
+
+def _nearest(path, history, when):
+    """Return (the Satellite of a history whose epoch is nearest to `when`, remark). Raises TargetError."""
+    if len(history) == 1:
+        return history[0], ''
+    epochs = [_epoch(path, satellite) for satellite in history]
+    wanted = when or max(epochs)
+    i = min(range(len(history)), key=lambda i: (abs(epochs[i] - wanted), -i))
+    return history[i], (f'{pathlib.Path(path).name}: {len(history)} sets of elements of satellite '
+                        f'{history[i].number or history[i].name}, of {min(epochs):%Y-%m-%d} to '
+                        f'{max(epochs):%Y-%m-%d}; taken: the set of {epochs[i]:%Y-%m-%d %H:%M:%S} UTC in line '
+                        f'{history[i].line}, the nearest to {wanted:%Y-%m-%d %H:%M:%S}')
+
+
+def _epoch(path, satellite):
+    """Return the epoch of a Satellite as datetime, UTC. Raises TargetError."""
+    if satellite.lines:
+        text = satellite.lines[0][TLE_EPOCH_COLUMNS]
+        try:
+            year, day = int(text[:2]), float(text[2:])
+            return (datetime.datetime(year + (1900 if year >= 57 else 2000), 1, 1)
+                    + datetime.timedelta(days=day - 1.0))
+        except (ValueError, OverflowError):
+            raise TargetError(f'TLE file {path}: line {satellite.line}, column {TLE_EPOCH_COLUMNS.start + 1}: epoch = '
+                              f'{text!r}: must be year and day, for example 19343.69339541') from None
+    try:
+        day, second = lines.instant(path, satellite.line, 1, 'EPOCH', satellite.fields.get('EPOCH', ''))
+    except csv_table.TableError as error:
+        raise TargetError(f'TLE file {error}') from None
+    return datetime.datetime(1970, 1, 1) + datetime.timedelta(seconds=SECONDS_PER_DAY * day + second)
 
 
 def _reader(beginning):
@@ -119,10 +161,9 @@ def _tles(path):
 
 def _number(text):
     """Return the catalogue number in a TLE, whose first digit may be a letter (Alpha-5)."""
-    from sgp4.alpha5 import from_alpha5
     try:
-        return str(from_alpha5(text.strip()))
-    except (ValueError, IndexError):
+        return omm.catalogue_number(text)
+    except ValueError:
         return text.strip()
 
 
@@ -132,7 +173,7 @@ def _designator(line):
 
 
 def _omm(line, fields):
-    number = fields.get('NORAD_CAT_ID', '')
+    number = _number(fields.get('NORAD_CAT_ID', ''))
     return Satellite(line, fields.get('OBJECT_NAME') or number or fields.get('OBJECT_ID', ''), number,
                      fields.get('OBJECT_ID', '').upper(), None, fields)
 
@@ -147,7 +188,7 @@ def _kvn(path):
             if begun:
                 yield _omm(begun, fields)
             fields, begun = {}, number
-        elif equals and keyword in OMM_KEYWORDS:
+        elif equals and keyword in omm.KEYWORDS:
             fields[keyword] = value.partition('[')[0].strip()[:MAX_VALUE_CHARS]
         elif not equals and keyword.split(None, 1)[0] not in ('COMMENT', 'META_START', 'META_STOP'):
             raise lines.wrong(path, number, 1, f'{text.strip()!r:.60}: must be KEYWORD = value')
@@ -159,7 +200,7 @@ def _csv(path):
     with csv_table.opened(path) as reader:
         csv_table.require(reader, ('EPOCH', 'NORAD_CAT_ID'))
         for row in reader:
-            yield _omm(reader.line_num, {keyword: row[keyword].strip()[:MAX_VALUE_CHARS] for keyword in OMM_KEYWORDS
+            yield _omm(reader.line_num, {keyword: row[keyword].strip()[:MAX_VALUE_CHARS] for keyword in omm.KEYWORDS
                                          if isinstance(row.get(keyword), str)})
 
 
@@ -179,7 +220,7 @@ def _json(path):
             raise lines.wrong(path, line, begun - text.rfind('\n', 0, begun), 'JSON nested too deeply') from None
         if not isinstance(value, dict):
             raise lines.wrong(path, line, begun - text.rfind('\n', 0, begun), 'must be an object of an OMM')
-        yield _omm(line, {keyword: str(value[keyword]).strip()[:MAX_VALUE_CHARS] for keyword in OMM_KEYWORDS
+        yield _omm(line, {keyword: str(value[keyword]).strip()[:MAX_VALUE_CHARS] for keyword in omm.KEYWORDS
                           if value.get(keyword) is not None})
         at = between.match(text, at).end()
 
@@ -203,7 +244,7 @@ def _xml(path):
             texts['line'] = parser.CurrentLineNumber
 
     def text(data):
-        if open_elements and open_elements[-1] in OMM_KEYWORDS:
+        if open_elements and open_elements[-1] in omm.KEYWORDS:
             texts[open_elements[-1]] = (texts.get(open_elements[-1], '') + data)[:MAX_VALUE_CHARS]
 
     def end(_name):
@@ -231,23 +272,13 @@ def _xml(path):
         raise lines.wrong(path, 1, 1, f'not well-formed XML: {error}') from None
 
 
-def _tle(path, satellite):
-    """Return the two lines of a satellite of an OMM. Raises TargetError."""
-    place, fields = f'TLE file {path}: line {satellite.line}', {**DEFAULT_FIELDS, **satellite.fields}
-    for keyword, allowed in ALLOWED_VALUES.items():
-        if fields.get(keyword, allowed[0]).upper() not in allowed:
-            raise TargetError(f'{place}: {keyword} = {fields[keyword]!r:.60}: must be {" or ".join(allowed)}')
+def _omm_text(path, satellite):
+    """Return the elements of a satellite of an OMM as JSON. Raises TargetError."""
+    fields = dict(satellite.fields)
     try:
-        for keyword, (low, high) in NUMBER_LIMITS.items():
-            value = csv_table.number(path, satellite.line, keyword, fields.get(keyword), low, high)
-            fields[keyword] = str(value % 360.0 if keyword in ANGLE_KEYWORDS
-                                  else int(value) if keyword in INTEGER_KEYWORDS else value)
-        day, second = lines.instant(path, satellite.line, 1, 'EPOCH', fields.get('EPOCH', ''))
+        fields['EPOCH'] = lines.text(*lines.instant(path, satellite.line, 1, 'EPOCH', fields.get('EPOCH', '')))
+        return json.dumps(omm.checked(fields))
     except csv_table.TableError as error:
         raise TargetError(f'TLE file {error}') from None
-    designator = fields.get('OBJECT_ID', '').upper()
-    satrec = Satrec()
-    omm.initialize(satrec, {
-        **fields, 'CLASSIFICATION_TYPE': 'U', 'EPHEMERIS_TYPE': '0', 'EPOCH': lines.text(day, second),
-        'OBJECT_ID': designator if DESIGNATOR_PATTERN.fullmatch(designator) else '    '})
-    return export_tle(satrec)
+    except ValueError as error:
+        raise TargetError(f'TLE file {path}: line {satellite.line}: {error}') from None

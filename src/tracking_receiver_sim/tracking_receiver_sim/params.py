@@ -25,6 +25,7 @@ class LeoPassParameters(Parameters):
                        'first line of the TLE')
     line_2: str = text('2 25544  51.6439 211.2001 0007417  17.6667  85.6398 15.50103472202482',
                        'second line of the TLE')
+    omm: str = text('', 'elements as a CCSDS OMM in JSON, instead of the TLE')
     start_time: str = text('', 'UTC of the start, ISO 8601; empty: the run is centred on a culmination')
     culmination_low_deg: float = parameter(30.0, 0.0, 90.0, 'deg', 'lowest culmination that the pass finder accepts')
     culmination_high_deg: float = parameter(70.0, 0.0, 90.0, 'deg', 'highest culmination that the pass finder accepts')

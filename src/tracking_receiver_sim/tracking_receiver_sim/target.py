@@ -39,6 +39,9 @@ PEAK_SEARCH_POINTS = 41
 RUN_MARGIN_S = 5.0
 """Time before and after the run [s] that a target covers, for a program track; a track_file only up to its ends."""
 
+MAX_HORIZON_POINTS = 10_000
+"""Largest number of points at which a target is compared with the horizon."""
+
 TargetState = namedtuple('TargetState', 'valid position velocity')
 """State of a target. valid: 0 or 1; position: ENU of the station [m]; velocity [m/s]; three floats each, NaN if not
 valid."""
@@ -130,13 +133,31 @@ def look_angles(built, times):
     return azimuth, elevation, distance
 
 
-def build(params, duration) -> Target:
-    """Return a Target of TargetParameters for a run of `duration` [s] from stamp 0; raises TargetError."""
+def build(params, duration, horizon_mask=0.0) -> Target:
+    """Return a Target of TargetParameters for a run of `duration` [s] from stamp 0.
+
+    Raises TargetError, also if the target stays below the horizon, or below a horizon_mask [rad] under it.
+    """
     builders: dict[str, Callable] = {'leo_pass': _leo_pass, 'track_file': _track_file, 'flyby': _flyby}
     breaks, coefficients, *known = builders.get(params.kind, _angles)(params, duration)
     constants = np.zeros(1, TARGET_DTYPE)
     constants['kind'], constants['angle'] = TARGET_KINDS.index(params.kind), record(params.angle)
-    return Target(constants, np.ascontiguousarray(breaks), np.ascontiguousarray(coefficients), *known)
+    built = Target(constants, np.ascontiguousarray(breaks), np.ascontiguousarray(coefficients), *known)
+    _require_above(params, built, duration, min(0.0, horizon_mask))
+    return built
+
+
+def _require_above(params, built, duration, limit):
+    """Raise TargetError if a Target stays below an elevation [rad] throughout a run of `duration` [s]."""
+    _, elevation, _ = look_angles(built, np.linspace(0.0, duration, 2 + int(min(duration, MAX_HORIZON_POINTS))))
+    highest = np.fmax.reduce(elevation)
+    if highest < limit:
+        name = (f'satellite {orbit.satellite(params.leo_pass).number}' if params.kind == 'leo_pass' else
+                params.track_file.path if params.kind == 'track_file' else f'target {params.kind}')
+        station = (f' at latitude {params.station.latitude_deg:g}, longitude {params.station.longitude_deg:g} deg'
+                   if params.kind in ('leo_pass', 'track_file') else '')
+        raise TargetError(f'{name}: below the horizon {f"from {built.start_time} " if built.start_time else ""}for '
+                          f'{duration:g} s{station}: highest {math.degrees(highest):.1f} deg')
 
 
 def _angles(params, duration):
@@ -179,7 +200,7 @@ def culmination(params, satrec):
                 best = max(best, highest)
     reached = (f'the highest culmination is {best:.1f} deg' if math.isfinite(best) else
                'the satellite does not rise')
-    raise TargetError(f'satellite {satrec.satnum_str}: no culmination between {low:g} and {high:g} deg within '
+    raise TargetError(f'satellite {satrec.number}: no culmination between {low:g} and {high:g} deg within '
                       f'{leo_pass.search_days:g} days of the TLE epoch ({reached}) at latitude '
                       f'{params.station.latitude_deg:g}, longitude {params.station.longitude_deg:g} deg')
 
@@ -206,7 +227,7 @@ def _start(params, satrec, duration):
     julian, fraction = orbit.julian_date(orbit.instant('start_time', params.leo_pass.start_time))
     age = julian - satrec.jdsatepoch + fraction - satrec.jdsatepochF
     if abs(age) > orbit.MAX_TLE_AGE_DAYS:
-        raise TargetError(f'start_time = {params.leo_pass.start_time!r}: {age:.1f} days from the TLE epoch '
+        raise TargetError(f'start_time = {params.leo_pass.start_time!r}: {age:.1f} days from the {satrec.form} epoch '
                           f'{orbit.iso(satrec.jdsatepoch, satrec.jdsatepochF)}, must be within '
                           f'{orbit.MAX_TLE_AGE_DAYS:g} days')
     return julian, fraction
@@ -218,10 +239,6 @@ def _leo_pass(params, duration):
     julian, fraction = _start(params, satrec, duration)
     knots = np.arange(-RUN_MARGIN_S, duration + RUN_MARGIN_S + SGP4_KNOT_SPACING_S, SGP4_KNOT_SPACING_S)
     position, velocity = orbit.enu(satrec, params.station, julian, fraction, knots, params.leo_pass.ut1_offset)
-    if position[:, 2].max() < 0.0:
-        raise TargetError(f'satellite {satrec.satnum_str}: below the horizon from {orbit.iso(julian, fraction)} for '
-                          f'{duration:g} s at latitude {params.station.latitude_deg:g}, longitude '
-                          f'{params.station.longitude_deg:g} deg')
     return knots, _hermite(knots, position, velocity), orbit.iso(julian, fraction)
 
 

@@ -100,7 +100,7 @@ class TrackingReceiver(Simulated):
 
     def __init__(self, parameters, reads):
         super().__init__(parameters, reads)
-        self.target = target.build(parameters.target, parameters.duration)
+        self.target = target.build(parameters.target, parameters.duration, parameters.receiver.horizon_mask)
         self._noise = noise.generator(parameters.seed, self.NODE.name)
         self._air, = self._noise.spawn(1)
         constants = receiver.constants(parameters, parameters.period, self.target)

@@ -45,6 +45,7 @@ class PredictionParameters(Parameters):
     """Parameters of the modes tle and sun."""
     line_1: str = text('', 'first line of the elements (TLE) of mode tle; empty: no satellite')
     line_2: str = text('', 'second line of the elements (TLE) of mode tle')
+    omm: str = text('', 'elements of mode tle as a CCSDS OMM in JSON, instead of the TLE')
     start_time: str = text('', 'UTC of stamp 0, ISO 8601; empty: in realtime the UTC of the stamps')
     oldest: float = parameter(14.0, 0.1, 365.0, 'd', 'largest allowed time between the epoch of the elements and now')
     station: StationParameters = group(StationParameters)
@@ -52,7 +53,7 @@ class PredictionParameters(Parameters):
     def check(self):
         """Raise ParameterError for invalid elements or an invalid time."""
         try:
-            if self.line_1 or self.line_2:
+            if self.line_1 or self.line_2 or self.omm:
                 orbit.satellite(self)
             if self.start_time:
                 orbit.instant('start_time', self.start_time)
@@ -78,16 +79,16 @@ class Predictor:
 
     def __init__(self, parameters, epoch=0):
         self.parameters, self.epoch = parameters, epoch
-        self._satellite = orbit.satellite(parameters) if parameters.line_1 else None
+        self._satellite = (orbit.satellite(parameters) if parameters.line_1 or parameters.omm else None)
 
     def with_elements(self, line_1, line_2):
         """Return a Predictor by other elements. Raises ValueError if they are invalid."""
-        return Predictor(dataclasses.replace(self.parameters, line_1=line_1, line_2=line_2), self.epoch)
+        return Predictor(dataclasses.replace(self.parameters, line_1=line_1, line_2=line_2, omm=''), self.epoch)
 
     @property
     def number(self):
         """Catalogue number of the satellite."""
-        return self._satellite.satnum_str
+        return self._satellite.number
 
     @property
     def _known(self):
@@ -113,7 +114,7 @@ class Predictor:
         """Return [(key, text)] at a stamp [s]: azimuth and elevation of the sun, if UTC is known,
         and the elements, if any."""
         sun_now = np.degrees(self._sun_angles(np.array([stamp]))[0]) if self._known else ()
-        lines = ('line_1', 'line_2') if self._satellite is not None else ()
+        lines = () if self._satellite is None else ('omm',) if self.parameters.omm else ('line_1', 'line_2')
         return [*((f'sun_{axis}_deg', f'{angle:.2f}') for axis, angle in zip(topics.AXES, sun_now)),
                 *((line, getattr(self.parameters, line)) for line in lines)]
 

@@ -63,10 +63,12 @@ def ros_arguments(options: argparse.Namespace) -> list[str]:
     return ['--ros-args', '-r', f'__ns:={name}']
 
 
-def add_remote(parser: argparse.ArgumentParser) -> None:
-    """Add namespace, name of the operator, beam and timeout for a client of a running graph."""
+def add_remote(parser: argparse.ArgumentParser, commands: bool = True) -> None:
+    """Add namespace, beam and timeout for a client of a running graph, and the operator if it sends commands."""
     add_namespace(parser)
-    parser.add_argument('--who', metavar='NAME', help='name of the operator in the commands; default: login@host')
+    parser.set_defaults(who=None)
+    if commands:
+        parser.add_argument('--who', metavar='NAME', help='name of the operator in the commands; default: login@host')
     parser.add_argument('--beam', default='', metavar='NAME', help='beam of an array with several beams, for example '
                         'beam_2')
     parser.add_argument('--timeout', type=float, default=5.0, metavar='S', help='longest wait for the graph and for '

@@ -9,7 +9,8 @@ from pedestal_common.geometry import orbit
 from tracking_receiver_sim.params import TargetParameters
 
 TARGET_DESCRIPTIONS = {
-    'leo_pass': lambda target: f'satellite {target.leo_pass.line_1[2:7]}, from its TLE',
+    'leo_pass': lambda target: (f'satellite {orbit.satellite(target.leo_pass).number}, from its '
+                                f'{"OMM" if target.leo_pass.omm else "TLE"}'),
     'track_file': lambda target: f'track of the file {target.track_file.path.rpartition("/")[2]}',
     'flyby': lambda target: (f'straight flight at {target.flyby.speed:g} m/s, {target.flyby.height:g} m above the '
                              f'station, closest distance over ground {target.flyby.closest_distance:g} m'),

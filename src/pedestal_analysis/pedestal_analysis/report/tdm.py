@@ -5,6 +5,7 @@ elevation (encoders plus receiver error), the range if measured, and C/N0. Only 
 receiver are written. On a ship the attitude of the INS rotates the angles. Nothing is corrected for refraction. Times
 are UTC.
 """
+import json
 import pathlib
 import re
 
@@ -165,7 +166,10 @@ def _participants(bag, names):
     receiver = bag.configuration['parameters'].get('tracking_receiver', {})
     target = str(receiver.get('target.kind', 'TARGET')).upper()[:80]
     launch = TLE_DESIGNATOR_PATTERN.fullmatch(str(receiver.get('target.leo_pass.line_1', ''))[9:17])
-    if target == 'LEO_PASS' and launch:
+    elements = receiver.get('target.leo_pass.omm', '')
+    if target == 'LEO_PASS' and elements:
+        target = json.loads(elements).get('OBJECT_ID', target)
+    elif target == 'LEO_PASS' and launch:
         year, number, piece = launch.groups()
         target = f'{1900 + int(year) + 100 * (int(year) < 57)}-{number}{piece}'
     return (*names, *(DEFAULT_STATION_NAME, target

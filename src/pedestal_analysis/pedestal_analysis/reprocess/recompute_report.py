@@ -39,6 +39,9 @@ def main(options):
     nodes = recompute.chosen(recording, options.node, given)
     changes = recompute.overrides(options.param, nodes)
     if changes:
+        unchanged = [name for name in nodes if options.node and name not in changes]
+        if unchanged:
+            raise recompute.RecomputeError(f'--node {unchanged[0]}: has no effect, because no --param is of it')
         nodes = list(changes)
     if changes and options.live:
         raise recompute.RecomputeError('--live compares with the recorded outputs; it cannot be combined with --param')

@@ -41,6 +41,11 @@ class LoopError(ValueError):
     """The loops of a plant cannot be designed, or not closed with the required margins; one line."""
 
 
+REQUIREMENT_OPTIONS = {'speed_bandwidth': 'speed', 'position_bandwidth': 'position', 'phase_margin': 'phase_margin',
+                       'gain_margin': 'gain_margin'}
+"""{option of the verb: field of LoopRequirements}."""
+
+
 @dataclasses.dataclass(frozen=True)
 class LoopRequirements:
     """Required crossovers of speed and position loop [Hz], None to derive from the other loop; margins [deg], [dB]."""
@@ -272,10 +277,10 @@ def main(options, progress):
     Raises LoopError.
     """
     for name in ('filter', 'feedforward', 'runs', 'seed', 'duration'):
-        if getattr(options, name):
+        if not (getattr(options, name) is None or getattr(options, name) is False):
             raise LoopError(f'--{name}: cannot be combined with --loops, which measures the plant')
-    required = LoopRequirements(options.speed_bandwidth, options.position_bandwidth, options.phase_margin,
-                                options.gain_margin)
+    required = LoopRequirements(**{field: getattr(options, name) for name, field in REQUIREMENT_OPTIONS.items()
+                                   if getattr(options, name) is not None})
     axes = AXES if options.axis == 'both' else (options.axis,)
     loops = Loops(options.source, options.param)
     file = options.output or pathlib.Path(f'{loops.name}-loops.yaml')

@@ -26,7 +26,7 @@ from acu_tracker.unit import RANGE_TOPIC
 from pedestal_analysis.reprocess import recompute, what_if
 from pedestal_analysis.results import identification
 from pedestal_analysis.results.tracking import HANDOVER_SETTLING_S
-from pedestal_analysis.tuning import parameter_search
+from pedestal_analysis.tuning import loops, parameter_search
 from pedestal_bringup.loop import closed_loop
 from pedestal_bringup.scenario import parameter_file, scenario
 from pedestal_common import parameters
@@ -290,6 +290,9 @@ def _check(options, is_bag, file):
     """Raise TuneError for options that do not fit together, or for an existing file."""
     if bool(options.filter) == options.feedforward:
         raise TuneError('one of --filter KIND and --feedforward must be given')
+    for name in loops.REQUIREMENT_OPTIONS:
+        if getattr(options, name) is not None:
+            raise TuneError(f'--{name.replace("_", "-")} {getattr(options, name):g}: needs --loops')
     if options.filter and options.filter not in FILTER_KINDS:
         raise TuneError(f'--filter {options.filter}: must be one of {", ".join(FILTER_KINDS)}')
     if is_bag and options.feedforward:

@@ -20,17 +20,20 @@ class Plan:
     @functools.cached_property
     def targets(self):
         """{prefix of the beam: true target.Target}."""
-        return {prefix: target.build(self._parameters(prefix), self.scenario.header.duration)
-                for prefix in self.scenario.prefixes}
+        return {prefix: self._built(prefix, self._parameters(prefix)) for prefix in self.scenario.prefixes}
 
     def _parameters(self, prefix):
         return self.scenario.node_parameters(prefix + 'tracking_receiver').target
+
+    def _built(self, prefix, parameters):
+        mask = self.scenario.node_parameters(prefix + 'tracking_receiver').receiver.horizon_mask
+        return target.build(parameters, self.scenario.header.duration, mask)
 
     def _nominal_target(self, prefix):
         """Return the target of a beam as the operator knows it, with UT1 equal to UTC."""
         true = self._parameters(prefix)
         nominal = dataclasses.replace(true, leo_pass=dataclasses.replace(true.leo_pass, ut1_offset=0.0))
-        return self.targets[prefix] if nominal == true else target.build(nominal, self.scenario.header.duration)
+        return self.targets[prefix] if nominal == true else self._built(prefix, nominal)
 
     @functools.cached_property
     def tables(self):
@@ -64,11 +67,11 @@ class Plan:
         return {f'{prefix}acu/program_track': program_message(*table) for prefix, table in self.tables.items()}
 
     def announced(self):
-        """Return lines on the targets of the beams, each once: the flight, or the times when a satellite culminates,
-        rises and sets."""
+        """Return lines on the targets of the beams, each once: what a flight is, when a target is highest, rises and
+        sets."""
         lines = []
-        for built in self.targets.values():
-            lines += built.summary or _sky(built, self.scenario.header.duration)
+        for prefix, built in self.targets.items():
+            lines += [*built.summary, *_sky(built, self._parameters(prefix).kind, self.scenario.header.duration)]
         return list(dict.fromkeys(lines))
 
     def begins(self):
@@ -80,25 +83,26 @@ class Plan:
         return round(begin.timestamp() * 1e3) * 1_000_000
 
 
-def _sky(built, duration):
-    """Return lines on a target with a date: the UTC of its highest place in a run of `duration` [s], and of its rise
-    and set within the run."""
-    if not built.start_time:
-        return ()
+def _sky(built, kind, duration):
+    """Return lines on a target of a kind: its rise and set if they are within a run of `duration` [s], and the highest
+    place of a target that has a date and no summary."""
+    name = 'satellite' if kind == 'leo_pass' else 'target'
     times = np.linspace(0.0, duration, 1 + int(min(1e5, 10.0 * duration)))
     elevation = np.degrees(target.look_angles(built, times)[1])
-    top, up = int(np.argmax(elevation)), np.flatnonzero(elevation > 0.0)
-    begin = orbit.instant('start', built.start_time)
+    known, up = np.flatnonzero(np.isfinite(elevation)), np.flatnonzero(elevation > 0.0)
+    if not up.size:
+        return ()
+    begin = orbit.instant('start', built.start_time) if built.start_time else None
 
     def when(row):
-        at = begin + datetime.timedelta(seconds=float(times[row]))
-        return f'after {times[row]:.1f} s, at {at:%H:%M:%S} UTC'
-    highest = (f'0 s is {begin:%Y-%m-%d %H:%M:%S} UTC; the satellite is highest in this run, '
-               f'{elevation[top]:.1f} deg, {when(top)}')
-    rises = (f'the satellite rises {when(up[0])}: nothing can be tracked before',) if up.size and up[0] else ()
-    sets = (f'the satellite sets {when(up[-1])}: nothing can be tracked after',) if up.size and (
-        up[-1] < times.size - 1) else ()
-    return (highest, *rises, *sets)
+        at = f', at {begin + datetime.timedelta(seconds=float(times[row])):%H:%M:%S} UTC' if begin else ''
+        return f'after {times[row]:.1f} s{at}'
+    top = int(np.nanargmax(elevation))
+    highest = (f'0 s is {begin:%Y-%m-%d %H:%M:%S} UTC; the {name} is highest in this run, {elevation[top]:.1f} deg, '
+               f'{when(top)}',) if begin and not built.summary else ()
+    rises = (f'the {name} rises {when(up[0])}: nothing can be tracked before',) if up[0] > known[0] else ()
+    sets = (f'the {name} sets {when(up[-1])}: nothing can be tracked after',) if up[-1] < known[-1] else ()
+    return (*highest, *rises, *sets)
 
 
 def program_message(times, angles):

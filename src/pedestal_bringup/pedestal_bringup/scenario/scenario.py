@@ -363,7 +363,11 @@ def _follow_flight(name: str, receiver_values: dict[str, typing.Any], header_val
     give them. Raises ScenarioError, TableError."""
     target = _checked(name, 'tracking_receiver', nodes.row('tracking_receiver').parameters_type(),
                       receiver_values).target
-    if target.kind != 'track_file' or not target.track_file.path:
+    if target.track_file.path and target.kind != 'track_file':
+        raise ScenarioError(f'scenario {name}, tracking_receiver: target.track_file.path = '
+                            f'{target.track_file.path!r:.60}: has no effect with target.kind = {target.kind}; take '
+                            'target.kind = track_file')
+    if not target.track_file.path:
         return
     from tracking_receiver_sim import track_files  # imported late, because only a flight needs scipy
     given = {*receiver_values, *({'duration'} & set(header_values))}

@@ -1,4 +1,4 @@
-"""Satellite by SGP4: its TLE, its position over a station, and Julian dates.
+"""Satellite by SGP4: its TLE or OMM, its position over a station, and Julian dates.
 
 Without a ut1_offset UT1 equals UTC; tracking_receiver_sim.target gives the resulting error.
 """
@@ -10,6 +10,7 @@ from sgp4.api import SGP4_ERRORS, WGS72, Satrec, jday
 from sgp4.io import compute_checksum
 from sgp4.propagation import gstime
 
+from pedestal_common.geometry import omm
 from pedestal_common.geometry.geodesy import EARTH_RATE, station_frame
 from pedestal_common.graph.steps import SECONDS_PER_DAY
 from pedestal_common.reproducible import arctan2, cos, sin, turned
@@ -19,7 +20,12 @@ TLE_NUMBER_COLUMNS = (
     {'inclination': (8, 16), 'ascending node': (17, 25), 'eccentricity': (26, 33), 'argument of perigee': (34, 42),
      'mean anomaly': (43, 51), 'mean motion': (52, 63)})
 """{field: columns} of the numbers of both TLE lines."""
+
+TLE_TYPE_COLUMN = 62
+"""Column of the ephemeris type in line 1, counted from 0."""
+
 LEAP_SECOND_PATTERN = re.compile(r'(T\d\d:59:)60\b')
+
 MAX_TLE_AGE_DAYS = 30.0
 """Largest time from the TLE epoch at which SGP4 is used [days]."""
 
@@ -28,8 +34,26 @@ class TargetError(ValueError):
     """Error of a target that cannot be built; one line with file or TLE line, row, field and value."""
 
 
-def satellite(leo_pass) -> Satrec:
-    """Return the SGP4 record of the `line_1` and `line_2` of parameters. Raises TargetError for an invalid TLE."""
+class Satellite(Satrec):
+    """The SGP4 record of a satellite. number: its catalogue number, with any number of digits; form: of its elements,
+    TLE or OMM."""
+    number: str
+    form: str
+
+
+def satellite(leo_pass) -> Satellite:
+    """Return the SGP4 record of the `omm` of parameters, or of their `line_1` and `line_2` if `omm` is empty. Raises
+    TargetError."""
+    if leo_pass.omm:
+        satrec = Satellite()
+        satrec.form = 'OMM'
+        try:
+            satrec.number = omm.initialize(satrec, leo_pass.omm)
+        except ValueError as error:
+            raise TargetError(f'omm: {error}') from None
+        if satrec.error:
+            raise TargetError(f'OMM of satellite {satrec.number}: {SGP4_ERRORS[satrec.error]}')
+        return satrec
     lines = leo_pass.line_1.rstrip(), leo_pass.line_2.rstrip()
     for number, line in enumerate(lines, 1):
         name = f'TLE line {number}'
@@ -43,9 +67,14 @@ def satellite(leo_pass) -> Satrec:
         for field, (first, end) in TLE_NUMBER_COLUMNS[number - 1].items():
             if not line[first:end].replace('.', '', 1).strip().isdigit():
                 raise TargetError(f'{name}: {field} {line[first:end]!r} is not a number')
+    try:
+        omm.require_sgp4(lines[0][TLE_TYPE_COLUMN])
+    except ValueError as error:
+        raise TargetError(f'TLE line 1, column {TLE_TYPE_COLUMN + 1}: {error}') from None
     if lines[0][2:7] != lines[1][2:7]:
         raise TargetError(f'TLE line 2: satellite {lines[1][2:7]!r}, must be {lines[0][2:7]!r} as in line 1')
-    satrec = Satrec.twoline2rv(*lines, WGS72)
+    satrec = Satellite.twoline2rv(*lines, WGS72)
+    satrec.number, satrec.form = satrec.satnum_str, 'TLE'
     if satrec.error:
         raise TargetError(f'TLE of satellite {lines[0][2:7]}: {SGP4_ERRORS[satrec.error]}')
     return satrec
@@ -71,7 +100,7 @@ def enu(satrec, station, julian, fraction, times, ut1_offset=0.0):
     error, position, velocity = satrec.sgp4_array(np.full(len(times), julian), fractions)
     if error.any():
         i = int(np.argmax(error != 0))
-        raise TargetError(f'TLE of satellite {satrec.satnum_str}: {iso(julian, fractions[i])}: '
+        raise TargetError(f'{satrec.form} of satellite {satrec.number}: {iso(julian, fractions[i])}: '
                           f'{SGP4_ERRORS[int(error[i])]}')
     to_fixed = earth_fixed(julian, fractions, ut1_offset)
     r = np.einsum('nij,nj->ni', to_fixed, 1e3 * position)

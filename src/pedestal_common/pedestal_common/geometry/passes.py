@@ -1,8 +1,8 @@
-"""Passes of a satellite over a station, each from its rise above the horizon to its set.
+"""Passes of a satellite over a station: from its rise above the horizon to its set.
 
-The elevation by SGP4 is computed every SEARCH_STEP_S. Where its sign changes, the instant is found to a millisecond;
-the culmination is the highest instant between rise and set. A pass shorter than SEARCH_STEP_S may be missed; it stays
-below 1 deg.
+The search computes the elevation by SGP4 every SEARCH_STEP_S seconds. Rise and set are exact to a millisecond, and the
+culmination is the highest instant between them. A pass shorter than SEARCH_STEP_S may be missed: it stays below 1 deg.
+A pass under way at the beginning or at the end of the search is followed to its rise and to its set.
 """
 import datetime
 import math
@@ -17,39 +17,56 @@ from pedestal_common.graph.steps import SECONDS_PER_DAY
 
 SEARCH_STEP_S = 20.0
 """Time between two elevations [s]."""
-
 MIN_CULMINATION_DEG = 10.0
-"""Culmination below which a pass is left out, because of refraction and buildings [deg]."""
-
+"""Culmination below which a pass is left out [deg]: a lower pass stays in the region of refraction and buildings."""
 SEARCH_DAYS = 5.0
-"""Length of the search [days]."""
-
-MAX_PASS_DAYS = 1.0
-"""Longest pass in the search, the longest run [days]."""
+"""Time that is searched [days]."""
+MAX_PASS_DAYS = 30.0
+"""Time before and after the search in which the rise and the set of a pass under way are found [days]."""
+PASS_CHUNK_STEPS = 540
+"""Number of steps computed at once on the way to a rise or set: three hours."""
+MAX_RUN_S = float(SECONDS_PER_DAY)
+"""Largest duration of a run [s]."""
 
 
 class Pass(typing.NamedTuple):
-    """Pass of a satellite. rise, top, set: UTC as datetime; azimuth at the rise and at the set, elevation at the top
-    [deg]."""
-    rise: datetime.datetime
+    """Pass of a satellite.
+
+        rise, set                   UTC as datetime; None if it is more than MAX_PASS_DAYS outside the search
+        top                         UTC of the highest place
+        rise_azimuth, set_azimuth   [deg]; NaN without rise or set
+        elevation                   at the top [deg]
+        begin                       UTC of the beginning of the search
+    """
+    rise: datetime.datetime | None
     top: datetime.datetime
-    set: datetime.datetime
+    set: datetime.datetime | None
     rise_azimuth: float
     elevation: float
     set_azimuth: float
+    begin: datetime.datetime
 
     @property
-    def duration(self):
-        """Time from rise to set [s]."""
-        return (self.set - self.rise).total_seconds()
+    def duration(self) -> float:
+        """Time from rise to set [s], infinite without a rise or a set."""
+        return (self.set - self.rise).total_seconds() if self.rise and self.set else math.inf
+
+    @property
+    def under_way(self) -> bool:
+        """True if the satellite is above the horizon at the beginning of the search."""
+        return self.rise is None or self.rise < self.begin
+
+    @property
+    def start(self) -> datetime.datetime:
+        """UTC at which a run begins: the rise, except in a pass under way that is longer than a run."""
+        return self.begin if self.rise is None or self.under_way and self.duration > MAX_RUN_S else self.rise
 
 
 def passes_after(satrec, station, begin, days=SEARCH_DAYS) -> list[Pass]:
-    """Return the passes that rise after `begin` (datetime, UTC) and set within `days`, without those below
-    MIN_CULMINATION_DEG.
+    """Return the passes that are under way at `begin` (datetime, UTC) or rise within `days` after it.
 
-    satrec: as of orbit.satellite; station: StationParameters. Raises TargetError where the satellite does not rise or
-    set, or where SGP4 ends.
+    A pass below MIN_CULMINATION_DEG is left out, except one that is longer than a run. satrec: as of orbit.satellite;
+    station: StationParameters. Raises TargetError if the satellite does not rise, or if SGP4 ends.
     """
     julian, fraction = orbit.julian_date(begin)
 
@@ -63,64 +80,88 @@ def passes_after(satrec, station, begin, days=SEARCH_DAYS) -> list[Pass]:
     def crossing(i):
         return brentq(lambda t: elevation(t)[0], times[i], times[i + 1], xtol=1e-3)
 
+    def utc(t):
+        return begin + datetime.timedelta(milliseconds=round(1e3 * t))
+
     times = np.arange(0.0, SECONDS_PER_DAY * days, SEARCH_STEP_S)
     seen = elevation(times)
-    above = seen > 0.0
-    if above.all() or not above.any():
-        raise TargetError(f'satellite {satrec.satnum_str} {"never sets" if above.all() else "does not rise"} within '
-                          f'{days:g} days of {begin:%Y-%m-%dT%H:%M:%SZ} at latitude {station.latitude_deg:g}, '
-                          f'longitude {station.longitude_deg:g} deg')
-    rises, sets = np.flatnonzero(~above[:-1] & above[1:]), np.flatnonzero(above[:-1] & ~above[1:])
-    found: list[Pass] = []
-    for i in rises:
-        later = sets[sets > i]
-        if not later.size:
-            break
-        j = int(later[0])
-        best = i + 1 + int(np.argmax(seen[i + 1:j + 1]))
-        rise, down = crossing(i), crossing(j)
-        top = minimize_scalar(lambda t: -elevation(t)[0], bounds=(max(rise, times[best] - SEARCH_STEP_S),
-                              min(down, times[best] + SEARCH_STEP_S)), method='bounded', options={'xatol': 1e-3})
-        if -top.fun >= MIN_CULMINATION_DEG:
-            rise_time, top_time, set_time = (begin + datetime.timedelta(milliseconds=round(1e3 * t))
-                                             for t in (rise, top.x, down))
-            found.append(Pass(rise_time, top_time, set_time, azimuth(rise), float(-top.fun), azimuth(down)))
+    if not (seen > 0.0).any():
+        raise TargetError(f'satellite {satrec.number} does not rise within {days:g} days of '
+                          f'{begin:%Y-%m-%dT%H:%M:%SZ} at latitude {station.latitude_deg:g}, longitude '
+                          f'{station.longitude_deg:g} deg')
+    if seen[0] > 0.0:
+        before, above = _until_below(elevation, times[0], -SEARCH_STEP_S)
+        times, seen = np.append(before[::-1], times), np.append(above[::-1], seen)
+    if seen[-1] > 0.0:
+        after, above = _until_below(elevation, times[-1], SEARCH_STEP_S)
+        times, seen = np.append(times, after), np.append(seen, above)
+    edges = np.diff(np.concatenate(([False], seen > 0.0, [False])).astype(int))
+    found = []
+    for i, j in zip(np.flatnonzero(edges > 0), np.flatnonzero(edges < 0) - 1):
+        rise, down = crossing(i - 1) if i else None, crossing(j) if j + 1 < len(times) else None
+        best = i + int(np.argmax(seen[i:j + 1]))
+        top = minimize_scalar(lambda t: -elevation(t)[0], bounds=(
+            max(times[i] if rise is None else rise, times[best] - SEARCH_STEP_S),
+            min(times[j] if down is None else down, times[best] + SEARCH_STEP_S)), method='bounded',
+            options={'xatol': 1e-3})
+        each = Pass(None if rise is None else utc(rise), utc(top.x), None if down is None else utc(down),
+                    math.nan if rise is None else azimuth(rise), float(-top.fun),
+                    math.nan if down is None else azimuth(down), begin)
+        if each.elevation >= MIN_CULMINATION_DEG or each.duration > MAX_RUN_S:
+            found.append(each)
     return found
 
 
+def _until_below(elevation, start, step):
+    """Return (times, elevations) after `start` [s] in steps [s], which may be negative, up to the first below the
+    horizon, at most MAX_PASS_DAYS away, and only as far as SGP4 goes."""
+    times, seen = np.zeros(0), np.zeros(0)
+    while len(times) * abs(step) < MAX_PASS_DAYS * SECONDS_PER_DAY:
+        chunk = start + step * np.arange(len(times) + 1, len(times) + 1 + PASS_CHUNK_STEPS)
+        try:
+            above = elevation(chunk)
+        except TargetError:
+            break
+        down = np.flatnonzero(above <= 0.0)
+        last = int(down[0]) + 1 if down.size else len(chunk)
+        times, seen = np.append(times, chunk[:last]), np.append(seen, above[:last])
+        if down.size:
+            break
+    return times, seen
+
+
 def search_start(satrec, now):
-    """Return (beginning of the search for passes, reason if that is not now, else ''): now, or the epoch of an old
-    TLE."""
+    """Return (beginning of the search, why it is not now, or ''): now, or the epoch of elements that are too old."""
     epoch = orbit.calendar(satrec.jdsatepoch, satrec.jdsatepochF)
     age = (now - epoch).total_seconds() / SECONDS_PER_DAY
     if abs(age) <= orbit.MAX_TLE_AGE_DAYS:
         return now, ''
-    return epoch, (f'the TLE of satellite {satrec.satnum_str} is of {epoch:%Y-%m-%d}, {abs(age):.0f} days '
+    return epoch, (f'the {satrec.form} of satellite {satrec.number} is of {epoch:%Y-%m-%d}, {abs(age):.0f} days '
                    f'{"old" if age > 0.0 else "ahead"}; SGP4 holds for {orbit.MAX_TLE_AGE_DAYS:g}')
 
 
 def chosen_pass(satrec, station, which, now) -> Pass:
-    """Return the pass that `which` names: 'next' after now, 'N' for number N of `passes_after` from `search_start`, or
-    the pass at or after a UTC. now: datetime, UTC. Raises TargetError."""
+    """Return the pass that `which` names: 'next' after now, 'N' of the passes after `search_start`, or the pass at or
+    after a UTC. now: datetime, UTC. Raises TargetError."""
     begin, old = search_start(satrec, now)
     if which == 'next' or which.isdecimal():
         if which == 'next' and old:
-            raise TargetError(f'--pass next: {old}. Take a new TLE, or name a pass of that time by its number or its '
-                              'UTC (--pass list)')
+            raise TargetError(f'--pass next: {old}. Take a new {satrec.form}, or name a pass of that time by its '
+                              'number or its UTC (--pass list)')
         number = 1 if which == 'next' else int(which)
-        passes = passes_after(satrec, station, begin)
-        if not 1 <= number <= len(passes):
-            raise TargetError(f'--pass {which}: there are {len(passes)} passes above {MIN_CULMINATION_DEG:g} deg '
+        found = passes_after(satrec, station, begin)
+        if not 1 <= number <= len(found):
+            raise TargetError(f'--pass {which}: there are {len(found)} passes above {MIN_CULMINATION_DEG:g} deg '
                               f'within {SEARCH_DAYS:g} days of {begin:%Y-%m-%dT%H:%M:%SZ}')
-        return passes[number - 1]
+        return found[number - 1]
     when = orbit.instant('--pass', which)
     epoch = orbit.calendar(satrec.jdsatepoch, satrec.jdsatepochF)
     age = (when - epoch).total_seconds() / SECONDS_PER_DAY
     if abs(age) > orbit.MAX_TLE_AGE_DAYS:
-        raise TargetError(f'--pass {which}: {age:.1f} days from the TLE epoch {epoch:%Y-%m-%dT%H:%M:%SZ}, must be '
-                          f'within {orbit.MAX_TLE_AGE_DAYS:g}')
-    for found in passes_after(satrec, station, when - datetime.timedelta(days=MAX_PASS_DAYS),
-                              SEARCH_DAYS + MAX_PASS_DAYS):
-        if found.set > when:
-            return found
-    raise TargetError(f'--pass {which}: no pass above {MIN_CULMINATION_DEG:g} deg within {SEARCH_DAYS:g} days of it')
+        raise TargetError(f'--pass {which}: {age:.1f} days from the {satrec.form} epoch '
+                          f'{epoch:%Y-%m-%dT%H:%M:%SZ}, must be within {orbit.MAX_TLE_AGE_DAYS:g}')
+    found = passes_after(satrec, station, when)
+    if not found:
+        raise TargetError(f'--pass {which}: no pass above {MIN_CULMINATION_DEG:g} deg within {SEARCH_DAYS:g} days of '
+                          'it')
+    return found[0]

@@ -29,6 +29,7 @@ class PassQuery(typing.NamedTuple):
     """
     line_1: str
     line_2: str
+    omm: str
     station: StationParameters
     ahead: float
     day: int
@@ -41,10 +42,11 @@ def pass_query(antenna):
     """
     p, acu = antenna.configuration, antenna.diagnostics_of('acu')
     target = p if p.get('target.kind') == 'leo_pass' else {}
-    simulated = [target.get(f'target.leo_pass.{name}') for name in page_state.ELEMENT_PARAMETERS]
-    lines = [acu.get(name) for name in page_state.ELEMENT_PARAMETERS] if 'line_1' in acu else simulated
+    simulated = [target.get(f'target.leo_pass.{name}', '') for name in page_state.ELEMENT_PARAMETERS]
+    lines = [acu.get(name, '') for name in page_state.ELEMENT_PARAMETERS]
+    lines = lines if any(lines) else simulated
     station = [p.get(f'prediction.station.{name}') for name in page_state.STATION_PARAMETERS]
-    if None in (*lines, *station):
+    if not any(lines) or None in station:
         return None
     start = p.get('prediction.start_time')
     if not start and lines == simulated:
@@ -69,7 +71,7 @@ def upcoming_passes(query):
         known = []
     return [{'aos': _seconds(each.rise) - query.ahead, 'los': _seconds(each.set) - query.ahead,
              'highest': round(each.elevation, 1), 'from': round(each.rise_azimuth, 1) % 360.0,
-             'to': round(each.set_azimuth, 1) % 360.0} for each in known]
+             'to': round(each.set_azimuth, 1) % 360.0} for each in known if each.rise and each.set]
 
 
 def _seconds(utc):

@@ -22,7 +22,8 @@ EXTRA_NUMBER_TOPICS = (MOTOR_STATES_TOPIC, ATTITUDE_TOPIC)
 TEXT_TOPIC_BY_NAME = {'mode': 'acu/mode', 'drive': 'adu/state', 'keyhole': 'acu/keyhole', 'blockage': 'acu/blockage'}
 """{name on the page: topic of the text}."""
 
-STATION_PARAMETERS, ELEMENT_PARAMETERS = ('latitude_deg', 'longitude_deg', 'height'), ('line_1', 'line_2')
+STATION_PARAMETERS, ELEMENT_PARAMETERS = ('latitude_deg', 'longitude_deg', 'height'), (
+    'line_1', 'line_2', 'omm')
 """Names of the parameters of a station, and of the elements of a satellite."""
 
 SHOWN_PARAMETERS = {'acu': ('graph.start', 'tracker.receiver.beamwidth', 'blockage', 'floor', 'prediction.start_time',

@@ -18,7 +18,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline, PPoly, make_smoothing_spline
 
 from pedestal_common.geometry import geodesy
-from pedestal_common.reproducible import turned
+from pedestal_common.reproducible import arctan2, turned
 from pedestal_common.text_files import csv_table
 from tracking_receiver_sim.track import instant
 
@@ -54,10 +54,15 @@ def lay_out(fixes, track, station) -> Flight:
                                    f'{time[-1] + track.start:g} s')
     spline = smoothed(time, enu, track) if track.smooth else CubicSpline(time, enu)
     speed, acceleration = _check_limits(kept, spline, track)
-    distance = np.linalg.norm(spline(_samples(spline.x)), axis=1)
+    at = _samples(spline.x)
+    at = at[at >= min(0.0, at[-1])]
+    east, north, up = spline(at).T
+    distance, elevation = np.hypot(np.hypot(east, north), up), arctan2(up, np.hypot(east, north))
+    top = int(np.argmax(elevation))
     log = (f'{fixes.description}: {len(kept.line)} of {len(fixes.line)} fixes, {dropped} held positions dropped'
            f'{_quantisation(fixes, speed)}{_residual(spline(time) - enu) if track.smooth else ""}')
-    path = (f'{time[-1]:.10g} s, at most {speed:.4g} m/s and {acceleration:.3g} m/s2, {distance.min() / 1e3:.4g} to '
+    path = (f'{time[-1]:.10g} s, at most {speed:.4g} m/s and {acceleration:.3g} m/s2, highest '
+            f'{np.degrees(elevation[top]):.1f} deg after {at[top]:.0f} s, {distance.min() / 1e3:.4g} to '
             f'{distance.max() / 1e3:.4g} km from the station at latitude {station.latitude_deg:.5f}, longitude '
             f'{station.longitude_deg:.5f} deg, height {station.height:.1f} m')
     start_time = instant.iso(fixes.time[0] + track.start) if fixes.dated else ''

@@ -34,6 +34,8 @@ def pairs(texts: Iterable[str]) -> dict[str, str | float]:
         name, equals, value = text.partition('=')
         if not (name and equals and value):
             raise ValueError(f'{text!r}: must be NAME=VALUE')
+        if name in given:
+            raise ValueError(f'{text!r}: {name} is given twice')
         given[name] = value
     return given
 

@@ -29,6 +29,8 @@ def main(options: argparse.Namespace) -> int:
     """Send the command. Return the exit code."""
     given = ask.pairs(options.given)
     for name, degrees in (('azimuth', options.az), ('elevation', options.el)):
+        if degrees is not None and name in given:
+            raise ValueError(f'--{name[:2]} {degrees:g}: {name} is given twice')
         if degrees is not None:
             given[name] = math.radians(degrees)
     return ask.send_command(options, options.mode, given)

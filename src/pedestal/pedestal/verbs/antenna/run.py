@@ -44,6 +44,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     operator_servers.add_arguments(parser)
 
 
+START_TIME_PARAMETER = 'tracking_receiver.target.leo_pass.start_time'
 MAX_LOST_STEP_SHARE = 0.01
 """Largest share of lost steps of a realtime run, outside announced restarts."""
 
@@ -111,23 +112,45 @@ def _chosen(options: argparse.Namespace) -> 'Scenario | None':
     from pedestal_bringup.scenario import scenario
     changes = (scenario.file_overrides(options.params_file) if options.params_file else []) + options.param
     duration = options.duration
+    if options.satellite and not options.tle:
+        raise ValueError(f'--satellite {options.satellite}: needs --tle FILE, the file that holds it')
     if not (options.tle or options.station or options.which):
         return scenario.load(options.scenario, changes, options.seed, duration, options.pacing)
     import datetime
 
     from pedestal import satellite
+    from pedestal_common.geometry import orbit
+    now = datetime.datetime.now(datetime.timezone.utc).replace(tzinfo=None)
+    started = next((change.partition('=')[2].strip('"\'') for change in reversed(changes)
+                    if change.startswith(START_TIME_PARAMETER + '=')), '')
+    if options.which and started:
+        raise ValueError(f'--pass {options.which}: sets {START_TIME_PARAMETER}, which is also given; leave out one')
     if options.station:
         changes = satellite.station_changes(options.station) + changes
     if options.tle:
-        changes = satellite.tle_changes(options.tle, options.satellite) + changes
+        named = options.which and not (options.which in ('list', 'next') or options.which.isdecimal())
+        when = (orbit.instant('--pass', options.which) if named else
+                orbit.instant('start_time', started) if started else now)
+        elements, remark = satellite.tle_changes(options.tle, options.satellite, when)
+        changes = elements + changes
+        if remark:
+            print(remark)
     draft = scenario.draft(options.scenario)
-    if options.tle or options.which:
-        now = datetime.datetime.now(datetime.timezone.utc).replace(tzinfo=None)
+    if options.which or options.tle and not started:
         selection = satellite.PassSelection(draft.changed(changes), now)
         if options.which == 'list':
+            _refuse_with_list(options)
             selection.print_passes()
             return None
-        start, length, line = selection.choose(options.which or 'next')
+        start, duration, line = selection.choose(options.which or 'next', duration)
         print(line)
-        changes, duration = start + changes, duration or length
+        changes = start + changes
     return scenario.checked(draft.changed(changes), options.seed, duration, options.pacing)
+
+
+def _refuse_with_list(options: argparse.Namespace) -> None:
+    """Raise ValueError for an option of a run beside --pass list, which runs nothing."""
+    from pedestal_bringup.graph import operator_servers
+    for name in ('bag', 'json', 'explain', *operator_servers.SERVERS):
+        if not (getattr(options, name) is None or getattr(options, name) is False):
+            raise ValueError(f'--{name}: has no effect with --pass list, which runs nothing')

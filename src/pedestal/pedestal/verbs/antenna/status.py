@@ -12,7 +12,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add file of the rows and the options of a client."""
     from pedestal_analysis import console
     console.add_json(parser)
-    arguments.add_remote(parser)
+    arguments.add_remote(parser, commands=False)
 
 
 def main(options: argparse.Namespace) -> int:

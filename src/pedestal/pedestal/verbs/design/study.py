@@ -38,6 +38,9 @@ def main(options: argparse.Namespace) -> int:
     """
     import pedestal_studies
     if not options.name:
+        for name in ('json', 'output', 'runs', 'vector', 'scenario', 'workers', 'scheduler'):
+            if getattr(options, name) is not None:
+                raise ValueError(f'--{name}: needs the NAME of a study')
         console.show_list(pedestal_studies.descriptions().items())
         return 0
     if options.name not in pedestal_studies.STUDY_NAMES:

@@ -19,9 +19,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         '--loops; default: 28, or 8 times --position-bandwidth')
     parser.add_argument('--position-bandwidth', type=float, metavar='HZ', help='crossover of the position loop [Hz], '
                         'for --loops; default: an eighth of --speed-bandwidth')
-    parser.add_argument('--phase-margin', type=float, default=45.0, metavar='DEG', help='smallest phase margin '
+    parser.add_argument('--phase-margin', type=float, metavar='DEG', help='smallest phase margin '
                         '[deg], for --loops; 20 to 80; default: 45')
-    parser.add_argument('--gain-margin', type=float, default=6.0, metavar='DB', help='smallest gain margin [dB], '
+    parser.add_argument('--gain-margin', type=float, metavar='DB', help='smallest gain margin [dB], '
                         'for --loops; 3 to 20; default: 6')
     parser.add_argument('--axis', choices=('azimuth', 'elevation', 'both'), default='both', help='axis to tune; '
                         'default: both')

@@ -5,6 +5,8 @@ Exit code 0: every message was published. 130: the replay was stopped, for examp
 import argparse
 import pathlib
 
+DEFAULT_DEADLINE_S = 60.0
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add bag, topics, pace and part of the recording."""
@@ -29,7 +31,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         metavar='PORT',
                         help="TCP port of the operator's page, which shows the recording with a slider and without a "
                              f"graph; default: {operator_servers.SERVERS['page'].port}")
-    parser.add_argument('--deadline', type=float, default=60.0, metavar='S',
+    parser.add_argument('--deadline', type=float, metavar='S',
                         help='longest wait for a subscriber or an answer, in wall-clock time [s]; default: 60')
 
 
@@ -40,7 +42,7 @@ def main(options: argparse.Namespace) -> int:
     from pedestal_analysis.reprocess.replay import ReplayOptions, replay
     result = replay(options.bag, ReplayOptions(
         options.node, options.topics, None if options.lockstep else options.rate, options.start, options.duration,
-        options.paused, options.deadline))
+        options.paused, DEFAULT_DEADLINE_S if options.deadline is None else options.deadline))
     print('\n'.join(result.lines()))
     if result.ended == 'stopped':
         raise KeyboardInterrupt
@@ -51,7 +53,8 @@ def _on_the_page(options: argparse.Namespace) -> int:
     """Show the recording on the operator's page until Ctrl-C. Return exit code 0."""
     from pedestal_analysis.reprocess import replay, replay_page
     from pedestal_recording import bag
-    if options.node or options.topics or options.lockstep or options.duration:
+    if options.node or options.topics or options.lockstep or options.duration is not None or (
+            options.deadline is not None):
         raise ValueError('--page: goes only with --start, --rate and --paused; other options are for a replay into a '
                          'graph')
     wanted = replay.ReplayOptions(rate=options.rate, start=options.start, paused=options.paused)

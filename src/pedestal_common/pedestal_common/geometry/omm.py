@@ -1,0 +1,100 @@
+"""Mean elements of a CCSDS Orbit Mean-Elements Message (OMM, 502.0-B) for SGP4, as the texts of its keywords.
+
+The digits of a TLE limit neither the numbers of the orbit nor the catalogue number. Element set and revolution number
+take no part in SGP4.
+"""
+import datetime
+import json
+import math
+
+from sgp4 import omm
+from sgp4.alpha5 import from_alpha5
+
+NUMBER_LIMITS = {'MEAN_MOTION': (0.05, 18.0), 'ECCENTRICITY': (0.0, 0.9999999), 'INCLINATION': (0.0, 180.0),
+                 'RA_OF_ASC_NODE': (-360.0, 360.0), 'ARG_OF_PERICENTER': (-360.0, 360.0),
+                 'MEAN_ANOMALY': (-360.0, 360.0), 'BSTAR': (-1e3, 1e3),
+                 'MEAN_MOTION_DOT': (-1e3, 1e3), 'MEAN_MOTION_DDOT': (-1e3, 1e3)}
+"""{keyword: (lowest, highest)} [rev/day], [deg], [1/earth radii], [rev/day^2 / 2], [rev/day^3 / 6]."""
+ANGLE_KEYWORDS = ('RA_OF_ASC_NODE', 'ARG_OF_PERICENTER', 'MEAN_ANOMALY')
+MAX_CATALOGUE_NUMBER = 999_999_999
+"""Largest catalogue number."""
+DEFAULT_FIELDS = {'MEAN_MOTION_DOT': '0', 'MEAN_MOTION_DDOT': '0'}
+"""{keyword that an OMM may omit: default value}."""
+ALLOWED_VALUES = {'CENTER_NAME': ('EARTH',), 'REF_FRAME': ('TEME',), 'TIME_SYSTEM': ('UTC',),
+                  'MEAN_ELEMENT_THEORY': ('SGP4', 'SGP/SGP4')}
+"""{keyword: allowed values}; the first one is the default."""
+SGP4_TYPES = ('', '0', '2')
+"""Ephemeris types of elements of SGP4."""
+OTHER_TYPES = {'1': 'SGP', '3': 'PPT3', '4': 'SGP4-XP', '6': 'numerical propagation'}
+"""{ephemeris type: theory of its elements}."""
+OTHER_KEYWORDS = ('BTERM', 'AGOM')
+"""Keywords that only elements of SGP4-XP have."""
+KEYWORDS = ('OBJECT_NAME', 'OBJECT_ID', 'EPOCH', 'EPHEMERIS_TYPE', 'NORAD_CAT_ID', *ALLOWED_VALUES, *NUMBER_LIMITS,
+            *OTHER_KEYWORDS)
+"""Keywords that are read."""
+
+
+def require_sgp4(ephemeris_type):
+    """Raise ValueError if an ephemeris type, '' if the elements have none, is that of another theory than SGP4."""
+    kind = str(ephemeris_type).strip()
+    if kind not in SGP4_TYPES:
+        theory = f'; type {kind} needs {OTHER_TYPES[kind]}' if kind in OTHER_TYPES else ''
+        raise ValueError(f'ephemeris type {kind!s:.20}: must be 0 or 2 (SGP4){theory}')
+
+
+def catalogue_number(text):
+    """Return the digits of a catalogue number, of which the first of five may be a letter (Alpha-5); '' of an empty
+    text. Raises ValueError."""
+    text = text.strip()
+    try:
+        number = from_alpha5(text) if len(text) == 5 else int(text or 0)
+        if not 0 <= number <= MAX_CATALOGUE_NUMBER:
+            raise ValueError(text)
+    except (ValueError, IndexError):
+        raise ValueError(f'NORAD_CAT_ID = {text!r:.60}: must be 0 to {MAX_CATALOGUE_NUMBER}') from None
+    return str(number) if text else ''
+
+
+def checked(fields):
+    """Return {keyword: text} of valid elements with every number that SGP4 needs. Raises ValueError, with keyword,
+    value and range."""
+    fields = {**DEFAULT_FIELDS, **{key: str(value).strip() for key, value in fields.items() if key in KEYWORDS}}
+    for keyword, allowed in ALLOWED_VALUES.items():
+        if fields.get(keyword, allowed[0]).upper() not in allowed:
+            raise ValueError(f'{keyword} = {fields[keyword]!r:.60}: must be {" or ".join(allowed)}')
+    require_sgp4(fields.get('EPHEMERIS_TYPE', ''))
+    for keyword in OTHER_KEYWORDS:
+        if float(fields.get(keyword) or 0.0):
+            raise ValueError(f'{keyword} = {fields[keyword]!r:.60}: must be absent, because it needs SGP4-XP')
+    for keyword, (low, high) in NUMBER_LIMITS.items():
+        try:
+            value = float(fields.get(keyword, ''))
+        except ValueError:
+            raise ValueError(f'{keyword} = {fields.get(keyword)!r:.60}: must be a number') from None
+        if not low <= value <= high:
+            raise ValueError(f'{keyword} = {value:g}: must be {low:g} to {high:g}')
+    return {**fields, 'NORAD_CAT_ID': catalogue_number(fields.get('NORAD_CAT_ID', ''))}
+
+
+def initialize(satrec, text):
+    """Fill a Satrec with the elements of an OMM in JSON; return the catalogue number, or the name if there is none.
+    Raises ValueError."""
+    try:
+        fields = json.loads(text, parse_int=str, parse_float=str)
+    except (json.JSONDecodeError, RecursionError) as error:
+        raise ValueError(f'not valid JSON: {error}') from None
+    if not isinstance(fields, dict):
+        raise ValueError('must be an object {"EPOCH": ...}')
+    fields = checked(fields)
+    try:
+        epoch = datetime.datetime.fromisoformat(fields.get('EPOCH', '').removesuffix('Z'))
+    except ValueError:
+        raise ValueError(f'EPOCH = {fields.get("EPOCH", "")!r:.60}: must be UTC as ISO 8601, for example '
+                         '2026-11-22T05:00:00.123456') from None
+    if epoch.tzinfo is not None:
+        epoch = epoch.astimezone(datetime.timezone.utc).replace(tzinfo=None)
+    angles = {keyword: str(math.fmod(float(fields[keyword]), 360.0) % 360.0) for keyword in ANGLE_KEYWORDS}
+    omm.initialize(satrec, {**fields, **angles, 'EPOCH': epoch.isoformat(timespec='microseconds'), 'NORAD_CAT_ID': '0',
+                            'CLASSIFICATION_TYPE': 'U', 'OBJECT_ID': '    ', 'EPHEMERIS_TYPE': '0',
+                            'ELEMENT_SET_NO': '0', 'REV_AT_EPOCH': '0'})
+    return fields['NORAD_CAT_ID'] or fields.get('OBJECT_ID') or fields.get('OBJECT_NAME', '')

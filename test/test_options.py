@@ -1,0 +1,52 @@
+"""Options of the command line: negative values, and options that would have no effect."""
+import pathlib
+
+import pytest
+
+from pedestal import cli
+
+REPOSITORY = pathlib.Path(__file__).parents[1]
+
+
+@pytest.mark.parametrize('arguments, parsed', [
+    (['mode', 'rate', '--az', '-1e-2'], {'az': -0.01}), (['mode', 'rate', '--az', '-.5', '--el=-2'], {'az': -0.5}),
+    (['run', 'leo_pass', '--station', '-33.9,18.4,10'], {'station': '-33.9,18.4,10'}),
+    (['run', 'leo_pass', '--seed', '-1', '--param', 'a.b=-1'], {'seed': -1, 'param': ['a.b=-1']})])
+def test_a_negative_value_needs_no_equals_sign(arguments, parsed):
+    options = vars(cli._parser().parse_args(arguments))
+    assert {name: options[name] for name in parsed} == parsed
+
+
+def test_passes_of_a_station_in_the_south(capsys):
+    assert cli.main(['run', 'leo_pass', '--station', '-33.9,18.4,10', '--pass', 'list']) == 0
+    assert 'latitude -33.9, longitude 18.4 deg' in capsys.readouterr().out
+
+
+@pytest.mark.parametrize('arguments, message', [
+    (['run', 'leo_pass', '--satellite', 'FOO'], '--satellite FOO: needs --tle FILE'),
+    (['run', 'leo_pass', '--pass', 'list', '--json', 'rows.json'], '--json: has no effect with --pass list'),
+    (['run', 'leo_pass', '--pass', '1', '--param', 'tracking_receiver.target.leo_pass.start_time=2019-12-10T00:00'],
+     '--pass 1: sets tracking_receiver.target.leo_pass.start_time, which is also given'),
+    (['run', 'leo_pass', '--param', 'tracking_receiver.target.track_file.path=flight.csv'],
+     "target.track_file.path = 'flight.csv': has no effect with target.kind = leo_pass"),
+    (['live', '--layouts', 'folder', '--port', '8765'], '--port: has no effect with --layouts'),
+    (['mode', 'preset', 'azimuth=0.1', '--az', '5'], '--az 5: azimuth is given twice'),
+    (['ask', 'offset', 'time=1', 'time=2'], "'time=2': time is given twice"),
+    (['study', '--runs', '3'], '--runs: needs the NAME of a study'),
+    (['tune', 'leo_pass', '--filter', 'imm', '--gain-margin', '7'], '--gain-margin 7: needs --loops'),
+    (['tune', 'leo_pass', '--loops', '--seed', '0'], '--seed: cannot be combined with --loops'),
+    (['replay', 'bags/reference/leo_pass', '--page', '--deadline', '5'],
+     '--page: goes only with --start, --rate and --paused'),
+    (['recompute', 'bags/reference/leo_pass', '--node', 'acu', '--node', 'adu', '--param',
+      'acu.azimuth.filter.kind=cv'], '--node adu: has no effect, because no --param is of it'),
+    (['program', 'leo_pass', '--start', '-10'], "--start = '-10': must be UTC as ISO 8601")])
+def test_an_option_without_effect_is_refused(arguments, message, capsys, one_line):
+    arguments = [str(REPOSITORY / each) if each.startswith('bags/') else each for each in arguments]
+    assert cli.main(arguments) == 1
+    assert message in one_line(capsys.readouterr().err)
+
+
+def test_a_status_asks_nothing_in_a_name(capsys):
+    with pytest.raises(SystemExit):
+        cli.main(['status', '--who', 'me'])
+    assert 'unrecognized arguments: --who me' in capsys.readouterr().err
