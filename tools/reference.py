@@ -114,7 +114,7 @@ def _argument(argument):
 
 def mode_table():
     """Return the table of the modes of the control unit."""
-    return _table(('mode', 'the axes follow', 'entered', 'ends by itself'),
+    return _table(('mode', 'motion of the axes', 'condition for entry', 'automatic exit'),
                   [(f'`{mode.name}`', mode.doc, mode.entry, mode.exit) for mode in modes.MODE_ROWS])
 
 
@@ -125,7 +125,7 @@ def filter_table():
 
 def fault_table():
     """Return the table of the faults on which the drive trips."""
-    return _table(('fault, per axis', 'from', 'parameter'),
+    return _table(('fault, per axis', 'condition', 'parameter'),
                   [(f'`{fault.name}`', fault.doc, ', '.join(f'`{name}`' for name in fault.parameters))
                    for fault in faults.AXIS_FAULTS])
 

@@ -3,8 +3,12 @@
 The estimate lives in earth angles, near the zenith in those of a tilted `estimate_frame`. docs/architecture.md shows
 the order of a step. Each part of the state is written by its own module; this module connects the parts.
 
-s, c, u, o: records of STATE_DTYPE, CONSTANTS_DTYPE, signals.INPUTS_DTYPE and OUTPUTS_DTYPE; all_tables: the Tables;
-gap: the outage.Outage.
+One-letter names in all functions:
+s, c, u, o   records of STATE_DTYPE, CONSTANTS_DTYPE, signals.INPUTS_DTYPE and OUTPUTS_DTYPE
+g, k, m      parts of s: guidance, tracking, mode
+t            s.stamp [s]
+
+all_tables: the Tables; gap: the outage.Outage (a silence between two steps is `silence`).
 """
 import math
 
@@ -47,7 +51,7 @@ p          parameters
 notch      coefficients of the filter
 reaction   time in front of a limit [s]; see AcuParameters.reaction
 braking    deceleration in front of a limit [rad/s2]
-lead       t_m - t_k [s]
+lead       t_m - t_k [s]; t_m: middle of the interval in which the command of t_k is in force
 """
 
 
@@ -255,7 +259,11 @@ def _change(s, c, u, o, all_tables, request, gap):
 
 @compiled
 def _situation(s, c, u, all_tables, request, gap):
-    """Return (modes.Situation at s.stamp, flags of the tables). A table is evaluated only where it matters."""
+    """Return (modes.Situation at s.stamp, flags of the tables).
+
+    A table is evaluated only if its mode can matter in this step. `wanted` holds these modes: the request, the running
+    mode, and the modes to which the running mode may fall back.
+    """
     m, g, k, t = s.mode, s.guidance, s.tracking, s.stamp
     unstable, pins = tracking.unstable(k, c, u, t), stow.obstacle(s.stow, c.p.stow_pins, u.pins)
     closed = m.now == Mode.AUTOTRACK and supervision.axes_follow_commands(s.supervision)
@@ -293,7 +301,7 @@ def _situation(s, c, u, all_tables, request, gap):
 
 @compiled
 def _wait(s, c, u, o):
-    """Wait for the stow pins, and for a drive that ended a mode, to resume the mode."""
+    """Advance the stow pins, and resume a mode that the drive interrupted when the drive is ready again."""
     m = s.mode
     if c.p.stow_pins and stow.step(s.stow, c, u, m.now):
         mode_change.mark_stowed(m)

@@ -56,23 +56,26 @@ def _wrong_level(s, u):
 
 
 @compiled
-def error_at(s, receiver, u, by_level, offset):
+def error_at(s, receiver, u, uses_level, intended_offset):
     """Return (flags of the receiver's message, True if its error is used, the Pointing of the beam at the error).
 
-    The error is a mean of samples that were taken while a beam jumped from step to step. Target and beam therefore
-    each have an instant that the mean belongs to. Linear interpolation between two steps is exact for a ramp, whatever
-    the weights of the samples are. No error is used while the beam is off the target by an intended offset [rad]. s:
-    ENCODERS_DTYPE; by_level: whether the mode uses the level of the signal.
+    The receiver error is a weighted mean of samples, target minus beam. The mean of the target belongs to the instant
+    receiver.age before the stamp of the error. The mean of the beam belongs to the instant receiver.beam_age before
+    it. The ages may differ, because an electronic beam jumps from step to step (docs/graph.md, Age of the error).
+    Linear interpolation between two steps is exact for a ramp, for all weights of the samples.
+
+    No error is used while the beam is intentionally off the target by intended_offset [rad]. s: ENCODERS_DTYPE;
+    uses_level: True if the mode uses the level of the signal.
     """
-    wrong = _wrong_level(s, u) if by_level else 0
+    wrong = _wrong_level(s, u) if uses_level else 0
     if wrong or not u.error_valid:
         return wrong, False, UNKNOWN_POINTING
     if not math.isfinite(u.cross_elevation + u.elevation + u.cn0_dbhz):
         return signals.Flag.ERROR, False, UNKNOWN_POINTING
-    if offset > MAX_OFFSET_BEAMWIDTHS * receiver.beamwidth:
+    if intended_offset > MAX_OFFSET_BEAMWIDTHS * receiver.beamwidth:
         return 0, False, UNKNOWN_POINTING
-    known, at = encoders.at(s, u.error_stamp - receiver.beam_age)
-    return 0 if known else signals.Flag.ERROR_STAMP, known, at
+    known, pointing = encoders.at(s, u.error_stamp - receiver.beam_age)
+    return 0 if known else signals.Flag.ERROR_STAMP, known, pointing
 
 
 @compiled

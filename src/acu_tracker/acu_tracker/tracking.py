@@ -43,7 +43,7 @@ def take_place(k, u):
 def used_error(k, c, u, by_level, offset):
     """Return (flags of the receiver's message, True if its error is used, the Pointing of the beam at the error).
 
-    by_level, offset: as of measurements.error_at.
+    by_level, offset: uses_level and intended_offset of measurements.error_at.
     """
     k.error[0] = k.error[1] = math.nan
     flags, used, at = measurements.error_at(k.encoders, c.p.tracker.receiver, u, by_level, offset)

@@ -27,6 +27,9 @@ _COMPRESSION = re.compile(rb'\x04\x00\x00\x00zstd|\x03\x00\x00\x00lz4')
 _BEFORE_COMPRESSION = 9 + 8 + 8 + 8 + 4
 """Length of a chunk record before the name of its compression [bytes]."""
 
+_UNUSABLE = 0
+"""Value in place of an opcode, for bytes that are no readable record."""
+
 _LENGTH = struct.Struct('<Q')
 _FOOTER = 9 + 20 + len(MAGIC)
 
@@ -128,9 +131,10 @@ def recover(path, output=None) -> Recovered:
     return recovered
 
 
-def _follows(data, at):
+def _record_begins(data, position):
+    """Return True if a record with a possible length begins at a position."""
     try:
-        return bool(frame(data, at))
+        return bool(frame(data, position))
     except ValueError:
         return False
 
@@ -162,30 +166,30 @@ def _next_chunk(file, data, start):
 
 
 def _pieces(file, data):
-    """Yield (opcode, start, stop, record) of the records of the data section, (0, start, stop, reason) of unusable
-    bytes.
+    """Yield (opcode, start, stop, record) of the records of the data section, (_UNUSABLE, start, stop, reason) of
+    unusable bytes.
 
-    After a broken record follows the record behind it. If there is none, the next whole chunk behind the last good
-    record follows.
+    If the length of a broken record leads to another record, continue with that record. Otherwise search the next
+    intact chunk, from the end of the last good record on.
     """
-    at = good = len(MAGIC)
-    while at < len(data):
+    start = last_good_end = len(MAGIC)
+    while start < len(data):
         stop = None
         try:
-            opcode, stop = frame(data, at)
-            record = _read(file, opcode, data, at, stop)
+            opcode, stop = frame(data, start)
+            record = _read(file, opcode, data, start, stop)
         except Exception as error:  # a decoder may raise anything on broken bytes
-            if stop is None or not _follows(data, stop):
-                stop = _next_chunk(file, data, good)
-            if stop > at:
-                yield 0, at, stop, str(error) or type(error).__name__
+            if stop is None or not _record_begins(data, stop):
+                stop = _next_chunk(file, data, last_good_end)
+            if stop > start:
+                yield _UNUSABLE, start, stop, str(error) or type(error).__name__
         else:
-            yield opcode, at, stop, record
+            yield opcode, start, stop, record
             if opcode in _END_OPCODES:
                 return
             if record is not None:
-                good = stop
-        at = stop
+                last_good_end = stop
+        start = stop
 
 
 def _summary(file, data):
@@ -246,7 +250,11 @@ class _Salvage:
                 self._skip(start, stop, str(error))
 
     def _take(self, opcode, record, message):
-        if opcode == 0:
+        """Add an item of _pieces to the bag; message: bytes of a message outside chunks.
+
+        Raises ValueError for unusable bytes.
+        """
+        if opcode == _UNUSABLE:
             raise ValueError(record)
         if opcode == Opcode.MESSAGE:
             self._add_messages(message)
@@ -275,13 +283,17 @@ class _Salvage:
             self._counts.setdefault(self._names[channel], 0)
 
     def _once(self, add, *content):
-        """Return the number of a schema or channel in the bag; the files of a bag repeat the same ones."""
+        """Return the number of a schema or channel in the new bag, and add it at its first occurrence.
+
+        Because each file of a bag repeats the schemas and channels, this avoids a second copy.
+        """
         key = add.__name__, str(content)
         if key not in self._declared or not self._several:
             self._declared[key] = add(*content)
         return self._declared[key]
 
     def _skip(self, start, stop, problem):
+        """Note unusable bytes as a new Gap, or as a part of the Gap that ends at `start`."""
         file = self._file.path.name if self._several else ''
         if self._gaps and self._gaps[-1].stop == start and self._gaps[-1].file == file:
             self._gaps[-1].stop = stop

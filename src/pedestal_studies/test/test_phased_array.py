@@ -125,8 +125,8 @@ def test_jitter_is_that_of_the_steady_filter():
 def test_with_the_ins_only_what_the_attitude_is_late_is_left():
     """A fixed target on a swaying deck: exact stamps leave almost nothing, late ones what the filter cannot follow."""
     sway, rate = phased_array.sway_target()
-    errors = {late: settled(sway - FilterLoop(1e-4, 1e-3, ins=True, late=late).run(sway, None, sway, rate)[0])
-              for late in (0, 5, 20)}
+    loops = {late: FilterLoop(1e-4, 1e-3, use_ins=True, stamp_error=late) for late in (0, 5, 20)}
+    errors = {late: settled(sway - loop.run(sway, None, sway, rate)[0]) for late, loop in loops.items()}
     assert metrics.peak(errors[0]) < 2e-5 * phased_array.SWAY_AMPLITUDE_RAD
     # The attitude error is a sine of rate x late, of which the slow filter takes little away again.
     assert metrics.peak(errors[20]) / metrics.peak(errors[5]) == pytest.approx(4.0, rel=0.1)

@@ -9,8 +9,8 @@ ALARM_PRIORITIES = ('critical', 'high', 'medium', 'low')
 JUDGED_CASES = ('always', 'motors', 'moving', 'following')
 """Cases in which an alarm is judged; otherwise it is suppressed by design.
 
-always: in every step; motors: where the axes have motors; moving: there, in any mode except standby; following: in a
-mode that follows a target.
+always: in every step; motors: if the axes have motors; moving: if the axes have motors and the mode is not standby;
+following: in a mode that follows a target.
 """
 
 
@@ -20,10 +20,10 @@ class Alarm(typing.NamedTuple):
     priority     of ALARM_PRIORITIES
     on_delay     time for which the condition must last before the alarm is raised [s]
     off_delay    time for which the condition must be gone before the alarm clears [s]
-    latched      whether the alarm stays until it is reset
+    latched      True if the alarm stays until it is reset
     cause        names of the alarms that the alarm may be a consequence of
-    meaning      what is wrong
-    action       what the operator should do
+    meaning      condition that is reported
+    action       recommended action of the operator
     judged       of JUDGED_CASES
     """
     name: str
@@ -60,20 +60,21 @@ ALARMS = (
           'the stamps of successive steps are more than `step_gap` apart; the axes restarted from their actual angles',
           'check the clock of the drive and the load of the computers'),
     Alarm('receiver silent', 'medium', 0.95, 1.0, False, ('drive silent', 'time jump'),
-          'the receiver publishes no message, neither locked nor unlocked, or repeats the same numbers',
+          'the receiver publishes no message at all, or repeats the same numbers',
           'check the receiver and its network; choose a mode that needs no receiver', 'following'),
     Alarm('INS lost', 'high', 0.0, 1.0, False, ('drive silent', 'time jump'),
           'no attitude of the ship for `attitude_timeout`; modes that follow a target end',
           'check the INS; stow the antenna if the INS stays silent'),
     Alarm('INS jump', 'medium', 0.0, 1.0, False, ('drive silent', 'time jump', 'INS lost'),
-          'the attitude has jumped by more than 3 mrad against the rates of the deck; the jump is applied at 1 mrad/s',
+          'the attitude differs by more than 3 mrad from the attitude that the deck rates predict; the ACU applies '
+          'the difference at 1 mrad/s',
           'compare with another heading; autotrack follows the receiver, other modes follow the attitude'),
     Alarm('receiver noisy', 'medium', 0.1, 1.0, False, ('receiver silent', 'INS lost', 'INS jump'),
-          'successive errors of the receiver differ by five times their noise; they are not used',
+          'successive receiver errors differ by five times their noise; the ACU does not use them',
           'check for interference, and check the receiver; choose a mode that needs no receiver', 'following'),
     Alarm('drive frozen', 'high', 0.0, 0.0, True, ('drive silent',),
-          'the drive repeats the same angles, rates and torques although a motion of 3 mrad was commanded; '
-          'leads to standby',
+          'a motion of more than 3 mrad was commanded, and the drive repeats the same angles, rates and torques. The '
+          'ACU enters standby',
           'make sure that the antenna is at rest; inspect the encoders, their interface and the drive; then reset'),
     *_of_axes('motor lost', 'medium', 0.0, 1.0, False,
               'one motor of the pair makes no torque; the remaining motor drives the axis with half the torque and '
@@ -89,11 +90,13 @@ ALARMS = (
               'the load encoder stands still while the motors turn by 3 mrad',
               'stop the antenna: its true angle may differ from the display; check encoder and coupling, then reset'),
     *_of_axes('encoder disagreement', 'high', 0.0, 1.0, True,
-              'load encoder and motors have moved by angles that differ by 10 mrad within some seconds',
+              'load encoder and motors have moved by angles that differ by 10 mrad; a difference decays with a time '
+              'constant of 2 s',
               'compare the encoders; inspect gear, couplings and cables; then reset',
               cause=('time jump', '* encoder jump', '* encoder stuck')),
     *_of_axes('brake not released', 'high', 0.5, 1.0, False,
-              'the torque has been 50 times the friction for half a second, whether the axis moves or not',
+              'the mean of the absolute torque has been above 50 times the Coulomb friction (`feedforward.friction`) '
+              'for half a second, with the axis in motion or at rest',
               'go to standby; inspect the brakes; check for an obstacle that blocks the axis', judged='moving'),
     *_of_axes('immobile', 'high', 0.3, 1.0, False,
               'the motors of the axis turn at less than a tenth of the commanded rate',
@@ -103,27 +106,29 @@ ALARMS = (
               'the drive has been off for 2.5 s and the axis still moves',
               'keep clear of the antenna; secure it by hand or by a pin; inspect the brakes'),
     *_of_axes('runaway', 'critical', 0.005, 1.0, True,
-              'the axis moves against its command',
+              'the axis turns opposite to its rate command',
               'keep the antenna stopped; inspect the wiring of motors and encoders; then reset',
               cause=('* brake not gripping', '* encoder stuck', '* motor lost')),
     Alarm('uncommanded motion', 'critical', 0.0, 1.0, True,
           ('drive frozen', *_both('runaway', 'brake not gripping', 'encoder stuck', 'motor lost')),
-          'uncommanded motion: for 14 ms a rate has been outside the envelope of the recent commands by more than '
-          '`unasked_rate`, in standby too; leads to standby and `adu/emergency_stop`',
+          'for 14 ms the rate of an axis has been outside the range of 0 and its recent rate commands, by more than '
+          '`unasked_rate` plus a quarter of this range; also active in standby. The ACU enters standby and calls '
+          '`adu/emergency_stop`',
           'keep the antenna stopped until the cause is known; then reset'),
     *_of_axes('oscillation', 'medium', 0.0, 5.0, False,
-              'the following error oscillates faster than 1 Hz and with more than the amplitude of noise',
+              'the following error oscillates faster than 1 Hz, with half waves of more than 0.1 mrad s (1 mrad at 3 '
+              'Hz)',
               'choose another controller or lower its bandwidth; check backlash, bias torque and the notch filter',
               cause=('* motor lost', '* encoder stuck'), judged='moving'),
     *_of_axes('following error', 'medium', 1.0, 1.0, False,
-              'the axis is more than a quarter of a beamwidth off its reference and at no limit',
+              'the axis is more than a quarter of a beamwidth off its reference, and its command is not limited',
               'check wind, motors and friction; choose a slower motion',
               cause=('drive silent', 'time jump', 'drive frozen', '* motor lost', '* encoder jump', '* encoder stuck',
                      '* encoder disagreement', '* brake not released', '* immobile', '* runaway',
                      '* oscillation'), judged='moving'),
     *_of_axes('at limit', 'low', 1.0, 1.0, False,
               'the reference is beyond the limits of the axis or below the floor; the axis holds at the limit',
-              'choose another target or another azimuth wrap; from behind a limit any mode leads back',
+              'choose another target or another azimuth wrap; beyond a limit, every mode moves the axis back inside',
               judged='moving'),
     Alarm('drive fault', 'high', 0.0, 0.0, False,
           ('emergency stop', *_both('motor lost', 'stow pin', 'encoder jump', 'encoder stuck', 'encoder disagreement',
@@ -134,10 +139,10 @@ ALARMS = (
     Alarm('diverged', 'medium', 0.0, 1.0, True,
           ('INS lost', *_both('encoder jump', 'encoder stuck', 'encoder disagreement', 'immobile',
                               'following error')),
-          'in autotrack the mean of 100 squared innovations over their variance exceeds 7, or 2 at a loss of signal, '
-          'or the error of an axis moves with the beam as with a reversed slope; leads to `program`, or to `standby` '
-          'without a program; autotrack is refused',
-          "check slope, phase and sign of the receiver's errors; then reset"),
+          'in autotrack the mean of the last 100 squared innovations, divided by their variance, exceeds 7 (2 at a '
+          'loss of signal), or the receiver error of an axis moves with the beam as with a reversed slope. The ACU '
+          'enters `program`, or `standby` without a program, and refuses autotrack until a reset',
+          "check slope, phase and sign of the receiver's error signals; then reset"),
     Alarm('signal lost', 'medium', 0.5, 1.0, False,
           ('emergency stop', 'drive silent', 'time jump', 'receiver silent', 'INS lost', 'INS jump', 'receiver noisy',
            'drive frozen',

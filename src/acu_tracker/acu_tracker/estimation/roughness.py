@@ -18,8 +18,8 @@ ROUGHNESS_ERROR_COUNT = 10
 """Number of errors in the mean q."""
 
 MAX_COUNTED_DIFFERENCE = 100.0
-"""Largest contribution of one difference to q [-]. Because one outlier makes two differences,
-this leaves it to the gate."""
+"""Largest contribution of one difference to q [-]. One outlier makes two large differences. This limit
+keeps q below the default gate of 25, so that the gate alone decides on the outlier."""
 
 
 @compiled
@@ -38,6 +38,6 @@ def take(s, innovation, m):
         d = nu - s.nu[i]
         x += 0.25 * d * d / m.axis[i].variance
         s.nu[i] = nu
-    if x == x:
+    if x == x:  # not NaN
         s.q += (min(x, MAX_COUNTED_DIFFERENCE) - s.q) / ROUGHNESS_ERROR_COUNT
     return s.q

@@ -30,7 +30,11 @@ def initialise(s):
 
 @compiled
 def now(s, accepted, t, p):
-    """Return the Outage at t [s]; accepted: stamp of the last accepted measurement [s]; p: SharedParameters."""
+    """Return the Outage at t [s]; accepted: stamp of the last accepted measurement [s]; p: SharedParameters.
+
+    Autotrack coasts after coast_after without a measurement, and ends after coast_time. An explanation stays valid for
+    coast_time after its last stamp.
+    """
     since = t - accepted - p.receiver_latency - p.tracker.receiver.age
     return Outage(since, since > p.tracker.coast_after, t - s.stamp <= p.tracker.coast_time)
 

@@ -20,7 +20,7 @@ def _of_axes(doc, low, high, unit, default=None, suffix=''):
 
 
 _MOTION_ARGUMENTS = (*_of_axes('rate of the angle', -10.0, 10.0, 'rad/s', 0.0, '_rate'),
-                     Argument('moves', 'duration of the motion at these rates', 0.0, 3600.0, 's', default=1.0))
+                     Argument('moves', 'time for which the rates apply', 0.0, 3600.0, 's', default=1.0))
 
 MODE_ARGUMENTS = {
     'preset': (*_of_axes('deck angle; default: unchanged', -20.0, 20.0, 'rad', math.nan), *_MOTION_ARGUMENTS,
@@ -42,7 +42,8 @@ ALARM_COMMANDS = (
         _ALARM_ARGUMENT, Argument('seconds', 'time until the alarm returns', 1.0, MAX_SHELVING_TIME_S, 's'),
         Argument('reason', 'reason for shelving'))),
     CommandDefinition('unshelve', 'end the shelving of an alarm', (_ALARM_ARGUMENT,)),
-    CommandDefinition('reset', 'reset latched alarms and discard a waiting mode; refused while a cause remains'))
+    CommandDefinition('reset', 'reset latched alarms and cancel a mode that waits for entry (initial mode, mode to '
+                      'resume); refused while a cause remains'))
 ALARM_COMMAND_NAMES = tuple(command.name for command in ALARM_COMMANDS)
 
 ACU_COMMANDS = (
@@ -51,10 +52,10 @@ ACU_COMMANDS = (
         Argument(f'line_{i}', f'line {i} of the elements, _ for blanks') for i in (1, 2))),
     CommandDefinition('fallback', 'choose the mode after the loss of the track', (
         Argument('mode', 'mode after the loss of the track', options=tuple(FALLBACK_MODES)),)),
-    CommandDefinition('offset', 'shift the table of `program`, `tle` and `sun`, also while it is followed', (
-        Argument('time', 'delay of the table', -3600.0, 3600.0, 's', default=0.0),
+    CommandDefinition('offset', 'shift the table of `program`, `tle` and `sun`, also while the antenna follows it', (
+        Argument('time', 'delay of the table; positive: follow it later', -3600.0, 3600.0, 's', default=0.0),
         *_of_axes('offset of the angle', -1.0, 1.0, 'rad', 0.0))),
-    CommandDefinition('take', 'take control: commands of others are refused, except `standby` and `stop`', (
+    CommandDefinition('take', 'take control: commands of other clients are refused, except `standby` and `stop`', (
         Argument('role', 'role of the client; a supervisor takes control from any holder', options=CONTROL_ROLES,
                  default='operator'),)),
     CommandDefinition('release', 'release control'),

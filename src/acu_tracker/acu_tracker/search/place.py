@@ -40,8 +40,8 @@ def motion_at(s, t):
     W, left = math.sqrt(dot(du, du)), math.exp((s.stamp - t) / RATE_FADE_TIME_S)
     angle = W * RATE_FADE_TIME_S * (1.0 - left)
     ahead = turned(u, du, W, angle)
-    # d/d angle (u cos + du/W sin) = (du cos - u W sin) / W, and the angle grows by W left; the second derivative is
-    # that of a circle and of the rate that fades.
+    # d/d angle (u cos + du/W sin) = (du cos - u W sin) / W, and the angle grows by W left. The second derivative is
+    # the sum of the circle, -(W left)^2 ahead, and of the fading rate, -rate / RATE_FADE_TIME_S.
     rate = times(left, turned(du, times(-W * W, u), W, angle))
     bend, fading = times(-(W * left)**2, ahead), times(-1.0 / RATE_FADE_TIME_S, rate)
     return earth_angles(LineOfSight(ahead, rate, Vector(bend.x + fading.x, bend.y + fading.y, bend.z + fading.z)))

@@ -3,7 +3,8 @@
     u = k_v v(t_m) + k_a a(t_m) + K_p e + I,    tau = J a(t_m) + Tc tanh(v(t_m) / v_s)
     e at t_k, t_m = middle of the command
 
-k_v + k_a s are the first terms of 1 / W(s), W the rate loop of the drive less the delay that t_m covers:
+k_v + k_a s are the first terms of 1 / W(s). W is the rate loop of the drive without the delay, which t_m already
+contains:
 
     W = (b0 + b1 s + ...) / (a1 + a2 s + ...)    k_v = a1 / b0,    k_a = a2 / b0 - a1 b1 / b0^2
     W of second order                            k_v = 1,          k_a = 2 zeta / w_s
@@ -17,22 +18,22 @@ from pedestal_common.compiled import compiled
 
 @compiled
 def fed(v, a, k_v, k_a):
-    """Return the rate [rad/s] fed forward of a reference rate v [rad/s] and acceleration a
-    [rad/s2]; k_v [-], k_a [s]."""
+    """Return the feed-forward rate [rad/s] for a reference with rate v [rad/s] and acceleration a [rad/s2]; k_v [-],
+    k_a [s]."""
     return k_v * v + k_a * a
 
 
 @compiled
 def rate(e, integral, fed_forward, K_p):
-    """Return the rate command [rad/s] of an error e [rad],
-    its integral and the rate fed forward [rad/s]; K_p [1/s]."""
+    """Return the rate command [rad/s] of an error e [rad], its integral and the feed-forward rate [rad/s]; K_p
+    [1/s]."""
     return fed_forward + K_p * e + integral
 
 
 @compiled
 def torque(v, a, c):
-    """Return the load torque [Nm] = J a + Tc tanh(v / v_s) of a reference of rate v [rad/s] and
-    acceleration a [rad/s2].
+    """Return the load torque [Nm] = J a + Tc tanh(v / v_s) for a reference with rate v [rad/s] and acceleration a
+    [rad/s2].
 
     c: record of FeedforwardParameters.
     """

@@ -39,23 +39,25 @@ class Memory(typing.NamedTuple):
 
 
 @compiled
-def condition(m):
+def condition(switches):
     """Return the code of adu/state from a record SWITCHES_DTYPE."""
-    return STATE_CODE_EMERGENCY_STOP if m.emergency else STATE_CODE_ENABLED if m.wanted else STATE_CODE_DISABLED
+    if switches.emergency:
+        return STATE_CODE_EMERGENCY_STOP
+    return STATE_CODE_ENABLED if switches.wanted else STATE_CODE_DISABLED
 
 
 @compiled
-def decode(u, m, command):
+def decode(u, switches, command):
     """Write the record of a command into the inputs of the beam, at the stamp of the last step."""
-    u.stamp_ns = m.stamp
-    u.due = 1 if command.stamp != NO_STAMP and condition(m) == STATE_CODE_ENABLED else 0
+    u.stamp_ns = switches.stamp
+    u.due = 1 if command.stamp != NO_STAMP and condition(switches) == STATE_CODE_ENABLED else 0
     if u.due == 1:
         u.command_stamp_ns = command.stamp
         u.position[0], u.position[1] = command.position[0], command.position[1]
 
 
 @compiled
-def encode(y, m, stamp, outputs):
+def encode(y, switches, stamp, outputs):
     """Write the outputs of the beam into the records of its messages.
 
     A beam has no rate and no torque, and its reported angles are the true ones.
@@ -64,7 +66,7 @@ def encode(y, m, stamp, outputs):
     joints.stamp = truth.stamp = outputs[CLOCK_TOPIC].stamp = stamp
     for i in range(2):
         joints.position[i] = truth.position[i] = y.position[i]
-    outputs[DRIVE_STATE_TOPIC] = condition(m)
+    outputs[DRIVE_STATE_TOPIC] = condition(switches)
 
 
 @compiled
@@ -73,15 +75,15 @@ def law(memory, stamp, inputs, outputs):
 
     A beam that is not enabled ignores commands, and discards commands that are still delayed.
     """
-    m = memory.record[0]
-    if m.switches.stamp != NO_STAMP:
-        decode(m.inputs, m.switches, inputs[REFERENCE_TOPIC])
-        if condition(m.switches) != STATE_CODE_ENABLED:
-            m.state.released = m.state.written
-        electronic_beam.step(m.state, m.constants, m.inputs, m.outputs)
-        m.switches.invalid |= m.outputs.invalid_command
-    m.switches.stamp = stamp
-    encode(m.outputs, m.switches, stamp, outputs)
+    record = memory.record[0]
+    if record.switches.stamp != NO_STAMP:
+        decode(record.inputs, record.switches, inputs[REFERENCE_TOPIC])
+        if condition(record.switches) != STATE_CODE_ENABLED:
+            record.state.released = record.state.written
+        electronic_beam.step(record.state, record.constants, record.inputs, record.outputs)
+        record.switches.invalid |= record.outputs.invalid_command
+    record.switches.stamp = stamp
+    encode(record.outputs, record.switches, stamp, outputs)
 
 
 @compiled

@@ -15,21 +15,25 @@ class Fault(typing.NamedTuple):
 
 
 AXIS_FAULTS = (
-    Fault('overcurrent', 'phase current of a motor too high; torque off at once, brakes on', ('faults.overcurrent',)),
-    Fault('overspeed', 'motor speed divided by the gear ratio too high', ('faults.overspeed',)),
-    Fault('encoder disagreement', 'load encoder differs from the mean of the motor encoders',
+    Fault('overcurrent',
+          'a phase current of a motor is above the limit; torque off at once, brakes on', ('faults.overcurrent',)),
+    Fault('overspeed', 'the motor speed, divided by the gear ratio, is above the limit', ('faults.overspeed',)),
+    Fault('encoder disagreement',
+          'the load encoder differs from the mean of the motor encoders by more than the limit',
           ('faults.encoder_disagreement',)),
-    Fault('following error', 'measured rate differs from commanded rate for longer than `faults.following_time`',
+    Fault('following error',
+          'the measured rate differs from the commanded rate by more than `faults.following_error` for longer than '
+          '`faults.following_time`',
           ('faults.following_error', 'faults.following_time')),
-    Fault('overtemperature', 'thermal load (I2t) of a motor too high; 1 is the steady state at rated torque; can be '
-          'reset below 0.8',
+    Fault('overtemperature', 'the thermal load (I2t) of a motor is above the limit (1: steady state at rated '
+          'torque); reset possible below 0.8',
           ('faults.overtemperature', 'thermal')),
-    *(Fault(f'motor {i} lost', 'its amplifier reports no torque; the other motor continues alone, without bias; '
-            'with both lost: torque off, brakes on', (), stops=False) for i in (1, 2)),
-    Fault('final limit', 'switch beyond the end of travel, independent of the encoders, while the axis moves '
-          'outwards; torque off at once, brakes on; after a reset the drive returns the axis', ('limits.final',)),
-    Fault('emergency limit', 'switch beyond the final switch; torque off at once, brakes on; cannot be reset there: '
-          'the axis must be moved back by hand', ('limits.emergency',)),
+    *(Fault(f'motor {i} lost', 'its amplifier reports that it is off; the other motor continues alone, without bias '
+            'torque. If both motors are lost: torque off, brakes on', (), stops=False) for i in (1, 2)),
+    Fault('final limit', 'the axis moves outwards on the switch beyond the end of travel, which is independent of the '
+          'encoders; torque off at once, brakes on; after a reset the drive moves the axis back', ('limits.final',)),
+    Fault('emergency limit', 'the axis is on the switch beyond the final switch; torque off at once, brakes on. A '
+          'reset is not possible there; the axis must be moved back by hand', ('limits.emergency',)),
     Fault('stow pin', 'a stow pin did not reach its position within `pins.timeout`', ('pins.timeout',)),
 )
 """Faults of an axis; bit i of a fault word is AXIS_FAULTS[i]."""

@@ -15,7 +15,7 @@ def add_scenario(parser: argparse.ArgumentParser) -> None:
 
 def add_duration(parser: argparse.ArgumentParser, whole: str = 'a run') -> None:
     """Add --duration S. whole: noun for the help, with its article."""
-    parser.add_argument('--duration', type=float, metavar='S', help=f'length of {whole} in the time of the drive [s]; '
+    parser.add_argument('--duration', type=float, metavar='S', help=f'length of {whole} in simulated time [s]; '
                         'default: value of the scenario')
 
 
@@ -33,7 +33,8 @@ def add_beam(parser: argparse.ArgumentParser) -> None:
 
 def add_vector(parser: argparse.ArgumentParser) -> None:
     """Add --vector FORMAT for a verb that draws figures."""
-    parser.add_argument('--vector', choices=('pdf', 'svg'), help='second format of each figure, for print')
+    parser.add_argument('--vector', choices=('pdf', 'svg'), help='additional vector format in which each figure is '
+                        'written, for print')
 
 
 def add_new_bag(parser: argparse.ArgumentParser) -> None:
@@ -99,4 +100,4 @@ def add_params_file(parser: argparse.ArgumentParser) -> None:
     """Add --params-file FILE."""
     parser.add_argument('--params-file', type=pathlib.Path, metavar='FILE',
                         help='ROS 2 parameter file whose values replace the values of the scenario, for example an '
-                        'output of `pedestal tune`')
+                        'output of `pedestal tune`; --param replaces both')

@@ -134,7 +134,7 @@ COMPARISON_RESULTS = (
     Result('single_sample_noise_deg', 'deg', 'truth', lambda acu: acu.noise * DEG_PER_RAD,
            'Rms of the difference between receiver error and true pointing error, both axes together.'),
     Result('noise_reduction', '-', 'truth', lambda acu: acu.noise / known_rms(acu.error),
-           'Ratio of the receiver noise to the error of the estimate.'),
+           'Noise of one receiver sample, divided by the error of the estimate.'),
     Result('estimate_lag_s', 's', 'truth', lambda acu: acu.motion[0],
            'Lag of the estimate behind the true direction.'),
     Result('estimate_rate_error_rms_deg_s', 'deg/s', 'truth', lambda acu: acu.motion[1] * DEG_PER_RAD,
@@ -145,7 +145,7 @@ COMPARISON_RESULTS = (
            f'Rms of the rate command minus its moving mean over {RIPPLE_WINDOW_S:g} s.'),
     Result('evaluated_time_s', 's', 'acu',
            lambda acu: acu.common.size * float(np.median(np.diff(acu.estimate['t']))),
-           'Total time with all versions in settled autotrack.'),
+           'Total time with the old and the new ACU in settled autotrack.'),
 )
 
 

@@ -6,8 +6,8 @@ encoders    tracking.Tracking with the true direction of the dish beside the enc
 filter      consistency.Consistency                     isolation   isolation.Isolation
 attitude    known_attitude.KnownAttitude                keyholes    tracking.keyholes
 run         start.Outcome                               supervised  start.Outcome in realtime
-An error counts per axis and sample: "both axes together" pools the samples of both axes; it is not the angle off the
-beam.
+Errors are taken per axis and sample. "Both axes together" pools the samples of both axes; the result is not the angle
+between beam and target.
 """
 import math
 import typing
@@ -25,7 +25,7 @@ class Result(typing.NamedTuple):
     sentence       definition
     label          name in the report, '' if the report does not show the result
     target         text or None
-    mark           mark(part) -> note on a value that is off, else ''
+    mark           mark(part) -> note on a value that is not as expected, else ''
     """
     name: str
     unit: str
@@ -77,12 +77,12 @@ RESULTS = (
            'Ratio of pointing_rms_deg to single_sample_noise_deg.', target='<= 0.4'),
     Result('noise_reduction_cross_elevation', '-', 'tracking',
            lambda run: known_rms(run.noise[:, 0]) / known_rms(run.filter_error[:, 0]),
-           'Ratio of the receiver noise to the error of the filtered line of sight, in cross-elevation.'),
+           'Noise of one receiver sample, divided by the error of the filtered line of sight, in cross-elevation.'),
     Result('noise_reduction_elevation', '-', 'tracking',
            lambda run: known_rms(run.noise[:, 1]) / known_rms(run.filter_error[:, 1]),
-           'Ratio of the receiver noise to the error of the filtered line of sight, in elevation.'),
+           'Noise of one receiver sample, divided by the error of the filtered line of sight, in elevation.'),
     Result('noise_reduction', '-', 'tracking', lambda run: known_rms(run.noise) / known_rms(run.filter_error),
-           'Ratio of the receiver noise to the error of the filtered line of sight, both axes together.'),
+           'Noise of one receiver sample, divided by the error of the filtered line of sight, both axes together.'),
     Result('lock_time_s', 's', 'tracking', lambda run: run.lock_time,
            'Time of the first lock of the receiver.', 'first lock'),
     Result('autotrack_time_s', 's', 'tracking', lambda run: float(np.sum(run.mode == 'autotrack') * run.period),
@@ -90,35 +90,41 @@ RESULTS = (
     Result('tracked_percent', '%', 'tracking', lambda run: 100.0 * float(np.mean(run.mode == 'autotrack')),
            'Share of the run in autotrack.'),
     Result('loss_s', 's', 'tracking', lambda run: run.loss,
-           'Total time, in any mode, with the target further than half a beamwidth off the beam. It counts from the '
-           'first evaluated step on.', 'time with the target further than half a beamwidth off'),
+           'Total time, in any mode, with the target further than half a beamwidth off the beam, counted from '
+           'the first step in settled autotrack.', 'time with the target further than half a beamwidth off'),
     Result('evaluated_time_s', 's', 'tracking', lambda run: float(np.sum(run.tracking) * run.period),
            f'Total time in settled autotrack: from {tracking.HANDOVER_SETTLING_S:g} s after the first hand-over to '
            'autotrack.', 'evaluated time'),
     Result('azimuth_nis_mean', '-', 'filter', lambda known: known.axes[0].nis,
-           "Mean squared innovation of azimuth over the filter's variance. Expected: 1 for each measured number.",
+           "Mean squared innovation of azimuth, divided by the filter's variance, summed over the measured numbers. "
+           'Expected: 1 (angle only) or 2 (angle and rate).',
            mark=lambda known: known.axes[0].nis_mark),
     Result('azimuth_nees_mean', '-', 'filter', lambda known: known.axes[0].nees,
-           "Mean squared error of azimuth and azimuth rate over the filter's covariance. Expected: 2 if correct.",
+           "Mean squared error of azimuth and azimuth rate, weighted with the inverse of the filter's covariance. "
+           'Expected: 2, for two states.',
            mark=lambda known: known.axes[0].nees_mark),
     Result('elevation_nis_mean', '-', 'filter', lambda known: known.axes[1].nis,
-           "Mean squared innovation of elevation over the filter's variance. Expected: 1 for each measured number.",
+           "Mean squared innovation of elevation, divided by the filter's variance, summed over the measured numbers. "
+           'Expected: 1 (angle only) or 2 (angle and rate).',
            mark=lambda known: known.axes[1].nis_mark),
     Result('elevation_nees_mean', '-', 'filter', lambda known: known.axes[1].nees,
-           "Mean squared error of elevation and elevation rate over the filter's covariance. Expected: 2 if correct.",
+           "Mean squared error of elevation and elevation rate, weighted with the inverse of the filter's "
+           'covariance. Expected: 2, for two states.',
            mark=lambda known: known.axes[1].nees_mark),
     Result('keyhole_loss_predicted_s', 's', 'keyholes', lambda slews: sum(loss for _, _, loss in slews),
-           'Total time without the target in keyholes, as the ACU predicted it.'),
+           'Total time with the target off the beam in keyholes, as the ACU predicted it.'),
     Result('ship_line_of_sight_rms_deg', 'deg', 'isolation', lambda ship: ship.motion * DEG_PER_RAD,
            'Rms motion of the line of sight on the deck caused by the rotation of the ship, per axis.',
            'motion of the line of sight by the rotation of the ship, rms per axis'),
     Result('ship_coherent_error_rms_deg', 'deg', 'isolation', lambda ship: ship.coherent * DEG_PER_RAD,
-           'Rms of the part of the pointing error that a linear law of the rotation of the ship explains, per axis.',
+           'Rms of the part of the pointing error that is linearly correlated with the rotation of the ship, per '
+           'axis.',
            'pointing error correlated with the rotation of the ship, rms per axis'),
     Result('isolation_db', 'dB', 'isolation', lambda ship: ship.isolation,
            'Ratio of ship_line_of_sight_rms_deg to ship_coherent_error_rms_deg.', 'isolation', '>= 60'),
     Result('isolation_limit_db', 'dB', 'isolation', lambda ship: ship.limit,
-           'Highest isolation that a run of this length and noise can show.', 'isolation that noise alone would show'),
+           'Isolation that a perfect antenna would show in a run of this length and noise.',
+           'isolation that noise alone would show'),
     Result('aligned_s', 's', 'attitude', lambda ins: ins.aligned,
            'Time at which the INS reported `aligned`.', 'INS aligned at'),
     Result('heading_at_alignment_deg', 'deg', 'attitude', lambda ins: ins.at_alignment[0] * DEG_PER_RAD,
@@ -132,7 +138,8 @@ RESULTS = (
            'Rms of the level error of the INS after alignment, per axis.',
            'level error after alignment, rms per axis'),
     Result('lost_steps', 'steps', 'run', lambda run: float(run.drive.get('lost_steps', math.nan)),
-           'Number of steps that the drive made without a command from the ACU for the step.', target='0'),
+           'Number of steps of the drive that were missed, or made without the command of the previous step.',
+           target='0'),
     Result('realtime_factor', 's/s', 'run', lambda run: run.drive.get('realtime_factor', math.nan),
            'Ratio of the time of the drive to wall time.', target='>= 4 in lockstep'),
     Result('messages', 'messages', 'run', lambda run: float(run.recorder['messages']), 'Number of recorded messages.'),

@@ -25,8 +25,10 @@ def new_bag(given, scenario):
 
 
 def read_files(plan):
-    """Read the files of target and ship of a program.Plan before any node is started. Raises ValueError, OSError for
-    an invalid file."""
+    """Read the files of ship and target of a program.Plan before any node is started, and return the program tracks.
+
+    The property plan.tracks reads the file of the target. Raises ValueError, OSError for an invalid file.
+    """
     scenario = plan.scenario
     if 'ship_motion' in scenario.nodes:
         motion.constants(scenario.node_parameters('ship_motion').ship)
@@ -41,6 +43,6 @@ def run(plan, bag, progress):
     """
     tracks = read_files(plan)
     with Graph(plan.scenario, bag) as graph, progress as advance:
-        # Imported late, because it imports rclpy, after which no node can be a copy of this process (child).
+        # This import loads rclpy. It must wait until the nodes have been forked from this process (child).
         from pedestal_bringup.graph import watch
         return watch.run(graph, tracks, advance)

@@ -84,7 +84,8 @@ NODES = (
          reads=('ship/imu/data_raw',),
          writes=('ship/imu/data', 'ins/state', 'ins/error'),
          obeys='ins/inject', replies='ins/injected',
-         doc='attitude with parametrised error and latency, or from its IMU with alignment and navigation',
+         doc='attitude and deck rate: the true attitude with a parametrised error, or strapdown alignment and '
+         'navigation with the data of the IMU',
          stands_for='INS', optional=True),
     Node('tracking_receiver', 'tracking_receiver_sim.tracking_receiver_node',
          'tracking_receiver_sim.params:TrackingReceiverNodeParameters', 'tracking_receiver_sim.unit:TrackingReceiver',
@@ -101,17 +102,19 @@ NODES = (
                  'acu/blockage', 'acu/alarms', 'acu/stow_pins'),
          answer='acu/rate_command',
          obeys='acu/command', replies='acu/command_result',
-         doc='antenna control unit: filter, modes, position loop', stands_for='the product itself', of_beam=True),
+         doc='antenna control unit: filter, modes, position loop',
+         stands_for='nothing: this node is the real control unit', of_beam=True),
     Node(DRIVE_NODE, 'adu_drive.adu_node', 'adu_drive.params:AduNodeParameters', 'adu_drive.unit:Adu',
          reads=('clock', 'acu/rate_command', 'ship/truth', 'acu/stow_pins'),
          writes=('joint_states', 'adu/truth', 'clock', 'adu/motor_states', 'adu/state', 'adu/stow_pins'),
          answer='joint_states', obeys='adu/inject', replies='adu/injected',
-         doc='antenna drive unit: two axes, two motors each, and the plant; owns the time',
+         doc='antenna drive unit: two axes, two motors each, with the simulated mechanics; its clock sets the steps '
+         'of all nodes',
          stands_for='servo drive and pedestal'),
     Node('recorder', 'pedestal_recording.recorder_node', 'pedestal_recording.recorder_params:RecorderParameters',
          doc='writes the messages of every topic, as received, into a rosbag2 directory'),
     Node('operator', reads=('diagnostics',), writes=('acu/program_track',),
-         doc='sends the program track, receives diagnostics: inside `pedestal run`, or `pedestal program`',
+         doc='sends the program track, receives diagnostics; runs inside `pedestal run`, or as `pedestal program`',
          stands_for='the operator'),
 )
 """Rows of the nodes, in the order in which a graph is started. Nodes with a unit also publish `diagnostics`."""
@@ -121,7 +124,7 @@ ARRAY_DRIVE = Node(DRIVE_NODE, 'adu_drive.beam_steering_node', 'adu_drive.params
                    reads=('clock', 'acu/reference'),
                    writes=('joint_states', 'adu/truth', 'clock', 'adu/state'),
                    answer='joint_states',
-                   doc='electronically steered array in the place of the drive (`beam: true`): no motors',
+                   doc='electronically steered array in place of the drive (`beam: true`), without motors',
                    stands_for='beam steering computer and array')
 """Drive of an array: it follows angles instead of rates, and the motion of the ship exerts no torque on it."""
 

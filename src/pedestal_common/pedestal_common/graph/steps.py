@@ -1,4 +1,13 @@
-"""Step matching: the messages that belong to step t_k. No ROS here: a recorded run is matched as in its nodes."""
+"""Step matching: the messages that belong to step t_k. No ROS here: a recorded run is matched as in its nodes.
+
+Each message of the trigger begins a step. A follower with a latency L contributes its message of the newest trigger
+stamp <= t_k - L. Example with the period T and L = 2 T:
+
+    trigger           t_0    t_1    t_2    t_3    t_4
+    due message       none   none   t_0    t_1    t_2
+
+The publisher of the trigger may therefore be up to two steps ahead of this follower.
+"""
 import collections
 import typing
 from collections.abc import Callable, Collection, Iterable, Mapping
@@ -28,12 +37,18 @@ class Steps:
                start
     answer     answer(stamp_ns, trigger_message, {topic: message or None}), called once per step, in order
     prompt     True if a realtime step is answered at once
-    held       followers for which a realtime step does not wait
+    held       followers for which a realtime step does not wait, because their last message stays valid
 
-    In lockstep a step waits for exactly the messages due. Triggers that arrive meanwhile are queued, because their
-    publisher may run ahead by as much as other latencies reach back. In realtime the step t_k is answered at the
-    latest when the trigger of the next step arrives, with the newest messages, and None for a follower without a new
-    message.
+    In lockstep a step waits for exactly the messages due. Triggers that arrive before the answer are queued. In
+    realtime the step t_k is answered at the latest when the trigger of the next step arrives, with the newest
+    messages, and None for a follower without a new message.
+
+    _ahead     triggers (stamp, message) whose step has not begun
+    _pending   trigger of the step that waits for its inputs, or None
+    _awaited   {follower: trigger stamps for which its message has not become due}
+    _due       {follower: stamp of its message due in the pending step, or None}
+    _arrived   {follower: messages (stamp, message) that no step has used}
+    _last      {topic: stamp of its newest message}
     """
 
     def __init__(self, trigger: str, followers: Mapping[str, int], lockstep: bool,
@@ -41,7 +56,7 @@ class Steps:
                  held: Collection[str] = frozenset()) -> None:
         self.trigger, self._lockstep, self._answer = trigger, lockstep, answer
         self._prompt = prompt and not lockstep
-        self._passed_over: Collection[str] = frozenset() if lockstep else held
+        self._held: Collection[str] = frozenset() if lockstep else held
         self._latency = dict(followers)
         self._awaited: dict[str, collections.deque[int]] = {topic: collections.deque() for topic in followers}
         self._due: dict[str, int | None] = dict.fromkeys(followers)
@@ -80,6 +95,7 @@ class Steps:
             self._close()
 
     def _begin(self, stamp: int, message: typing.Any) -> None:
+        """Make a trigger the pending step, and determine the message due of each follower."""
         self._pending = (stamp, message)
         for name, awaited in self._awaited.items():
             awaited.append(stamp)
@@ -100,14 +116,19 @@ class Steps:
             self._pending = None
 
     def _refuse(self, reason: str) -> None:
+        """Raise GraphError in lockstep; count the refused message in realtime."""
         if self._lockstep:
             raise GraphError(reason)
         self.refused += 1
         self.refusal = reason
 
     def _ready(self, topic: str) -> bool:
+        """Return True if the pending step does not wait for a follower. Drop its older messages, except the last one.
+
+        Raises GraphError in lockstep if the next message is not the message due.
+        """
         due, arrived = self._due[topic], self._arrived[topic]
-        if due is None or topic in self._passed_over:
+        if due is None or topic in self._held:
             return True
         while arrived and arrived[0][0] < due and len(arrived) > 1:
             arrived.popleft()
@@ -125,6 +146,7 @@ class Steps:
             self._close()
 
     def _close(self) -> None:
+        """Answer the pending step: in lockstep with the messages due, in realtime with the newest up to its stamp."""
         assert self._pending is not None
         stamp, message = self._pending
         self._pending = None

@@ -105,16 +105,16 @@ TOPICS = (
           '`azimuth`, `elevation`: encoder angle [rad], rate [rad/s], torque on the load [Nm]', frame='base_link',
           inputs={'position': 'position', 'velocity': 'velocity', 'effort': 'torque'}),
     Topic('adu/truth', 'sensor_msgs/msg/JointState', 'step',
-          '`azimuth`, `elevation`: true deck angle [rad] and rate [rad/s] of the dish, or of the beam of an array; '
-          'for simulated equipment, the ACU does not subscribe to it', frame='base_link',
+          '`azimuth`, `elevation`: true deck angle [rad] and rate [rad/s] of the dish, or of the beam of an array. '
+          'Only simulated equipment uses it; the ACU does not subscribe to it', frame='base_link',
           only=('position', 'velocity')),
     Topic('adu/motor_states', 'sensor_msgs/msg/JointState', 'step',
           '`azimuth_motor_1` ... `elevation_motor_2`: shaft angle [rad], rate [rad/s], torque [Nm]', names=MOTOR_NAMES,
           frame='base_link'),
     Topic('adu/state', 'std_msgs/msg/String', 'change',
-          '`enabled` while the drive follows commands, `enabled: azimuth motor lost` with one motor of a pair; '
-          'otherwise the reason: `stopping`, `engaging brakes`, `disabled`, `releasing brakes`, `emergency stop`, '
-          '`fault: azimuth overspeed, ...`',
+          'the drive follows commands: `enabled`, or `enabled: azimuth motor lost` with one motor of a pair. The '
+          'drive does not follow commands: `stopping`, `engaging brakes`, `disabled`, `releasing brakes`, `emergency '
+          'stop`, or `fault: azimuth overspeed, ...`',
           texts=(*ENABLED_STATES, 'stopping', 'engaging brakes', 'disabled', 'releasing brakes', 'emergency stop'),
           inputs={'code': 'drive'}),
     Topic('adu/stow_pins', 'std_msgs/msg/String', 'change',
@@ -132,13 +132,14 @@ TOPICS = (
           frame='base_link', latency='attitude_latency',
           inputs={'stamp': 'attitude_stamp', 'orientation': 'quaternion', 'angular_velocity': 'deck_rate'}),
     Topic('ins/state', 'std_msgs/msg/String', 'change',
-          '`aligned` once the 1-sigma of the heading is below `alignment.aligned_sigma`; before that, and after 0.1 s '
-          'without its IMU, `aligning`; method `model` never publishes it, which counts as aligned',
+          '`aligned` from the time on at which the 1-sigma of the heading is at most `alignment.aligned_sigma`, else '
+          '`aligning`. After 0.1 s without its IMU the INS starts again with `aligning`. With method `model` the INS '
+          'never publishes this topic; the ACU then takes the INS as aligned',
           texts=('aligning', 'aligned')),
     Topic('ins/error', 'sensor_msgs/msg/JointState', 'step',
-          '`roll`, `pitch`, `heading`: 1-sigma of the changing part of the error of `ship/imu/data`, with its stamp; '
-          'position: noise of each sample [rad]; velocity: random walk [rad/sqrt(s)]; all six must be finite, and are '
-          'valid until the next message',
+          '`roll`, `pitch`, `heading`: 1-sigma of the error of `ship/imu/data` with the same stamp, without a '
+          'constant part; position: white noise of each sample [rad]; velocity: random walk [rad/sqrt(s)]. All six '
+          'must be finite. They are valid until the next message',
           names=('roll', 'pitch', 'heading'), frame='base_link',
           units={f'{angle}.velocity': 'rad/sqrt(s)' for angle in ('roll', 'pitch', 'heading')},
           measured='error_told', flag='ins_error', holds=True, only=('position', 'velocity'),
@@ -151,8 +152,8 @@ TOPICS = (
           inputs={'came': 'error_came', 'stamp': 'error_stamp',
                   'vector': ('cross_elevation', 'elevation', 'cn0_dbhz')}),
     Topic('tracking_receiver/angle_rate', 'geometry_msgs/msg/Vector3Stamped', 'step',
-          'x cross-elevation, y elevation: rate of the error [rad/s], NaN while unlocked; z their 1-sigma [rad/s], '
-          'tachometer and receiver together; delayed by `latency`', frame='beam',
+          'x cross-elevation, y elevation: rate of the error [rad/s], NaN while unlocked; z: 1-sigma [rad/s] of the '
+          'sum of this rate and the tachometer rate of the antenna; delayed by `latency`', frame='beam',
           units={'x': 'rad/s', 'y': 'rad/s', 'z': 'rad/s'}, measured='receiver.rate.measured',
           flag='receiver_rate', latency='receiver_latency',
           inputs={'vector': ('error_rate', 'error_rate', 'error_rate_sigma')}),
@@ -171,7 +172,8 @@ TOPICS = (
     Topic('acu/reference', 'trajectory_msgs/msg/JointTrajectory', 'step',
           'one point: reference of the position loop, deck angles at t_k', frame='base_link'),
     Topic('acu/filter', 'sensor_msgs/msg/JointState', 'step',
-          'named numbers of each axis, all in `position`, NaN for a number without a value in this step: '
+          'numbers of the filter of each axis, all in `position`: innovation, NIS, 1-sigma, correlation of angle and '
+          'rate, and the probability of each motion model; NaN for a number without a value in this step: '
           + ', '.join(f'`azimuth_{name}`' + (f' [{unit}]' if unit else '') for name, unit in FILTER_UNITS.items()),
           names=tuple(f'{axis}_{name}' for axis in AXES for name in FILTER_UNITS), frame='earth', only=('position',),
           units={f'{axis}_{name}.position': unit for axis in AXES for name, unit in FILTER_UNITS.items()}),
@@ -180,27 +182,28 @@ TOPICS = (
           'commanded position of the stow pins: `out` or `in`; no message before the first mode `stow` or `unstow`',
           texts=('out', 'in'), measured='stow_pins', flag='stow_pins'),
     Topic('acu/keyhole', 'std_msgs/msg/String', 'change',
-          'predicted passage through the zenith of the deck: time, direction of the azimuth, expected loss; the '
-          'numbers are in the diagnostics (`keyhole_begins_s`, `keyhole_ends_s`, `keyhole_loss_s`, '
-          '`keyhole_worst_deg`, `keyhole_needed_deg_s`, `deck_motion_deg`)'),
+          'predicted passage through the zenith of the deck: time, direction of the azimuth, expected time with the '
+          'target off the beam. The numbers are in the diagnostics (`keyhole_begins_s`, `keyhole_ends_s`, '
+          '`keyhole_loss_s`, `keyhole_worst_deg`, `keyhole_needed_deg_s`, `deck_motion_deg`)'),
     Topic('acu/blockage', 'std_msgs/msg/String', 'change',
           'predicted beginning and end of the blockage of the target by the superstructure'),
     Topic('acu/alarms', 'diagnostic_msgs/msg/DiagnosticArray', 'change',
-          'the alarms that are not normal, a status each, annunciated alarms first; `values` hold state, priority, '
-          'time of raising, first-out, the alarm that explains it, advice, and end and reason of shelving'),
+          'one status for each alarm in a state other than normal, annunciated alarms first; the section Alarms gives '
+          'the meaning of `values`'),
     Topic('acu/program_track', 'trajectory_msgs/msg/JointTrajectory', 'once',
-          'two or more points: time-tagged azimuth and elevation (earth); one point: a preset (deck)', frame='earth'),
+          'two or more points: program track, time-tagged azimuth and elevation (earth); one point: preset angles '
+          '(deck)', frame='earth'),
     Topic('acu/command', 'diagnostic_msgs/msg/DiagnosticStatus', 'command',
           'name = command, hardware_id = client, message = number of the request, values = arguments; see commands'),
     Topic('acu/command_result', 'diagnostic_msgs/msg/DiagnosticStatus', 'reply',
-          'every command that was accepted or refused, by topic, service or schedule, with `granted` and `reply`; it '
-          'takes effect in the next step that is answered'),
+          'every command that was accepted or refused, by topic, service or schedule, with `granted` and `reply`; an '
+          'accepted command takes effect in the next step that the ACU answers'),
     *(topic for node in ('ship_motion', 'ins', 'tracking_receiver', 'adu') for topic in (
         Topic(f'{node}/inject', 'diagnostic_msgs/msg/DiagnosticStatus', 'command',
               'command to inject a fault: name = fault, values = its arguments; see the faults that can be injected'),
         Topic(f'{node}/injected', 'diagnostic_msgs/msg/DiagnosticStatus', 'reply',
               'every injection that was accepted or refused, as on `acu/command_result`'
-              + ('; also the commands by service' if node == 'adu' else '')))),
+              + ('; also the replies to its services (enable, disable ...)' if node == 'adu' else '')))),
     Topic('diagnostics', 'diagnostic_msgs/msg/DiagnosticArray', 'second', 'state of each node'),
 )
 

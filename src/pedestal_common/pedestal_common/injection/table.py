@@ -61,7 +61,8 @@ INJECTED_FAULTS = {
         _fault('encoder_stuck', 'the load encoder repeats its last angle', _AXIS),
         _fault('brake_stuck', 'the brakes of an axis stay on or off, whatever the drive commands', _AXIS,
                _option('state', 'state of the brakes', 'on', 'off')),
-        _fault('lost_tooth', 'a tooth of a pinion is missing: half a pitch of play in its place', _AXIS, _MOTOR,
+        _fault('lost_tooth',
+               'a tooth of a pinion is missing; at its place the mesh has half a pitch of play', _AXIS, _MOTOR,
                _number('teeth', 'teeth of the pinion', 17.0, 200.0, low=8.0)),
         _fault('gust', 'a torque on the load, without a ramp', _AXIS,
                _number('torque', 'torque on the axis', 2000.0, 1e5, 'Nm')),
@@ -83,9 +84,11 @@ INJECTED_FAULTS = {
         _fault('nan', 'the numbers of the measurements are NaN'),
         _fault('noise', 'white noise on the measured errors', *_noise(0.01, 1.0, 'rad')),
         _fault('fade', 'the carrier is weaker', _number('depth', 'loss of level', 30.0, 200.0, 'dB', low=0.0)),
-        _fault('wrong_slope', 'difference channels have the wrong sign',
+        _fault('wrong_slope', 'the chosen difference channels have the wrong sign',
                _option('axis', 'channel', 'both', 'cross_elevation', 'elevation')),
-        _fault('phase_180', 'the difference channels are shifted by 180 deg against the sum channel'),
+        _fault('phase_180',
+               'the phase of both difference channels against the sum channel is shifted by 180 deg, so both errors '
+               'change their sign'),
         _fault('clock_step', 'the clock of the receiver steps: the stamps of the measurements are wrong',
                _CLOCK_OFFSET, lockstep=False)),
     'ship_motion': (

@@ -12,18 +12,20 @@ import yaml
 from pedestal_common.text_files import files
 
 MAX_YAML_BYTES = 2_000_000
-"""Largest size of a file [bytes]; every parameter of an array of 16 beams is a tenth of it."""
+"""Largest size of a file [bytes]. The largest known file, all parameters of an array of 16 beams, has a tenth of
+it."""
 
 MAX_DEPTH, MAX_VALUES = 20, 200_000
-"""Largest depth of sections, and largest number of values, with those that aliases stand for."""
+"""Largest depth of sections, and largest number of values. An alias counts as all the values that it stands for."""
 
 _TAG = 'tag:yaml.org,2002:'
 _PLAIN = ('null', 'bool', 'int', 'float', 'str', 'seq', 'map')
 _Base: typing.Any = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
+"""Loader of PyYAML in C, or in Python where libyaml is missing."""
 
 
 class _Loader(_Base):
-    """Loader of the plain values."""
+    """Loader of the plain values. Its own resolvers and constructors replace the rules of YAML 1.1."""
 
     yaml_implicit_resolvers: dict = {}
     yaml_constructors = {tag: _Base.yaml_constructors[tag] for tag in (*(_TAG + name for name in _PLAIN), None)}

@@ -77,29 +77,29 @@ class CommandDefinition(typing.NamedTuple):
     arguments: tuple = ()
 
 
-def values(verbs, command) -> dict:
-    """Return {argument: number or text} of a command by the table of commands, defaults included. Raises
+def values(definitions, command) -> dict:
+    """Return {argument: number or text} of a command by its CommandDefinition, defaults included. Raises
     ValueError."""
-    verb = next((verb for verb in verbs if verb.name == command.verb), None)
-    if verb is None:
-        names = [verb.name for verb in verbs]
+    definition = next((row for row in definitions if row.name == command.verb), None)
+    if definition is None:
+        names = [row.name for row in definitions]
         raise ValueError(f'unknown command {command.verb!r};{did_you_mean(command.verb, names)} there are '
                          f'{", ".join(names)}')
-    known = [argument.name for argument in verb.arguments]
+    known = [argument.name for argument in definition.arguments]
     for name in command.arguments:
         if name not in known:
-            raise ValueError(f'{verb.name}: unknown argument {name!r}; there are {", ".join(known) or "none"}')
-    return {argument.name: _value(verb, argument, command.arguments.get(argument.name))
-            for argument in verb.arguments}
+            raise ValueError(f'{definition.name}: unknown argument {name!r}; there are {", ".join(known) or "none"}')
+    return {argument.name: _value(definition, argument, command.arguments.get(argument.name))
+            for argument in definition.arguments}
 
 
-def _value(verb, argument, text):
+def _value(definition, argument, text):
     if text is None:
         if argument.default is None:
-            raise ValueError(f'{verb.name}: {argument.name} is missing; must be {argument.range} {argument.unit}'
+            raise ValueError(f'{definition.name}: {argument.name} is missing; must be {argument.range} {argument.unit}'
                              .rstrip())
         return argument.default
-    refused = ValueError(f'{verb.name}: {argument.name} = {text} {argument.unit}'.rstrip()
+    refused = ValueError(f'{definition.name}: {argument.name} = {text} {argument.unit}'.rstrip()
                          + f': must be {argument.range}')
     if argument.options:
         if text not in argument.options:
@@ -171,7 +171,7 @@ def parsed(text) -> Command:
     return Command(verb, arguments=arguments)
 
 
-def schedule(name, text, verbs) -> list:
+def schedule(name, text, definitions) -> list:
     """Return [(at [ns], Command)] of the schedule in the parameter `name`, in order of time. Raises ParameterError."""
     due = []
     for part in filter(None, (part.strip() for part in text.split(';'))):
@@ -180,7 +180,7 @@ def schedule(name, text, verbs) -> list:
             if not (re.fullmatch(r'\d+(\.\d+)?', at) and len(at) < 20 and rest.strip()):
                 raise ValueError('must be AT COMMAND name=value ..., AT in seconds')
             command = parsed(rest)._replace(who=SCHEDULE_CLIENT)
-            values(verbs, command)
+            values(definitions, command)
         except ValueError as error:
             raise ParameterError(f'{name} = {part!r}: {error}') from None
         due.append((round(float(at) * 1e9), command))

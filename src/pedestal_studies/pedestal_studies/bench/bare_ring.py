@@ -1,4 +1,4 @@
-"""The floor of `pedestal bench graph`: bare rclpy nodes that pass the graph's messages and compute nothing.
+"""The lower bound of `pedestal bench graph`: bare rclpy nodes that pass the graph's messages and compute nothing.
 
 `python -m pedestal_studies.bench.bare_ring ROLE STEPS` runs one process per role; the role `adu` prints the time of a
 lap. Topics, types, QoS and executor are those of the graph. The messages are made once, and rclpy itself publishes
@@ -46,6 +46,7 @@ class Ring(Node):
         self.steps, self.lap, self.begun, self.finished, self.failure = steps, 0, 0.0, False, None
         step_topics = [link for link in nodes.recorded(RING_NODES) if link.rate == 'step']
         profile = middleware.qos('step')
+        # (publisher, its message, number of subscribers for which it waits)
         self.writers = [(self.create_publisher(middleware.message_class(topic.type), topic.name, profile),
                          _filled(topic), len(nodes.readers(topic, RING_NODES)))
                         for topic in step_topics if role in topic.writers]

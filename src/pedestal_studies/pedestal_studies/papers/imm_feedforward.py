@@ -1,12 +1,17 @@
 """Feed-forward of estimated rate and acceleration (paper 003): a conventional Kalman filter beside the IMM.
 
-The loop is `feedforward_loop`: 20 deg to and fro at 3.5 deg/s, with a miss every 10 ms that is 40 ms old. `imm` feeds
-forward rate and acceleration at the time of the miss. `imm-predicted` feeds forward their prediction for the middle of
-the interval in which the command is in force, d + T / 2 later. `perfect-state` feeds forward the truth of that
-instant. All filters get the same noise.
+The miss is the angle from the axis of the antenna to the target (the pointing error), as the paper's miss distance.
+The loop is `feedforward_loop`: 20 deg to and fro at 3.5 deg/s. Every 10 ms it gets a measured miss, which is 40 ms
+old. Cases AXIS/SOURCE, by the source of the rate and acceleration that are fed forward:
 
-`drive-...` uses the product: receiver with that latency, control unit, motors and gears. Its target makes reversals
-without a pause, which is a sine.
+kalman-cv, kalman-cv-Q   conventional filter of constant velocity; Q: process noise [deg/s2/sqrt(Hz)]
+kalman-ca-Q              filter of constant acceleration; Q: process noise [deg/s3/sqrt(Hz)]
+imm, imm-b               IMM whose ca model has a process noise of 40 and of 5 deg/s3/sqrt(Hz)
+perfect-state            truth in the middle of the interval in which the command is in force
+...-predicted            the same filter, predicted from the time of the miss to that instant, d + T / 2 later
+drive-...                whole product: receiver with this latency, control unit, motors and gears
+
+All filters get the same noise. The target of `drive-...` makes reversals without a pause, which is a sine.
 """
 import dataclasses
 import math
@@ -58,10 +63,11 @@ PAPER_CV_NOISES = {'azimuth': 0.1, 'elevation': 0.3}
 """Process noise of `kalman-cv` that comes nearest to the paper's results; the paper prints none."""
 
 FEEDFORWARD_SOURCES = {
-    'imm': imm(40.0, False), 'imm-predicted': imm(40.0, True), 'perfect-state': Source(None, True),
-    'imm-b-predicted': imm(5.0, True), 'kalman-ca-0.1': ca(0.1), 'kalman-ca-40': ca(40.0),
+    'imm': imm(40.0, predicted=False), 'imm-predicted': imm(40.0, predicted=True),
+    'perfect-state': Source(None, predicted=True), 'imm-b-predicted': imm(5.0, predicted=True),
+    'kalman-ca-0.1': ca(0.1), 'kalman-ca-40': ca(40.0),
     'kalman-ca-40-predicted': dataclasses.replace(ca(40.0), predicted=True)}
-"""{name: Source} of rate and acceleration."""
+"""{name: Source} of rate and acceleration. The first argument of imm and ca is the process noise [deg/s3/sqrt(Hz)]."""
 
 
 def cv_name(axis, q):
@@ -69,10 +75,12 @@ def cv_name(axis, q):
     return f'{axis}/kalman-cv' if q == PAPER_CV_NOISES[axis] else f'{axis}/kalman-cv-{q:g}'
 
 
-CASES = {f'{axis}/kalman-cv': (axis, cv(q)) for axis, q in PAPER_CV_NOISES.items()}
-CASES |= {f'{axis}/{name}': (axis, source) for axis in REVERSAL_S_BY_AXIS
-          for name, source in FEEDFORWARD_SOURCES.items()}
-CASES |= {cv_name(axis, q): (axis, cv(q)) for axis in REVERSAL_S_BY_AXIS for q in CV_NOISES}
+CASES = {
+    **{f'{axis}/kalman-cv': (axis, cv(q)) for axis, q in PAPER_CV_NOISES.items()},
+    **{f'{axis}/{name}': (axis, source)
+       for axis in REVERSAL_S_BY_AXIS for name, source in FEEDFORWARD_SOURCES.items()},
+    **{cv_name(axis, q): (axis, cv(q)) for axis in REVERSAL_S_BY_AXIS for q in CV_NOISES}}
+"""{case: (axis, Source)}."""
 
 
 def drive_case(axis, tuned):
@@ -129,8 +137,8 @@ MAIN_CASES = {f'{axis}/{name}' for axis in REVERSAL_S_BY_AXIS
 
 MISS_RATIO_TARGETS = {'azimuth/imm': ('>= 4', None), 'azimuth/imm-predicted': ('>= 6', None),
                       'elevation/imm': ('>= 3', 3.0), 'elevation/imm-predicted': ('>= 5', None)}
-"""{case: (target, value of the paper)} of the miss of kalman-cv over the miss of the case; for azimuth the paper
-prints 4 to 5."""
+"""{case: (target, value of the paper)} of the miss of kalman-cv, divided by the miss of the case. For azimuth the
+paper prints 4 to 5."""
 
 
 def conventional_curve(misses, axis):
@@ -152,7 +160,7 @@ def at_rate_noise(misses, axis, rate_noise):
 def rows(misses):
     """Return the rows of {case: MissStatistics} of all cases.
 
-    A ratio is that of two filters under the noise of one run.
+    A ratio divides the misses of two filters in runs with the same noise.
     """
     table = []
     for name, case in misses.items():
@@ -279,7 +287,7 @@ def probability_figure():
 
 
 def tuning_figure(misses):
-    """Draw the miss over the noise of the rate fed forward, for the tunings."""
+    """Draw the miss against the noise of the rate fed forward, for the tunings."""
     figure, axes = new_panels(1, 2, height=3.8, x='noise of the rate fed forward [deg/s]', y='miss rms [deg]',
                               sharex=True, sharey=True)
     for axis, panel in zip(REVERSAL_S_BY_AXIS, axes[0]):

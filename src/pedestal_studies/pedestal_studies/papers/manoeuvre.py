@@ -2,7 +2,8 @@
 
 A target moves to and fro through 20 deg at 3.5 deg/s. Its reversals are half a cosine and last 4, 2, 1, 0.5 and 0.35
 s, one after the other. It is measured at 100 Hz with 0.02 deg. Cases are reversal-<s>/<filter>, with the rms of a run
-inside the reversal. `cv` and `ca` are conventional filters, `imm-a` and `imm-b` those of the study imm-feedforward.
+inside the reversal. `cv` and `ca` are conventional filters. `imm-a` and `imm-b` are `imm`
+and `imm-b` of the study imm-feedforward.
 """
 import math
 
@@ -37,7 +38,8 @@ MEASUREMENT_NOISE = ensemble.Noise(feedforward_loop.MISS_SIGMA_RAD)
 """Noise of the measured angle."""
 
 FILTERS = {'cv': feedforward_loop.cv(0.1).filter, 'ca': feedforward_loop.ca(10.0).filter,
-           'imm-a': feedforward_loop.imm(40.0, False).filter, 'imm-b': feedforward_loop.imm(5.0, False).filter}
+           'imm-a': feedforward_loop.imm(40.0, predicted=False).filter,
+           'imm-b': feedforward_loop.imm(5.0, predicted=False).filter}
 """{filter: FilterParameters}."""
 
 FILTER_COLOURS = {'cv': TRUTH_COLOUR, 'ca': RAW_COLOUR, 'imm-a': MOTOR_1_COLOUR, 'imm-b': FILTERED_COLOUR}
@@ -57,9 +59,9 @@ def motion():
         begin += uniform + reversal
     t = ensemble.MEASUREMENT_PERIOD_S * np.arange(round(begin / ensemble.MEASUREMENT_PERIOD_S))
     truth = np.array([rate * (t - LEAD_TIME_S), np.full(len(t), rate), np.zeros(len(t))])
-    for i, (reversal, begin) in enumerate(zip(REVERSAL_DURATIONS_S, legs)):
-        later = t >= begin
-        truth[:, later] = (-1.0) ** i * np.array(profiles.s_motion(t[later] - begin, stroke, rate, reversal))
+    for i, (reversal, leg) in enumerate(zip(REVERSAL_DURATIONS_S, legs)):
+        later = t >= leg
+        truth[:, later] = (-1.0) ** i * np.array(profiles.s_motion(t[later] - leg, stroke, rate, reversal))
     return t, tuple(truth), {reversal: (t >= start) & (t <= start + reversal) for reversal, start in starts.items()}
 
 

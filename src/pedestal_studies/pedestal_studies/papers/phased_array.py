@@ -79,7 +79,7 @@ COMPARED_LOOPS = {
     'best': FilterLoop(jerk(0.1), RECEIVER_NOISE_RAD),
     'fast': FilterLoop(jerk(1.0), RECEIVER_NOISE_RAD), 'faster': FilterLoop(jerk(10.0), RECEIVER_NOISE_RAD),
     'best-delay-150ms': FilterLoop(jerk(0.1), RECEIVER_NOISE_RAD, delay=150),
-    'best-told-10ms-less': FilterLoop(jerk(0.1), RECEIVER_NOISE_RAD, known=LOOP_DELAY_MS - 10)}
+    'best-told-10ms-less': FilterLoop(jerk(0.1), RECEIVER_NOISE_RAD, assumed_delay=LOOP_DELAY_MS - 10)}
 """Loops on one plant: the paper's loop with the ship's rate, its type-2 form, and constant-acceleration filters.
 
 The input of the filters is beam in force + error. The command is their prediction for the middle of the interval,
@@ -87,9 +87,9 @@ every 1 ms (tracked-10ms: every 10 ms). In `best-told-10ms-less` the loop assume
 """
 
 INS_LOOPS = {
-    'best/sway-ins': FilterLoop(jerk(1e-3), RECEIVER_NOISE_RAD, ins=True, late=INS_STAMP_ERROR_MS),
-    'best/sway-ins/exact-stamps': FilterLoop(jerk(1e-3), RECEIVER_NOISE_RAD, ins=True),
-    'best/sway-ins/rate-only': FilterLoop(jerk(1e-3), RECEIVER_NOISE_RAD, ins=True, tau=0.0)}
+    'best/sway-ins': FilterLoop(jerk(1e-3), RECEIVER_NOISE_RAD, use_ins=True, stamp_error=INS_STAMP_ERROR_MS),
+    'best/sway-ins/exact-stamps': FilterLoop(jerk(1e-3), RECEIVER_NOISE_RAD, use_ins=True),
+    'best/sway-ins/rate-only': FilterLoop(jerk(1e-3), RECEIVER_NOISE_RAD, use_ins=True, tau=0.0)}
 """Loops with a filter in the earth frame: with an error of the stamps, with exact stamps, without acceleration."""
 
 METRIC_TARGETS = {
@@ -345,7 +345,8 @@ RECEIVER_LOSS_POWERS = {
 
 def signal_loss_loop(kind, form):
     """Return the PaperLoop of a form with a kind of RECEIVER_LOSS_POWERS."""
-    return PaperLoop(delay=LOOP_DELAY_MS, form=form, beamwidth=BEAMWIDTH_RAD, lost=RECEIVER_LOSS_POWERS[kind])
+    return PaperLoop(delay=LOOP_DELAY_MS, form=form, beamwidth=BEAMWIDTH_RAD,
+                     lost_power_ratio=RECEIVER_LOSS_POWERS[kind])
 
 
 def sine_from_rest(rate):

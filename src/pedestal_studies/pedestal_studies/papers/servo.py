@@ -1,10 +1,10 @@
 """Paper 000's step and sine (figures 5, 6), then a better controller on the same plant.
 
-The cases paper-r1 and paper-r2 are the two readings of the paper's sine, with gains for each. `paper-all` is one
-controller for every number that is printed with figures 5 and 6, with the sine read as 0.4 Hz. `best` is the
-feed-forward controller. `best-inertia-plus` and `-minus` have the controller `best` with 20 % more and less load.
-`best-full-torque` has no reserve for such a load. `adrc` is the ADRC. `pedestal run servo_step|servo_sine --param ...`
-runs every case too (Case.command).
+The cases paper-r1 and paper-r2 are the two readings of the paper's sine, with gains for each: r1 = 0.4 Hz, r2 = 0.4
+rad/s. `paper-all` is one controller for every number that is printed with figures 5 and 6, with the sine read as 0.4
+Hz. `best` is the feed-forward controller. `best-inertia-plus` and `-minus` have the controller `best` with 20 % more
+and less load. `best-full-torque` has no reserve for such a load. `adrc` is the ADRC. `pedestal run
+servo_step|servo_sine --param ...` runs every case too (Case.command).
 """
 import functools
 import math
@@ -45,10 +45,10 @@ GUST_TORQUE_NM, GUST_START_S = 1000.0, 0.2
 """Step of wind torque on the azimuth [Nm] and its start [s]."""
 
 SETTLING_BAND = 0.02
-"""Band of the settling time, over the step."""
+"""Half-width of the band of the settling time, divided by the step."""
 
 PAPER_R1_PARAMETERS: dict[str, float] = {}
-"""Parameters of the scenarios, unchanged."""
+"""No changes: the scenarios servo_step and servo_sine have the gains for the reading 0.4 Hz."""
 
 PAPER_R2_PARAMETERS = {'acu.azimuth.pid.bandwidth': 8.75, 'acu.azimuth.pid.derivative': 0.0}
 
@@ -57,14 +57,14 @@ PAPER_ALL_PARAMETERS = {'acu.azimuth.pid.bandwidth': 54.0, 'acu.azimuth.pid.deri
 """Gains that a search found, because the paper prints none.
 
 A position loop K e + D e' before a rate loop of type 1 falls short of the amplitude. The shortfall is (1 + 2 D) (w /
-K)^2 / 2, which is 0.2 % with paper-r1. A slow rate loop, tau = J / K_p, returns tau w^2 / K of this shortfall.
+K)^2 / 2, which is 0.2 % with paper-r1. A slow rate loop, tau = J / K_p, compensates tau w^2 / K of it.
 """
 
 DRIVE_PARAMETERS = {
     'adu.azimuth.speed_loop.proportional': 8.0, 'adu.azimuth.speed_loop.integral': 50.0,
     'adu.azimuth.bias.schedule': 'hold_fade', 'adu.azimuth.bias.torque': 12.0, 'adu.azimuth.bias.hold': 14.0,
     'adu.azimuth.bias.out': 45.0}
-"""Speed loop and bias of our cases."""
+"""Speed loop and bias torque of the cases best and adrc."""
 
 SHAPER_PARAMETERS = {
     'acu.azimuth.shaper.rate': 2.42, 'acu.azimuth.shaper.acceleration': 31.0, 'acu.azimuth.shaper.jerk': 8000.0,
@@ -77,9 +77,10 @@ BEST_PARAMETERS = {
     'acu.azimuth.feedforward.integral': 0.2}
 """Controller of the case best.
 
-After a knock that opens the lash, each gain tolerates 1.3 times its value. Beyond that (a bandwidth of 45 rad/s)
-closing the lash takes so much torque that the bias stays faded. The lash then opens again, in a limit cycle of some
-mrad. A faster observer (600 rad/s) reduces the effect of the gust by 6 % and lets the load ring on the gear for 0.2 s.
+After a shock that opens the lash, the loop stays stable if any one gain is multiplied by up to 1.3. Above this factor
+(a bandwidth of 45 rad/s) the closing of the lash takes so much torque that the bias torque stays faded out. The lash
+then opens again, in a limit cycle of some mrad. A faster observer (600 rad/s) reduces the effect of the gust by 6 %
+and lets the load ring on the gear for 0.2 s.
 """
 
 FULL_TORQUE_PARAMETERS = {**BEST_PARAMETERS, 'acu.azimuth.shaper.acceleration': 38.0,
@@ -88,7 +89,7 @@ FULL_TORQUE_PARAMETERS = {**BEST_PARAMETERS, 'acu.azimuth.shaper.acceleration': 
 
 ADRC_PARAMETERS = {**DRIVE_PARAMETERS, **SHAPER_PARAMETERS, 'adu.azimuth.speed_loop.proportional': 6.0,
                    'adu.azimuth.speed_loop.integral': 200.0, 'acu.azimuth.controller': 'adrc'}
-"""ADRC with its own observer in place of the drive's, and the speed loop for which it was designed."""
+"""ADRC, and the speed loop for which it was designed. The observer of the ADRC replaces the observer of the drive."""
 
 CASE_PARAMETERS = {
     'paper-r1': PAPER_R1_PARAMETERS, 'paper-r2': PAPER_R2_PARAMETERS, 'paper-all': PAPER_ALL_PARAMETERS,
@@ -113,7 +114,7 @@ METRIC_TARGETS = {
     'best-inertia-plus': {'step_overshoot_percent': '<= 0.5', 'step_settling_2percent_s': '<= 0.15'},
     'best-inertia-minus': {'step_overshoot_percent': '<= 0.5', 'step_settling_2percent_s': '<= 0.15'},
 }
-"""{case: {metric: target}}."""
+"""{case: {metric: target}}; target: 'value +- tolerance', 'low to high', or a limit."""
 PAPER_VALUES = {'step_overshoot_percent': 12.0, 'step_settling_2percent_s': 0.2, 'max_error_rad': 0.04,
                 'rms_error_rad': 0.0281, 'amplitude_rad': 0.869, 'peak_error_percent': 0.12, 'max_error_percent': 4.6}
 """{metric without the prefix of the sine: number that the paper prints}."""

@@ -1,10 +1,14 @@
 """The angle loop of a phased array on one axis, on a grid of 1 ms: paper 002's loop, and a loop with a target filter.
 
 Each loop is one compiled kernel of the laws that the nodes run: the smoothing and the pattern of the receiver, the
-loop of the beam or a target filter, and the electronic beam. Sample i of the grid is measured over the millisecond
-that ends at its stamp i GRID_STEP_S, against the beam in force in this millisecond. A target is given at the middles
-of the milliseconds. A command with the stamp i GRID_STEP_S is in force from the millisecond after i GRID_STEP_S +
-delay on.
+loop of the beam or a target filter, and the electronic beam. The grid, with h = GRID_STEP_S:
+
+    stamp    (i-1) h                 i h                 (i+1) h
+                |------ sample i ------|---- sample i+1 ----|
+                        target[i]           target[i+1]             (targets: middles of the intervals)
+
+Sample i is measured over the interval that ends at its stamp i h, against the beam in force in this interval. A
+command with the stamp i h is in force from the interval that begins at i h + delay on.
 """
 import dataclasses
 import math
@@ -48,25 +52,25 @@ rate [rad/s], as measured for the loop. `noise`: noise of the samples [rad].
 Beam = namedtuple('Beam', 'state constants inputs outputs')
 """Records (1,) of an electronic beam without elevation."""
 
-Receiver = namedtuple('Receiver', 'slope beamwidth lost')
+Receiver = namedtuple('Receiver', 'slope beamwidth lost_power_ratio')
 """Constants of a receiver.
 
-`slope`: true slope over assumed slope [-]. `beamwidth`: [rad], 0 for a linear receiver. `lost`: power over the power
-on axis below which the signal is lost [-].
+`slope`: true slope divided by assumed slope [-]. `beamwidth`: [rad], 0 for a linear receiver. `lost_power_ratio`:
+ratio of the power to the power on axis below which the signal is lost [-].
 """
 
 PaperLoopConstants = namedtuple('PaperLoopConstants', 'form alpha period delta smoothing')
 """Constants of a PaperLoop.
 
-`form`: code of beam_loop.LOOP_FORMS. `alpha`: gain [-]. `period`: in samples. `delta`: share of the carrier's rate
-that is compensated [-]. `smoothing`: code of SMOOTHING_CODES.
+`form`: code of beam_loop.LOOP_FORMS. `alpha`: gain [-]. `period`: time between two updates, in samples. `delta`: share
+of the carrier's rate that is compensated [-]. `smoothing`: code of SMOOTHING_CODES.
 """
 
 FilterLoopConstants = namedtuple('FilterLoopConstants', 'filter variance period hold delay tau')
 """Constants of a FilterLoop.
 
-`filter`: constants (1,) of its filter. `variance`: of a measurement [rad2]. `period`, `hold`: in samples. `delay`,
-`tau`: delay and low-pass of the acceleration [s].
+`filter`: constants (1,) of its filter. `variance`: of a measurement [rad2]. `period`, `hold`: as in FilterLoop, in
+samples. `delay`: assumed delay of the beam [s]. `tau`: low-pass of the acceleration [s].
 """
 
 
@@ -74,8 +78,13 @@ FilterLoopConstants = namedtuple('FilterLoopConstants', 'filter variance period 
 class PaperLoop:
     """Loop of paper 002.
 
-    `period`, `delay`: in samples of the grid. `slope`, `beamwidth`, `lost`: as in Receiver. `delta`: share of the
-    carrier's rate that is compensated.
+    alpha       gain [-]
+    period      time between two updates of the loop, in samples of the grid
+    delay       time from a command to its effect, in samples
+    smoothing   key of SMOOTHING_CODES
+    form        one of beam_loop.LOOP_FORMS
+    delta       share of the carrier's rate that is compensated [-]
+    slope, beamwidth, lost_power_ratio  as in Receiver
     """
     alpha: float = 0.1
     period: int = 10
@@ -85,7 +94,7 @@ class PaperLoop:
     delta: float = 0.0
     slope: float = 1.0
     beamwidth: float = 0.0
-    lost: float = 0.0
+    lost_power_ratio: float = 0.0
 
     def run(self, target, rate=None, noise=None):
         """Return (beam, smoothed error in the loop), each (n,) [rad], of a target (n,) [rad].
@@ -96,7 +105,7 @@ class PaperLoop:
         zeros, beam, errors = np.zeros(len(target)), np.zeros(len(target)), np.zeros(len(target))
         constants = PaperLoopConstants(beam_loop.LOOP_FORMS.index(self.form), self.alpha, self.period, self.delta,
                                        SMOOTHING_CODES[self.smoothing])
-        _paper_loop(constants, Receiver(self.slope, self.beamwidth, self.lost),
+        _paper_loop(constants, Receiver(self.slope, self.beamwidth, self.lost_power_ratio),
                     Target(np.asarray(target), zeros, zeros if rate is None else rate,
                            zeros if noise is None else noise),
                     np.zeros(1, SMOOTHER_RECORD), _beam(self.delay, self.period), beam, errors)
@@ -108,20 +117,25 @@ class FilterLoop:
     """Loop in which beam in force + error is the input of a target filter.
 
     The command is the prediction of the filter for the middle of the interval in which the command will be in force.
-    `period`: samples averaged to one measurement. `hold`: samples between two commands. `delay`: true delay in
-    samples. `known`: delay that the loop assumes, in samples, None for the true delay. `jerk`: noise of the
-    constant-acceleration filter [rad/s3/sqrt(Hz)]. `sigma`: noise of one sample [rad]. `ins`: True if the filter works
-    in the earth frame. `late`: error of the INS's stamps in samples. `tau`: low-pass of its acceleration [s], 0
-    without the acceleration.
+
+    jerk            noise of the constant-acceleration filter [rad/s3/sqrt(Hz)]
+    sigma           noise of one sample [rad]
+    period          number of samples that are averaged to one measurement
+    hold            time between two commands, in samples
+    delay           true time from a command to its effect, in samples
+    assumed_delay   delay that the loop assumes, in samples; None: the true delay
+    use_ins         True if the filter works in the earth frame, with the attitude of the INS
+    stamp_error     error of the stamps of the INS, in samples
+    tau             low-pass of the acceleration of the INS [s]; 0: acceleration not used
     """
     jerk: float
     sigma: float
     period: int = 10
     hold: int = 1
     delay: int = 20
-    known: int | None = None
-    ins: bool = False
-    late: int = 0
+    assumed_delay: int | None = None
+    use_ins: bool = False
+    stamp_error: int = 0
     tau: float = 0.05
 
     def run(self, target, noise=None, attitude=None, rate=None):
@@ -132,12 +146,13 @@ class FilterLoop:
         """
         n = len(target)
         zeros, beam, errors = np.zeros(n), np.zeros(n), np.zeros(n)
-        late = np.maximum(np.arange(n) - self.late, 0)
+        measured = np.maximum(np.arange(n) - self.stamp_error, 0)
         c = axis_filter.constants(FilterParameters(kind='ca', ca=CaParameters(noise=self.jerk)))
-        constants = FilterLoopConstants(c, self.sigma**2 / self.period, self.period, self.hold,
-                                        GRID_STEP_S * (self.delay if self.known is None else self.known), self.tau)
-        _filter_loop(constants, Target(np.asarray(target), attitude[late] if self.ins else zeros,
-                                       rate[late] if self.ins else zeros, zeros if noise is None else noise),
+        delay = self.delay if self.assumed_delay is None else self.assumed_delay
+        constants = FilterLoopConstants(c, self.sigma**2 / self.period, self.period, self.hold, GRID_STEP_S * delay,
+                                        self.tau)
+        _filter_loop(constants, Target(np.asarray(target), attitude[measured] if self.use_ins else zeros,
+                                       rate[measured] if self.use_ins else zeros, zeros if noise is None else noise),
                      np.zeros(1, SMOOTHER_RECORD), np.zeros(1, axis_filter.FILTER_DTYPE), _beam(self.delay, self.hold),
                      beam, errors)
         return beam, errors
@@ -158,11 +173,11 @@ def receiver_reading(offset, receiver):
     The error is linear without a beamwidth, otherwise it follows the monopulse pattern within full scale. It is NaN if
     the signal is lost.
     """
-    slope, beamwidth, lost = receiver
+    slope, beamwidth, lost_power_ratio = receiver
     if beamwidth == 0.0:
         return slope * offset
     S, D, _ = monopulse.channels(offset / beamwidth, 0.0, slope * K_M, 1.0, 0.0)
-    if S * S < lost:
+    if S * S < lost_power_ratio:
         return math.nan
     return beamwidth * max(-FULL_SCALE_BEAMWIDTHS, min(D / (K_M * S), FULL_SCALE_BEAMWIDTHS))
 
@@ -203,7 +218,8 @@ def _filter_loop(constants, target, smoothers, filters, plant, beam, errors):
     """Run the loop with a target filter over a Target into beam and innovations (n,) [rad]; plant: the Beam."""
     s, f, c = smoothers[0].error, filters[0], constants.filter[0]
     period, hold, rate = constants.period, constants.hold, target.rate
-    running, aimed, acceleration = False, 0.0, 0.0
+    # beam_command [rad]: newest command; last_sample: last sample of the newest measurement.
+    running, beam_command, acceleration = False, 0.0, 0.0
     for i in range(len(target.angle)):
         beam[i] = plant.outputs[0].position[0]
         if i % period == 0:
@@ -223,14 +239,14 @@ def _filter_loop(constants, target, smoothers, filters, plant, beam, errors):
             else:
                 axis_filter.start(f, c, y, constants.variance, 1.0)
             running = True
-            block = i
+            last_sample = i
         if running and i % hold == 0:
             # The prediction goes from the stamp to the middle of the interval in which the command is in force.
             lead = constants.delay + 0.5 * hold * GRID_STEP_S
-            earth = axis_filter.outlook(f, c, (i - block + 0.5 * period) * GRID_STEP_S + lead).angle
-            aimed = (earth + target.attitude[i]
-                     + attitudes.rotation_angle(rate[i], acceleration, 0.5 * GRID_STEP_S + lead))
-        command(plant.inputs[0], i, running and i % hold == 0, aimed)
+            earth = axis_filter.outlook(f, c, (i - last_sample + 0.5 * period) * GRID_STEP_S + lead).angle
+            beam_command = (earth + target.attitude[i]
+                            + attitudes.rotation_angle(rate[i], acceleration, 0.5 * GRID_STEP_S + lead))
+        command(plant.inputs[0], i, running and i % hold == 0, beam_command)
         electronic_beam.step(plant.state[0], plant.constants[0], plant.inputs[0], plant.outputs[0])
 
 
@@ -257,9 +273,16 @@ def delay_limit(loop, highest=400):
 def spectral_radius(loop):
     """Return the largest modulus of the eigenvalues of a PaperLoop, linear, over one period.
 
-    The state is v T, the output of the smoothing, and a list of commands k, k - 1, ... The list holds the commands in
-    force in the samples of the next period (and of the moving average before it). In sample j = 1 ... period after the
-    update k the command k + floor((j - 1 - delay) / period) is in force.
+    The state is V = v T, the smoothed error E, and the commands C_k, C_k-1, ... that are in force in the samples of
+    the next period (and of the moving average before it). In sample j = 1 ... period after the update k the command
+    k - age with age = -floor((j - 1 - delay) / period) is in force. With a target at 0:
+
+        S1:      E <- E (1 - 1/n) - slope C_k-age / n       for each sample
+        S0, S2:  E <- - slope times the mean of C_k-age over the samples in the smoothing
+        type 1:  V <- (1 - beta) V + beta E,  C_k+1 = C_k + (1 - alpha) V + alpha E
+        type 2:  V <- V + beta E,             C_k+1 = C_k + V + (alpha + beta) E
+
+    The right sides have the old values of V and C_k. The lines of V and C_k+1 have the new value of E.
     """
     M, beta, n = loop.period, constant_gain.benedict_bordner(loop.alpha), SMOOTHING_SAMPLES
     first = {'S0': M, 'S1': 1, 'S2': M - n + 1}[loop.smoothing]

@@ -4,8 +4,12 @@ A case NODE.FAULT/MODE is the closed loop of ship_pass in a mode. At 10 s a faul
 s, and the run ends 5 s after the fault. The study measures three numbers of each case. `told_after_steps` is the
 number of steps from the onset to the first report. A report is an alarm, or a diagnostic text that the node does not
 publish without the fault. `ends_as_expected` is 1 if the mode at the end is one of the expected modes.
-`largest_error_deg` is the largest error against truth while the mode is kept: off the target, or off the place where
-the axes stood on the deck.
+`largest_error_deg` is the largest error against truth while the mode is kept. The error depends on the mode:
+
+TOWARDS_TARGET_MODES   pointing error, off the true target
+slave, sun             angle from the true beam to the commanded direction, or to the sun
+rate                   angle from the place at the onset, moved on with the commanded rate, on the deck
+all other modes        angle from the place at the onset, on the deck
 """
 import typing
 
@@ -73,8 +77,8 @@ ON_TARGET_MODES = ('program', 'tle', 'autotrack')
 TOWARDS_TARGET_MODES = ('search', 'acquire', 'steptrack', *ON_TARGET_MODES)
 """Modes that use the signal level, and the modes to which they lead; a change between them does not count either."""
 
-FINE_CHECK_STEPS = 200
-"""Steps after the onset in which the reports are read in every step; before and later they are read every 20 steps."""
+FINE_CHECK_STEPS, COARSE_CHECK_STEPS = 200, 20
+"""Steps after the onset in which the reports are read in every step, and steps between two readings at other times."""
 
 
 class FaultOutcome(typing.NamedTuple):
@@ -104,11 +108,14 @@ def run_of(mode, inject=''):
     onset, reports = round(FAULT_ONSET_S * 1e9 / loop.period_ns), []
 
     def watch(made):
+        """Note the reports after `made` steps. Return the number of steps until the next call."""
         if made:
             alarms = loop.units['acu'].alarms
             reports.extend((made - 1, ALARM_SOURCE, 0, ALARM_NAMES[i]) for i in report.order(alarms))
             reports.extend((made - 1, name, *unit.diagnose()[:2]) for name, unit in loop.units.items())
-        return 1 if onset <= made < onset + FINE_CHECK_STEPS else min(20, onset - made) if made < onset else 20
+        if made < onset:
+            return min(COARSE_CHECK_STEPS, onset - made)
+        return 1 if made < onset + FINE_CHECK_STEPS else COARSE_CHECK_STEPS
     return loop.run(watch=watch), reports
 
 
@@ -117,23 +124,33 @@ def errors(run, mode):
 
     A change within ON_TARGET_MODES or TOWARDS_TARGET_MODES does not leave the mode.
     """
-    first = int(np.searchsorted(run.t, FAULT_ONSET_S - 1e-9))
-    same = next((alike for alike in (ON_TARGET_MODES, TOWARDS_TARGET_MODES) if mode in alike), (mode,))
-    at = run['adu/truth']['position']
+    onset = int(np.searchsorted(run.t, FAULT_ONSET_S - 1e-9))
+    same_modes = next((group for group in (ON_TARGET_MODES, TOWARDS_TARGET_MODES) if mode in group), (mode,))
     if mode in TOWARDS_TARGET_MODES:
-        off = np.hypot(*run.truth['error'].T)
+        error = np.hypot(*run.truth['error'].T)
     elif mode in ('slave', 'sun'):
-        beam = Rotation.from_quat(run['ship/truth']['orientation']).apply(pointing(*at.T))
-        cosine = (beam @ enu(*SLAVE_DIRECTION_RAD)[0] if mode == 'slave'
-                  else (beam * enu(*sun_angles(run.t))).sum(axis=1))
-        off = np.arccos(np.clip(cosine, -1.0, 1.0))
+        error = direction_error(run, enu(*SLAVE_DIRECTION_RAD) if mode == 'slave' else enu(*sun_angles(run.t)))
     else:
-        turned = AZIMUTH_RATE_RAD_S * (run.t - run.t[first - 1]) if mode == 'rate' else 0.0
-        off = np.hypot((at[:, 0] - at[first - 1, 0] - turned) * np.cos(at[:, 1]), at[:, 1] - at[first - 1, 1])
-    left = ~np.isin(run['acu/mode'], [MODES.index(name) for name in same])
-    left[:first] = False
-    kept = (np.arange(len(off)) >= first) & (np.cumsum(left) == 0)
-    return np.where(kept, np.degrees(off), np.nan)
+        error = deck_error(run, onset, AZIMUTH_RATE_RAD_S if mode == 'rate' else 0.0)
+    left = ~np.isin(run['acu/mode'], [MODES.index(name) for name in same_modes])
+    left[:onset] = False
+    kept = (np.arange(len(error)) >= onset) & (np.cumsum(left) == 0)
+    return np.where(kept, np.degrees(error), np.nan)
+
+
+def direction_error(run, directions):
+    """Return the angle (n,) [rad] from the true beam to directions, ENU unit vectors (n, 3) or (1, 3)."""
+    beam = Rotation.from_quat(run['ship/truth']['orientation']).apply(pointing(*run['adu/truth']['position'].T))
+    cosine = beam @ directions[0] if len(directions) == 1 else (beam * directions).sum(axis=1)
+    return np.arccos(np.clip(cosine, -1.0, 1.0))
+
+
+def deck_error(run, onset, azimuth_rate):
+    """Return the angle (n,) [rad] on the deck from the place before step `onset`, moved on with a rate [rad/s]."""
+    angles = run['adu/truth']['position']
+    azimuth, elevation = angles[onset - 1]
+    turned = azimuth_rate * (run.t - run.t[onset - 1])
+    return np.hypot((angles[:, 0] - azimuth - turned) * np.cos(angles[:, 1]), angles[:, 1] - elevation)
 
 
 def pointing(azimuth, elevation):
@@ -168,9 +185,10 @@ def fault_outcome(mode, inject, baseline):
     new = [(step, source, text) for step, source, level, text in reports
            if step >= onset and (source, level, text) not in baseline]
     alarms = tuple(dict.fromkeys(text for _, source, text in new if source == ALARM_SOURCE))
-    off = errors(run, mode)
+    error = errors(run, mode)
+    largest = float(np.nanmax(error)) if np.isfinite(error).any() else 0.0
     return FaultOutcome(new[0][0] - onset if new else None, '{}: {}'.format(*new[0][1:]) if new else '', alarms,
-                        MODES[run['acu/mode'][-1]], float(np.nanmax(off)) if np.isfinite(off).any() else 0.0, off)
+                        MODES[run['acu/mode'][-1]], largest, error)
 
 
 def cases():
@@ -192,13 +210,13 @@ def rows(case, found, mode, expected):
     return [{**report_steps, 'text': found.text, 'alarms': list(found.alarms)}, {**end, 'text': found.end}, largest]
 
 
-def line(case, found, mode, expected, of_case):
+def line(case, found, mode, expected, case_rows):
     """Return a case in one line: outcome and expectation."""
     report_text = 'no report' if found.report_steps is None else (
         f'report after {found.report_steps} steps "{found.text}"')
     if found.alarms:
         report_text += f', alarms {", ".join(found.alarms)}'
-    verdict = '  MISSED' if any(map(missed, of_case)) else ''
+    verdict = '  MISSED' if any(map(missed, case_rows)) else ''
     return (f'{case}: {report_text}, error {found.error:.3g} deg, ends in {found.end}'
             f' (expected: {expected.sentence(mode)}){verdict}')
 
@@ -210,12 +228,12 @@ def run(progress) -> Result:
     for i, (case, mode, inject, expected) in enumerate(all_cases):
         progress(i / len(all_cases), case)
         found = fault_outcome(mode, inject, baselines[mode])
-        of_case = rows(case, found, mode, expected)
-        table_rows += of_case
-        lines.append(line(case, found, mode, expected, of_case))
+        case_rows = rows(case, found, mode, expected)
+        table_rows += case_rows
+        lines.append(line(case, found, mode, expected, case_rows))
         drawn[case] = found.errors
-    short = [r for r in table_rows if missed(r)]
-    return Result(table_rows, {'errors': lambda: figure(drawn)}, lines, shown=short)
+    missed_rows = [r for r in table_rows if missed(r)]
+    return Result(table_rows, {'errors': lambda: figure(drawn)}, lines, shown=missed_rows)
 
 
 DRAWN_FAULTS = ('adu.gust', 'adu.motor_loss', 'adu.drop', 'tracking_receiver.fade', 'tracking_receiver.wrong_slope',
@@ -227,8 +245,8 @@ def figure(of_cases):
     """Draw the error of DRAWN_FAULTS in autotrack over time, with a line at half a beamwidth."""
     made, axes = new_panels(len(DRAWN_FAULTS), height=9.0, x='time from the onset [s]', y='[deg]', sharex=True)
     for panel, fault in zip(axes[:, 0], DRAWN_FAULTS):
-        off = of_cases[f'{fault}/autotrack']
-        panel.plot(np.linspace(0.0, RUN_DURATION_S, len(off)) - FAULT_ONSET_S, off, color=FILTERED_COLOUR)
+        error = of_cases[f'{fault}/autotrack']
+        panel.plot(np.linspace(0.0, RUN_DURATION_S, len(error)) - FAULT_ONSET_S, error, color=FILTERED_COLOUR)
         panel.axhline(0.5, color=RAW_COLOUR, linewidth=0.8)
         panel.axvspan(0.0, FAULT_DURATION_S, color=INK_COLOUR, alpha=0.08)
         panel.set_title(fault)

@@ -1,11 +1,17 @@
 """A strapdown INS from power-up on: alignment by the selected method, then navigation.
 
-aligning    strapdown at the rate of the IMU, the step of the method every `step` seconds: its commands rotate n'. oba
-            has no commands and integrates the gyros in inertial space.
-navigating  as soon as the 1-sigma of azimuth is small enough. Free inertial without aid. With an aid, riccati_eso
-            continues with the difference of both velocities, so level and azimuth keep improving.
+aligning    The strapdown runs at the rate of the IMU, the method every `step` seconds. The commands of the method
+            rotate n'. Method oba has no commands; it integrates the gyros in inertial space.
+navigating  Begins as soon as the 1-sigma of azimuth is small enough. Without an aid the INS is free inertial. With an
+            aid, riccati_eso continues with the difference of both velocities, so level and azimuth keep improving.
 
 An aid is a velocity in deck axes (log) or ENU (gnss).
+
+n, n'       ENU; computed navigation frame, which differs from n by the azimuth and by small level errors
+w_c, w_cN   commanded rate of n' against the earth, and its north component [rad/s]
+w_N         north component of the earth rate [rad/s]
+Methods     classical: gyrocompass; adrc, adrc_scheduled: ADRC; riccati_eso: extended state observer with Kalman
+            gains; oba: optimisation-based alignment
 """
 import math
 
@@ -40,7 +46,7 @@ STATE_DTYPE = np.dtype([
     ('free', 'f8'),                             # time since navigation without aid began [s]
     ('strapdown', strapdown.STATE_DTYPE),
     ('command', 'f8', (3,)),                    # w_c [rad/s]
-    ('levelling', 'f8'),                        # w_cN of the gyrocompass, smoothed [rad/s]
+    ('north_command_smoothed', 'f8'),           # w_cN of the gyrocompass, smoothed [rad/s]
     ('azimuth', 'f8'),                          # estimated azimuth of n' [rad]
     ('azimuth_sigma', 'f8'), ('level_sigma', 'f8'),         # [rad]
     ('aligned_azimuth_sigma', 'f8'), ('aligned_level_sigma', 'f8'),     # at the start of navigation [rad]
@@ -97,8 +103,8 @@ def begin(s, c, qx, qy, qz, qw):
 def aided_velocity(s, c, aid):
     """Return the (E, N) components in n' [m/s] of the velocity (3,) of the aid; GNSS only after n' is aligned with n.
 
-    The velocity of GNSS is not rotated by the later estimate of azimuth. This avoids an amplified feedback of 7 m/s
-    into the estimate.
+    The velocity of GNSS is not rotated by the later estimate of azimuth. This avoids a feedback of the estimate
+    through the velocity of the ship (7 m/s), which would amplify its errors.
     """
     if c.aid == AID_LOG:
         east, north, _ = to_earth(s.strapdown.mat, aid[0], aid[1], aid[2])
@@ -136,8 +142,9 @@ def reject_reversed_azimuth(s, c, h):
     The loop is at rest also at 180 deg of azimuth, where the level command to the north is twice the earth rate: (19)
     of paper 001, cos az = 1 + w_cN / w_N.
     """
-    s.levelling += c.classical.s0 * h * (s.command[1] - s.levelling)
-    if 1.0 + s.levelling / c.conditions.earth_rate[1] < 0.5:
+    # s0: bandwidth of the gyrocompass [rad/s], here of the low-pass.
+    s.north_command_smoothed += c.classical.s0 * h * (s.command[1] - s.north_command_smoothed)
+    if 1.0 + s.north_command_smoothed / c.conditions.earth_rate[1] < 0.5:
         s.azimuth_sigma = UNKNOWN_AZIMUTH_SIGMA_RAD
 
 

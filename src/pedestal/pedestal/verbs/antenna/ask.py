@@ -1,11 +1,11 @@
 """send a command to a running node
 
-Publishes the command and waits for the reply. The topic is acu/command, or the command topic of the node of --node.
+Publishes the command on acu/command, or with --node NODE on NODE/inject, and waits for the reply.
 Exit code 0: the node accepted the command. Exit code 1: the node refused it; the reason is printed.
 
-    pedestal ask take                    take control: commands of others are refused, except `stop`
+    pedestal ask take                    take control: of other clients only `stop` and `standby` are accepted
     pedestal ask fallback mode=memory    select the mode after a loss of the track
-    pedestal ask offset time=0.5         delay the program track by half a second
+    pedestal ask offset time=0.5         follow the program track 0.5 s later
 """
 import argparse
 from collections.abc import Iterable, Mapping
@@ -15,9 +15,11 @@ from pedestal.verbs import arguments
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add command, its arguments, node and the options of a client."""
-    parser.add_argument('verb', metavar='COMMAND', help='name of the command; an unknown name is refused with a list '
-                        'of all')
-    parser.add_argument('given', nargs='*', metavar='NAME=VALUE', help='arguments of the command, in SI units')
+    parser.add_argument('verb', metavar='COMMAND', help='name of the command; for an unknown name the reply lists all '
+                        'names')
+    parser.add_argument('given',
+                        nargs='*', metavar='NAME=VALUE', help='arguments of the command (radians, SI units); see '
+                        'docs/operating.md, Commands')
     parser.add_argument('--node', default='acu', metavar='NODE', help='node that receives the command; default: acu')
     arguments.add_remote(parser)
 

@@ -14,9 +14,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add port, beams and folder of the layouts."""
     parser.add_argument('--port', type=int, metavar='PORT', help='TCP port on 127.0.0.1; default: 8765')
     parser.add_argument('--beams', type=int, metavar='N', help='number of beams of an electronic array; '
-                        'default: 0, an antenna with motors')
-    parser.add_argument('--layouts', type=pathlib.Path, metavar='DIR', help='new folder for the files of viewers '
-                        '(layouts for Foxglove and PlotJuggler, the URDF, an .rviz file); nothing is served')
+                        'default: 0 (antenna with motors)')
+    parser.add_argument('--layouts', type=pathlib.Path, metavar='DIR', help='new folder; the verb only writes the '
+                        'files of the viewers into it (layouts for Foxglove and PlotJuggler, the URDF, an .rviz '
+                        'file) and ends')
 
 
 def main(options: argparse.Namespace) -> int:

@@ -1,10 +1,10 @@
-"""command a mode of a running ACU
+"""set the mode of a running antenna control unit (ACU)
 
 Publishes the command on acu/command and waits for the reply. Exit code 0: the ACU accepted the command. Exit code 1:
 the ACU refused it; the reason is printed.
 
     pedestal mode preset --az 30 --el 45
-    pedestal mode preset point=zenith
+    pedestal mode preset point=zenith    go to the stored preset zenith (parameter acu.points)
     pedestal mode rate --az 0.5          turn at 0.5 deg/s for half a second; repeat the command to continue
     pedestal mode stow
 """
@@ -17,11 +17,14 @@ from pedestal.verbs.antenna import ask
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add mode, angles and the options of a client."""
-    parser.add_argument('mode', help='name of the mode, for example stop; an unknown name is refused with a '
-                        'list of all')
-    parser.add_argument('--az', type=float, metavar='DEG', help='azimuth [deg]; for mode rate its rate [deg/s]')
-    parser.add_argument('--el', type=float, metavar='DEG', help='elevation [deg]; for mode rate its rate [deg/s]')
-    parser.add_argument('given', nargs='*', metavar='NAME=VALUE', help='other arguments of the mode, in SI units')
+    parser.add_argument('mode', help='name of the mode, for example stop; for an unknown name the reply lists '
+                        'all names')
+    parser.add_argument('--az', type=float, metavar='DEG', help='azimuth [deg]; in mode rate: azimuth rate [deg/s]')
+    parser.add_argument('--el',
+                        type=float, metavar='DEG', help='elevation [deg]; in mode rate: elevation rate [deg/s]')
+    parser.add_argument('given',
+                        nargs='*', metavar='NAME=VALUE', help='other arguments of the mode (radians, SI units); '
+                        'see docs/operating.md, Commands')
     arguments.add_remote(parser)
 
 

@@ -1,7 +1,7 @@
 """operate a running antenna by hand on this terminal
 
-Shows angles, errors, mode and its reason, receiver and alarms. Letters command modes; an arrow jogs the antenna while
-it is held down. Needs a terminal. q ends the program; the antenna continues.
+Shows angles, errors, mode and its reason, receiver and alarms. The screen lists the key of each mode. An arrow key
+jogs the antenna while it is held down. Needs a terminal. q ends the program; the antenna continues.
 """
 import argparse
 import sys

@@ -1,4 +1,4 @@
-"""send the program track of a scenario to a running ACU"""
+"""send a table of times and angles (program track) of a scenario to a running ACU"""
 import argparse
 import datetime
 import typing
@@ -16,8 +16,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add scenario, duration, start and parameters."""
     arguments.add_scenario(parser)
     arguments.add_duration(parser, 'the program track')
-    parser.add_argument('--start', metavar='UTC', help='UTC at the beginning of the track: for example '
-                        '2026-11-22T12:00:00, now, or file (start time in the file or TLE of the target); '
+    parser.add_argument('--start', metavar='UTC', help='time of the first row: a UTC such as '
+                        '2026-11-22T12:00:00, now, or the word file (start time in the file or TLE of the target); '
                         'default: start of the running graph')
     arguments.add_param(parser)
     arguments.add_namespace(parser)

@@ -3,8 +3,8 @@
 Starts a process for each node, records every topic in a new bag, and prints the results.
 
 Exit code 0: the run is complete. 1: the run failed, or the recording is not complete. 3: a realtime run ended early,
-or its drive lost more than 1 % of its steps outside announced restarts. 130: the run was stopped, for example by
-Ctrl-C.
+or its drive lost more than 1 % of its steps, without the 5 s after each death of a node. 130: the run was stopped,
+for example by Ctrl-C.
 """
 import argparse
 import pathlib
@@ -22,23 +22,28 @@ if typing.TYPE_CHECKING:
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add scenario, pacing, duration, seed, bag, parameters, satellite and servers."""
     arguments.add_scenario(parser)
-    parser.add_argument('--pacing', choices=('lockstep', 'realtime'), help='pacing of the steps: as fast as all nodes '
-                        'follow, or by the clock; default: value of the scenario')
+    parser.add_argument('--pacing',
+                        choices=('lockstep', 'realtime'), help='lockstep: as fast as the nodes can; realtime: by '
+                        'the clock; default: value of the scenario')
     arguments.add_duration(parser, 'the run')
-    parser.add_argument('--seed', type=int, metavar='N', help='seed of every noise stream')
+    parser.add_argument('--seed',
+                        type=int, metavar='N', help='seed from which the seeds of all noises follow; default: '
+                        'value of the scenario')
     arguments.add_new_bag(parser)
     console.add_json(parser)
     console.add_explain(parser)
     arguments.add_param(parser)
-    parser.add_argument('--tle', type=pathlib.Path, metavar='FILE', help='orbit of the satellite to track: TLE, or '
-                        'OMM as KVN, XML, JSON or CSV')
-    parser.add_argument('--satellite', default='', metavar='NAME', help='name or number of the satellite in a file of '
-                        'several')
+    parser.add_argument('--tle',
+                        type=pathlib.Path, metavar='FILE', help='file with the orbit of the satellite to track: '
+                        'TLE, or OMM in KVN, XML, JSON or CSV form')
+    parser.add_argument('--satellite',
+                        default='', metavar='NAME', help='name or catalogue number of the satellite, if '
+                        'the file of --tle contains several')
     parser.add_argument('--station', metavar='LAT,LON,H', help='place of the antenna: latitude [deg], longitude '
                         '[deg], height [m]')
-    parser.add_argument('--pass', dest='which', metavar='WHICH', help='pass to track from rise to set: next, a number '
-                        'of the list, or a UTC such as 2019-12-10T12:35 for the pass at or after that time; list: '
-                        'print the passes; default with --tle: next')
+    parser.add_argument('--pass', dest='which', metavar='WHICH', help='pass to track from rise to set. next: the next '
+                        'pass; N: number N of the list; a UTC such as 2019-12-10T12:35: the first pass at or after '
+                        'it; list: only print the passes; default with --tle: next')
     arguments.add_params_file(parser)
     from pedestal_bringup.graph import operator_servers
     operator_servers.add_arguments(parser)

@@ -1,7 +1,7 @@
 """print the state of a running antenna
 
 Prints angles, rates, errors, mode and its reason, receiver, drive, and the nodes that report a warning or an error.
-Exit code 0: every node reports OK. Exit code 1: a node reports a warning or an error, is silent, or no graph runs.
+Exit code 0: every node reports OK. Exit code 1: no graph runs, or a node is silent or reports a warning or an error.
 """
 import argparse
 

@@ -1,4 +1,4 @@
-"""measure the speed of this machine: lockstep ring, compiled core, recordings"""
+"""measure the speed of this machine: nodes in lockstep, compiled control laws, recordings"""
 import argparse
 import importlib
 import typing

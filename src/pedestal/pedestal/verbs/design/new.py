@@ -1,7 +1,7 @@
 """write a scenario of your own antenna from the numbers of its data sheet
 
-Values that the data sheet lacks are scaled from the antenna that comes with the product. A comment in the file
-explains each value. `pedestal tune FILE --loops` then tunes the loops and measures their margins.
+All other values of the antenna are scaled from the antenna of the scenario leo_pass. A comment in the file explains
+each value. `pedestal tune FILE --loops` then tunes the loops and measures their margins.
 """
 import argparse
 import pathlib

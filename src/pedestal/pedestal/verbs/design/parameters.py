@@ -8,8 +8,9 @@ from pedestal_analysis import console
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the node."""
-    parser.add_argument('node', help='name of the node: acu, adu, beam_steering, tracking_receiver, ship_motion, ins, '
-                        'recorder ...')
+    parser.add_argument('node',
+                        help='name of the node: acu, adu, beam_steering (drive of an array), tracking_receiver, '
+                        'ship_motion, ins, recorder; or scenario')
 
 
 def main(options: argparse.Namespace) -> int:

@@ -1,6 +1,6 @@
-"""measure the compiled closed loop against the papers
+"""repeat the experiments of the source papers and compare the numbers
 
-Prints a table with remarks and draws the figures of the study.
+Runs the compiled laws of all nodes in one process. Prints a table with remarks and draws the figures of the study.
 """
 import argparse
 import contextlib
@@ -23,8 +23,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     console.add_json(parser)
     parser.add_argument('--output', type=pathlib.Path, metavar='DIR', help='output folder of the figures; default: '
                         'studies/NAME')
-    parser.add_argument('--runs', type=int, metavar='N', help='number of runs of each case; default: number of '
-                        'the study')
+    parser.add_argument('--runs', type=int, metavar='N', help='number of runs of each case; default: set by the '
+                        'study')
     arguments.add_vector(parser)
     parser.add_argument('--scenario', metavar='SCENARIO', help='scenario (name or .yaml file) whose plant '
                         'replaces the plant of the paper, for studies servo, backlash and bode')

@@ -1,14 +1,14 @@
-"""run a scenario many times with varied parameters: percentiles, rates, sensitivities, the worst trials
+"""run a scenario many times with varied parameters, and print statistics and the worst trials
 
-Each trial has its own seed and the results of `pedestal run`. A trial runs in the closed loop without ROS. The printed
-commands of the worst trials give the same numbers in the graph.
+Each trial has its own seed and the results of `pedestal run`. A trial runs all laws in one process, without ROS. For
+each of the worst trials a `pedestal run` command is printed, which gives the same numbers with separate nodes.
 
---vary NODE.KEY=DISTRIBUTION draws a parameter from uniform(low, high), normal(mean, sigma) or choice(a, b, ...). An x
-after the distribution multiplies the value of the scenario by the drawn number. --vary FILE.csv reads the trials from
-a file with a column for each parameter and a row for each trial.
+--vary NODE.KEY=DISTRIBUTION draws a parameter from uniform(low, high), normal(mean, sigma) or choice(a, b, ...). With
+an x after the distribution, as in normal(1, 0.1)x, the drawn number is a factor of the value of the scenario. The
+form --vary FILE.csv reads the trials from a file with a column for each parameter and a row for each trial.
 
-Rows are written to OUTPUT/trials.csv as soon as they exist. After Ctrl-C or a crash the same command continues.
---against and --against-param compare the trials of two sides pair by pair, with the same seeds and draws.
+Rows are written to OUTPUT/trials.csv as soon as they exist. Repeat the command to continue after Ctrl-C or a crash.
+--against and --against-param compare two variants. Trial i of both variants has the same seed and drawn values.
 """
 import argparse
 import contextlib
@@ -34,16 +34,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--vary', action='append', default=[], metavar='NODE.KEY=DISTRIBUTION|FILE.csv',
                         help="varied parameter, for example 'adu.azimuth.load.inertia=normal(1, 0.1)x', or file of "
                         'trials; may be repeated')
-    parser.add_argument('--sobol', action='store_true', help='draw the points of a Sobol sequence, which fill the '
-                        'ranges evenly')
+    parser.add_argument('--sobol', action='store_true', help='use a Sobol sequence in place of random draws; its '
+                        'points fill the ranges evenly')
     arguments.add_duration(parser, 'a trial')
     parser.add_argument('--seed', type=int, metavar='N', help='seed of the first trial; default: value of the '
                         'scenario')
     arguments.add_param(parser)
     arguments.add_params_file(parser)
-    parser.add_argument('--against', metavar='SCENARIO', help='scenario to compare with')
+    parser.add_argument('--against', metavar='SCENARIO', help='scenario of the second variant')
     parser.add_argument('--against-param', action='append', default=[], metavar='NODE.KEY=VALUE',
-                        help='parameter and its value on the side to compare with; may be repeated')
+                        help='parameter of the second variant and its value; may be repeated')
     parser.add_argument('--by', metavar='RESULT', help='result that ranks the trials and decides a comparison; '
                         'default: pointing_rms_deg')
     arguments.add_workers(parser)

@@ -16,7 +16,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--rate', type=float, metavar='HZ', help='largest rate of the records of a tdm [Hz]; default: '
                         '10')
     parser.add_argument('--participants', nargs=2, metavar=('STATION', 'TARGET'), help='names of station and target '
-                        'in a tdm; default: PEDESTAL and the international designator of the TLE')
+                        'in a tdm; default: PEDESTAL and the international designator of the TLE; kind of the target '
+                        'without a TLE')
     parser.add_argument('--overwrite', action='store_true', help='replace existing files')
 
 

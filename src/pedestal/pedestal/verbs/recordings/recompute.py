@@ -1,15 +1,16 @@
 """feed recorded inputs to a node again and compare its outputs
 
-Feeds the recorded inputs of a node to its step function and compares the new outputs with the recorded outputs: first
-count and order of the messages, then every field. Exit code 1 if a field differs by more than its tolerance, or if the
-recording never exercised the node (never locked, never in autotrack, never moved).
+Feeds the recorded inputs of a node to its step function and compares the new outputs with the recorded outputs. It
+compares count and order of the messages, then every field. Exit code 1 if a field differs by more than its tolerance,
+or if the node did nothing in the recording (never locked, never in autotrack, never moved).
 
 A lockstep recording is recomputed exactly: the same version on the same machine gives the same bits. In a realtime
-recording a step gets all messages that were sent before the next step began. A message that was then still in transit
-reached the recorded node later, so small differences are normal.
+recording, a step of the recomputation gets all messages that were sent before the next step began. In the run, a
+message in transit at that moment was used one step later, so small differences are normal.
 
-A bag holds the replies to service requests, not the requests. A change of acu/mode or adu/state without a recorded
-cause is therefore requested again at its step, and counted. Changes of parameters during the run are not recorded.
+A bag holds the replies to service requests, not the requests. Changes of acu/mode or adu/state that no recorded input
+explains are therefore repeated as requests in their steps; the report states their number. Changes of parameters
+during the run are not recorded.
 Diagnostics are not recomputed.
 
 With --param the verb compares old with new results, and a difference is no failure. Because the recorded antenna does
@@ -35,15 +36,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--params-file', type=pathlib.Path, metavar='FILE',
                         help='scenario or parameter file of the recorded nodes, for a bag without parameters')
     parser.add_argument('--pacing', choices=('lockstep', 'realtime'),
-                        help='rule that assigns inputs to steps; default: pacing in the bag, else realtime')
+                        help='pacing of the run, which determines the inputs of each step; default: pacing in the '
+                        'bag, else realtime')
     parser.add_argument('--absolute', type=float, metavar='X', help='absolute tolerance of every field, in its unit; '
-                        'default: by kind of field')
+                        'default: tolerance of the field (docs/graph.md, Recomputing)')
     parser.add_argument('--relative', type=float, metavar='X', help='additional tolerance relative to the recorded '
                         'value; default: 1e-9')
     parser.add_argument('--ignore', action='append', default=[], metavar='PATTERN',
                         help="topics or topic.field not to compare, for example 'acu/reference*'; may be repeated")
-    parser.add_argument('--allow-idle', action='store_true', help='do not fail for a node that was never exercised')
-    parser.add_argument('--live', action='store_true', help='feed a process of the node, in lockstep over DDS')
+    parser.add_argument('--allow-idle', action='store_true', help='accept a node that did nothing in the recording '
+                        '(never locked, never in autotrack, never moved)')
+    parser.add_argument('--live', action='store_true', help='start a process of the node and send it the inputs over '
+                        'DDS, in lockstep')
     console.add_json(parser)
     console.add_explain(parser)
     parser.add_argument('--output', type=pathlib.Path, metavar='BAG',

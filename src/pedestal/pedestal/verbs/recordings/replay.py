@@ -14,7 +14,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('bag', type=pathlib.Path, help='recording: a folder or an .mcap file')
     into = parser.add_mutually_exclusive_group()
     into.add_argument('--node', nargs='+', action='extend', default=[], metavar='NAME',
-                      help='nodes whose subscribed topics are published, for example acu; default: every topic')
+                      help='nodes, for example acu; only their inputs are published; default: every topic')
     into.add_argument('--topics', nargs='+', action='extend', default=[], metavar='NAME', help='topics to '
                       'publish')
     pace = parser.add_mutually_exclusive_group()
@@ -29,8 +29,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--paused', action='store_true', help='start in pause')
     parser.add_argument('--page', nargs='?', type=operator_servers.port, const=operator_servers.SERVERS['page'].port,
                         metavar='PORT',
-                        help="TCP port of the operator's page, which shows the recording with a slider and without a "
-                             f"graph; default: {operator_servers.SERVERS['page'].port}")
+                        help="TCP port of the operator's page, which shows the recording with a slider; no ROS graph "
+                             f"is needed; default: {operator_servers.SERVERS['page'].port}")
     parser.add_argument('--deadline', type=float, metavar='S',
                         help='longest wait for a subscriber or an answer, in wall-clock time [s]; default: 60')
 

@@ -1,6 +1,7 @@
 """repeat a recorded run and compare the two recordings
 
-Exit code 1 if a message differs.
+Exit code 0 if all messages are equal, also if metadata or the layout of the file differ. Exit code 1 if any message
+differs.
 """
 import argparse
 import pathlib
