@@ -336,6 +336,7 @@ class Acu(Unit):
     def _refusal(self, mode, reason):
         """Return the text of the reason why a mode is refused."""
         more = self.predictor.refusal_details(mode, reason, self.now * 1e-9) if mode in (Mode.TLE, Mode.SUN) else ''
+        more = more or diagnosis.missing(self, diagnosis.INPUTS_OF_REASONS.get(reason, ''))
         return modes.REASONS[reason] + (f', {more}' if more else '')
 
     @property
@@ -350,6 +351,9 @@ class Acu(Unit):
         words = {code: modes.REASONS[code] for code in set(why) - {Reason.NONE}}
         if Reason.DRIVE_NOT_READY in words:
             words[Reason.DRIVE_NOT_READY] += f': {self.drive_status}'
+        for reason, name in diagnosis.INPUTS_OF_REASONS.items():
+            if reason in words and (text := diagnosis.missing(self, name)):
+                words[reason] += f', {text}'
         return {mode: words[code] for mode, code in zip(modes.MODES, why) if code in words}
 
     def requests_for(self, topic, text):

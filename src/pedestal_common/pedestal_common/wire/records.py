@@ -70,7 +70,8 @@ def code_of(topic, text) -> int:
 class _Shape:
     """Where the columns of a topic lie in messages alike in everything but their numbers, from one of them.
 
-    fields: [(column, start, dtype)]; reader: the Struct that reads these numbers at once.
+    fields: [(column, start, dtype)]; reader: the Struct that reads these numbers at once; marks: [(columns, Structs with
+    their starts, function absent)] of layouts.no_data.
     """
 
     def __init__(self, topic, data):
@@ -87,6 +88,9 @@ class _Shape:
             form += f'{start - at}x{_FORMATS[dtype[1:]]}'
             at = start + int(dtype[2:])
         self.reader = struct.Struct(form)
+        self.marks = [([index[name] for name in names if name in index],
+                       [(struct.Struct(dtype[0] + _FORMATS[dtype[1:]]), start) for start, dtype in where], absent)
+                      for names, where, absent in layouts.no_data(type_name, places.numbers, places.texts)]
 
     def fits(self, data):
         """Whether the numbers of a message lie at the same places."""
@@ -129,8 +133,9 @@ class Decoder:
         self._stamp, self._numbers = record[topic]['stamp'], numbers(record, topic)[0]
 
     def decoded(self, data):
-        """(stamp [ns], numbers (columns,)) of CDR bytes; NaN for a number the message has not. Raises ValueError when
-        they are no message of the topic's type, or their stamp is none."""
+        """(stamp [ns], numbers (columns,)) of CDR bytes; NaN for a number the message has not, and for those that it
+        marks as no data (layouts.NO_DATA_MARKS). Raises ValueError when they are no message of the topic's type, or
+        their stamp is none."""
         if not self._shape.fits(data):
             self._shape = _Shape(self.topic, data)
         seconds, nanoseconds = _STAMP.unpack_from(data, 4)
@@ -141,6 +146,9 @@ class Decoder:
             given, values = values, [np.nan] * self._columns
             for (column, _, _), value in zip(self._shape.fields, given):
                 values[column] = value
+        for marked, where, absent in self._shape.marks:
+            if absent(*[form.unpack_from(data, start)[0] for form, start in where]):
+                values = [np.nan if column in marked else value for column, value in enumerate(values)]
         return seconds * 1_000_000_000 + nanoseconds, values
 
     def put(self, stamp, values):
