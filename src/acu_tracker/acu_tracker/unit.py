@@ -263,7 +263,7 @@ class Acu(Unit):
         """Return the text of a code on a text topic, or the message on acu/alarms."""
         lookahead = self.parts['state']['guidance']['lookahead']
         if topic == KEYHOLE_TOPIC:
-            return announcement.keyhole(lookahead, self.parameters.tracker.receiver.beamwidth)
+            return announcement.keyhole(lookahead, self.parameters)
         if topic == ALARMS_TOPIC:
             tripped = dict.fromkeys((DRIVE_FAULT_ALARM, *MOTOR_LOST_ALARMS), self.drive_state)
             return report.message(self.alarms, tripped, self.desk.reasons)
@@ -363,7 +363,7 @@ class Acu(Unit):
     def diagnose(self):
         """Return the Diagnosis and clear the bits of the invalid inputs.
 
-        ERROR: invalid inputs since the last diagnosis. WARN: gated errors, overtravel or coasting.
+        ERROR: invalid inputs since the last diagnosis. WARN: gated errors, a turn, overtravel or coasting.
         """
         result = diagnosis.of(self)
         self.parts['invalid'] = 0

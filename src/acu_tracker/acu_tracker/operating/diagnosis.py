@@ -61,10 +61,16 @@ def of(unit):
     if invalid:
         why = [text for name in invalid if (text := missing(unit, name))]
         return Diagnosis(LEVEL_ERROR, '; '.join((f'invalid input: {" ".join(invalid)}', *why)), values)
-    if state['guidance']['overtravel']:
-        return Diagnosis(LEVEL_WARN, 'no azimuth wrap holds the whole program track: the axis will stop at a limit',
-                         values)
     mode, reason = modes.MODES[outputs['mode']], modes.REASONS[outputs['reason']]
+    if state['guidance']['turn']['under_way']:
+        return Diagnosis(LEVEL_WARN, f'{mode} ({reason}): {announcement.turn(unit)}', values)
+    if state['guidance']['held'] >= state['stamp']:
+        return Diagnosis(LEVEL_WARN, f'{mode} ({reason}): an axis is held at a limit, and the beam is off the target',
+                         values)
+    if state['guidance']['overtravel']:
+        return Diagnosis(LEVEL_WARN, announcement.overtravel(unit), values)
+    if announcement.reaches_end(unit):
+        return Diagnosis(LEVEL_WARN, f'{mode} ({reason}): {announcement.end_of_travel(unit)}', values)
     return Diagnosis(LEVEL_WARN if outputs['coasting'] else LEVEL_OK, f'{mode} ({reason})', values)
 
 

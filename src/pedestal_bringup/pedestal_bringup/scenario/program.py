@@ -64,9 +64,9 @@ class Plan:
         return {f'{prefix}acu/program_track': program_message(*table) for prefix, table in self.tables.items()}
 
     def announced(self):
-        """Lines on the targets of the beams, each once: what a flight is, when a satellite is highest, rises and
-        sets."""
-        lines = []
+        """Lines on changed values, and on the targets of the beams, each once: what a flight is, when a satellite is
+        highest, rises and sets."""
+        lines = list(self.scenario.notes)
         for built in self.targets.values():
             lines += built.summary or _sky(built, self.scenario.header.duration)
         return list(dict.fromkeys(lines))
