@@ -17,7 +17,7 @@ MECHANICAL = ('pid', 'feedforward', 'adrc')
 
 @pytest.fixture(name='BeamRig')
 def beam_rig(Rig):
-    """The Rig with the errors of a beam: straight to half its width, then wrong, and noise-free side lobes to 25 deg."""
+    """The Rig with the errors of a beam: straight to half its width, then those of side lobes, up to 25 deg."""
     class BeamRig(Rig):
         def error(self, t, angle):
             true, width = np.array(super().error(t, angle)), self.params.tracker.receiver.beamwidth
@@ -127,8 +127,8 @@ def test_an_error_belongs_to_a_turn_by_its_own_time(turn):
 
 @pytest.mark.parametrize(('limits', 'said'), (
     ({}, 'at 1.8 s the azimuth turns back by 360 deg at the end of its travel, for about 2.8 s off the target'),
-    ({'azimuth.limits.low': -1.0}, 'at 1.8 s the azimuth stops at the end of its travel until the target is inside the '
-                                   'travel again')))
+    ({'azimuth.limits.low': -1.0},
+     'at 1.8 s the azimuth stops at the end of its travel until the target is inside the travel again')))
 def test_the_announcement_says_what_the_azimuth_will_do(limits, said):
     unit = Acu(build(AcuParameters, {**limits}), ())
     times = np.arange(20.0)

@@ -263,7 +263,7 @@ def test_table_of_text_clock_and_diagnostics(recording):
 
 
 def test_numbers_that_a_message_marks_as_no_data_are_nan_in_the_table():
-    """REP 145 and sensor_msgs/Imu; an export of such an orientation would be an attitude that nobody has measured."""
+    """REP 145 and sensor_msgs/Imu; an export must not show such an orientation as an attitude."""
     data = []
     for variance in (1e-6, -1.0):
         message = messages.template('ship/imu/data')

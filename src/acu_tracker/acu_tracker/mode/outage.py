@@ -1,4 +1,4 @@
-"""Outage of the receiver: its duration, and whether a keyhole, a turn of the azimuth or a hidden sector explains it."""
+"""Outage of the receiver: its duration, and its explanation by a keyhole, a turn of the azimuth or a hidden sector."""
 import math
 from collections import namedtuple
 

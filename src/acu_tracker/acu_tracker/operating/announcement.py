@@ -32,11 +32,15 @@ def keyhole(h, parameters):
 
 
 def _at_the_end(axis, when):
-    """Return what the azimuth does at the end of its travel; axis: its AxisParameters; when: text, '' for no time."""
+    """Return the text of the motion of the azimuth at the end of its travel.
+
+    axis: its AxisParameters; when: text of the time, '' for none.
+    """
     if axis.limits.high - axis.limits.low < 2.0 * math.pi:
         return f'{when}the azimuth stops at the end of its travel until the target is inside the travel again'
     duration = 2.0 * math.pi / axis.shaper.rate + axis.shaper.rate / axis.shaper.acceleration
-    return f'{when}the azimuth turns back by 360 deg at the end of its travel, for about {duration:.1f} s off the target'
+    return (f'{when}the azimuth turns back by 360 deg at the end of its travel, for about {duration:.1f} s off the '
+            'target')
 
 
 def overtravel(unit):
@@ -45,7 +49,8 @@ def overtravel(unit):
     On a ship the time is unknown, because it depends on the motion of the deck.
     """
     state, limits = unit.parts['state'], unit.parameters.azimuth.limits
-    track, now, when = unit.memory.tables[tables.TABLE_INDEX[state['mode']['table']]], state['stamp'], ''
+    now, when = state['stamp'], ''
+    track = unit.memory.tables[tables.TABLE_INDEX[state['mode']['table']]]
     ahead = track.times > now
     if ahead.any() and not unit.parts['inputs']['stabilised']:
         azimuth = np.unwrap(np.concatenate(([state['guidance']['azimuth']], track.angles[ahead, 0])))

@@ -347,7 +347,7 @@ LIMIT_ENDS = (('low', 'lower', 1.0), ('high', 'upper', -1.0))
 """(end of the limits of the control unit, of the drive, sign of the way into the travel)."""
 
 
-def _narrow(sections, header):
+def _narrow(sections: dict, header: ScenarioParameters) -> tuple:
     """Set each limit of a control unit to that of the drive where the drive's is narrower. Return a line for each.
 
     This holds for an end of the travel that the scenario gives for one of both; two defaults stay as they are.

@@ -77,11 +77,12 @@ class NoDataMark(typing.NamedTuple):
     absent: typing.Callable
 
 
-def _negative(variance):
+def _negative(variance: typing.Any) -> typing.Any:
+    """Return True where a variance is negative."""
     return variance < 0.0
 
 
-def _out_of_range(distance, least, largest):
+def _out_of_range(distance: typing.Any, least: typing.Any, largest: typing.Any) -> typing.Any:
     """Return True where a range is infinite (REP 117), or outside the limits of its sensor where there are limits."""
     outside = (largest > least) & ((distance < least) | (distance > largest))
     return (np.abs(distance) == math.inf) | outside
@@ -96,7 +97,7 @@ NO_DATA_MARKS = {
 negative number counts as this mark. sensor_msgs/Range: a range outside min_range to max_range must be discarded."""
 
 
-def no_data(type_name, numbers, texts):
+def no_data(type_name: str, numbers: list, texts: dict) -> list:
     """Return [(names of the columns of a field, [(start, dtype)] of its mark, function absent)] for a message.
 
     numbers, texts: as in cdr.Places.

@@ -70,8 +70,8 @@ def code_of(topic, text) -> int:
 class _Shape:
     """Where the columns of a topic lie in messages alike in everything but their numbers, from one of them.
 
-    fields: [(column, start, dtype)]; reader: the Struct that reads these numbers at once; marks: [(columns, Structs with
-    their starts, function absent)] of layouts.no_data.
+    fields: [(column, start, dtype)]; reader: the Struct that reads these numbers at once. marks: [(columns, Structs
+    with their starts, function absent)] of layouts.no_data.
     """
 
     def __init__(self, topic, data):
