@@ -207,14 +207,16 @@ def _take_attitude(s, c, u):
 def _take_receiver(s, c, u, o, way):
     """Take the receiver's error of this step. Return a flag where the error is not accepted, else 0."""
     g, k, mode = s.guidance, s.tracking, s.mode.now
-    flags, used, at = tracking.used_error(k, c, u, modes.USES_SIGNAL_LEVEL[mode], g.pointing_offset)
+    offset = guidance.pointing_offset(g, u.error_stamp - c.p.tracker.receiver.age)
+    flags, used, at = tracking.used_error(k, c, u, modes.USES_SIGNAL_LEVEL[mode], offset)
     if not used:
         return flags
     if mode == Mode.ACQUIRE:
         guidance.check_slope(g, k, c, u, at, way)
     restart_gap = math.inf if _outage(s, c).permitted else c.p.tracker.restart_gap
-    return tracking.take_error(k, c, u, o, at, restart_gap, mode == Mode.AUTOTRACK,
-                               supervision.axes_follow_commands(s.supervision))
+    judged = not guidance.held(g, c, s.stamp)
+    return tracking.take_error(k, c, u, o, at, restart_gap, mode == Mode.AUTOTRACK and judged,
+                               supervision.axes_follow_commands(s.supervision) and judged)
 
 
 @compiled
@@ -334,6 +336,8 @@ def _move(s, c, u, o, program, gap, begins, dt):
         V = tracking.deck_rates(k, c, t, actual.azimuth.angle, actual.elevation.angle)
         axes.follow(s.axis, c, u, o, motion, now, (k.error, V, m.now == Mode.AUTOTRACK))
         mode_change.mark_started(m)
+        limited = o.angle_limited[0] != 0 or o.angle_limited[1] != 0
+        guidance.watch_beam(g, c, m.now, axes.now(s.axis), limited, now.t_m)
         if _note_outage_reason(s, c) and m.now == Mode.AUTOTRACK and not gap.coasting:
             guidance.bridge_to(g, k, c, program, t)
         o.blocked, o.coasting = s.outage.blocked, m.now == Mode.AUTOTRACK and gap.coasting
@@ -346,11 +350,13 @@ def _move(s, c, u, o, program, gap, begins, dt):
 def _note_outage_reason(s, c):
     """Note the reason why the receiver may be without signal. Return True if there is one.
 
-    The target may be hidden, or the beam may slew through the keyhole.
+    The target may be hidden, or the beam may slew through the keyhole or go round at a limit of its travel.
     """
     g, follows = s.guidance, modes.FOLLOWS_TARGET[s.mode.now]
     hidden = follows and blockage.blocked(c.lookahead.sectors, g.target_angles[0], g.target_angles[1])
-    reason = outage.watch(s.outage, hidden, follows and planner.slewing(g.lookahead, s.stamp), s.stamp)
+    turning = g.turn.under_way and supervision.axes_follow_commands(s.supervision)
+    reason = outage.watch(s.outage, hidden, follows and planner.slewing(g.lookahead, s.stamp), follows and turning,
+                          s.stamp)
     mode_change.set_outage_reason(s.mode, reason)
     return reason != Reason.NONE
 

@@ -8,10 +8,8 @@ from acu_tracker import signals
 from acu_tracker.estimation import target
 from acu_tracker.estimation.filters import measurement
 from acu_tracker.geometry import attitude, attitude_error, direction, encoders
+from acu_tracker.guidance.azimuth_turn import MAX_OFFSET_BEAMWIDTHS
 from pedestal_common.compiled import compiled
-
-MAX_OFFSET_BEAMWIDTHS = 0.5
-"""Largest intended pointing offset [beamwidths] at which the receiver's error is still used."""
 
 UNKNOWN_POINTING = encoders.Pointing(math.nan, math.nan, math.nan, math.nan)
 """Pointing of the beam where no error is used."""

@@ -35,7 +35,8 @@ REASON_TEXTS = dict(
     FOUND='found', NOT_FOUND='not found', WRONG_SLOPE='wrong slope', SIDE_LOBE='side lobe',
     PINNED='stow pins not out', PIN_FAILED='stow pin failed', PINS_IN='stow pins in', PINS_OUT='stow pins out',
     NO_ELEMENTS='no elements', TOO_OLD='elements too old', BELOW_HORIZON='below the horizon',
-    PROGRAM_GAP='gap in the program track', NO_UTC='UTC unknown', DRIVE_FROZEN='drive frozen')
+    PROGRAM_GAP='gap in the program track', NO_UTC='UTC unknown', DRIVE_FROZEN='drive frozen',
+    TURN='azimuth turn')
 """{name of a reason: its text in replies and diagnostics}."""
 
 REASONS = tuple(REASON_TEXTS.values())

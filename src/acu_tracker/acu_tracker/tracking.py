@@ -56,8 +56,8 @@ def take_error(k, c, u, o, at, restart_gap, closed, follows):
 
     at           Pointing of the beam
     restart_gap  as in tracker.observe
-    closed       whether the loop is closed on the errors
-    follows        whether the axes follow their commands
+    closed       whether the loop is closed on the errors, and no limit holds the beam
+    follows      whether the axes follow their commands, and no limit holds the beam
 
     Return a flag where the error is not accepted, else 0.
     """

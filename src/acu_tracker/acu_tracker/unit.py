@@ -263,7 +263,7 @@ class Acu(Unit):
         """Return the text of a code on a text topic, or the message on acu/alarms."""
         lookahead = self.parts['state']['guidance']['lookahead']
         if topic == KEYHOLE_TOPIC:
-            return announcement.keyhole(lookahead, self.parameters.tracker.receiver.beamwidth)
+            return announcement.keyhole(lookahead, self.parameters)
         if topic == ALARMS_TOPIC:
             tripped = dict.fromkeys((DRIVE_FAULT_ALARM, *MOTOR_LOST_ALARMS), self.drive_state)
             return report.message(self.alarms, tripped, self.desk.reasons)
@@ -336,6 +336,7 @@ class Acu(Unit):
     def _refusal(self, mode, reason):
         """Return the text of the reason why a mode is refused."""
         more = self.predictor.refusal_details(mode, reason, self.now * 1e-9) if mode in (Mode.TLE, Mode.SUN) else ''
+        more = more or diagnosis.missing(self, diagnosis.INPUTS_OF_REASONS.get(reason, ''))
         return modes.REASONS[reason] + (f', {more}' if more else '')
 
     @property
@@ -350,6 +351,9 @@ class Acu(Unit):
         words = {code: modes.REASONS[code] for code in set(why) - {Reason.NONE}}
         if Reason.DRIVE_NOT_READY in words:
             words[Reason.DRIVE_NOT_READY] += f': {self.drive_status}'
+        for reason, name in diagnosis.INPUTS_OF_REASONS.items():
+            if reason in words and (text := diagnosis.missing(self, name)):
+                words[reason] += f', {text}'
         return {mode: words[code] for mode, code in zip(modes.MODES, why) if code in words}
 
     def requests_for(self, topic, text):
@@ -359,7 +363,7 @@ class Acu(Unit):
     def diagnose(self):
         """Return the Diagnosis and clear the bits of the invalid inputs.
 
-        ERROR: invalid inputs since the last diagnosis. WARN: gated errors, overtravel or coasting.
+        ERROR: invalid inputs since the last diagnosis. WARN: gated errors, a turn, overtravel or coasting.
         """
         result = diagnosis.of(self)
         self.parts['invalid'] = 0

@@ -50,7 +50,7 @@ def test_through_the_keyhole(Rig, mode, with_program):
     pointing_errors(rig, 2.0)
     rig.track = rig.track if with_program else NO_TRACK
     before = pointing_errors(rig, 18.0)
-    text = announcement.keyhole(rig.state[0]['guidance']['lookahead'], BEAMWIDTH)
+    text = announcement.keyhole(rig.state[0]['guidance']['lookahead'], rig.params)
     numbers = dict(announcement.numbers(rig.state[0]['guidance']['lookahead']))
     plan = rig.state['guidance']['lookahead']['slew'][0].copy()
     assert before[:, 1].max() < 1e-3 and plan['t1'] > before[-1, 0]
@@ -68,7 +68,7 @@ def test_through_the_keyhole(Rig, mode, with_program):
     assert numbers['keyhole_loss_s'] == f'{plan["loss"]:.3f}' and float(numbers['deck_motion_deg']) == 0.0
     moving = rig.state[0]['guidance']['lookahead'].copy()
     moving['deck_motion'] = 0.5 * BEAMWIDTH
-    assert f'the deck moves by {math.degrees(0.5 * BEAMWIDTH):.2f} deg rms' in announcement.keyhole(moving, BEAMWIDTH)
+    assert f'the deck moves by {math.degrees(0.5 * BEAMWIDTH):.2f} deg rms' in announcement.keyhole(moving, rig.params)
 
 
 def slewing(Rig, **parameters):

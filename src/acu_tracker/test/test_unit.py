@@ -2,6 +2,8 @@
 import numpy as np
 import pytest
 
+from acu_tracker.alarms import machine, table
+from acu_tracker.geometry import direction
 from acu_tracker.params import AcuParameters
 from acu_tracker.program.prediction import PredictionParameters
 from acu_tracker.unit import DRIVE_STATE_TOPIC, JOINT_STATES_TOPIC, MODE_TOPIC, RATE_COMMAND_TOPIC, Acu
@@ -84,3 +86,70 @@ def test_a_program_track_without_the_axes_is_refused():
     with pytest.raises(ValueError, match='must hold azimuth and elevation'):
         Acu(AcuParameters(), ()).decode('acu/program_track', message)
     assert records.is_text(MODE_TOPIC)
+
+
+def stepped(unit, decoders, k, **changes):
+    """Step k of a unit by the bytes of one message of each topic; changes: {topic: change(message)}."""
+    for topic, decoder in decoders.items():
+        message = messages.template(topic)
+        messages.put_stamp(message.header.stamp, k * 5_000_000)
+        if topic in changes:
+            changes[topic](message)
+        decoder.put(*decoder.decoded(messages.serialize(message)))
+    unit.step(np.full(1, k * 5_000_000, np.int64), unit.inputs, unit.outputs)
+
+
+def marked(field):
+    """Return a change that marks a field of an Imu as no data."""
+    def change(message):
+        getattr(message, f'{field}_covariance')[0] = -1.0
+    return change
+
+
+@pytest.mark.parametrize('field', ('orientation', 'angular_velocity'))
+def test_an_attitude_without_orientation_or_rates_is_lost(field):
+    """The INS publishes on, with the level deck of an empty message: the alarm comes after attitude_timeout."""
+    unit = Acu(AcuParameters(initial_mode='slave'), ('joint_states', 'ship/imu/data'))
+    decoders = {topic: records.Decoder(topic, unit.inputs) for topic in unit.reads}
+    # The beam of the axes at rest, on a deck whose bow points east.
+    direction.set_moving(unit.parts['state']['guidance']['slave'], 0.0, (0.5 * np.pi, 0.0), 0.0, 0.0, np.inf)
+    for k in range(20):
+        stepped(unit, decoders, k)
+    assert unit.encode(MODE_TOPIC, int(unit.outputs[0][MODE_TOPIC])) == 'slave' and unit.diagnose().level == 0
+    lost = []
+    for k in range(20, 80):
+        stepped(unit, decoders, k, **{'ship/imu/data': marked(field)})
+        lost.append(unit.alarms['alarm'][table.ALARM_INDEX['INS lost']]['state'] != machine.State.NORMAL)
+    assert lost.index(True) == pytest.approx(40, abs=2)
+    diagnosis = unit.diagnose()
+    assert diagnosis.level == 2
+    assert diagnosis.message == f'invalid input: attitude; ship/imu/data: {field} missing'
+    assert unit.request('acu/slave').text == (f'refused: attitude invalid, ship/imu/data: {field} missing; '
+                                              'mode is standby')
+    for k in range(80, 90):
+        stepped(unit, decoders, k)
+    unit.diagnose()
+    assert unit.request('acu/slave').granted
+
+
+@pytest.mark.parametrize('change, missing', (
+    (lambda message: setattr(message, 'velocity', np.zeros(0)), 'velocity'),
+    (lambda message: setattr(message, 'velocity', np.zeros(1)), 'elevation.velocity'),
+    (lambda message: setattr(message, 'name', ['azimuth', 'tilt']), 'elevation.position, elevation.velocity'),
+    (lambda message: setattr(message, 'name', []), 'position, velocity'),
+    (lambda message: message.position.__setitem__(0, np.nan), 'azimuth.position')))
+def test_a_number_that_joint_states_lacks_is_named(change, missing):
+    unit = Acu(AcuParameters(), ('joint_states',))
+    decoders = {'joint_states': records.Decoder('joint_states', unit.inputs)}
+    stepped(unit, decoders, 0, joint_states=change)
+    text = f'joint_states: {missing} missing'
+    assert unit.diagnose().message == f'invalid input: encoder; {text}'
+    assert unit.request('acu/preset').text == f'refused: encoder invalid, {text}; mode is standby'
+    assert dict(unit.diagnose().values)['refused preset'] == f'encoder invalid, {text}'
+
+
+def test_a_torque_that_joint_states_lacks_is_no_fault():
+    unit = Acu(AcuParameters(), ('joint_states',))
+    decoders = {'joint_states': records.Decoder('joint_states', unit.inputs)}
+    stepped(unit, decoders, 0, joint_states=lambda message: setattr(message, 'effort', np.zeros(0)))
+    assert unit.diagnose().level == 0 and unit.request('acu/preset').granted

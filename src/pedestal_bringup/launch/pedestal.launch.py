@@ -39,6 +39,7 @@ def start(context):
     servers = launch_arguments.servers(given, chosen)
     file, whole = launch_arguments.prepare(given, chosen)
     actions = [LogInfo(msg=line) for line in launch_arguments.misspelt_arguments(context.launch_configurations)]
+    actions += [LogInfo(msg=line) for line in chosen.notes]
     actions += [PushRosNamespace(given['namespace'])] if given['namespace'] else []
     for name in chosen.nodes:
         if name == 'operator':

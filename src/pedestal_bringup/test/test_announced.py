@@ -1,10 +1,12 @@
 """What a run says of its targets before it begins."""
+import math
 import re
 
 import pytest
 
 from pedestal_bringup.scenario import scenario
 from pedestal_bringup.scenario.program import Plan
+from pedestal_common import parameters
 
 
 def lines(name, duration):
@@ -36,3 +38,33 @@ def test_a_track_that_rises_and_sets_within_the_run_says_so(tmp_path):
         f'tracking_receiver.target.track_file.path={path}'])).announced()
     assert 'highest 5.0 deg after 10 s' in highest and summary.startswith('a.csv')
     assert rises.startswith('the target rises after 5.') and sets.startswith('the target sets after 15.0')
+
+
+@pytest.mark.parametrize(('given', 'held', 'line'), (
+    (('acu.azimuth.limits.high=6.2832',), {'azimuth.limits.high': 1.5 * math.pi},
+     'acu.azimuth.limits.high = 6.2832 rad is wider than the travel of the drive: adu.azimuth.limits.upper = 4.71239 '
+     'rad (270.0 deg) holds'),
+    (('adu.azimuth.limits.lower=-2',), {'azimuth.limits.low': -2.0},
+     'acu.azimuth.limits.low = -4.71239 rad is wider than the travel of the drive: adu.azimuth.limits.lower = -2 rad '
+     '(-114.6 deg) holds'),
+    (('acu.elevation.limits.low=-0.2',), {'elevation.limits.low': math.radians(-2.0)},
+     'acu.elevation.limits.low = -0.2 rad is wider than the travel of the drive: adu.elevation.limits.lower = '
+     '-0.0349066 rad (-2.0 deg) holds'),
+    (('acu.azimuth.limits.high=4',), {'azimuth.limits.high': 4.0}, ''),
+    (('acu.azimuth.limits.high=6.3', 'adu.azimuth.limits.upper=6.4'), {'azimuth.limits.high': 6.3}, '')))
+def test_the_narrower_limit_of_control_unit_and_drive_holds(given, held, line):
+    chosen = scenario.load('uav_flyby', given)
+    assert held.items() <= parameters.as_dict(chosen.node_parameters('acu')).items()
+    assert Plan(chosen).announced() == ([line] if line else [])
+    assert Plan(scenario.parse('uav_flyby', chosen.as_yaml())).announced() == []
+
+
+def test_every_scenario_keeps_its_limits():
+    assert [name for name in scenario.available() if scenario.load(name).notes] == []
+
+
+def test_a_stow_angle_that_the_drive_does_not_reach_is_refused_with_both_limits():
+    with pytest.raises(scenario.ScenarioError) as error:
+        scenario.load('uav_flyby', ['adu.elevation.limits.upper=1.5'])
+    assert 'elevation.stow = 1.5708 rad: must be limits.low to limits.high' in str(error.value)
+    assert 'adu.elevation.limits.upper = 1.5 rad (85.9 deg) holds' in str(error.value)

@@ -79,6 +79,30 @@ def test_a_point_that_is_not_there_holds_no_number():
     assert np.isnan(decoder.decoded(messages.serialize(message))[1]).all()
 
 
+@pytest.mark.parametrize('field, width', [('orientation', 4), ('angular_velocity', 3), ('linear_acceleration', 3)])
+def test_a_covariance_that_begins_with_minus_one_is_no_data(field, width):
+    """sensor_msgs/Imu and REP 145: only this field has no number, and the next message has all of them again."""
+    columns = [column.field for column in layouts.columns('ship/imu/data')]
+    decoder = records.Decoder('ship/imu/data', records.empty(records.of('ship/imu/data'), 1))
+    for variance, absent in ((-1.0, width), (0.0, 0), (1e-6, 0)):
+        message = messages.template('ship/imu/data')
+        getattr(message, f'{field}_covariance')[0] = variance
+        _, values = decoder.decoded(messages.serialize(message))
+        assert [name for name, value in zip(columns, values) if math.isnan(value)] == [field] * absent
+
+
+@pytest.mark.parametrize('distance, least, largest, known', [
+    (5e3, 0.0, math.inf, True), (5e3, 0.0, 0.0, True), (5e3, 0.0, 4e3, False), (5.0, 10.0, 4e3, False),
+    (math.inf, 0.0, math.inf, False), (-math.inf, 0.0, 0.0, False), (math.nan, 0.0, 4e3, False)])
+def test_a_range_outside_its_limits_is_no_data(distance, least, largest, known):
+    """sensor_msgs/Range and REP 117; limits that are both zero were left out by the publisher."""
+    message = messages.template('tracking_receiver/range')
+    message.range, message.min_range, message.max_range = distance, least, largest
+    decoder = records.Decoder('tracking_receiver/range', records.empty(records.of('tracking_receiver/range'), 1))
+    value = decoder.decoded(messages.serialize(message))[1][0]
+    assert value == distance if known else math.isnan(value)
+
+
 @pytest.mark.parametrize('data, reason', [(b'', '0 bytes are no sensor_msgs/msg/JointState'),
                                           (b'\0\1\0\0' + b'\xff' * 20, 'are no sensor_msgs/msg/JointState')])
 def test_broken_bytes_are_named(data, reason):

@@ -29,7 +29,7 @@ def stamps(data, type_name, log):
     return pairs[:, 0].astype(np.int32).astype(np.int64) * 1_000_000_000 + pairs[:, 1]
 
 
-def table(data, type_name, log, start=0):
+def table(data, type_name, log, start=0, as_sent=False):
     """Return the columns of CDR messages of one type with their log times [ns].
 
     `t` [s] is the header stamp after start [ns], or the log time for a type without header. Each number is an array:
@@ -40,8 +40,9 @@ def table(data, type_name, log, start=0):
     Imu            orientation.w, angular_velocity.x, linear_acceleration.z, orientation_variance.z, ...
     String         data (a list of texts)
     others         the path of the field
-    Covariances and header are omitted; a DiagnosticArray has `t` only. A missing number is NaN in its row. Raises
-    ValueError for bytes that are no message of the type.
+    Covariances and header are omitted; a DiagnosticArray has `t` only. A missing number is NaN in its row. A number
+    that its message marks as no data (layouts.NO_DATA_MARKS) is NaN too, except if as_sent. Raises ValueError for
+    bytes that are no message of the type.
     """
     out = {'t': (stamps(data, type_name, log) - start) / 1e9}
     if type_name == 'std_msgs/msg/String':
@@ -52,11 +53,11 @@ def table(data, type_name, log, start=0):
         for length in np.unique(lengths):
             rows = np.flatnonzero(lengths == length)
             block = np.frombuffer(b''.join([data[row] for row in rows]), np.uint8).reshape(rows.size, length)
-            _fill(out, block, rows, type_name, len(data), most)
+            _fill(out, block, rows, type_name, len(data), most, as_sent)
     return out
 
 
-def _fill(out, block, rows, type_name, count, most):
+def _fill(out, block, rows, type_name, count, most, as_sent):
     """Put the numbers of messages of one length (m, length) into rows of the columns, of `most` cells at most."""
     shapes = 0
     while rows.size:
@@ -69,14 +70,22 @@ def _fill(out, block, rows, type_name, count, most):
         for path, start, dtype in walk.numbers:
             name = layouts.column(type_name, path, walk.texts)
             if name is not None:
-                size = int(dtype[2:])
-                values = np.ascontiguousarray(same[:, start:start + size]).view(dtype)[:, 0]
+                values = _numbers(same, start, dtype)
                 if name not in out:
                     if (len(out) + 1) * count > most:
                         raise ValueError(f'more than {len(out)} columns in {count} messages')
                     out[name] = np.full(count, np.nan)
                 out[name][where] = values
+        for names, marks, absent in () if as_sent else layouts.no_data(type_name, walk.numbers, walk.texts):
+            without = where[absent(*[_numbers(same, start, dtype) for start, dtype in marks])]
+            for name in names:
+                out[name][without] = np.nan
         block, rows = (block[~alike], rows[~alike]) if tried == len(block) else (block[tried:], rows[tried:])
+
+
+def _numbers(block, start, dtype):
+    """Return the numbers (m,) at a start in messages of one length (m, length)."""
+    return np.ascontiguousarray(block[:, start:start + int(dtype[2:])]).view(dtype)[:, 0]
 
 
 def alike(data, type_name, template, names):

@@ -56,7 +56,7 @@ def made(name, k, rng):
         message = messages.template(name)
         for part in (message.orientation, message.angular_velocity, message.linear_acceleration):
             part.x, part.y, part.z = map(float, rng.normal(size=3))
-        message.orientation_covariance[[0, 4, 8]] = rng.normal(size=3)
+        message.orientation_covariance[[0, 4, 8]] = abs(rng.normal(size=3))
     elif kind == 'Vector3Stamped':
         message = messages.Vector3Stamped(header=messages.header('beam'),
                                           vector=messages.vector3(math.nan, float(rng.normal()), 45.0))
@@ -260,6 +260,19 @@ def test_table_of_text_clock_and_diagnostics(recording):
     assert mode['data'] == ['standby', 'autotrack'] and mode['t'].tolist() == [0.0, 0.5]
     assert list(content.table('diagnostics')) == ['t']
     np.testing.assert_array_equal(content.table('clock')['t'], np.arange(450) * T / 1e9)
+
+
+def test_numbers_that_a_message_marks_as_no_data_are_nan_in_the_table():
+    """REP 145 and sensor_msgs/Imu; an export must not show such an orientation as an attitude."""
+    data = []
+    for variance in (1e-6, -1.0):
+        message = messages.template('ship/imu/data')
+        message.angular_velocity.x, message.orientation_covariance[0] = 0.1, variance
+        data.append(messages.serialize(message))
+    made = columns.table(data, 'sensor_msgs/msg/Imu', [0, 1])
+    np.testing.assert_array_equal(made['orientation.w'], [1.0, math.nan])
+    np.testing.assert_array_equal(made['angular_velocity.x'], [0.1, 0.1])
+    assert columns.table(data, 'sensor_msgs/msg/Imu', [0, 1], as_sent=True)['orientation.w'].tolist() == [1.0, 1.0]
 
 
 def test_table_of_messages_that_differ_in_names_and_length():

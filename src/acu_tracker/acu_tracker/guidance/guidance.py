@@ -3,6 +3,7 @@
 g: record of GUIDANCE_DTYPE; k: record of tracking.TRACKING_DTYPE; c: record of control_unit.CONSTANTS_DTYPE; way: the
 bridge.Way of the program; gap: the outage.Outage.
 """
+import math
 from collections import namedtuple
 
 import numpy as np
@@ -13,7 +14,7 @@ from acu_tracker.geometry import attitude, azimuth_wrap, direction
 from acu_tracker.geometry.azimuth_wrap import Travel
 from acu_tracker.geometry.motion import AxisMotion, Motion, line_of_sight
 from acu_tracker.geometry.vector import rotation
-from acu_tracker.guidance import manual
+from acu_tracker.guidance import azimuth_turn, manual
 from acu_tracker.lookahead import planner
 from acu_tracker.mode import signal_level_modes
 from acu_tracker.modes import Mode, Reason
@@ -25,14 +26,17 @@ from pedestal_common.compiled import compiled
 GUIDANCE_DTYPE = np.dtype([
     ('preset', direction.DIRECTION_DTYPE), ('slave', direction.DIRECTION_DTYPE), ('manual', manual.MANUAL_DTYPE),
     ('bridge', bridge.BRIDGE_DTYPE), ('acquisition', acquisition.ACQUISITION_DTYPE),
-    ('lookahead', planner.PLANNER_DTYPE),
-    ('azimuth', 'f8'), ('target_angles', 'f8', (2,)), ('pointing_offset', 'f8'), ('overtravel', 'i8')], align=True)
+    ('lookahead', planner.PLANNER_DTYPE), ('turn', azimuth_turn.TURN_DTYPE),
+    ('azimuth', 'f8'), ('target_angles', 'f8', (2,)), ('pointing_offset', 'f8'), ('held', 'f8'), ('overtravel', 'i8')],
+    align=True)
 """State of the guidance.
 
 bridge           rotation of the program to the place where the target was last tracked
 azimuth          raw azimuth of the last reference [rad]
 target_angles    deck angles of the target of that reference [rad]
 pointing_offset  intended angle between beam and target [rad]
+turn             turn of the azimuth by whole revolutions
+held             last instant [s] at which a limit held the beam off the target
 overtravel       1: no azimuth wrap holds the whole program
 """
 
@@ -53,6 +57,8 @@ def initialise(g, preset):
     manual.initialise(g['manual'])
     acquisition.initialise(g['acquisition'])
     planner.initialise(g['lookahead'])
+    azimuth_turn.initialise(g['turn'])
+    g['held'] = -math.inf
 
 
 @compiled
@@ -109,7 +115,7 @@ def _reference(g, k, c, order, way, gap, t):
         motion, g.pointing_offset = planner.motion_at(g.lookahead, c.lookahead, t, motion, level)
         start_from(g, motion.azimuth.angle)
         return motion
-    return Motion(_wrapped(g, c.axis[0].p.limits, order, way.program, t, motion.azimuth), motion.elevation)
+    return Motion(_wrapped(g, c.axis[0].p, order, way.program, t, motion.azimuth), motion.elevation)
 
 
 @compiled
@@ -127,19 +133,54 @@ def _source(g, k, c, mode, way, gap, t):
 
 
 @compiled
-def _wrapped(g, limits, order, program, t, azimuth):
-    """Return the AxisMotion of the azimuth at t [s] on the wrap that fits.
+def _wrapped(g, p, order, program, t, azimuth):
+    """Return the AxisMotion of the azimuth at t [s] on the wrap that fits; p: record of AxisParameters.
 
-    When a program begins, the wrap must hold all of it.
+    When a program begins, the wrap must hold all of it. Another change of the wrap is a turn, except for a beam, which
+    needs no time for it.
     """
-    travel = Travel(0.0, 0.0)
+    travel, before, limits = Travel(0.0, 0.0), g.azimuth, p.limits
     begins = order.begins and modes.FOLLOWS_TABLE[order.mode]
     if begins:
         travel = program_track.azimuth_travel(program, t)
-    g.azimuth = azimuth_wrap.nearest(azimuth.angle, g.azimuth, limits.low, limits.high, travel)
+    g.azimuth = azimuth_wrap.nearest(azimuth.angle, before, limits.low, limits.high, travel)
+    if not begins and abs(g.azimuth - before) > math.pi and p.controller != position_loop.CONTROLLER_BEAM:
+        azimuth_turn.begin(g.turn, t)
+        if g.overtravel and program_track.status(program, t) == Reason.NONE:
+            begins, travel = True, program_track.azimuth_travel(program, t)
     if begins:
         g.overtravel = g.azimuth + travel.below < limits.low or g.azimuth + travel.above > limits.high
     return AxisMotion(g.azimuth, azimuth.rate, azimuth.acceleration)
+
+
+@compiled
+def watch_beam(g, c, mode, references, limited, t):
+    """Note whether a turn of the azimuth is over, and whether a limit holds the beam off the target.
+
+    references: Motion of the axes at t [s]; limited: whether an axis is held at a limit.
+    """
+    beamwidth, elevation = c.p.tracker.receiver.beamwidth, g.target_angles[1]
+    azimuth_turn.watch(g.turn, references.azimuth.angle, (g.azimuth, elevation), beamwidth, t)
+    if limited and modes.FOLLOWS_TARGET[mode] and math.hypot(
+            (g.azimuth - references.azimuth.angle) * math.cos(elevation),
+            elevation - references.elevation.angle) > azimuth_turn.MAX_OFFSET_BEAMWIDTHS * beamwidth:
+        g.held = t
+
+
+@compiled
+def pointing_offset(g, t):
+    """Return the intended angle [rad] between beam and target for an error measured at t [s]; inf in a turn."""
+    return math.inf if azimuth_turn.covers(g.turn, t) else g.pointing_offset
+
+
+@compiled
+def held(g, c, t):
+    """Return True if a limit holds the beam off the target at t [s], or did within the last coast_time.
+
+    The receiver's errors are then no evidence of a divergence. Because a target may come back to the beam, they are
+    used.
+    """
+    return t - g.held <= c.p.tracker.coast_time
 
 
 @compiled
@@ -183,6 +224,9 @@ def look_ahead(g, k, c, mode, program, gap, t):
     if not modes.FOLLOWS_TARGET[mode] or mode == Mode.SLAVE:
         planner.clear_plan(h)
         g.overtravel, g.pointing_offset = 0, 0.0
+        if mode != Mode.SLAVE:
+            azimuth_turn.stop(g.turn)
+            g.held = -math.inf
         return False
     another = planner.another_program(h, program)
     if another:

@@ -1,4 +1,4 @@
-"""Outage of the receiver: its duration, and whether a keyhole or a hidden sector explains it."""
+"""Outage of the receiver: its duration, and its explanation by a keyhole, a turn of the azimuth or a hidden sector."""
 import math
 from collections import namedtuple
 
@@ -10,7 +10,7 @@ from pedestal_common.compiled import compiled
 OUTAGE_DTYPE = np.dtype([('stamp', 'f8'), ('blocked', 'i8')], align=True)
 """Last explanation of an outage.
 
-stamp      last stamp at which a keyhole or a hidden sector explained an outage [s]
+stamp      last stamp at which a keyhole, a turn or a hidden sector explained an outage [s]
 blocked    1 while the target is hidden
 """
 
@@ -19,7 +19,7 @@ Outage = namedtuple('Outage', 'since coasting permitted')
 
 since      time [s] since the last accepted measurement, less the receiver's latency and the age of its errors
 coasting   whether that time is longer than coast_after
-permitted  whether a keyhole or a hidden sector explains the outage, now or within the last coast_time
+permitted  whether a keyhole, a turn or a hidden sector explains the outage, now or within the last coast_time
 """
 
 
@@ -40,12 +40,13 @@ def now(s, accepted, t, p):
 
 
 @compiled
-def watch(s, hidden, slewing, t):
+def watch(s, hidden, slewing, turning, t):
     """Return the reason why the receiver may be without signal at t [s], or NONE.
 
-    hidden: whether the target is hidden; slewing: whether the beam slews through the keyhole.
+    hidden: whether the target is hidden; slewing: whether the beam slews through the keyhole; turning: whether the
+    azimuth goes round at a limit of its travel.
     """
     s.blocked = hidden
-    if hidden or slewing:
+    if hidden or slewing or turning:
         s.stamp = t
-    return Reason.BLOCKED if hidden else Reason.KEYHOLE if slewing else Reason.NONE
+    return Reason.BLOCKED if hidden else Reason.KEYHOLE if slewing else Reason.TURN if turning else Reason.NONE

@@ -4,13 +4,18 @@
 """
 import math
 
+import numpy as np
+
+from acu_tracker import modes
 from acu_tracker.lookahead import planner
+from acu_tracker.program import tables
 
 
-def keyhole(h, beamwidth):
-    """Return the text of acu/keyhole: the planned slew, or that no azimuth wrap fits; beamwidth [rad]."""
+def keyhole(h, parameters):
+    """Return the text of acu/keyhole: the planned slew, or that no azimuth wrap fits; parameters: AcuParameters."""
+    beamwidth = parameters.tracker.receiver.beamwidth
     if h['forecast'] == planner.FORECAST_NO_WRAP:
-        return 'keyhole ahead: no azimuth wrap holds the pass; the axis will stop at the end of its travel'
+        return f'keyhole ahead: no azimuth wrap holds the pass; {_at_the_end(parameters.azimuth, "")}'
     slew = h['slew']
     way = 'clockwise' if slew['peak'] > 0.0 else 'counter-clockwise'
     if slew['other_cost'] == math.inf:
@@ -24,6 +29,67 @@ def keyhole(h, beamwidth):
     if h['deck_motion'] > 0.25 * beamwidth:
         text += f'; approximate, because the deck moves by {_deg(h["deck_motion"]):.2f} deg rms'
     return text
+
+
+def _at_the_end(axis, when):
+    """Return the text of the motion of the azimuth at the end of its travel.
+
+    axis: its AxisParameters; when: text of the time, '' for none.
+    """
+    if axis.limits.high - axis.limits.low < 2.0 * math.pi:
+        return f'{when}the azimuth stops at the end of its travel until the target is inside the travel again'
+    duration = 2.0 * math.pi / axis.shaper.rate + axis.shaper.rate / axis.shaper.acceleration
+    return (f'{when}the azimuth turns back by 360 deg at the end of its travel, for about {duration:.1f} s off the '
+            'target')
+
+
+def overtravel(unit):
+    """Return the text for a program track that no azimuth wrap of an Acu holds, with the time of the end of travel.
+
+    On a ship the time is unknown, because it depends on the motion of the deck.
+    """
+    state, limits = unit.parts['state'], unit.parameters.azimuth.limits
+    now, when = state['stamp'], ''
+    track = unit.memory.tables[tables.TABLE_INDEX[state['mode']['table']]]
+    ahead = track.times > now
+    if ahead.any() and not unit.parts['inputs']['stabilised']:
+        azimuth = np.unwrap(np.concatenate(([state['guidance']['azimuth']], track.angles[ahead, 0])))
+        beyond = np.flatnonzero((azimuth < limits.low) | (azimuth > limits.high))
+        if beyond.size and beyond[0] > 0:
+            row, times = beyond[0], np.concatenate(([now], track.times[ahead]))
+            end = limits.low if azimuth[row] < limits.low else limits.high
+            when = f'at {np.interp(end, *_increasing(azimuth[row - 1:row + 1], times[row - 1:row + 1])):.1f} s '
+    return f'no azimuth wrap holds the whole program track: {_at_the_end(unit.parameters.azimuth, when)}'
+
+
+def reaches_end(unit):
+    """Return True if the azimuth of an Acu that follows a target without a table is soon at the end of its travel.
+
+    Soon is within keyhole.notice at the present rate. Where there is a program track, `overtravel` shows what it leads
+    to.
+    """
+    outputs, state, program = unit.parts['outputs'], unit.parts['state'], unit.memory.tables[0].times
+    mode, covered = outputs['mode'], len(program) > 0 and program[0] <= state['stamp'] <= program[-1]
+    return (modes.FOLLOWS_TARGET[mode] and not modes.FOLLOWS_TABLE[mode] and not covered
+            and outputs['time_to_limit'][0] < unit.parameters.keyhole.notice)
+
+
+def end_of_travel(unit):
+    """Return the text for an azimuth of an Acu that is soon at the end of its travel."""
+    left = unit.parts['outputs']['time_to_limit'][0]
+    return _at_the_end(unit.parameters.azimuth, f'at the present rate, in {left:.1f} s ')
+
+
+def _increasing(x, y):
+    """Return two points (2,), (2,) in increasing order of x."""
+    order = np.argsort(x)
+    return x[order], y[order]
+
+
+def turn(unit):
+    """Return the text for a turn of the azimuth of an Acu that is under way."""
+    guidance, reference = unit.parts['state']['guidance'], unit.parts['state']['axis'][0]['reference']
+    return f'the azimuth goes round by {_deg(guidance["azimuth"] - reference["angle"]):+.0f} deg to the target'
 
 
 def hidden(h):

@@ -1,9 +1,12 @@
 """Diagnosis of the control unit for /diagnostics."""
 import math
 
+import numpy as np
+
 from acu_tracker import modes, signals
+from acu_tracker.modes import Reason
 from acu_tracker.operating import announcement
-from pedestal_common.graph import topics
+from pedestal_common.graph import layouts, topics
 from pedestal_common.node.unit import LEVEL_ERROR, LEVEL_OK, LEVEL_WARN, Diagnosis
 
 FAULT_TEXTS = {
@@ -19,6 +22,30 @@ GATED_ERROR_TEXTS = {('error_gated',): 'an error of the receiver was outside the
                      ('error_gated', 'error_noisy'): 'the errors of the receiver are noise and are not used'}
 """Texts of the diagnosis where only these bits of signals.INVALID_INPUTS are set."""
 
+NEEDED_FIELDS = {'encoder': ('joint_states', ('position', 'velocity')),
+                 'attitude': ('ship/imu/data', ('orientation', 'angular_velocity')),
+                 'attitude_error': ('ins/error', ('position', 'velocity'))}
+"""{name in signals.INVALID_INPUTS: (topic, fields of its layout that the control unit needs)}."""
+
+INPUTS_OF_REASONS = {Reason.ENCODER_INVALID: 'encoder', Reason.ATTITUDE_INVALID: 'attitude'}
+"""{reason: name in NEEDED_FIELDS}."""
+
+
+def missing(unit, name):
+    """Return the text of the numbers that the last message of an input lacks, a name in NEEDED_FIELDS; '' for none.
+
+    A number is missing where the message has no such number, where it is NaN, and where it is marked as no data.
+    """
+    topic, needed = NEEDED_FIELDS.get(name, ('', ()))
+    if topic not in unit.reads and topic != unit.trigger:
+        return ''
+    message, absent = unit.inputs[0][topic], []
+    for field in needed:
+        numbers = np.isnan(message[field])
+        names = [column.name for column in layouts.columns(topic) if column.field == field]
+        absent += [field] if numbers.all() else [name for name, nan in zip(names, numbers) if nan]
+    return f'{topic}: {", ".join(absent)} missing' if absent else ''
+
 
 def of(unit):
     """Return the Diagnosis of an Acu."""
@@ -32,11 +59,18 @@ def of(unit):
     if invalid in GATED_ERROR_TEXTS:
         return Diagnosis(LEVEL_WARN, GATED_ERROR_TEXTS[invalid], values)
     if invalid:
-        return Diagnosis(LEVEL_ERROR, f'invalid input: {" ".join(invalid)}', values)
-    if state['guidance']['overtravel']:
-        return Diagnosis(LEVEL_WARN, 'no azimuth wrap holds the whole program track: the axis will stop at a limit',
-                         values)
+        why = [text for name in invalid if (text := missing(unit, name))]
+        return Diagnosis(LEVEL_ERROR, '; '.join((f'invalid input: {" ".join(invalid)}', *why)), values)
     mode, reason = modes.MODES[outputs['mode']], modes.REASONS[outputs['reason']]
+    if state['guidance']['turn']['under_way']:
+        return Diagnosis(LEVEL_WARN, f'{mode} ({reason}): {announcement.turn(unit)}', values)
+    if state['guidance']['held'] >= state['stamp']:
+        return Diagnosis(LEVEL_WARN, f'{mode} ({reason}): an axis is held at a limit, and the beam is off the target',
+                         values)
+    if state['guidance']['overtravel']:
+        return Diagnosis(LEVEL_WARN, announcement.overtravel(unit), values)
+    if announcement.reaches_end(unit):
+        return Diagnosis(LEVEL_WARN, f'{mode} ({reason}): {announcement.end_of_travel(unit)}', values)
     return Diagnosis(LEVEL_WARN if outputs['coasting'] else LEVEL_OK, f'{mode} ({reason})', values)
 
 

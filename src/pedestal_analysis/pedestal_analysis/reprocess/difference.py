@@ -100,11 +100,13 @@ def lines(differences) -> list:
 class Output:
     """Messages of one topic as numbers: stamps (n,) [ns], values (n, columns) in the units of the topic.
 
-    texts: (n,) instead of values for a text topic.
+    texts: (n,) instead of values for a text topic. read: values as a subscriber takes them, NaN where their message
+    marks them as no data; None: all of them.
     """
     stamps: np.ndarray
     values: np.ndarray
     texts: list | None = None
+    read: np.ndarray | None = None
 
     def table(self, topic):
         """Return {column: array (n,)} with the names of columns.table."""
@@ -121,11 +123,17 @@ def recorded(data, log, topic) -> Output:
     log = np.asarray(log, np.int64)
     if type_name == 'std_msgs/msg/String':
         return Output(log, np.zeros((len(data), 0)), columns.table(data, type_name, log)['data'])
-    table = columns.table(data, type_name, log)
-    values = np.full((len(data), len(layouts.columns(topic))), math.nan)
+    values = _values(columns.table(data, type_name, log, as_sent=True), topic)
+    read = _values(columns.table(data, type_name, log), topic) if type_name in layouts.NO_DATA_MARKS else None
+    return Output(columns.stamps(data, type_name, log), values, read=read)
+
+
+def _values(table, topic):
+    """Return the numbers (n, columns) of a topic in a table of its columns; NaN for a column that is missing."""
+    values = np.full((len(table['t']), len(layouts.columns(topic))), math.nan)
     for number, column in enumerate(layouts.columns(topic)):
         values[:, number] = table.get(column.name, math.nan)
-    return Output(columns.stamps(data, type_name, log), values)
+    return values
 
 
 def compare(topic, was: Output, now: Output, tolerance=Tolerance(), data=None, template=None) -> TopicDifference:

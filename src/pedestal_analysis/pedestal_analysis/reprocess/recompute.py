@@ -232,8 +232,9 @@ def _gathered(recording, unit, trigger, steps):
     for name, of_step in rows.items():
         if name in inputs.dtype.names:
             came, output = of_step >= 0, recording.output(name)
+            read = output.values if output.read is None else output.read
             inputs[name]['stamp'][came] = output.stamps[of_step[came]]
-            records.numbers(inputs, name)[came] = output.values[of_step[came]]
+            records.numbers(inputs, name)[came] = read[of_step[came]]
     return inputs, rows
 
 

@@ -53,14 +53,13 @@ def read(bag):
     table = bag.table(ATTITUDE_TOPIC)
     t = table['t']
     quaternion = [f'orientation.{letter}' for letter in 'xyzw']
-    true = tracking.on_grid(bag, t, 'ship/truth', quaternion)
-    both = np.isfinite(true).all(axis=1)
+    true, known = tracking.on_grid(bag, t, 'ship/truth', quaternion), np.column_stack([table[x] for x in quaternion])
+    both = np.isfinite(true + known).all(axis=1)
     if not both.any():
         return None
     from scipy.spatial.transform import Rotation  # slow to import, and most runs are ashore
     t, true = t[both], Rotation.from_quat(true[both])
-    known = Rotation.from_quat(np.column_stack([table[name] for name in quaternion])[both])
-    error = (known * true.inv()).as_rotvec() * (1.0, 1.0, -1.0)
+    error = (Rotation.from_quat(known[both]) * true.inv()).as_rotvec() * (1.0, 1.0, -1.0)
     sigma = np.sqrt(np.column_stack([table[f'orientation_variance.{axis}'] for axis in 'xz'])[both])
     return KnownAttitude(t, error, sigma, _aligned(bag, t[0]))
 

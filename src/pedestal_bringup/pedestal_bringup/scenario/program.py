@@ -67,9 +67,11 @@ class Plan:
         return {f'{prefix}acu/program_track': program_message(*table) for prefix, table in self.tables.items()}
 
     def announced(self):
-        """Return lines on the targets of the beams, each once: what a flight is, when a target is highest, rises and
-        sets."""
-        lines = []
+        """Return lines on changed values and on the targets of the beams, each once.
+
+        The lines of a target state what a flight is, when the target is highest, and when it rises and sets.
+        """
+        lines = list(self.scenario.notes)
         for prefix, built in self.targets.items():
             lines += [*built.summary, *_sky(built, self._parameters(prefix).kind, self.scenario.header.duration)]
         return list(dict.fromkeys(lines))

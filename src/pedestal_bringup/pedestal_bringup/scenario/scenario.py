@@ -8,7 +8,9 @@ import contextlib
 import dataclasses
 import functools
 import importlib.resources
+import itertools
 import json
+import math
 import pathlib
 import typing
 from collections.abc import Iterable, Iterator, Mapping
@@ -133,11 +135,13 @@ class ScenarioError(ValueError):
 class Scenario:
     """Checked scenario: its header and, for each node that takes part, the values that differ from the defaults.
 
-    With several beams the values of `acu` hold for each `beam_2/acu`; its own values replace them.
+    With several beams the values of `acu` hold for each `beam_2/acu`; its own values replace them. notes: lines on
+    values that were changed.
     """
     name: str
     header: ScenarioParameters
     values: Sections
+    notes: tuple[str, ...] = dataclasses.field(default=(), compare=False)
 
     @property
     def nodes(self) -> tuple[str, ...]:
@@ -349,13 +353,44 @@ def checked(changed: Draft, seed: int | None = None, duration: float | None = No
     _spread(name, sections, header, seed)
     for node in of_beams:
         _spread_to_beam(name, node, sections, header, seed)
+    notes = _narrow(sections, header)
     for node, values in sections.items():
-        checked = _checked(name, node, nodes.row(node, header.beam).parameters_type(), _whole(sections, node))
+        try:
+            checked = _checked(name, node, nodes.row(node, header.beam).parameters_type(), _whole(sections, node))
+        except ScenarioError as error:
+            raise ScenarioError('; '.join((str(error), *notes))) from None
         with _named(name, node):
             checked.check_graph(header.graph_beams, header.pacing == 'lockstep')
         typed = parameters.as_dict(checked)
         sections[node] = {key: typed[key] for key in values}
-    return Scenario(name, header, sections)
+    return Scenario(name, header, sections, notes)
+
+
+LIMIT_ENDS = (('low', 'lower', 1.0), ('high', 'upper', -1.0))
+"""(end of the limits of the control unit, of the drive, sign of the way into the travel)."""
+
+
+def _narrow(sections: Sections, header: ScenarioParameters) -> tuple[str, ...]:
+    """Set each limit of a control unit to that of the drive where the drive's is narrower. Return a line for each.
+
+    This holds for an end of the travel that the scenario gives for one of both; two defaults stay as they are.
+    """
+    drive, notes = nodes.row('adu', header.beam).parameters_type(), []
+    if header.beam:
+        return ()
+    acu_defaults, drive_defaults = parameters.defaults(nodes.row('acu').parameters_type()), parameters.defaults(drive)
+    for section in [section for section in sections if nodes.plain(section) == 'acu']:
+        for axis, (end, drive_end, inward) in itertools.product(topics.AXES, LIMIT_ENDS):
+            own, of_drive = f'{axis}.limits.{end}', f'{axis}.limits.{drive_end}'
+            values = _whole(sections, section)
+            if own not in values and of_drive not in sections['adu']:
+                continue
+            wide, narrow = values.get(own, acu_defaults[own]), sections['adu'].get(of_drive, drive_defaults[of_drive])
+            if inward * (narrow - wide) > 0.0:
+                sections[section][own] = narrow
+                notes.append(f'{section}.{own} = {wide:g} rad is wider than the travel of the drive: '
+                             f'adu.{of_drive} = {narrow:g} rad ({math.degrees(narrow):.1f} deg) holds')
+    return tuple(notes)
 
 
 def _follow_flight(name: str, receiver_values: dict[str, typing.Any], header_values: dict[str, typing.Any]) -> None:

@@ -3,9 +3,12 @@
 A column is one number of the messages of a topic, 'azimuth.velocity' of joint_states for example. The records of the
 nodes, the tables of a bag, the comparison of recordings and the export all take their columns from here.
 """
+import math
 import re
 import typing
 from collections.abc import Mapping
+
+import numpy as np
 
 import numpy as np
 
@@ -64,6 +67,51 @@ LAYOUTS = {
 }
 """{message type: its Fields}. The diagonal of an Imu's orientation_covariance is the variance of the attitude of an
 INS."""
+
+
+class NoDataMark(typing.NamedTuple):
+    """The convention by which a message states that it has no data for a field.
+
+    field   name of the field
+    paths   of the numbers in the message that state it
+    absent  function of these numbers, scalars or arrays: True where there is no data
+    """
+    field: str
+    paths: tuple
+    absent: typing.Callable
+
+
+def _negative(variance: typing.Any) -> typing.Any:
+    """Return True where a variance is negative."""
+    return variance < 0.0
+
+
+def _out_of_range(distance: typing.Any, least: typing.Any, largest: typing.Any) -> typing.Any:
+    """Return True where a range is infinite (REP 117), or outside the limits of its sensor where there are limits."""
+    outside = (largest > least) & ((distance < least) | (distance > largest))
+    return (np.abs(distance) == math.inf) | outside
+
+
+NO_DATA_MARKS = {
+    'sensor_msgs/msg/Imu': tuple(NoDataMark(field, (f'{field}_covariance[0]',), _negative)
+                                 for field in ('orientation', 'angular_velocity', 'linear_acceleration')),
+    'sensor_msgs/msg/Range': (NoDataMark('range', ('range', 'min_range', 'max_range'), _out_of_range),),
+}
+"""{type: marks}. sensor_msgs/Imu and REP 145: element 0 of the covariance is -1. No variance is negative, so every
+negative number counts as this mark. sensor_msgs/Range: a range outside min_range to max_range must be discarded."""
+
+
+def no_data(type_name: str, numbers: list, texts: dict) -> list:
+    """Return [(names of the columns of a field, [(start, dtype)] of its mark, function absent)] for a message.
+
+    numbers, texts: as in cdr.Places.
+    """
+    places = {path: (start, dtype) for path, start, dtype in numbers}
+    marks = NO_DATA_MARKS.get(type_name, ())
+    patterns = {field.name: field.path for field in LAYOUTS.get(type_name, ())}
+    return [([column(type_name, path, texts) for path in places if re.fullmatch(patterns[mark.field], path)],
+             [places[path] for path in mark.paths], mark.absent) for mark in marks]
+
 
 _JOINTS = {'sensor_msgs/msg/JointState': 'name', 'trajectory_msgs/msg/JointTrajectory': 'joint_names'}
 """{message type: its field with the names of the joints}."""

@@ -70,7 +70,8 @@ def code_of(topic, text) -> int:
 class _Shape:
     """Places of the columns of a topic, from one message, valid for messages that differ only in their numbers.
 
-    fields: [(column, start, dtype)]; reader: the Struct that reads these numbers at once.
+    fields: [(column, start, dtype)]; reader: the Struct that reads these numbers at once. marks: [(columns, Structs
+    with their starts, function absent)] of layouts.no_data.
     """
 
     def __init__(self, topic, data):
@@ -87,6 +88,9 @@ class _Shape:
             form += f'{start - at}x{_FORMATS[dtype[1:]]}'
             at = start + int(dtype[2:])
         self.reader = struct.Struct(form)
+        self.marks = [([index[name] for name in names if name in index],
+                       [(struct.Struct(dtype[0] + _FORMATS[dtype[1:]]), start) for start, dtype in where], absent)
+                      for names, where, absent in layouts.no_data(type_name, places.numbers, places.texts)]
 
     def fits(self, data):
         """Return True if the numbers of a message are at the same places."""
@@ -129,8 +133,9 @@ class Decoder:
         self._stamp, self._numbers = record[topic]['stamp'], numbers(record, topic)[0]
 
     def decoded(self, data):
-        """Return (stamp [ns], numbers (columns,)) of CDR bytes, NaN for a number that the message does not contain.
-        Raises ValueError for bytes that are no message of the topic's type, and for an invalid stamp."""
+        """Return (stamp [ns], numbers (columns,)) of CDR bytes. A number is NaN if the message does not contain it, or
+        marks it as no data (layouts.NO_DATA_MARKS). Raises ValueError for bytes that are no message of the topic's
+        type, and for an invalid stamp."""
         if not self._shape.fits(data):
             self._shape = _Shape(self.topic, data)
         seconds, nanoseconds = _STAMP.unpack_from(data, 4)
@@ -141,6 +146,9 @@ class Decoder:
             given, values = values, [np.nan] * self._columns
             for (column, _, _), value in zip(self._shape.fields, given):
                 values[column] = value
+        for marked, where, absent in self._shape.marks:
+            if absent(*[form.unpack_from(data, start)[0] for form, start in where]):
+                values = [np.nan if column in marked else value for column, value in enumerate(values)]
         return seconds * 1_000_000_000 + nanoseconds, values
 
     def put(self, stamp, values):

@@ -1,6 +1,8 @@
 """Frames of a running antenna from its encoders and its INS."""
 import contextlib
 
+import numpy as np
+
 from pedestal_common.graph import nodes
 from pedestal_common.wire import records
 from pedestal_operator.viewers import frames
@@ -43,14 +45,16 @@ class FrameSource:
     def read(self):
         """Return (stamp of the last angles [ns], their frames.Transforms), (0, []) before the first.
 
-        The deck is ashore before the first message of the INS.
+        The deck is ashore before the first message of the INS. A deck without an attitude has no transform.
         """
         latest = {prefix: latest.read() for prefix, latest in self._angles.items()}
         known = {prefix: read for prefix, read in latest.items() if read}
         if not known:
             return 0, []
         attitude = self._attitude.read()
-        deck = frames.of_deck(attitude[1][:4]) if attitude else frames.of_deck()
-        return max(stamp for stamp, _ in known.values()), [deck, *(
+        decks = [frames.of_deck(attitude[1][:4]) if attitude else frames.of_deck()]
+        if attitude and not np.isfinite(attitude[1][:4]).all():
+            decks = []
+        return max(stamp for stamp, _ in known.values()), [*decks, *(
             transform for prefix, (_, numbers) in known.items()
             for transform in frames.of_pedestal(numbers[:2], prefix))]
