@@ -10,15 +10,15 @@ import functools
 import importlib.resources
 import json
 import pathlib
+import re
 
 import numpy as np
 import yaml
 
-from pedestal_bringup.scenario import parameter_file
 from pedestal_common import parameters
 from pedestal_common.graph import nodes, topics
 from pedestal_common.graph.graph_parameters import GraphParameters
-from pedestal_common.text_files import files, plain_yaml
+from pedestal_common.text_files import files, parameter_file, plain_yaml
 
 
 @dataclasses.dataclass(frozen=True)
@@ -147,7 +147,7 @@ class Scenario:
 
     def node_parameters(self, node):
         """The parameter dataclass of one node as this scenario sets it."""
-        return _built(self.row(node).parameters_type(), self.given(node))
+        return _built(self.row(node).parameters_type(), parameters.without_ros(self.given(node)))
 
     def unit(self, node, parameters=None):
         """The unit of one of its nodes; parameters: in the place of the scenario's."""
@@ -158,7 +158,7 @@ class Scenario:
     def as_yaml(self):
         """The scenario as a ROS 2 parameter file."""
         sections = {'scenario': parameters.as_dict(self.header), **self.values}
-        return yaml.safe_dump({node: {'ros__parameters': values} for node, values in sections.items()}, sort_keys=True)
+        return plain_yaml.dump({node: {'ros__parameters': values} for node, values in sections.items()})
 
 
 def _folder():
@@ -201,22 +201,43 @@ def _is_node(name):
 
 
 def _sections(name, content):
-    try:
-        tree = plain_yaml.parse(content)
-    except yaml.YAMLError as error:
-        raise ScenarioError(f'scenario {name}: {plain_yaml.problem(error)}') from None
-    if not isinstance(tree, dict) or 'scenario' not in map(parameter_file.node_of, tree):
-        raise ScenarioError(f'scenario {name}: the section `scenario` is missing')
-    sections = {}
-    for section, body in ((parameter_file.node_of(section), body) for section, body in tree.items()):
-        if section != 'scenario' and not _is_node(section):
-            raise ScenarioError(f'scenario {name}: section {section!r} is no node; there are {", ".join(SECTION_NODES)}')
-        whole = isinstance(body, dict) and list(body) == ['ros__parameters']
-        values = body['ros__parameters'] or {} if whole else None
-        if not isinstance(values, dict):
-            raise ScenarioError(f'scenario {name}: section {section!r} must hold ros__parameters and nothing else')
-        sections[section] = parameter_file.dotted(values)
-    return sections
+    with _named(f'scenario {name}'):
+        sections = by_node(parameter_file.parse(content))
+        if 'scenario' not in sections:
+            raise ScenarioError('the section `scenario` is missing')
+        return sections
+
+
+def by_node(sections, namespace=''):
+    """Return {node or `scenario`: {dotted name: value}} of the sections of a parameter file, for a graph in a
+    namespace such as '/ship_1'. Raises ScenarioError, without the file, for a section of none of its nodes."""
+    found = {}
+    for section, values in sections.items():
+        node = parameter_file.node_of(section, namespace)
+        for name in _every_node(section, values) if node == parameter_file.EVERY_NODE else [node]:
+            if name != 'scenario' and not (name and _is_node(name)):
+                raise ScenarioError(f'section {section!r} {_not_of_the_graph(section, namespace)}')
+            found[name] = {**found.get(name, {}), **values}
+    return found
+
+
+def _not_of_the_graph(section, namespace):
+    """Return why a section is for no node of a graph, and the section that would be."""
+    name = re.search(r'(?:beam_[1-9]\d*/)?[^/]*$', section)[0]
+    if name == 'scenario' or _is_node(name):
+        graph = f'in the namespace {namespace}' if namespace else 'without a namespace'
+        return f'is for no node of a graph {graph}; write {parameter_file.ANY_NAMESPACE}{name} or {name}'
+    return f'is no node; there are {", ".join(SECTION_NODES)}'
+
+
+def _every_node(section, values):
+    """Return the nodes of a section such as /**, which may hold the parameters of every ROS 2 node only."""
+    for key in parameters.without_ros(values):
+        owners = [node for node in SECTION_NODES if key in parameters.defaults(nodes.row(node).parameters_type())]
+        sections = ' or '.join(parameter_file.ANY_NAMESPACE + node for node in owners)
+        cure = f'write it in the section {sections}' if owners else 'it is a parameter of none'
+        raise ScenarioError(f'section {section!r} is for every node: {key}: {cure}')
+    return SECTION_NODES
 
 
 def parameters_of(node):
@@ -250,10 +271,35 @@ def override(name, value):
     return f'{name}={json.dumps(value, ensure_ascii=False)}'
 
 
-def file_overrides(path):
-    """Texts 'node.key=value' of a ROS 2 parameter file."""
-    return [override(f'{node}.{key}', value)
-            for node, values in parameter_file.read(path).items() for key, value in values.items()]
+def file_sections(path, namespace=''):
+    """Return {node or `scenario`: {dotted name: value}} of a ROS 2 parameter file, for a graph in a namespace. Raises
+    ParameterFileError, ScenarioError."""
+    sections = parameter_file.read(path)
+    with _named(f'--params-file {path}'):
+        return by_node(sections, f'/{namespace.strip("/")}'.rstrip('/'))
+
+
+def file_overrides(path, namespace=''):
+    """Return texts 'node.key=value' of a ROS 2 parameter file, for a graph in a namespace. Raises ParameterFileError,
+    ScenarioError."""
+    sections = file_sections(path, namespace)
+    for node, values in sections.items():
+        with _named(f'--params-file {path}, {node}'):
+            _check_each(node, values)
+    return [override(f'{node}.{key}', value) for node, values in sections.items() for key, value in values.items()]
+
+
+def _check_each(node, values):
+    """Raise ParameterError for the first of some values that no scenario would accept."""
+    own = values if node == 'scenario' else parameters.without_ros(values)
+    try:
+        parameters.check_each(parameters_of(node), own)
+    except parameters.ParameterError:
+        with contextlib.suppress(parameters.ParameterError):
+            if node == nodes.DRIVE_NODE:
+                parameters.check_each(parameters_of('beam_steering'), own)
+                return
+        raise
 
 
 @dataclasses.dataclass(frozen=True)
@@ -328,10 +374,10 @@ def checked(changed, seed=None, duration=None, pacing=None):
         _spread_to_beam(name, node, sections, header, seed)
     for node, values in sections.items():
         checked = _checked(name, node, nodes.row(node, header.beam).parameters_type(), _whole(sections, node))
-        with _named(name, node):
+        with _named(f'scenario {name}, {node}'):
             checked.check_graph(header.graph_beams, header.pacing == 'lockstep')
         typed = parameters.as_dict(checked)
-        sections[node] = {key: typed[key] for key in values}
+        sections[node] = {key: typed.get(key, value) for key, value in values.items()}
     return Scenario(name, header, sections)
 
 
@@ -426,8 +472,8 @@ def _spread_to_beam(name, node, sections, header, seed):
 
 
 def _checked(name, section, parameters_type, values):
-    with _named(name, section):
-        return _built(parameters_type, values)
+    with _named(f'scenario {name}, {section}'):
+        return _built(parameters_type, values if section == 'scenario' else parameters.without_ros(values))
 
 
 def _built(parameters_type, values):
@@ -443,9 +489,9 @@ def _built_once(parameters_type, key):
 
 
 @contextlib.contextmanager
-def _named(name, section):
-    """A ParameterError becomes a ScenarioError that names the section."""
+def _named(origin):
+    """Make any refusal a ScenarioError that names its origin, the scenario or file and its section."""
     try:
         yield
-    except parameters.ParameterError as error:
-        raise ScenarioError(f'scenario {name}, {section}: {error}') from None
+    except (ScenarioError, parameters.ParameterError, parameter_file.ParameterFileError) as error:
+        raise ScenarioError(f'{origin}: {error}') from None
