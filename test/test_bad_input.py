@@ -45,7 +45,7 @@ COMMAND_LINES = {
     'no such pass': (['leo_pass', '--pass', '99'], ['--pass 99: there are 26 passes above 10 deg']),
     'station': (['leo_pass', '--station', '47.4,8.5'], ["--station '47.4,8.5': must be LATITUDE,LONGITUDE,HEIGHT"]),
     'latitude': (['leo_pass', '--station', '95,8.5,0'], ['target.station.latitude_deg = 95 deg: must be -90 to 90']),
-    'pass of a UAV': (['uav_flyby', '--pass', '1'], ['the target of uav_flyby is a flyby, which is no satellite']),
+    'pass of a UAV': (['uav_flyby', '--pass', '1'], ['the target of uav_flyby is a flyby, must be a satellite']),
     'pass of an array': (['phased_array_four', '--pass', '1'], ['phased_array_four has 4 beams']),
     'no file': (['/nowhere/run.yaml'], ['/nowhere/run.yaml: No such file']),
 }

@@ -12,6 +12,7 @@ from pedestal_common.text_files.parameter_file import EVERY_NODE
     ('beam_2/acu', 'beam_2/acu', 'beam_2/acu'), ('/**/beam_2/acu', 'beam_2/acu', 'beam_2/acu'),
     ('/ship_1/beam_2/acu', None, 'beam_2/acu'),
     ('/**', EVERY_NODE, EVERY_NODE), ('/*', EVERY_NODE, None), ('/**/*', EVERY_NODE, EVERY_NODE),
+    ('a\nb', 'a\nb', 'a\nb'), ('/a\nb/acu', None, None), ('', '', ''), ('/', '', None),
     ('/ship_1/*', None, EVERY_NODE), ('/ship_1/**', None, EVERY_NODE)])
 def test_a_section_is_for_the_node_that_rcl_would_give_it_to(section, without, in_ship_1):
     assert parameter_file.node_of(section) == without

@@ -28,7 +28,7 @@ def test_keys_are_texts():
     ('a: &x [1]\nb: *x', r'the alias \*x is refused; write the values themselves at line 2, column 4'),
     ('a: {<<: {b: 1}}', '<< is refused'), ('a:\n\tb: 1', 'a tab; indent with blanks at line 2, column 1'),
     ('a: !!int 5', 'tag tag:yaml.org,2002:int'),
-    ('a: 1\na: 2', "'a' is said twice"), ('? [1]\n: 2', 'a key must be a text'),
+    ('a: 1\na: 2', "'a' is given twice"), ('? [1]\n: 2', 'a key must be a text'),
     ('[' * 100_000, 'sections in sections'), ('- ' * 100_000, 'sections in sections'),
     ('a: ' + '9' * 20, 'more than 64 bits'), ('a: ' + '9' * 5000, 'more than 64 bits'),
     ('a: 9223372036854775808', 'more than 64 bits'), ('a: [', 'a'), ('--- 1\n--- 2', 'document'),

@@ -9,21 +9,22 @@ import numpy as np
 from pedestal_common.text_files import files
 
 MAX_CSV_BYTES = 64_000_000
-"""Bytes of a file."""
+"""Largest size of a file [bytes]."""
 
 MAX_CSV_ROWS = 1_000_000
+"""Largest number of rows of a file."""
 
 
 class TableError(ValueError):
-    """A file is no such table; one line naming file, line, column, value and allowed range."""
+    """Error of a file that is no such table; one line with file, line, column, value and allowed range."""
 
 
 def read(path, columns, least_rows=2, max_step=np.inf, step_name='its greatest step', optional=None) -> np.ndarray:
-    """The rows of a CSV file with a header, (n, k) in the order of columns {name: (low, high)}, then of the optional
-    ones, which are 0 where the file has none.
+    """Return the rows of a CSV file with a header, (n, k) in the order of columns {name: (low, high)}, then of the
+    optional columns, which are 0 where the file has none.
 
-    The first column grows from row to row, by at most max_step (called step_name in the error). Columns of other
-    names are passed over. Units are the last part of a name, as in time_s. Raises TableError.
+    The first column grows from row to row, by at most max_step (called step_name in the error). Columns of other names
+    are ignored. Units are the last part of a name, as in time_s. Raises TableError.
     """
     first, *_ = columns
     optional = optional or {}
@@ -49,7 +50,8 @@ def read(path, columns, least_rows=2, max_step=np.inf, step_name='its greatest s
 
 @contextlib.contextmanager
 def stream(path):
-    """Context with the bytes of a file of at most MAX_CSV_BYTES. What cannot be read raises TableError."""
+    """Yield the bytes of a file of at most MAX_CSV_BYTES, as a context. Raises TableError for a file that cannot be
+    read."""
     try:
         with files.open_regular(path, MAX_CSV_BYTES) as file:
             yield file
@@ -59,7 +61,7 @@ def stream(path):
 
 @contextlib.contextmanager
 def opened(path):
-    """Context with a csv.DictReader of a file, see `stream`."""
+    """Yield a csv.DictReader of a file, as a context, see `stream`."""
     with stream(path) as file:
         try:
             yield csv.DictReader(io.TextIOWrapper(file, newline='', encoding='utf-8-sig'))
@@ -75,7 +77,7 @@ def require(path, reader, columns):
 
 
 def number(path, line, name, cell, low, high):
-    """The number in a cell of text, between low and high. Raises TableError."""
+    """Return the number in a cell of text, between low and high. Raises TableError."""
     try:
         value = float(cell)
     except (TypeError, ValueError):
@@ -86,11 +88,11 @@ def number(path, line, name, cell, low, high):
 
 
 def too_long(path, line):
-    """The TableError of a file with more than MAX_CSV_ROWS rows."""
+    """Return the TableError of a file with more than MAX_CSV_ROWS rows."""
     return TableError(f'{path}: line {line}: must be at most {MAX_CSV_ROWS} rows')
 
 
 def bad_step(path, line, value, step, unit, max_step, step_name):
-    """The TableError of a row whose `value` does not grow from that of the row before by at most max_step."""
+    """Return the TableError of a row whose `value` does not grow from that of the row before by at most max_step."""
     limit = f' and at most {step_name} = {max_step:g} {unit}' if np.isfinite(max_step) else ''
     return TableError(f'{path}: line {line}: {value}: {step:g} {unit} after the row before, must be above 0{limit}')

@@ -16,7 +16,7 @@ EVERY_NODE = '*'
 
 
 class ParameterFileError(ValueError):
-    """A parameter file cannot be read; one line naming the file and the section."""
+    """Error of a parameter file that cannot be read; one line with the file and the section."""
 
 
 def text(sections):
@@ -30,13 +30,18 @@ def dumped(sections):
                            sort_keys=False)
 
 
+def divided(section):
+    """Return (namespace, node) of a section, of a beam 'beam_2/acu'."""
+    return re.fullmatch(r'(.*?)/?((?:beam_[1-9]\d*/)?[^/]*)', section, re.DOTALL).groups()
+
+
 def node_of(section, namespace=''):
     """Return the node, as 'acu' or 'beam_2/acu', that a section is for in a graph in a namespace such as '/ship_1'.
 
     EVERY_NODE: each node of the namespace. None: no node of this namespace. A section such as acu, without a slash, is
     for the node of the graph in any namespace; rcl has the rules for the others.
     """
-    place, node = re.fullmatch(r'(.*?)/?((?:beam_[1-9]\d*/)?[^/]*)', section).groups()
+    place, node = divided(section)
     if node in ('*', '**'):
         place, node = (section if node == '**' else place), EVERY_NODE
     levels = {'': '', '*': r'/[^/]+', '**': r'(?:/[^/]+)*'}

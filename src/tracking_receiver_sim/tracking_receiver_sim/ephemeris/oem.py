@@ -30,10 +30,11 @@ def read(path, wanted='') -> states.Ephemeris:
 
     wanted: name or international designator of the object; it may be empty for a file of one object.
     """
-    objects, midnight = {}, None
+    objects: dict[tuple, list] = {}
+    midnight = 0
     for meta, rows in _blocks(path):
         names = meta['OBJECT_NAME'].upper(), meta['OBJECT_ID'].upper()
-        if midnight is None:
+        if not objects:
             midnight = int(rows[0, 1]) if len(rows) else 0
         objects.setdefault(names, []).append((meta, rows))
     if not objects:

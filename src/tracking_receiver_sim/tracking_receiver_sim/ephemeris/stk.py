@@ -35,7 +35,8 @@ EPOCH_PATTERN = re.compile(r'(\d{1,2}) ([a-z]{3})[a-z]* (\d{4}) (\d{1,2}):(\d\d)
 
 def read(path, _wanted='') -> states.Ephemeris:
     """Return the Ephemeris of an STK ephemeris file. Raises TableError."""
-    head, limits, rows, skipped = {}, None, array.array('d'), ''
+    head: dict[str, tuple] = {}
+    limits, rows, skipped = None, array.array('d'), ''
     for line, text in lines.read(path):
         text = text.split('#', 1)[0].rstrip()
         words = text.lower().split(None, 2)

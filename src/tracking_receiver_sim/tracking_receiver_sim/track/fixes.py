@@ -53,7 +53,8 @@ class Fixes(typing.NamedTuple):
 def read(track, rows) -> Fixes:
     """Return the Fixes of the file of a TrackFileParameters; rows: reader of its format. Raises
     csv_table.TableError."""
-    log, numbers, names = Log(), array.array('d'), {}
+    log, numbers = Log(), array.array('d')
+    names: dict[tuple, tuple[int, set]] = {}
     for line, identities, *fix in rows(track.path, log):
         if len(numbers) >= 6 * csv_table.MAX_CSV_ROWS:
             raise csv_table.too_long(track.path, line)
@@ -64,10 +65,10 @@ def read(track, rows) -> Fixes:
         numbers.extend((line, number, *fix))
     table = np.array(numbers).reshape(-1, 6)
     aircraft, number = _chosen(track, names)
-    line, time, *position = table[table[:, 1] == number][:, (0, 2, 3, 4, 5)].T
+    line, time, latitude, longitude, altitude = table[table[:, 1] == number][:, (0, 2, 3, 4, 5)].T
     if len(line) < MIN_FIXES:
         raise csv_table.TableError(f'{track.path}: {len(line)} fixes, must be at least {MIN_FIXES}{_passed_over(log)}')
-    fixes = Fixes(track.path, line.astype(int), time + log.offset, *position, log.dated,
+    fixes = Fixes(track.path, line.astype(int), time + log.offset, latitude, longitude, altitude, log.dated,
                   f'{pathlib.Path(track.path).name}: {log.form}{aircraft}'
                   + ''.join(f', {remark}' for remark in log.remarks) + _passed_over(log))
     _check_order(fixes, track, log)

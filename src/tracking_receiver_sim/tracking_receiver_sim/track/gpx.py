@@ -79,7 +79,7 @@ class _Points:
             self.texts, self.line, self.place = {}, self.parser.CurrentLineNumber, attributes
 
     def text(self, text):
-        *_, parent, name = ('', '', *self.path_of_elements)
+        parent, name = ['', '', *self.path_of_elements][-2:]
         if name in TEXT_ELEMENTS and parent == ('trk' if name == 'name' else 'trkpt'):
             self.texts[name] = (self.texts.get(name, '') + text[:MAX_TEXT_CHARS])[:MAX_TEXT_CHARS]
 
