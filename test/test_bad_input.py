@@ -121,7 +121,7 @@ TRACKS = {
     'text': ([*ROWS[:5], '5,north,8.52,1500', *ROWS[6:]], ['line 7', 'north']),
     'NaN': ([*ROWS[:5], '5,nan,8.52,1500', *ROWS[6:]], ['line 7', 'nan']),
     'short row': ([*ROWS[:5], '5,47.4', *ROWS[6:]], ['line 7']),
-    'no rows': ([], ['0 rows']),
+    'no rows': ([], ['0 fixes']),
 }
 
 

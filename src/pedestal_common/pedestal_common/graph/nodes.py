@@ -11,9 +11,6 @@ from collections.abc import Collection, Iterable
 
 from pedestal_common.graph.topics import TOPIC_BY_NAME, TOPICS
 
-if typing.TYPE_CHECKING:
-    from pedestal_common.node.unit import Unit
-
 MAX_BEAMS = 16
 
 REPLAY_NODE = 'replay'
@@ -66,7 +63,7 @@ class Node(typing.NamedTuple):
         """Return its parameter dataclass."""
         return _named(self.parameters)
 
-    def unit_type(self) -> 'type[Unit]':
+    def unit_type(self) -> type[typing.Any]:
         """Return the class of its unit."""
         return _named(self.unit)
 
