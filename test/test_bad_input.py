@@ -69,9 +69,10 @@ SCENARIO_FILES = {
     'no ros__parameters': ('scenario: {duration: 2.0}\n', "section 'scenario' must hold ros__parameters"),
     'ros__parameters no mapping': ('scenario: {ros__parameters: 3}\n', "section 'scenario' must hold ros__parameters"),
     'no YAML': ('scenario: {ros__parameters: [}\n', 'no valid YAML'),
-    'empty': ('', 'the section `scenario` is missing'),
+    'empty': ('', 'must hold a section for a node'),
     'number as key': ('scenario: {ros__parameters: {1: 2}}\n', "unknown parameter '1'"),
     'no text': (b'\xff\xfe\x00scenario', 'no valid'),
+    'namespace': ('scenario: {ros__parameters: {}}\n/ship_1/acu: {ros__parameters: {}}\n', 'write /**/acu or acu'),
 }
 
 
@@ -82,6 +83,36 @@ def test_scenario_file(case, capsys, one_line, tmp_path):
     file.write_bytes(content if isinstance(content, bytes) else content.encode())
     line = refused(capsys, one_line, 'run', file, '--bag', tmp_path / 'bag')
     assert 'mine' in line and text in line
+
+
+PARAMETER_FILES = {
+    'quoted number': ('/**/acu: {ros__parameters: {azimuth.stow: "1"}}', "acu: azimuth.stow = '1': must be a number"),
+    'octal number': ('/**/acu: {ros__parameters: {azimuth.stow: 010}}', "acu: azimuth.stow = '010': must be a number"),
+    'range': ('/**/adu: {ros__parameters: {period: 1}}', 'adu: period = 1 s: must be 0.001 to 0.02'),
+    'misspelt key': ('acu: {ros__parameters: {azimuth: {stwo: 1}}}', "acu: unknown parameter 'azimuth.stwo'; did you "
+                     "mean 'azimuth.stow'?"),
+    'alias': ('acu: {ros__parameters: {azimuth: &a {stow: 1}, elevation: *a}}', 'the alias *a is refused'),
+    'tab': ('acu:\n\tros__parameters: {}', 'a tab; indent with blanks at line 2, column 1'),
+    'flag': ('/**: {ros__parameters: {use_sim_time: "true"}}', "section '/**': use_sim_time = 'true': must be true or "
+             'false'),
+    'namespace': ('/ship_1/acu: {ros__parameters: {azimuth.stow: 1}}', "section '/ship_1/acu' is for no node of a "
+                  'graph without a namespace; write /**/acu or acu'),
+    'every node': ('/**: {ros__parameters: {azimuth.stow: 1}}', "section '/**' is for every node: azimuth.stow: write "
+                   'it in the section /**/acu'),
+    'node': ('/**/antenna: {ros__parameters: {azimuth.stow: 1}}', "section '/**/antenna' is no node; there are "
+             'ship_motion, ins, tracking_receiver, acu, adu, recorder'),
+    'missing': (None, 'No such file or directory'),
+}
+
+
+@pytest.mark.parametrize('case', PARAMETER_FILES)
+def test_parameter_file(case, capsys, one_line, tmp_path):
+    content, text = PARAMETER_FILES[case]
+    file = tmp_path / 'mine.yaml'
+    if content is not None:
+        file.write_text(content)
+    line = refused(capsys, one_line, 'run', 'leo_pass', '--params-file', file, '--bag', tmp_path / 'bag')
+    assert line.startswith(f'pedestal: error: --params-file {file}') and text in line
 
 
 TRACKS = {

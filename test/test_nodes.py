@@ -12,7 +12,7 @@ import time
 
 import pytest
 
-from pedestal_bringup.scenario import parameter_file
+from pedestal_common.text_files import parameter_file
 
 NODES = ('ship_motion', 'ins', 'tracking_receiver', 'acu', 'adu', 'recorder')
 
@@ -106,15 +106,26 @@ REFUSED = {
     'NMEA host': ('ship_motion', ['-p', 'nmea.port:=10110', '-p', 'nmea.host:=::1'], "nmea.host = '::1': must be"),
     'never aligned': ('ins', ['-p', 'method:=oba', '-p', 'ship.latitude_deg:=89.0'], 'alignment.aligned_sigma = '),
     'pacing': ('adu', ['-p', 'graph.pacing:=sometimes'], 'must be one of lockstep, realtime'),
+    'no parameter file': ('acu', ['--params-file', '/nowhere.yaml'], '--params-file /nowhere.yaml: No such file'),
+}
+
+REFUSED_FILES = {
+    'file': ('recorder', 'recorder: {ros__parameters: {bagg: here}}', "unknown parameter 'bagg'; did you mean 'bag'?"),
+    'quoted number': ('acu', 'acu: {ros__parameters: {azimuth.stow: "1"}}', "azimuth.stow = '1': must be a number"),
+    'octal number': ('acu', 'acu: {ros__parameters: {azimuth.stow: 010}}', "azimuth.stow = '010': must be a number"),
+    'list': ('acu', 'acu: {ros__parameters: {azimuth.stow: [1, 2]}}', 'azimuth.stow = [1, 2]: must be a number'),
+    'alias': ('acu', 'acu: {ros__parameters: {azimuth: &a {stow: 1}, elevation: *a}}', 'the alias *a is refused'),
+    'flag': ('acu', '/**: {ros__parameters: {use_sim_time: "true"}}', "use_sim_time = 'true': must be true or false"),
 }
 
 
 @pytest.fixture(scope='module')
 def refused(start_node, tmp_path_factory):
-    file = tmp_path_factory.mktemp('parameters') / 'wrong.yaml'
-    file.write_text('recorder:\n  ros__parameters:\n    bagg: here\n')
     started = {case: start_node(node, *arguments) for case, (node, arguments, _) in REFUSED.items()}
-    started['file'] = start_node('recorder', '--params-file', file)
+    for case, (node, content, _) in REFUSED_FILES.items():
+        file = tmp_path_factory.mktemp('parameters') / 'wrong.yaml'
+        file.write_text(content)
+        started[case] = start_node(node, '--params-file', file)
     return {case: node.finish() for case, node in started.items()}
 
 
@@ -133,10 +144,10 @@ def test_a_parameter_file_holds_in_any_namespace(start_node, connect, tmp_path, 
     assert ended.returncode == 0 and 'no parameter of /ship/ins is in the parameter file' in one_line(ended.stderr)
 
 
-@pytest.mark.parametrize('case', [*REFUSED, 'file'])
+@pytest.mark.parametrize('case', [*REFUSED, *REFUSED_FILES])
 def test_a_node_refuses_a_parameter_in_one_line(refused, case, one_line):
     result = refused[case]
-    node, _, text = REFUSED.get(case, ('recorder', (), "unknown parameter 'bagg'; did you mean 'bag'?"))
+    node, _, text = {**REFUSED, **REFUSED_FILES}[case]
     assert result.returncode == 1
     line = one_line(result.stderr)
     assert 'error: ' in line and text in line

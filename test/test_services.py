@@ -190,6 +190,7 @@ def test_an_invalid_encoder_ends_a_mode(plant):
 def put(plant, name, value):
     """The answer to `ros2 param set /acu name value`."""
     typed = (ParameterValue(type=ParameterType.PARAMETER_STRING, string_value=value) if isinstance(value, str) else
+             ParameterValue(type=ParameterType.PARAMETER_INTEGER, integer_value=value) if isinstance(value, int) else
              ParameterValue(type=ParameterType.PARAMETER_DOUBLE, double_value=value))
     request = SetParameters.Request(parameters=[Parameter(name=name, value=typed)])
     return plant.client.call('acu/set_parameters', SetParameters, request).results[0]
@@ -219,6 +220,7 @@ def test_controllers_while_it_tracks(plant):
         assert rates[-1] == pytest.approx(0.05, abs=2e-3)
         lag = 0.1 + 0.05 * (plant.stamp * 1e-9 - start) - (azimuth - PERIOD * 1e-9 * rates[-1])
         assert abs(lag) < 0.05 / 20.0
+    assert put(plant, 'azimuth.feedforward.bandwidth', 20).successful
     result = put(plant, 'azimuth.controller', 'lqr')
     assert not result.successful and 'must be one of pid, feedforward, adrc' in result.reason
     result = put(plant, 'azimuth.controller', 'beam')

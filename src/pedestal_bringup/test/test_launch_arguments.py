@@ -2,7 +2,9 @@
 import pytest
 
 from pedestal_bringup.graph import launch_arguments, operator_servers
-from pedestal_common.text_files import plain_yaml
+from pedestal_bringup.graph.start import parameters_of_all
+from pedestal_bringup.scenario import scenario
+from pedestal_common.text_files import parameter_file, plain_yaml
 
 
 def given(**texts):
@@ -24,6 +26,36 @@ def test_what_is_said_takes_the_place_of_what_the_scenario_says(tmp_path):
     assert (changed.header.pacing, changed.header.duration, changed.header.seed) == ('realtime', 12.5, 7)
     assert changed.node_parameters('acu').azimuth.filter.kind == 'ca' != plain.node_parameters(
         'acu').azimuth.filter.kind
+
+
+@pytest.mark.parametrize('section, namespaces', [
+    ('acu', ['', 'ship_1']), ('/**/acu', ['', 'ship_1']), ('/ship_1/acu', ['ship_1', '/ship_1/']), ('/acu', ['']),
+    ('/*/acu', ['ship_1'])])
+def test_a_section_holds_in_the_namespace_of_ros_2(tmp_path, section, namespaces):
+    file = tmp_path / 'mine.yaml'
+    file.write_text(f'{section}:\n  ros__parameters:\n    azimuth.stow: 1\n')
+    for namespace in ('', 'ship_1', '/ship_1/'):
+        texts = given(params_file=str(file), namespace=namespace)
+        if namespace in namespaces or namespace.strip('/') in namespaces:
+            assert launch_arguments.load_scenario(texts).values['acu']['azimuth.stow'] == 1.0
+        else:
+            with pytest.raises(ValueError, match=r'write /\*\*/acu or acu$'):
+                launch_arguments.load_scenario(texts)
+
+
+def test_every_node_has_the_parameters_of_ros_2(tmp_path):
+    """They reach the nodes, and their units know nothing of them."""
+    file = tmp_path / 'mine.yaml'
+    file.write_text('/**: {ros__parameters: {use_sim_time: true, qos_overrides./clock.publisher.depth: 5}}\n'
+                    '/**/acu: {ros__parameters: {start_type_description_service: false}}\n')
+    plain, chosen = (launch_arguments.load_scenario(given(**texts)) for texts in ({}, {'params_file': str(file)}))
+    assert all(chosen.node_parameters(node) == plain.node_parameters(node) for node in ('acu', 'adu'))
+    text = parameters_of_all(chosen, tmp_path / 'bag', 0)
+    for node in ('acu', 'adu', 'tracking_receiver', 'recorder'):
+        values = parameter_file.parse(text)[f'/**/{node}']
+        assert values['use_sim_time'] is True and values['qos_overrides./clock.publisher.depth'] == 5
+        assert values.get('start_type_description_service', True) is (node != 'acu')
+    assert scenario.parse(chosen.name, chosen.as_yaml()) == chosen
 
 
 @pytest.mark.parametrize('texts, told', [

@@ -54,7 +54,7 @@ class Parameters:
 
     def __post_init__(self) -> None:
         for field in dataclasses.fields(self):
-            _check_field(field, getattr(self, field.name))
+            _check_field(field, field.name, getattr(self, field.name))
         self.check()
 
     def check(self) -> None:
@@ -75,8 +75,27 @@ def _cached(function: _F) -> _F:
     return typing.cast(_F, functools.cache(function))
 
 
-def _check_field(field: dataclasses.Field, value: typing.Any) -> None:
-    meta, name = field.metadata, field.name
+@dataclasses.dataclass(frozen=True)
+class RosParameters(Parameters):
+    """The parameters that rclpy gives every node; the units read none of them."""
+    use_sim_time: bool = flag(False, 'the ROS clock of the node is /clock; the steps of a node do not read this clock')
+    start_type_description_service: bool = flag(True, 'the node describes its message types')
+
+
+_ROS_PREFIX = 'qos_overrides.'
+
+
+def without_ros(values: Mapping[str, typing.Any]) -> dict[str, typing.Any]:
+    """Return {dotted name: value} without the parameters of every ROS 2 node. Raises ParameterError for a value that
+    rclpy would refuse."""
+    own = {name: value for name, value in values.items() if name in RosParameters.__dataclass_fields__}
+    if own:
+        RosParameters(**own)
+    return {name: value for name, value in values.items() if name not in own and not name.startswith(_ROS_PREFIX)}
+
+
+def _check_field(field: dataclasses.Field, name: str, value: typing.Any) -> None:
+    meta = field.metadata
     if 'low' in meta:
         if isinstance(value, bool) or not isinstance(value, (int, float)):
             raise ParameterError(f'{name} = {value!r}: must be a number')
@@ -142,20 +161,28 @@ def build(cls: type[_P], values: Mapping[str, typing.Any], prefix: str = '') -> 
 
     Raises ParameterError for an unknown name (with the nearest known name) or a refused value.
     """
-    known = [name for name, _ in flatten(cls, prefix)]
+    _check_names(dict(flatten(cls, prefix)), values)
+    return _replace(_default(cls), values, prefix)
+
+
+def check_each(cls: type[Parameters], values: Mapping[str, typing.Any]) -> None:
+    """Raise ParameterError for the first of {dotted name: value} that `build` would refuse by itself."""
+    known = dict(flatten(cls))
+    _check_names(known, values)
+    for name, value in values.items():
+        _check_field(known[name], name, typed(known[name], value))
+
+
+def _check_names(known: Mapping[str, dataclasses.Field], values: Iterable[str]) -> None:
     for name in values:
         if name not in known:
             hint = did_you_mean(name, known)
             raise ParameterError(f'unknown parameter {name!r}' + (f';{hint}' if hint else ''))
-    return _replace(_default(cls), values, prefix)
 
 
-def _number(value: typing.Any) -> typing.Any:
-    """Return an int, or a text such as 2e-3 that is no number in YAML 1.1, as a float; any other value unchanged."""
-    try:
-        return float(value)
-    except (TypeError, ValueError):
-        return value
+def typed(field: dataclasses.Field, value: typing.Any) -> typing.Any:
+    """Return the value of a field, a whole number as a float where the field is one."""
+    return float(value) if field.type is float and type(value) is int else value
 
 
 def _replace(instance: _P, values: Mapping[str, typing.Any], prefix: str) -> _P:
@@ -165,10 +192,7 @@ def _replace(instance: _P, values: Mapping[str, typing.Any], prefix: str) -> _P:
         if field.metadata.get('group'):
             changes[field.name] = _replace(getattr(instance, field.name), values, name + '.')
         elif name in values:
-            value = values[name]
-            if field.type is float and not isinstance(value, bool):
-                value = _number(value)
-            changes[field.name] = value
+            changes[field.name] = typed(field, values[name])
     try:
         return dataclasses.replace(instance, **changes)
     except ParameterError as error:

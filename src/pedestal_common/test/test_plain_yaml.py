@@ -1,6 +1,7 @@
 import math
 import os
 import pathlib
+import re
 
 import pytest
 import yaml
@@ -11,7 +12,9 @@ from pedestal_common.text_files import files, plain_yaml
 @pytest.mark.parametrize('text, value', [
     ('1:30', '1:30'), ('1:30:00.5', '1:30:00.5'), ('010', '010'), ('1_000', '1_000'), ('2024-01-01', '2024-01-01'),
     ('on', 'on'), ('no', 'no'), ('=', '='), ('5', 5), ('-5', -5), ('0x1f', 31), ('0', 0), ('0.5', 0.5),
-    ('1.0e-05', 1e-5), ('-.inf', -math.inf), ('true', True), ('False', False), ('~', None), ('', None),
+    ('1.0e-05', 1e-5),
+    ('2e-3', 2e-3), ('-1E5', -1e5), ('.5e2', 50.0), ('08e1', '08e1'),
+    ('-.inf', -math.inf), ('true', True), ('False', False), ('~', None), ('', None),
     ('-9223372036854775808', -2**63), ("'5'", '5'), ('[1, x]', [1, 'x'])])
 def test_a_value_is_what_it_looks_like(text, value):
     assert plain_yaml.parse(f'a: {text}') == {'a': value}
@@ -22,7 +25,8 @@ def test_keys_are_texts():
 
 
 @pytest.mark.parametrize('text, problem', [
-    ('a: &x [*x]', 'more than 200000 values'), ('a: *x', 'more than 200000 values'),
+    ('a: &x [1]\nb: *x', r'the alias \*x is refused; write the values themselves at line 2, column 4'),
+    ('a: {<<: {b: 1}}', '<< is refused'), ('a:\n\tb: 1', 'a tab; indent with blanks at line 2, column 1'),
     ('a: !!int 5', 'tag tag:yaml.org,2002:int'),
     ('a: 1\na: 2', "'a' is given twice"), ('? [1]\n: 2', 'a key must be a text'),
     ('[' * 100_000, 'sections in sections'), ('- ' * 100_000, 'sections in sections'),
@@ -30,24 +34,37 @@ def test_keys_are_texts():
     ('a: 9223372036854775808', 'more than 64 bits'), ('a: [', 'a'), ('--- 1\n--- 2', 'document'),
     ('a: \0', 'character')])
 def test_what_hides_or_grows_is_refused(text, problem):
-    with pytest.raises(yaml.YAMLError, match=problem) as error:
+    with pytest.raises(yaml.YAMLError) as error:
         plain_yaml.parse(text)
-    assert '\n' not in plain_yaml.problem(error.value)
+    told = plain_yaml.problem(error.value)
+    assert re.search(problem, told) and '\n' not in told
 
 
 def test_a_few_lines_do_not_stand_for_billions_of_values():
     lines = ['a: &a [x, x, x, x, x, x, x, x, x, x]']
     lines += [f'{name}: &{name} [{", ".join([f"*{other}"] * 10)}]' for other, name in zip('abcdefgh', 'bcdefghi')]
-    assert plain_yaml.parse('\n'.join(lines[:4]))['d'][9][9][9][9] == 'x'
-    with pytest.raises(yaml.YAMLError, match='more than 200000 values'):
-        plain_yaml.parse('\n'.join(lines))
+    assert plain_yaml.parse('\n'.join(lines[:4]), aliases=True)['d'][9][9][9][9] == 'x'
+    for text in ('\n'.join(lines), 'a: &x [*x]', 'a: *x'):
+        with pytest.raises(yaml.YAMLError, match='more than 200000 values'):
+            plain_yaml.parse(text, aliases=True)
 
 
 def test_what_is_dumped_comes_back():
     values = {'text': '1:30', 'other': '010', 'date': '2024-01-01', 'flag': True, 'number': 1e-5, 'large': 2**63 - 1,
               'empty': '', 'none': None, 'list': [1.0, 'on'], 'on': 'null', 'float': '1e5', 'nan': '.nan'}
-    assert plain_yaml.parse(yaml.safe_dump(values)) == values
-    assert plain_yaml.parse(yaml.safe_dump([values, values])) == [values, values]
+    assert plain_yaml.parse(plain_yaml.dump(values)) == values
+    assert plain_yaml.parse(plain_yaml.dump([values, values]), aliases=True) == [values, values]
+
+
+@pytest.mark.parametrize('text', ['y', 'N', '08', '1e5', '-1E-5', '.5e3', 'nan', '-Infinity', '0x1p3', '5.', '+7'])
+def test_a_text_that_ros_2_takes_for_a_number_or_a_flag_is_quoted(text):
+    assert plain_yaml.dump({'a': text}) == f"a: '{text}'\n"
+    assert plain_yaml.parse(plain_yaml.dump({'a': text})) == {'a': text}
+
+
+@pytest.mark.parametrize('text', ['1 25544U 98067A', '2019-12-10T12:35:00', 'yes/no', '1.2.3', 'nano', 'in', '-'])
+def test_other_texts_are_dumped_as_ever(text):
+    assert plain_yaml.dump({'a': text}) == yaml.safe_dump({'a': text})
 
 
 @pytest.mark.parametrize('make, problem', [

@@ -8,8 +8,6 @@ import pathlib
 import platform
 import subprocess
 
-import yaml
-
 from pedestal_common import parameters
 from pedestal_common.text_files import plain_yaml
 
@@ -60,7 +58,7 @@ def recorder_parameters(scenario):
     values = {node: parameters.as_dict(scenario.node_parameters(node))
               for node in scenario.nodes if node != 'operator'}
     values['recorder'] = {key: value for key, value in values['recorder'].items() if key not in OMITTED_PARAMETERS}
-    return {'scenario_yaml': scenario.as_yaml(), 'parameters_yaml': yaml.safe_dump(values)}
+    return {'scenario_yaml': scenario.as_yaml(), 'parameters_yaml': plain_yaml.dump(values)}
 
 
 def records(scenario_yaml, parameters_yaml):
@@ -69,7 +67,7 @@ def records(scenario_yaml, parameters_yaml):
     if scenario_yaml:
         content['scenario'] = {'yaml': scenario_yaml}
     if parameters_yaml:
-        content['parameters'] = {node: yaml.safe_dump(values)
+        content['parameters'] = {node: plain_yaml.dump(values)
                                  for node, values in plain_yaml.parse(parameters_yaml).items()}
     return content
 

@@ -207,10 +207,11 @@ class RecorderNode(shell.Shell):
         """Return the log time of a message [ns]: its stamp, or the time of the drive.
 
         The time of the drive replaces a stamp that is missing, in the future, or MAX_STAMP_DISTANCE_NS away from it.
+        The program track has the stamp of the start, and arrives some seconds before the start.
         """
         if stamp is not None:
             now = self._stamp or stamp
-            latest = self.clock()[1] + self.graph.future * NS_PER_SECOND
+            latest = max(self.clock()[1], self.graph.start) + self.graph.future * NS_PER_SECOND
             if abs(stamp - now) < MAX_STAMP_DISTANCE_NS and stamp <= latest:
                 return stamp
             self._without_stamp += 1

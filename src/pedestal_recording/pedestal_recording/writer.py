@@ -280,7 +280,7 @@ def _times(contents):
 
 def _profiles(channel):
     try:
-        return plain_yaml.parse(channel.metadata.get('offered_qos_profiles', '')) or []
+        return plain_yaml.parse(channel.metadata.get('offered_qos_profiles', ''), aliases=True) or []
     except yaml.YAMLError:
         return []
 

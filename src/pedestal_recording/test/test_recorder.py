@@ -15,6 +15,7 @@ import pytest
 
 rclpy = pytest.importorskip('rclpy')
 from rclpy.duration import Duration  # noqa: E402
+from rclpy.executors import SingleThreadedExecutor  # noqa: E402
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy  # noqa: E402
 
 from pedestal_common.graph import nodes, topics  # noqa: E402
@@ -93,6 +94,8 @@ class Graph:
         self.context = rclpy.Context()
         rclpy.init(args=[], context=self.context, domain_id=domain)
         self.node = rclpy.create_node('graph', context=self.context)
+        self.executor = SingleThreadedExecutor(context=self.context)
+        self.executor.add_node(self.node)
         self.publishers = {}
         for topic in RECORDED:
             latched = topics.QOS_BY_RATE[topic.rate].latched
@@ -224,6 +227,33 @@ def test_broken_messages_are_recorded_all_the_same(tmp_path, graph, rows):
     assert (code, err, said['messages']) == (0, '', 63)
     recorded = [(name, log, data) for name, log, _, data in bag.read(tmp_path / 'b').raw()]
     assert all(row in recorded for row in broken)
+
+
+def test_a_message_before_the_start_may_have_the_stamp_of_the_start(tmp_path, graph):
+    """As the program track has; a later stamp is from the future."""
+    start = time.time_ns() + 600 * 10**9
+    recorder = Recorder(tmp_path / 'b', 'realtime', '-p', f'graph.start:={start}')
+    status = {}
+
+    def take(array):
+        for found in array.status:
+            if found.name == 'recorder':
+                status.update({'level': found.level[0], **{value.key: value.value for value in found.values}})
+    subscription = graph.node.create_subscription(message_class('diagnostic_msgs/msg/DiagnosticArray'), 'diagnostics',
+                                                  take, 10)
+    graph.await_recorder()
+    for count, stamp, level, wrong in ((1, start, 0, '0'), (2, start + 10**9, 1, '1')):
+        track = messages.template('acu/program_track')
+        messages.put_stamp(track.header.stamp, stamp)
+        graph.publishers['acu/program_track'].publish(messages.serialize(track))
+        end = time.monotonic() + LIMIT
+        while status.get('messages') != str(count) and time.monotonic() < end:
+            graph.executor.spin_once(timeout_sec=0.1)
+        assert (status['messages'], status['level'], status['without valid stamp']) == (str(count), level, wrong)
+    graph.node.destroy_subscription(subscription)
+    code, said, err = recorder.end()
+    assert (code, err, said['messages']) == (0, '', 2)
+    assert [log for _, log, _, _ in bag.read(tmp_path / 'b').raw()] == [start, start]
 
 
 def test_lost_messages_end_a_lockstep_recorder_with_topic_and_count(tmp_path, graph, rows):

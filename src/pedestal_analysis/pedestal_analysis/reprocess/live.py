@@ -16,11 +16,11 @@ from std_srvs.srv import Trigger
 from pedestal_analysis.reprocess import difference, recompute
 from pedestal_bringup.graph.operator_node import Operator, sole_run
 from pedestal_bringup.graph.processes import RunError, command_line
-from pedestal_bringup.scenario import parameter_file
 from pedestal_common import parameters
 from pedestal_common.graph import nodes
 from pedestal_common.graph.steps import NS_PER_SECOND
 from pedestal_common.node import middleware
+from pedestal_common.text_files import parameter_file
 from pedestal_common.wire import commands, messages, records
 
 NODE_START_TIMEOUT_S = 300.0

@@ -18,7 +18,7 @@ import time
 import numpy as np
 
 from pedestal_analysis.reprocess import difference
-from pedestal_bringup.scenario import parameter_file, scenario
+from pedestal_bringup.scenario import scenario
 from pedestal_common import parameters
 from pedestal_common.graph import nodes, topics
 from pedestal_common.graph.steps import NS_PER_SECOND, GraphError, Steps
@@ -394,7 +394,7 @@ def file_parameters(path, beam=''):
 
     Raises ScenarioError or ParameterFileError.
     """
-    sections = parameter_file.read(path)
+    sections = scenario.file_sections(path)
     if 'scenario' in sections and 'recorder' not in sections:
         chosen = scenario.load(str(path))
         return {node: chosen.given(beam + node if nodes.row(node).of_beam else node) for node in chosen.values
@@ -421,7 +421,8 @@ def parameters_of(recording, node, file_values=None, changes=()):
     values = (file_values if file_values is not None else recording.bag.configuration['parameters']).get(node, {})
     values = {key: value for key, value in values.items() if not key.startswith('graph.')}
     try:
-        params = parameters.build(row_of(recording, node).parameters_type(), {**values, **dict(changes)})
+        params = parameters.build(row_of(recording, node).parameters_type(),
+                                  parameters.without_ros({**values, **dict(changes)}))
         params.check_graph(recording.bag.beams, recording.bag.metadata.get('pacing') == 'lockstep')
         return params
     except parameters.ParameterError as error:

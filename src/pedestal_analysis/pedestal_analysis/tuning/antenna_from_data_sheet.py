@@ -12,11 +12,11 @@ of 210 kg m2). The scaling keeps the resonance frequencies of gears and motors:
 import math
 
 from adu_drive.params import AduParameters
-from pedestal_bringup.scenario import parameter_file, scenario
+from pedestal_bringup.scenario import scenario
 from pedestal_bringup.scenario.program import Plan
 from pedestal_common.graph.topics import AXES
 from pedestal_common.parameters import ParameterError, as_dict, build, flatten
-from pedestal_common.text_files import plain_yaml
+from pedestal_common.text_files import parameter_file
 
 BACK_EMF_SHARE, RESISTANCE_VOLTAGE_SHARE, INDUCTANCE_VOLTAGE_SHARE = 0.85, 0.033, 0.24
 """Shares of the phase voltage: back-EMF at rated speed, drops over resistance and inductance at rated torque [-]."""
@@ -60,8 +60,7 @@ def sections(sheet, title):
     """Return {node: {key: value}} of the scenario of a DataSheet. Raises ScenarioError, ParameterError, LoopError."""
     from pedestal_analysis.tuning import loops
     _, content = scenario.text(sheet.like)
-    found = {parameter_file.node_of(node): parameter_file.dotted(body['ros__parameters'])
-             for node, body in plain_yaml.parse(content).items()}
+    found = scenario.by_node(parameter_file.parse(content))
     found['scenario']['title'] = title
     if 'program.time_offset' in found['scenario']:  # keeps the offset in beamwidths
         found['scenario']['program.time_offset'] *= min(1.0, sheet.theta / 0.0175)

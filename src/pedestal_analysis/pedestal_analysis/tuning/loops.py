@@ -21,8 +21,9 @@ import numpy as np
 
 from adu_drive.params import SPEED_LOOP_PERIOD_S
 from pedestal_analysis.tuning import frequency_response as frequency
-from pedestal_bringup.scenario import parameter_file, scenario
+from pedestal_bringup.scenario import scenario
 from pedestal_common.graph.topics import AXES
+from pedestal_common.text_files import parameter_file
 from pedestal_recording import configuration
 
 DEFAULT_SPEED_CROSSOVER_HZ, CROSSOVER_RATIO = 28.0, 8.0

@@ -28,10 +28,11 @@ from pedestal_analysis.results import identification
 from pedestal_analysis.results.tracking import HANDOVER_SETTLING_S
 from pedestal_analysis.tuning import loops, parameter_search
 from pedestal_bringup.loop import closed_loop
-from pedestal_bringup.scenario import parameter_file, scenario
+from pedestal_bringup.scenario import scenario
 from pedestal_common import parameters
 from pedestal_common.graph import layouts, topics
 from pedestal_common.graph.steps import NS_PER_SECOND
+from pedestal_common.text_files import parameter_file
 from pedestal_common.wire import records
 from pedestal_recording import configuration
 

@@ -51,7 +51,7 @@ def _number(given, name, kind, what):
 
 def load_scenario(given):
     """Return the Scenario of the texts {argument: value}. Raises ValueError."""
-    changes = scenario.file_overrides(given['params_file']) if given['params_file'] else ()
+    changes = scenario.file_overrides(given['params_file'], given['namespace']) if given['params_file'] else ()
     return scenario.load(given['scenario'], changes,
                          _number(given, 'seed', int, 'a whole number'),
                          _number(given, 'duration', float, 'a number of seconds'), given['pacing'] or None)

@@ -3,9 +3,9 @@ import dataclasses
 import time
 
 from pedestal_bringup.graph.processes import log_folder
-from pedestal_bringup.scenario import parameter_file
 from pedestal_common.graph import nodes
 from pedestal_common.graph.steps import NS_PER_SECOND
+from pedestal_common.text_files import parameter_file
 from pedestal_recording import configuration
 
 START_LEAD_TIME_S = 5.0

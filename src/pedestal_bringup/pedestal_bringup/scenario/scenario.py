@@ -18,12 +18,11 @@ from collections.abc import Iterable, Iterator, Mapping
 import numpy as np
 import yaml
 
-from pedestal_bringup.scenario import parameter_file
 from pedestal_common import parameters
 from pedestal_common.graph import nodes, topics
 from pedestal_common.graph.graph_parameters import GraphParameters
 from pedestal_common.graph.nodes import Node
-from pedestal_common.text_files import files, plain_yaml
+from pedestal_common.text_files import files, parameter_file, plain_yaml
 
 if typing.TYPE_CHECKING:
     from importlib.abc import Traversable
@@ -167,7 +166,7 @@ class Scenario:
 
     def node_parameters(self, node: str) -> typing.Any:
         """Return the parameter dataclass of one node with the values of this scenario."""
-        return _built(self.row(node).parameters_type(), self.given(node))
+        return _built(self.row(node).parameters_type(), parameters.without_ros(self.given(node)))
 
     def unit(self, node: str, parameters: parameters.Parameters | None = None) -> 'Unit':
         """Return the unit of one of its nodes; parameters: they replace those of the scenario."""
@@ -178,7 +177,7 @@ class Scenario:
     def as_yaml(self) -> str:
         """Return the scenario as a ROS 2 parameter file."""
         sections = {'scenario': parameters.as_dict(self.header), **self.values}
-        return yaml.safe_dump({node: {'ros__parameters': values} for node, values in sections.items()}, sort_keys=True)
+        return plain_yaml.dump({node: {'ros__parameters': values} for node, values in sections.items()})
 
 
 def _folder() -> 'Traversable':
@@ -222,23 +221,43 @@ def _is_node(name: str) -> bool:
 
 
 def _sections(name: str, content: str) -> Sections:
-    try:
-        tree = plain_yaml.parse(content)
-    except yaml.YAMLError as error:
-        raise ScenarioError(f'scenario {name}: {plain_yaml.problem(error)}') from None
-    if not isinstance(tree, dict) or 'scenario' not in map(parameter_file.node_of, tree):
-        raise ScenarioError(f'scenario {name}: the section `scenario` is missing')
-    sections = {}
-    for section, body in ((parameter_file.node_of(section), body) for section, body in tree.items()):
-        if section != 'scenario' and not _is_node(section):
-            raise ScenarioError(f'scenario {name}: section {section!r} is no node; there are '
-                                f'{", ".join(SECTION_NODES)}')
-        whole = isinstance(body, dict) and list(body) == ['ros__parameters']
-        values = body['ros__parameters'] or {} if whole else None
-        if not isinstance(values, dict):
-            raise ScenarioError(f'scenario {name}: section {section!r} must hold ros__parameters and nothing else')
-        sections[section] = parameter_file.dotted(values)
-    return sections
+    with _named(f'scenario {name}'):
+        sections = by_node(parameter_file.parse(content))
+        if 'scenario' not in sections:
+            raise ScenarioError('the section `scenario` is missing')
+        return sections
+
+
+def by_node(sections: Sections, namespace: str = '') -> Sections:
+    """Return {node or `scenario`: {dotted name: value}} of the sections of a parameter file, for a graph in a
+    namespace such as '/ship_1'. Raises ScenarioError, without the file, for a section of none of its nodes."""
+    found: Sections = {}
+    for section, values in sections.items():
+        node = parameter_file.node_of(section, namespace)
+        for name in _every_node(section, values) if node == parameter_file.EVERY_NODE else [node or '']:
+            if name != 'scenario' and not _is_node(name):
+                raise ScenarioError(f'section {section!r} {_not_of_the_graph(section, namespace)}')
+            found[name] = {**found.get(name, {}), **values}
+    return found
+
+
+def _not_of_the_graph(section: str, namespace: str) -> str:
+    """Return why a section is for no node of a graph, and the section that would be."""
+    _, name = parameter_file.divided(section)
+    if name == 'scenario' or _is_node(name):
+        graph = f'in the namespace {namespace}' if namespace else 'without a namespace'
+        return f'is for no node of a graph {graph}; write {parameter_file.ANY_NAMESPACE}{name} or {name}'
+    return f'is no node; there are {", ".join(SECTION_NODES)}'
+
+
+def _every_node(section: str, values: Mapping[str, typing.Any]) -> tuple[str, ...]:
+    """Return the nodes of a section such as /**, which may hold the parameters of every ROS 2 node only."""
+    for key in parameters.without_ros(values):
+        owners = [node for node in SECTION_NODES if key in parameters.defaults(nodes.row(node).parameters_type())]
+        sections = ' or '.join(parameter_file.ANY_NAMESPACE + node for node in owners)
+        cure = f'write it in the section {sections}' if owners else 'it is a parameter of none'
+        raise ScenarioError(f'section {section!r} is for every node: {key}: {cure}')
+    return SECTION_NODES
 
 
 def parameters_of(node: str) -> type[parameters.Parameters]:
@@ -273,10 +292,35 @@ def override(name: str, value: typing.Any) -> str:
     return f'{name}={json.dumps(value, ensure_ascii=False)}'
 
 
-def file_overrides(path: str | pathlib.Path) -> list[str]:
-    """Return texts 'node.key=value' of a ROS 2 parameter file."""
-    return [override(f'{node}.{key}', value)
-            for node, values in parameter_file.read(path).items() for key, value in values.items()]
+def file_sections(path: str | pathlib.Path, namespace: str = '') -> Sections:
+    """Return {node or `scenario`: {dotted name: value}} of a ROS 2 parameter file, for a graph in a namespace. Raises
+    ParameterFileError, ScenarioError."""
+    sections = parameter_file.read(path)
+    with _named(f'--params-file {path}'):
+        return by_node(sections, f'/{namespace.strip("/")}'.rstrip('/'))
+
+
+def file_overrides(path: str | pathlib.Path, namespace: str = '') -> list[str]:
+    """Return texts 'node.key=value' of a ROS 2 parameter file, for a graph in a namespace. Raises ParameterFileError,
+    ScenarioError."""
+    sections = file_sections(path, namespace)
+    for node, values in sections.items():
+        with _named(f'--params-file {path}, {node}'):
+            _check_each(node, values)
+    return [override(f'{node}.{key}', value) for node, values in sections.items() for key, value in values.items()]
+
+
+def _check_each(node: str, values: Mapping[str, typing.Any]) -> None:
+    """Raise ParameterError for the first of some values that no scenario would accept."""
+    own = values if node == 'scenario' else parameters.without_ros(values)
+    try:
+        parameters.check_each(parameters_of(node), own)
+    except parameters.ParameterError:
+        with contextlib.suppress(parameters.ParameterError):
+            if node == nodes.DRIVE_NODE:
+                parameters.check_each(parameters_of('beam_steering'), own)
+                return
+        raise
 
 
 @dataclasses.dataclass(frozen=True)
@@ -359,10 +403,10 @@ def checked(changed: Draft, seed: int | None = None, duration: float | None = No
             checked = _checked(name, node, nodes.row(node, header.beam).parameters_type(), _whole(sections, node))
         except ScenarioError as error:
             raise ScenarioError('; '.join((str(error), *notes))) from None
-        with _named(name, node):
+        with _named(f'scenario {name}, {node}'):
             checked.check_graph(header.graph_beams, header.pacing == 'lockstep')
         typed = parameters.as_dict(checked)
-        sections[node] = {key: typed[key] for key in values}
+        sections[node] = {key: typed.get(key, value) for key, value in values.items()}
     return Scenario(name, header, sections, notes)
 
 
@@ -488,8 +532,8 @@ def _spread_to_beam(name: str, node: str, sections: Sections, header: ScenarioPa
 
 
 def _checked(name: str, section: str, parameters_type: type[_P], values: Mapping[str, typing.Any]) -> _P:
-    with _named(name, section):
-        return _built(parameters_type, values)
+    with _named(f'scenario {name}, {section}'):
+        return _built(parameters_type, values if section == 'scenario' else parameters.without_ros(values))
 
 
 def _built(parameters_type: type[_P], values: Mapping[str, typing.Any]) -> _P:
@@ -507,9 +551,9 @@ def _built_once(parameters_type: type[_P], key: tuple[tuple[str, type, typing.An
 
 
 @contextlib.contextmanager
-def _named(name: str, section: str) -> Iterator[None]:
-    """Turn a ParameterError into a ScenarioError that names the section."""
+def _named(origin: str) -> Iterator[None]:
+    """Make any refusal a ScenarioError that names its origin, the scenario or file and its section."""
     try:
         yield
-    except parameters.ParameterError as error:
-        raise ScenarioError(f'scenario {name}, {section}: {error}') from None
+    except (ScenarioError, parameters.ParameterError, parameter_file.ParameterFileError) as error:
+        raise ScenarioError(f'{origin}: {error}') from None

@@ -2,13 +2,16 @@
 import importlib
 import os
 import pathlib
+import re
 import sys
 
 import rclpy
+from rclpy._rclpy_pybind11 import RCLError, RCLInvalidROSArgsError, UnknownROSArgsError
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
 
 from pedestal_common.graph import topics
+from pedestal_common.text_files import parameter_file
 
 DDS_PROFILES = {'LOCALHOST': 'fastdds.xml', 'SUBNET': 'fastdds_subnet.xml'}
 """{ROS_AUTOMATIC_DISCOVERY_RANGE: the DDS profile for it}."""
@@ -48,11 +51,36 @@ def set_defaults():
 
 def initialise(args=None):
     """Initialise rclpy in this process with arguments, by default those of the command line. DDS is set as in
-    set_defaults, and signals are left to the caller. Logs go to stderr only, which needs neither a home nor a disk."""
+    set_defaults, and signals are left to the caller. Logs go to stderr only, which needs neither a home nor a disk.
+    Raises ValueError for arguments that rcl refuses."""
     set_defaults()
-    given = sys.argv if args is None else args
-    rclpy.init(args=[*given, '--ros-args', '--disable-external-lib-logs'],
-               signal_handler_options=SignalHandlerOptions.NO)
+    given = list(sys.argv if args is None else args)
+    for place in parameter_files(given):
+        given[place] = _as_read(given[place])
+    try:
+        rclpy.init(args=[*given, '--ros-args', '--disable-external-lib-logs'],
+                   signal_handler_options=SignalHandlerOptions.NO)
+    except (RCLError, RCLInvalidROSArgsError, UnknownROSArgsError) as error:
+        raise ValueError(re.sub(r', at \S+:\d+', '', ' '.join(str(error).split()))) from None
+
+
+def parameter_files(arguments):
+    """Return the places of the parameter files among the arguments of a process."""
+    places, of_ros = [], False
+    for place, argument in enumerate(arguments):
+        of_ros = argument == '--ros-args' or of_ros and argument != '--'
+        if of_ros and arguments[place - 1] == '--params-file':
+            places.append(place)
+    return places
+
+
+def _as_read(path):
+    """Return the path of a copy of a parameter file in memory, written as parameter_file reads the file: rcl takes 010
+    for 8 and `on` for true. Raises ParameterFileError."""
+    copy = os.memfd_create('parameters')
+    with open(copy, 'w', closefd=False) as stream:
+        stream.write(parameter_file.dumped(parameter_file.read(path)))
+    return f'/proc/self/fd/{copy}'
 
 
 def make_executor(context=None):

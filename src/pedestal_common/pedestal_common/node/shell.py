@@ -1,4 +1,5 @@
 """Shell of every node: parameters, clock, topics of the table, the wait for its graph, `main`."""
+import array
 import contextlib
 import gc
 import inspect
@@ -19,6 +20,7 @@ from rclpy.clock import Clock, ClockType
 from rclpy.duration import Duration
 from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValueException
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 
 from pedestal_common import parameters
 from pedestal_common.graph import nodes
@@ -144,28 +146,35 @@ class Shell(Node):
         return namespace.removesuffix(prefix), prefix
 
     def _declare(self, live):
-        graph = self._declare_all(GraphParameters, (), 'graph.')
-        own = self._declare_all(self._parameters_type, live)
-        known = {'use_sim_time', 'start_type_description_service', *graph, *own}
-        unknown = [name for name in self._parameter_overrides
-                   if name not in known and not name.startswith('qos_overrides')]
-        self.parameters = parameters.build(self._parameters_type, {**own, **dict.fromkeys(unknown)})
+        given = {name: given.value for name, given in self._parameter_overrides.items()}
+        given = parameters.without_ros({name: list(value) if isinstance(value, array.array) else value
+                                        for name, value in given.items()})
+        graph = {name: given.pop(name) for name in list(given) if name.startswith('graph.')}
+        self.parameters = parameters.build(self._parameters_type, given)
         self.graph = parameters.build(GraphParameters, graph, 'graph.')
         self.parameters.check_graph(self.graph.beams, self.graph.lockstep)
-        if '--params-file' in sys.argv and not self._parameter_overrides:
+        self._declare_all(parameters.as_dict(self.graph, 'graph.'), parameters.flatten(GraphParameters, 'graph.'), ())
+        self._declare_all(parameters.as_dict(self.parameters), parameters.flatten(self._parameters_type), live)
+        if middleware.parameter_files(sys.argv) and not self._parameter_overrides:
+            name = self.get_name()
             self.get_logger().warning(f'no parameter of {self.get_fully_qualified_name()} is in the parameter file: a '
-                                      'section /**/NODE is for a node in any namespace, NODE for a node without one')
+                                      f'section /**/{name} is for {name} in any namespace, {name} for one without')
         if live:
+            self.add_pre_set_parameters_callback(self._typed)
             self.add_on_set_parameters_callback(self._on_set)
             self.add_post_set_parameters_callback(self._post_set)
 
-    def _declare_all(self, cls, live, prefix=''):
-        """Declare the ROS parameters of a dataclass, those that begin with one of `live` writable; return {dotted
-        name: value}."""
-        defaults = parameters.as_dict(cls(), prefix)
-        return {name: self.declare_parameter(name, defaults[name],
-                                             _descriptor(field, not name.startswith(tuple(live)))).value
-                for name, field in parameters.flatten(cls, prefix)}
+    def _declare_all(self, values, fields, live):
+        """Declare ROS parameters of (name, field) with their values, those that begin with one of `live` writable."""
+        for name, field in fields:
+            self.declare_parameter(name, values[name], _descriptor(field, not name.startswith(tuple(live))),
+                                   ignore_override=True)
+
+    def _typed(self, changes):
+        """Return the changes with a whole number as a float where the parameter is one."""
+        fields = dict(parameters.flatten(self._parameters_type))
+        return [Parameter(change.name, value=parameters.typed(fields[change.name], change.value))
+                if change.name in fields else change for change in changes]
 
     def _changed(self, changes):
         values = parameters.as_dict(self.parameters)

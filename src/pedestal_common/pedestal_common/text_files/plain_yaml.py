@@ -1,8 +1,8 @@
 """YAML as parameter files use it: sections, lists, numbers, true, false and texts, each as it is written.
 
 YAML 1.1 reads 1:30 as 90, 010 as 8, 1_0 as 10, 2024-01-01 as a date and `on` as true. Here they are texts, so that a
-parameter which is a number refuses them. A section has each key once. Tags are refused, and so are aliases, where a
-few lines would stand for billions of values.
+parameter which is a number refuses them. A section has each key once. Tags are refused, and in a parameter file
+aliases, as rcl refuses them. Where aliases are accepted, a few lines cannot stand for billions of values.
 """
 import re
 import typing
@@ -36,6 +36,9 @@ class _Loader(_Base):
         for key, value in node.value:
             if not isinstance(key, yaml.ScalarNode):
                 raise yaml.constructor.ConstructorError(None, None, 'a key must be a text', key.start_mark)
+            if key.value == '<<':
+                raise yaml.constructor.ConstructorError(None, None, '<< is refused; write the values themselves',
+                                                        key.start_mark)
             if key.value in section:
                 raise yaml.constructor.ConstructorError(None, None, f'{key.value!r} is given twice', key.start_mark)
             section[key.value] = self.construct_object(value, deep=deep)
@@ -53,24 +56,48 @@ _Loader.add_constructor(_TAG + 'int', _Loader.construct_integer)
 for _name, _pattern, _first in (
         ('null', r'~|null|Null|NULL|', ['~', 'n', 'N', '']), ('bool', 'true|True|TRUE|false|False|FALSE', 'tTfF'),
         ('int', '[-+]?(?:0|[1-9][0-9]*|0x[0-9a-fA-F]+)', '-+0123456789'),
-        ('float', r'[-+]?(?:[0-9]+\.[0-9]*|\.[0-9]+)(?:[eE][-+][0-9]+)?|[-+]?\.(?:inf|Inf|INF)|\.(?:nan|NaN|NAN)',
+        ('float', r'[-+]?(?:(?:[0-9]+\.[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?|(?:0|[1-9][0-9]*)[eE][-+]?[0-9]+'
+         r'|\.(?:inf|Inf|INF))|\.(?:nan|NaN|NAN)',
          '-+.0123456789')):
     _Loader.add_implicit_resolver(_TAG + _name, re.compile(f'^(?:{_pattern})$'), list(_first))
 
 
-def parse(text):
-    """Return the values of a YAML text. Raises yaml.YAMLError."""
-    _check(yaml.parse(text, Loader=_Base))
-    return yaml.load(text, Loader=_Loader)
+class _Dumper(yaml.SafeDumper):
+    """A dumper that quotes each text that `parse` or rcl would take for a number or a flag."""
 
 
-def _check(events):
-    """Raise yaml.YAMLError where a text is too deep, contains a tag or stands for too many values."""
+_Dumper.add_implicit_resolver(_TAG + 'quoted', re.compile(
+    r'(?i)^(?:[-+]?(?:inf(?:inity)?|nan|0x[0-9a-f.]+(?:p[-+]?\d+)?|(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?)|[yn])$'),
+    list('-+.0123456789iInNyY'))
+
+
+def dump(values, sort_keys=True) -> str:
+    """Return the YAML text of values, which `parse` reads back."""
+    return yaml.dump(values, Dumper=_Dumper, sort_keys=sort_keys)
+
+
+def parse(text, aliases=False):
+    """Return the values of a YAML text. aliases: accept them. Raises yaml.YAMLError."""
+    try:
+        _check(yaml.parse(text, Loader=_Base), aliases)
+        return yaml.load(text, Loader=_Loader)
+    except yaml.scanner.ScannerError as error:
+        mark = error.problem_mark
+        if text.splitlines()[mark.line:mark.line + 1] and text.splitlines()[mark.line][mark.column:][:1] == '\t':
+            raise yaml.scanner.ScannerError(None, None, 'a tab; indent with blanks', mark) from None
+        raise
+
+
+def _check(events, aliases):
+    """Raise yaml.YAMLError where a text is too deep, has a tag or an alias, or stands for too many values."""
     count, begun, sizes = 0, [], {}
     for event in events:
         if getattr(event, 'tag', None):
             raise yaml.composer.ComposerError(None, None, f'tag {event.tag}', event.start_mark)
         if isinstance(event, yaml.AliasEvent):
+            if not aliases:
+                problem = f'the alias *{event.anchor} is refused; write the values themselves'
+                raise yaml.composer.ComposerError(None, None, problem, event.start_mark)
             count += sizes.get(event.anchor, MAX_VALUES)  # an unknown anchor, or one around this alias, has no size
         elif isinstance(event, yaml.CollectionStartEvent):
             begun.append((event.anchor, count))
@@ -86,9 +113,9 @@ def _check(events):
 
 
 def read(path):
-    """Return the values of a YAML file of at most MAX_YAML_BYTES bytes. Raises OSError, UnicodeDecodeError,
-    yaml.YAMLError."""
-    return parse(files.read_text(path, MAX_YAML_BYTES))
+    """Return the values of a YAML file of at most MAX_YAML_BYTES bytes, aliases accepted. Raises OSError,
+    UnicodeDecodeError, yaml.YAMLError."""
+    return parse(files.read_text(path, MAX_YAML_BYTES), aliases=True)
 
 
 def problem(error) -> str:
