@@ -32,14 +32,17 @@ def read_files(plan):
     return plan.tracks
 
 
-def run(plan, bag, progress):
+def run(plan, bag, progress, servers=None):
     """Run the scenario of a program.Plan to its end, or until Ctrl-C, and return its Outcome.
 
+    servers: {name: processes.ServerProcess} beside the nodes.
     progress: a context with a function of the time of the run [s], which is called as it goes on. Raises RunError when
     it cannot go on. The recording up to then stays readable.
     """
     tracks = read_files(plan)
-    with Graph(plan.scenario, bag) as graph, progress as advance:
+    with Graph(plan.scenario, bag, servers) as graph:
+        graph.start_servers()
         # With rclpy, after which no node can be a copy of this process (child).
         from pedestal_bringup.graph import watch
-        return watch.run(graph, tracks, advance)
+        with progress as advance:
+            return watch.run(graph, tracks, advance)

@@ -59,7 +59,8 @@ class Supervisor:
         self._graph, self._operator = graph, operator
         self._start, self._end = start, start + round(header.duration * NS_PER_SECOND)
         self._limits = header.restart
-        self.restarts = Restarts(self._limits.attempts, self._limits.within, self._limits.delay)
+        self.restarts, self._server_restarts = (
+            Restarts(self._limits.attempts, self._limits.within, self._limits.delay) for _ in range(2))
         self._silence, self.losses = Silence(), Losses()
         self._called = set()
         self._dead = set()
@@ -101,20 +102,27 @@ class Supervisor:
         for node, code in self._graph.ended().items():
             if node not in self._dead and not self._is_nearly_over():
                 self._bury(node, code, now)
-        for node in self.restarts.due(now):
+        self._graph.announce()
+        for node in (*self.restarts.due(now), *self._server_restarts.due(now)):
             self._dead.discard(node)
             self._graph.start(node)
 
     def _bury(self, node, code, now):
-        """A node has died: it is started again, or the run is given up."""
+        """A node has died: it is started again, or the run is given up. A server that died too often stays off."""
         limits = self._limits
         reason = ('was silent and was killed' if node in self._called and code == -signal.SIGKILL
                   else exit_description(code))
         self._dead.add(node)
         self._called.discard(node)
         self._silence.forget(node)
-        self.losses.died(now)
-        number = self.restarts.died(node, now)
+        server = node in self._graph.servers
+        if not server:
+            self.losses.died(now)
+        number = (self._server_restarts if server else self.restarts).died(node, now)
+        if not number and server:
+            report(f'{node} {reason}{self._graph.cause(node, code)}, after {limits.attempts} starts within '
+                   f'{limits.within:g} s: it stays off')
+            return
         if not number:
             raise RunError(self._graph.obituary(node, f'{reason}, after {limits.attempts} starts within '
                                                 f'{limits.within:g} s'))

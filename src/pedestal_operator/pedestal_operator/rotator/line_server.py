@@ -3,8 +3,9 @@ import collections
 import contextlib
 import os
 import selectors
-import socket
 import tty
+
+from pedestal_operator import tcp_port
 
 MAX_UNREAD_BYTES = 65_536
 """Largest size of unread answers of a client [bytes]; further answers are dropped."""
@@ -92,7 +93,7 @@ class LineServer:
         self._selector, self.clients, self.refused_count = selectors.DefaultSelector(), [], 0
         self._server = None
         if port >= 0:
-            self._server = socket.create_server((address, port), backlog=most)
+            self._server = tcp_port.listen(address, port, most)
             self._server.setblocking(False)
             self._selector.register(self._server, selectors.EVENT_READ)
         if device:

@@ -38,8 +38,7 @@ class ServerNode(Remote):
         p = self.parameters
         self.controller = Controller(self)
         self._server = LineServer(name, p.address, p.port, p.clients, longest, self.device, make_client)
-        self.get_logger().info(f'listens on {p.address}:{self._server.port}'
-                               + (f' and {self.device}' if self.device else ''))
+        print(f'{name}: {p.address}:{self._server.port}' + (f' and {self.device}' if self.device else ''), flush=True)
         self.every(POLL_PERIOD_S, self._serve_clients)
 
     def serve(self, client, now):

@@ -25,6 +25,6 @@ def main(options):
             print(file)
         return 0
     from pedestal_operator import live_node
-    print(f'ws://127.0.0.1:{options.port} until Ctrl-C; layouts: pedestal live --layouts DIR', flush=True)
+    print('layouts: pedestal live --layouts DIR; Ctrl-C ends the server', flush=True)
     return live_node.main(['--ros-args', '--log-level', 'warn', '-p', f'port:={options.port}',
                            '-p', f'graph.beams:={options.beams}'])
