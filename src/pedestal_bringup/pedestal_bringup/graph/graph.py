@@ -2,6 +2,7 @@
 import pathlib
 
 from pedestal_bringup.graph.processes import Graph
+from pedestal_bringup.graph.start import START_LEAD_TIME_S
 from ship_motion_sim.sea import motion
 
 
@@ -42,6 +43,9 @@ def run(plan, bag, progress, servers=None):
     tracks = read_files(plan)
     with Graph(plan.scenario, bag, servers) as graph:
         graph.start_servers()
+        if servers:
+            print(f'the servers are usable as soon as the antenna runs, in {START_LEAD_TIME_S:g} s at the soonest',
+                  flush=True)
         # With rclpy, after which no node can be a copy of this process (child).
         from pedestal_bringup.graph import watch
         with progress as advance:
