@@ -102,7 +102,8 @@ class Supervisor:
         for node, code in self._graph.ended().items():
             if node not in self._dead and not self._is_nearly_over():
                 self._bury(node, code, now)
-        self._graph.announce()
+        with contextlib.suppress(OSError):
+            self._graph.announce()
         for node in (*self.restarts.due(now), *self._server_restarts.due(now)):
             self._dead.discard(node)
             self._graph.start(node)
