@@ -245,6 +245,7 @@ def test_a_server_that_is_killed_serves_again_and_releases_the_control_of_its_cl
         assert first.recv(10) == b''
     with connected(port) as second:
         client.until(lambda: ask(second, 'P 25 45') == b'RPRT 0\n', 60.0)
+        client.until(lambda: ask(second, 'S') == b'RPRT 0\n', 60.0)
 
 
 def _arguments(process):
