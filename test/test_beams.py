@@ -127,7 +127,7 @@ def test_ctrl_c_ends_an_array_in_order(start_run):
         assert time.monotonic() < deadline
         time.sleep(0.02)
     done = run.interrupt()
-    assert (done.returncode, done.stderr) == (130, f'pedestal: stopped; what was recorded is in {run.bag}\n')
+    assert (done.returncode, done.stderr) == (130, f'pedestal: stopped; the recorded part is in {run.bag}\n')
     assert run.pids() == {}
     recorded = bags.read(run.bag)
     assert all(len(recorded.rows(f'{beam}/joint_states')) > 50 for beam in BEAMS) and not recorded.damage

@@ -136,7 +136,7 @@ def test_a_topic_nobody_measures_is_not_waited_for(override, text):
 
 def test_a_model_of_an_ins_that_tells_its_error_is_refused():
     chosen = ['acu.tracker.attitude.tilt_noise=1e-4']
-    with pytest.raises(scenario.ScenarioError, match='acu: tracker.attitude.tilt_noise: the INS tells it; it is of '
-                                                     'use with ins.error_told = false'):
+    with pytest.raises(scenario.ScenarioError, match='acu: tracker.attitude.tilt_noise: the INS publishes its errors; '
+                                                     'this parameter needs ins.error_told = false'):
         scenario.load('ship_pass', chosen)
     assert scenario.load('ship_pass', [*chosen, 'ins.error_told=false']).node_parameters('acu').ins_error is False

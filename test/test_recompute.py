@@ -390,7 +390,7 @@ def test_a_drive_that_was_never_told_to_move_fails(runs, rewrite, pedestal):
         return rows
     code, said, _ = pedestal(rewrite(runs['leo'].bag, change), '--node', 'adu')
     assert code == 1
-    assert 'adu: NOT exercised: the drive was never told to move' in said
+    assert 'adu: NOT exercised: no rate was ever commanded' in said
 
 
 def test_speed_is_measured(runs):

@@ -1,6 +1,7 @@
 """Check of the language: `python -m tools.language [PATH ...]` prints the texts that break a rule of CONTRIBUTING.md.
 
-Without PATH it reads README.md, CONTRIBUTING.md, CHANGELOG.md, docs/, and the docstrings, comments and other texts of all modules.
+Without PATH it reads README.md, CONTRIBUTING.md, CHANGELOG.md, docs/, and the docstrings, comments and texts of all
+modules.
 """
 import ast
 import io

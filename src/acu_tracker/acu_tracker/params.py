@@ -71,7 +71,7 @@ class ElevationParameters(AxisParameters):
 
 
 @dataclasses.dataclass(frozen=True)
-class SharedParameters(topic_flags(nodes.row('acu').reads)):
+class SharedParameters(topic_flags(nodes.row('acu').reads)):  # type: ignore[misc]  # a field per flag of the topics
     """Parameters that belong to no axis alone."""
 
     period: float = parameter(0.005, 1e-4, 1.0, 's', 'drive step T')

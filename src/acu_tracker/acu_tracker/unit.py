@@ -215,14 +215,14 @@ class Acu(Unit):
         """Time [ns] of the next command of the schedule, or of the next update of the tables."""
         return min(super().next_due, self._tables_valid[1])
 
-    def obey_due(self, stamp):
+    def execute_due(self, stamp):
         """Execute the scheduled commands that are due before the step of a stamp [ns], on the tables for that step."""
         if self.epoch != self.predictor.epoch:
             self._predict_by(Predictor(self.predictor.parameters, self.epoch))
         since, until = self._tables_valid
         if not since <= stamp < until:
             self.update_tables(stamp)
-        super().obey_due(stamp)
+        super().execute_due(stamp)
 
     @property
     def now(self):
@@ -275,7 +275,7 @@ class Acu(Unit):
         """Return [(at [ns], Command)] of the parameter `commands`."""
         return schedule('commands', self.parameters.commands, ACU_COMMANDS)
 
-    def obey(self, command, arguments):
+    def execute(self, command, arguments):
         """Return the Reply to a command of VERBS; a refusal states the reason and changes nothing."""
         verb, state = command.verb, self.parts['state']
         if verb in ALARM_COMMAND_NAMES:

@@ -196,7 +196,7 @@ def test_a_command_that_was_stopped_goes_on(never_stopped, tmp_path, number):
     assert 4 <= done < 120
     if number == signal.SIGINT:
         assert process.returncode == 130
-        assert errors == f'pedestal: {done} of 120 trials are in cut; the same command goes on\npedestal: stopped\n'
+        assert errors == f'pedestal: {done} of 120 trials are in cut; the same command continues\npedestal: stopped\n'
     assert finish_many(tmp_path / 'cut') == never_stopped
 
 

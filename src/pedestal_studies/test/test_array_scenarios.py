@@ -69,12 +69,12 @@ def test_a_beam_that_only_leads_is_seen_at_the_beginning_of_its_intervals():
                                                     'feedforward, adrc: the drive has motors'),
     (FOUR, ['beam_2/acu.azimuth.controller=pid'], "beam_2/acu: azimuth.controller = 'pid': must be beam: the drive is "
                                                   'an array'),
-    (FOUR, ['beam_2/acu.period=0.001'], 'beam_2/acu: period = 0.001: must be 0.01, as is said elsewhere; leave it out '
-                                        'here'),
-    (FOUR, ['beam_3/tracking_receiver.duration=5.0'], 'beam_3/tracking_receiver: duration = 5.0: must be 30.0, as is '
-                                                      'said elsewhere; leave it out here'),
-    (FOUR, ['beam_3/acu.receiver_rate=true'], 'beam_3/acu: receiver_rate = True: must be False, as is said elsewhere; '
-                                              'leave it out here'),
+    (FOUR, ['beam_2/acu.period=0.001'], 'beam_2/acu: period = 0.001: must be 0.01, as for the other nodes; leave it '
+                                        'out here'),
+    (FOUR, ['beam_3/tracking_receiver.duration=5.0'], 'beam_3/tracking_receiver: duration = 5.0: must be 30.0, as for '
+                                                      'the other nodes; leave it out here'),
+    (FOUR, ['beam_3/acu.receiver_rate=true'], 'beam_3/acu: receiver_rate = True: must be False, as for the other '
+                                              'nodes; leave it out here'),
 ])
 def test_what_does_not_go_together_is_refused(name, overrides, line):
     with pytest.raises(scenario.ScenarioError) as error:

@@ -4,7 +4,7 @@ from acu_tracker.modes import Reason
 from pedestal_common.compiled import compiled
 
 UNCOMMANDED_MOTION_ALARM, FROZEN_DRIVE_ALARM, DIVERGENCE_ALARM = (
-    table.ALARM_INDEX[name] for name in ('moves unasked', 'drive frozen', 'diverged'))
+    table.ALARM_INDEX[name] for name in ('uncommanded motion', 'drive frozen', 'diverged'))
 """Indices of the alarms of the latched faults."""
 
 LATCHED_FAULT_BITS = 1 << UNCOMMANDED_MOTION_ALARM | 1 << FROZEN_DRIVE_ALARM | 1 << DIVERGENCE_ALARM

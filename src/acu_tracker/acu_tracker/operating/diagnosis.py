@@ -7,7 +7,7 @@ from pedestal_common.graph import topics
 from pedestal_common.node.unit import LEVEL_ERROR, LEVEL_OK, LEVEL_WARN, Diagnosis
 
 FAULT_TEXTS = {
-    'moves unasked': 'uncommanded motion: {motion}; call acu/reset_faults once the cause is known',
+    'uncommanded motion': 'uncommanded motion: {motion}; call acu/reset_faults once the cause is known',
     'drive frozen': 'the drive repeats its numbers although motion is commanded; call acu/reset_faults once the cause '
                     'is known',
     'diverged': "autotrack diverged: the receiver's errors led away from the target; call acu/reset_faults once "

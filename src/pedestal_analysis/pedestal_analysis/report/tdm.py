@@ -16,6 +16,7 @@ from pedestal_common.graph import nodes
 from pedestal_recording import bag as bags
 from pedestal_recording import columns
 from pedestal_recording.export import whole
+from tracking_receiver_sim.track import instant
 
 RATE_LIMITS_HZ = 1e-3, 1000.0
 """Smallest and largest rate of records [Hz]."""
@@ -115,8 +116,8 @@ class _Tracks:
             mode = tracking.modes(self.bag, (stamps - self.bag.start) / 1e9)
             there = np.isfinite(angles).all(axis=1) & ((mode == 'autotrack') | ('acu/mode' not in self.bag.topics))
             if there.any():
-                times = self.begin + np.round((stamps[there] - self.bag.start) / 1e3).astype('m8[us]')
-                yield (np.datetime_as_string(times), angles[there],
+                passed = np.round((stamps[there] - self.bag.start) / 1e3).astype('m8[us]')
+                yield (instant.utc_texts(self.begin, passed), angles[there],
                        1e-3 * self._at('tracking_receiver/range', stamps)[there, 0], error[there, 2])
 
     def _at(self, topic, stamps):

@@ -142,7 +142,7 @@ def compare(topic, was: Output, now: Output, tolerance=Tolerance(), data=None, t
             difference.fields.append(FieldDifference(name, int(different.sum()), int(beyond.sum()), float(
                 size[different].max()), stamps[np.argmax(different)] / 1e9))
 
-    if was.texts is not None:
+    if was.texts is not None and now.texts is not None:
         different = np.array([was.texts[i] != now.texts[j] for i, j in zip(here, there)], bool)
         add('data', different, different, np.full(different.size, math.inf))
         return difference

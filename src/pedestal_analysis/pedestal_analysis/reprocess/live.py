@@ -145,7 +145,7 @@ def _run(recording, done, params, folder):
     inputs = [name for name in done.unit.reads if recording.feeds(name) and name not in done.unit.NODE.writes]
     feeder = Feeder(done.node, inputs, done.outputs)
     with sole_run(feeder.context.get_domain_id()), open(log, 'wb') as output:
-        feeder.refuse_company()
+        feeder.check_domain_free()
         feeder.stand_in(names)
         process = subprocess.Popen(command_line(done.node, done.unit.NODE.module, file),
                                    stdin=subprocess.DEVNULL, stdout=output, stderr=subprocess.STDOUT,

@@ -177,14 +177,15 @@ def feed(recording, unit) -> Feed:
     for name in names:
         if not recording.feeds(name):
             raise RecomputeError(f'{recording.bag.path}: no {name} in the bag, an input of the node')
-    stamps = [recording.output(name).stamps for name in names]
-    sources = np.concatenate([np.full(len(part), number) for number, part in enumerate(stamps)])
-    rows = np.concatenate([np.arange(len(part)) for part in stamps])
-    stamps = np.concatenate(stamps)
+    parts = [recording.output(name).stamps for name in names]
+    sources = np.concatenate([np.full(len(part), number) for number, part in enumerate(parts)])
+    rows = np.concatenate([np.arange(len(part)) for part in parts])
+    stamps = np.concatenate(parts)
     arrival = np.concatenate([recording.arrival(name) for name in names])
     order = np.lexsort((sources, stamps)) if recording.lockstep else np.argsort(arrival, kind='stable')
 
-    steps, taken = [], []
+    steps: list[tuple] = []
+    taken: list[int] = []
     matched = Steps(trigger, {name: round(latency * NS_PER_SECOND) for name, latency in latencies.items()},
                     recording.lockstep, lambda *step: steps.append(step), prompt=paces, held=nodes.held(latencies))
     problem = ''

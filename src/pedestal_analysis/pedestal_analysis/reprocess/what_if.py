@@ -157,7 +157,8 @@ def numbers(bag, versions) -> dict:
     overlays = [Overlay(bag, outputs) for outputs in versions]
     acus = [RecomputedAcu(overlay) for overlay in overlays]
     try:
-        truths = [TruthComparison(acu, tracking.read(overlay)) for acu, overlay in zip(acus, overlays)]
+        truths: list[TruthComparison | None] = [
+            TruthComparison(acu, tracking.read(overlay)) for acu, overlay in zip(acus, overlays)]
     except ValueError:
         truths = [None] * len(versions)
     common = functools.reduce(np.intersect1d, [acu.autotrack for acu in acus])

@@ -107,10 +107,10 @@ def identify(scenario, torque=True) -> dict:
     if abs(steps * drive.period - COMMON_PERIOD_S) > 1e-9:
         raise ValueError(f'adu.period = {drive.period:g} s: must divide {COMMON_PERIOD_S:g} s, the period of the '
                          'identification')
-    for name, axis, rate in zip(topics.AXES, axes, IDENTIFICATION_RATES_RAD_S):
-        if axis.limits.upper - axis.limits.lower < 1.1 * rate * duration:
+    for name, axis, turn in zip(topics.AXES, axes, IDENTIFICATION_RATES_RAD_S):
+        if axis.limits.upper - axis.limits.lower < 1.1 * turn * duration:
             raise ValueError(f'adu.{name}.limits: travel must be at least '
-                             f'{1.1 * rate * duration:g} rad to identify the drive')
+                             f'{1.1 * turn * duration:g} rad to identify the drive')
     # Because Schroeder's phases keep the peak of the sum low, the sines have these phases.
     k = np.arange(len(w))
     angle = w * drive.period * np.arange(steps)[:, np.newaxis] - math.pi * k * (k + 1) / len(k)

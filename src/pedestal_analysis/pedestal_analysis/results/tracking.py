@@ -272,9 +272,9 @@ def read(bag) -> Tracking:
     start = t[automatic][0] + HANDOVER_SETTLING_S if automatic.any() else math.inf
     reference = at_steps('acu/reference', ('azimuth.position', 'elevation.position'))
     reference[(mode == 'standby') | (mode == '') | (bag.beams > 0)] = np.nan
-    return Tracking(t, *encoders.T, reference, *error.T, encoder_error, measured[:, :2], measured[:, 2],
-                    filtered, beam_earth, target_earth, np.linalg.norm(relative, axis=1), mode,
-                    automatic & (t >= start), t >= start, beamwidth(bag),
+    return Tracking(t, encoders[:, 0], encoders[:, 1], reference, error[:, 0], error[:, 1], encoder_error,
+                    measured[:, :2], measured[:, 2], filtered, beam_earth, target_earth,
+                    np.linalg.norm(relative, axis=1), mode, automatic & (t >= start), t >= start, beamwidth(bag),
                     interval_start_error(beam, error) if bag.beams else np.full_like(error, np.nan))
 
 

@@ -1,4 +1,4 @@
-"""A run of a scenario from its files to its end. `watch` begins and watches its nodes."""
+"""Run of a scenario from its files to its end. `watch` starts and watches its nodes."""
 import pathlib
 
 from pedestal_bringup.graph.processes import Graph
@@ -7,7 +7,7 @@ from ship_motion_sim.sea import motion
 
 
 def _free_bag(scenario):
-    """bags/runs/SCENARIO-N with the first N that is free."""
+    """Return bags/runs/SCENARIO-N with the first N that is free."""
     number = 1
     while True:
         bag = pathlib.Path('bags') / 'runs' / f'{scenario}-{number}'
@@ -17,7 +17,8 @@ def _free_bag(scenario):
 
 
 def new_bag(given, scenario):
-    """Where to record: as given, else bags/runs/SCENARIO-N. Raises ValueError where there is one already."""
+    """Return the folder of the recording: as given, else bags/runs/SCENARIO-N. Raises ValueError where it exists
+    already."""
     bag = pathlib.Path(given) if given else _free_bag(scenario)
     if bag.exists():
         raise ValueError(f'bag {bag} exists already; a recording is never overwritten')
@@ -25,8 +26,8 @@ def new_bag(given, scenario):
 
 
 def read_files(plan):
-    """Read the files of target and ship of a program.Plan before anything is started. Raises ValueError, OSError for a
-    file that is not what it should be."""
+    """Read the files of target and ship of a program.Plan before any node is started. Raises ValueError, OSError for
+    an invalid file."""
     scenario = plan.scenario
     if 'ship_motion' in scenario.nodes:
         motion.constants(scenario.node_parameters('ship_motion').ship)
@@ -37,8 +38,8 @@ def run(plan, bag, progress, servers=None):
     """Run the scenario of a program.Plan to its end, or until Ctrl-C, and return its Outcome.
 
     servers: {name: processes.ServerProcess} beside the nodes.
-    progress: a context with a function of the time of the run [s], which is called as it goes on. Raises RunError when
-    it cannot go on. The recording up to then stays readable.
+    progress: a context with a function of the time of the run [s], which is called during the run. Raises RunError
+    when the run cannot continue. The recording up to then stays readable.
     """
     tracks = read_files(plan)
     with Graph(plan.scenario, bag, servers) as graph:
@@ -46,7 +47,7 @@ def run(plan, bag, progress, servers=None):
         if servers:
             print(f'the servers are usable as soon as the antenna runs, in {START_LEAD_TIME_S:g} s at the soonest',
                   flush=True)
-        # With rclpy, after which no node can be a copy of this process (child).
+        # Imported late, because it imports rclpy, after which no node can be a copy of this process (child).
         from pedestal_bringup.graph import watch
         with progress as advance:
             return watch.run(graph, tracks, advance)

@@ -111,8 +111,8 @@ class Sums(typing.NamedTuple):
     `squares` (n, 3): squared errors about east, north, up [rad2]. `ratios` (n,): squared ratio of the error in azimuth
     to its 1 sigma. `first` (n, 3): errors of the first run [rad], None if it is not among the runs. `wall_time`: [s].
     """
-    squares: np.ndarray = 0.0
-    ratios: np.ndarray = 0.0
+    squares: np.ndarray | float = 0.0
+    ratios: np.ndarray | float = 0.0
     first: np.ndarray | None = None
     wall_time: float = 0.0
     steps: float = 0.0
@@ -339,7 +339,7 @@ METRIC_TARGETS = {
 PAPER_VALUES = {('classical', 'time_to_12arcmin_rms_s'): 420, ('adrc', 'time_to_12arcmin_rms_s'): 250}
 
 
-KIND_METRICS = {
+KIND_METRICS: dict[str, dict[str, tuple]] = {
     '': {'time_to_12arcmin_rms_s': ('s', lambda a: settling_time(a.azimuth)),
          **{f'azimuth_rms_arcmin_{t}s': ('arcmin', lambda a, t=t: value_at(a.azimuth, t)) for t in EVALUATION_TIMES_S},
          'level_rms_arcmin': ('arcmin', lambda a: a.level),

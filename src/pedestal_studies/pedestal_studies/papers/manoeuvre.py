@@ -82,7 +82,8 @@ def run(progress, runs=DEFAULT_RUNS, pool=None) -> Result:
     """Filter `runs` noisy records with each of FILTERS; pool: monte_carlo.Pool, None for this process."""
     pool = pool or monte_carlo.Pool(1)
     items = [(name, first, count) for name in FILTERS for first, count in monte_carlo.batches(runs, BATCH_RUNS)]
-    sums_of, errors = {}, {}
+    sums_of: dict[str, np.ndarray] = {}
+    errors: dict[str, list] = {}
     for (name, *_), (sums, rms) in zip(items, pool.map(batch, items, progress)):
         sums_of[name] = ensemble.sum_of_moments(sums_of[name], sums) if name in sums_of else sums
         errors.setdefault(name, []).append(rms)

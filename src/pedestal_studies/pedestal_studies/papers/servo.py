@@ -47,7 +47,7 @@ GUST_TORQUE_NM, GUST_START_S = 1000.0, 0.2
 SETTLING_BAND = 0.02
 """Band of the settling time, over the step."""
 
-PAPER_R1_PARAMETERS = {}
+PAPER_R1_PARAMETERS: dict[str, float] = {}
 """Parameters of the scenarios, unchanged."""
 
 PAPER_R2_PARAMETERS = {'acu.azimuth.pid.bandwidth': 8.75, 'acu.azimuth.pid.derivative': 0.0}

@@ -120,7 +120,7 @@ SIGNAL_LOSS_FAULTS, WRONG_ERROR_FAULTS = ('drop', 'freeze', 'nan', 'clock_step')
 """Faults of the receiver that remove its signal, or give its errors a wrong sign; no target is found with them."""
 
 
-def _signal_level_modes(node, fault, of_modes):
+def _signal_level_modes(of_modes, node, fault):
     """Return {mode: Expectation} of the modes that use the signal level, derived from the other modes."""
     (report_steps, end, error), permitted_errors = of_modes['program'], LEVEL_MODE_ERRORS_DEG
     if node == 'tracking_receiver' and fault == 'fade':
@@ -191,7 +191,7 @@ _LEVEL_INDEPENDENT_EXPECTATIONS = {
     'ins.clock_step': _attitude_fault(60, HALF_BEAMWIDTH_DEG),
 }
 """{'NODE.FAULT': {mode: Expectation}} of LEVEL_INDEPENDENT_MODES; the other modes and unstow are derived from them."""
-FAULT_EXPECTATIONS = {name: {**of_modes, **_signal_level_modes(*name.split('.'), of_modes),
+FAULT_EXPECTATIONS = {name: {**of_modes, **_signal_level_modes(of_modes, *name.split('.')),
                              'unstow': _unstow_expectation(name, of_modes)}
                       for name, of_modes in _LEVEL_INDEPENDENT_EXPECTATIONS.items()}
 """{'NODE.FAULT': {mode: Expectation}} of every fault with its defaults and a duration of 5 s."""

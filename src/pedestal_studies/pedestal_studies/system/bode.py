@@ -80,13 +80,14 @@ def run(progress) -> Result:
              'speed loops': (functools.partial(frequency.speed, drive), frequency.SPEED_SWEEP)}
     parts |= {f'position loop {name}': (functools.partial(frequency.position, case, axes), frequency.POSITION_SWEEP)
               for name, (case, axes) in LOOP_CASES.items()}
-    responses, change = {}, {}
+    responses: dict[str, frequency.Response] = {}
+    change: dict[str, float] = {}
     for i, (text, (measure, sweep)) in enumerate(parts.items()):
         progress(i / len(parts), text)
         measured, smaller = measure(sweep), measure(dataclasses.replace(sweep, peak=0.5 * sweep.peak))
         change |= {name: nonlinearity(measured[name], smaller[name]) for name in measured}
         responses |= measured
-    worst = max(change, key=change.get)
+    worst = max(change, key=change.__getitem__)
     remarks = [f'The loops are linear: with half the excitation no open loop changes by more than '
                f'{100.0 * change[worst]:.1f} % within 10 dB of |L| = 1 (largest change: {worst}).']
     return Result(rows(responses), drawings(responses, drive), remarks)

@@ -170,7 +170,8 @@ def run(progress, runs=DEFAULT_RUNS, pool=None, on=profiles.PROFILES, noises=tup
             tune, wanted, lambda share, text: progress(0.5 * share, f'tuning, {text}'))):
         tuned[profile, noise][name] = params
     items = [(*key, tuned[key], *part) for key in tuned for part in monte_carlo.batches(runs, BATCH_RUNS)]
-    of_runs, over_time = {}, {}
+    of_runs: dict[tuple, list] = {}
+    over_time: dict[tuple, np.ndarray] = {}
     for (profile, noise, *_), sums_of in zip(items, pool.map(
             batch, items, lambda share, text: progress(0.5 + 0.5 * share, f'{runs} runs of each case, {text}'))):
         for name, (sums, thinned) in sums_of.items():
