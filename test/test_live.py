@@ -4,6 +4,7 @@ import contextlib
 import json
 import pathlib
 import signal
+import socket
 import struct
 import sys
 import time
@@ -227,6 +228,17 @@ def test_the_recording_has_every_track_once(station):
 def test_what_cannot_be_is_refused_before_anything_runs(options, said, pedestal, monkeypatch):
     monkeypatch.setitem(sys.modules, 'foxglove', None)
     assert pedestal('run', 'uav_flyby', *options) == (1, '', f'pedestal: error: {said}\n')
+
+
+@pytest.mark.parametrize('server', ('rotctld', 'easycomm', 'page', 'foxglove'))
+def test_a_port_in_use_ends_a_run_before_anything_runs(server, pedestal, tmp_path):
+    with socket.create_server(('127.0.0.1', 0)) as taken:
+        port = taken.getsockname()[1]
+        told = pedestal('run', 'uav_flyby', '--pacing', 'realtime', '--bag', tmp_path / 'bag', f'--{server}', port)
+        assert told == (
+            1, '', f'pedestal: error: --{server}: port {port} of 127.0.0.1 is in use: --{server} PORT selects another '
+            'port\n')
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_the_files_for_viewers_are_written(pedestal, tmp_path):

@@ -13,7 +13,7 @@ import sys
 import time
 
 import pytest
-from shared import free_port
+from shared import begins_with, free_port
 
 ROTCTL = shutil.which('rotctl')
 _SPEC = importlib.util.spec_from_file_location('rotator_gpredict',
@@ -72,6 +72,40 @@ def test_hamlibs_client_is_served(antenna, command, code, said):
         assert len([float(line) for line in done.stdout.split()]) == 2
     else:
         assert said in done.stdout + done.stderr
+
+
+def test_a_program_without_line_ends_is_answered(antenna):
+    """gpredict for Windows."""
+    _, client, port = antenna
+    with connected(port) as windows:
+        for command, lines in ((b'p', 2), (b'P  30.00   45.00', 1), (b'p', 2), (b'S', 1)):
+            windows.sendall(command)
+            assert windows.recv(4096).count(b'\n') == lines
+
+
+def test_without_an_antenna_no_answer_is_a_position(start_process, complaints):
+    """One line in the log for each kind of refusal, however often it happens."""
+    nodes = {name: start_process([sys.executable, '-m', f'pedestal_operator.{name}_node', '--ros-args', '-p',
+                                  'port:=0']) for name in ('rotctld', 'easycomm')}
+    ports = {name: int(begins_with(node, 1).removeprefix(f'{name}: 127.0.0.1:')) for name, node in nodes.items()}
+    with connected(ports['rotctld']) as probe:
+        for line in (*('p', '\\get_pos', 's', '1', '\\dump_state', 'P 10 20') * 3,):
+            assert ask(probe, line) == b'RPRT -6\n', line
+        assert ask(probe, '+p') == b'get_pos:\nRPRT -6\n'
+        assert ask(probe, '_') == b'pedestal, no control unit\n'
+    if ROTCTL:
+        for command in (['p'], ['P', '10', '20'], ['S']):
+            assert subprocess.run([ROTCTL, '-m', '2', '-r', f'127.0.0.1:{ports["rotctld"]}', *command],
+                                  capture_output=True, timeout=60.0).returncode == 2
+    with connected(ports['easycomm']) as probe:
+        for line in ('AZ EL', 'AZ', 'AZ10 EL20', 'EL20', 'AZ EL'):
+            probe.sendall(line.encode() + b'\n')
+            assert ask(probe, 'GS') == b'GS8\n', line
+    for name, kinds in (('rotctld', 5 + 3 * bool(ROTCTL)), ('easycomm', 2)):
+        nodes[name].send_signal(signal.SIGTERM)
+        _, errors = nodes[name].communicate(timeout=60.0)
+        said = complaints(errors).splitlines()
+        assert nodes[name].returncode == 0 and len(said) == kinds and all('refused' in line for line in said), errors
 
 
 def test_a_set_point_moves_the_antenna_from_standby(antenna):
@@ -172,6 +206,13 @@ def test_easycomm_over_tcp_and_a_serial_device(antenna, start_process):
     client.until(lambda: _serial(end, b'AZ EL \n') == b'AZ21.0 EL37.0\n', 60.0)
     client.until(lambda: _serial(end, b'GS\n') == b'GS1\n', 60.0)
     assert client.heard['acu/mode'][-1].data == 'preset'
+    for line in (b'AZ25.0 EL3x\n', b'AZ25.0EL39.0\n', b'AZ 25.0 EL 39.0\n', b'AZ25.0 EL200\n', b'AZ25,0 ELnan\n'):
+        assert _serial(end, line) == b'' and _serial(end, b'GS\n') == b'GS8\n', line  # never half of a line
+        assert _serial(end, b'AZ EL \n') == b'AZ21.0 EL37.0\n', line
+    assert _serial(end, b'AZ21,5 EL37,5\n') == b''
+    client.until(lambda: _serial(end, b'AZ EL \n') == b'AZ21.5 EL37.5\n', 60.0)
+    assert _serial(end, b'AZ21.0 EL37.0\n') == b'' and _serial(end, b'GS\n') in (b'GS1\n', b'GS2\n')
+    client.until(lambda: _serial(end, b'AZ EL \n') == b'AZ21.0 EL37.0\n', 60.0)
     _serial(end, b'EL39.0\n')                                               # the azimuth stays as it was asked for
     client.until(lambda: _serial(end, b'AZ EL \n') == b'AZ21.0 EL39.0\n', 60.0)
     for model, words in (('201', 'P'), ('202', 'PpS'), ('204', 'PpS')):        # 201 only points, in Hamlib
@@ -192,6 +233,26 @@ def _serial(end, line):
     with contextlib.suppress(BlockingIOError):
         return os.read(end, 1000)
     return b''
+
+
+def test_a_server_that_is_killed_serves_again_and_releases_the_control_of_its_clients(antenna):
+    _, client, port = antenna
+    with connected(port) as first:
+        assert granted(first, 'P 20 40')
+        [pid] = [int(process.name) for process in pathlib.Path('/proc').glob('[0-9]*')
+                 if {f'port:={port}', 'pedestal_operator.rotctld_node'} <= set(_arguments(process))]
+        os.kill(pid, signal.SIGKILL)
+        assert first.recv(10) == b''
+    with connected(port) as second:
+        client.until(lambda: ask(second, 'P 25 45') == b'RPRT 0\n', 60.0)
+        client.until(lambda: ask(second, 'S') == b'RPRT 0\n', 60.0)
+
+
+def _arguments(process):
+    try:
+        return (process / 'cmdline').read_text().split('\0')
+    except OSError:
+        return []
 
 
 def test_the_recording_says_who_moved_the_antenna(station):

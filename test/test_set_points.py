@@ -8,6 +8,8 @@ import pytest
 
 from pedestal_bringup.loop import closed_loop
 from pedestal_bringup.scenario import scenario
+from pedestal_operator.rotator import outcomes
+from pedestal_operator.rotator.controller import Controller
 
 _SPEC = importlib.util.spec_from_file_location('rotator_passes',
                                                pathlib.Path(__file__).parents[1] / 'docs' / 'rotator' / 'passes.py')
@@ -23,6 +25,29 @@ def test_the_middle_of_a_pass_is_followed(name, setting, rms, off):
     row = passes.measured('leo_pass', passes.PASSES[name], setting, 30.0)
     assert row['antenna deg'] < row['satellite deg'] + setting[0] + 2.0 and row['reversals'] == 0
     assert row['rms deg'] < rms and row['off s'] < off
+
+
+def test_refusals_of_the_control_unit_are_distinguished():
+    """By the parts of their texts in commands.py, whatever their words are."""
+    loop = closed_loop.Loop(scenario.load('leo_pass', passes.IDLE, None, 1.0, 'lockstep'))
+    outcomes_of, acu = {}, loop.units['acu']
+
+    def watch(step):
+        remote = passes.Remote(acu)
+        control = Controller(remote)
+        first = control.do('a', 'preset', 0.0)
+        first.look(remote, 0.0)
+        outcomes_of['other'] = Controller(remote).stop('b', 0.0).look(remote, 0.0)
+        outcomes_of['busy'] = Controller(remote).do('b', 'stow', 0.0).look(remote, 0.0)
+        outcomes_of['limits'] = control._request('a', 0.0, lambda: remote.request('preset', {
+            'azimuth': 0.0, 'elevation': 3.0})).look(remote, 0.0)
+        outcomes_of['range'] = control.jog('a', (1e6, 0.0), 0.0).look(remote, 0.0)
+        outcomes_of['refused'] = control.do('a', 'program', 0.0).look(remote, 0.0)
+        return 1000
+    loop.run(watch=watch)
+    assert outcomes_of == {'other': outcomes.OUTCOME_DONE, 'busy': outcomes.OUTCOME_BUSY,
+                           'limits': outcomes.OUTCOME_OUT_OF_REACH, 'range': outcomes.OUTCOME_OUT_OF_REACH,
+                           'refused': outcomes.OUTCOME_REFUSED}
 
 
 def test_set_points_at_a_pace_are_met_without_jerk():

@@ -129,9 +129,11 @@ class Remote:
     def subscribe_numbers(self, topic):
         """Do nothing: the encoders are the only source."""
 
-    def present(self, topic):
-        """Whether a topic is there."""
+    def present(self, topic, age=None):
+        """Return True for the topic that is there."""
         return topic == 'joint_states'
+
+    exists = present
 
     def angles(self, topic):
         """(azimuth, elevation) [deg] of the encoders."""

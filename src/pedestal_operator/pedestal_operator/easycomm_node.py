@@ -8,8 +8,9 @@ import sys
 from pedestal_common import parameters
 from pedestal_common.node import shell
 from pedestal_operator.rotator import easycomm
-from pedestal_operator.rotator.controller import OUTCOME_DONE
+from pedestal_operator.rotator.controller import PendingRequest
 from pedestal_operator.rotator.line_server import Client
+from pedestal_operator.rotator.outcomes import OUTCOME_DONE, Refused
 from pedestal_operator.rotator.server_node import ServerNode, ServerParameters, tcp_port
 
 SERVER_VERSION = 'pedestal'
@@ -27,10 +28,15 @@ class EasycommParameters(ServerParameters):
 class EasycommClient(Client):
     """A connected program.
 
-    pending     its controller.PendingRequest; the outcome is logged only
+    pending     [(line, its controller.PendingRequest)] in order
     set_point   last set-point (azimuth, elevation) [deg], because a line may have one of the angles only
+    refused     True after a refused setting, until the next accepted one
     """
-    pending = set_point = None
+    set_point, refused = None, False
+
+    def __init__(self, stream, name, longest):
+        super().__init__(stream, name, longest)
+        self.pending = []
 
 
 class EasycommNode(ServerNode):
@@ -38,7 +44,6 @@ class EasycommNode(ServerNode):
 
     def __init__(self):
         super().__init__('easycomm', EasycommParameters, easycomm.MAX_LINE_BYTES, EasycommClient)
-        self._refused = False
 
     @property
     def device(self):
@@ -46,34 +51,66 @@ class EasycommNode(ServerNode):
         return self.parameters.device
 
     def serve(self, client, now):
-        """Execute the lines of a client, and note the outcome of its last request."""
+        """Execute the lines of a client, and note the outcomes of its requests."""
         while client.lines:
             line = client.lines.popleft()
-            if line is not None:
-                self._do(client, easycomm.read(line), now)
-        if client.pending and (outcome := client.pending.look(self, now)) is not None:
-            client.pending, self._refused = None, outcome != OUTCOME_DONE
-            if self._refused:
-                self.get_logger().warning(f'{client.name}: refused')
+            try:
+                if line is None:
+                    raise ValueError(f'more than {easycomm.MAX_LINE_BYTES} bytes')
+                self._do(client, line, easycomm.read(line), now)
+            except ValueError as error:
+                self._note(client, line, str(error))
+        while client.pending and (outcome := client.pending[0][1].look(self, now)) is not None:
+            line, pending = client.pending.pop(0)
+            self._note(client, line, '' if outcome == OUTCOME_DONE else pending.reason)
 
-    def _do(self, client, request, now):
+    def _note(self, client, line, refusal):
+        """Note the outcome of a setting; refusal: its reason, '' for an accepted setting."""
+        client.refused = bool(refusal)
+        if refusal:
+            client.set_point = None
+            self.refuse(client, 'setting', line, refusal)
+        else:
+            client.refusals.pop('setting', None)
+
+    def _do(self, client, line, request, now):
         control, name = self.controller, client.name
+        pending = None
         if request.azimuth is not None or request.elevation is not None:
-            before = client.set_point or self.controller.pointing.earth_angles()
-            client.set_point = tuple(angle if given is None else given for given, angle in zip(
-                (request.azimuth, request.elevation), before))
-            client.pending = control.go(name, *client.set_point, now)
-        if request.rates is not None:
+            pending = self._point(client, (request.azimuth, request.elevation), now)
+        elif request.rates is not None:
             scale = self.parameters.jog_rate if request.scaled else 1.0
-            client.pending = control.jog(name, [scale * rate for rate in request.rates], now)
-        if request.verb:
-            stops = request.verb == 'stop'
-            client.pending = control.stop(name, now) if stops else control.do(name, request.verb, now)
-        angles = self.controller.pointing.earth_angles()
-        client.queue_answer(easycomm.answer(request, angles, self._status(), 0, SERVER_VERSION))
+            pending = control.jog(name, [scale * rate for rate in request.rates], now)
+        elif request.verb:
+            pending = control.stop(name, now) if request.verb == 'stop' else control.do(name, request.verb, now)
+        if pending:
+            client.pending.append((line, pending))
+        angles = self._angles(client, line) if request.queries else None
+        client.queue_answer(easycomm.answer(request, angles, self._status(client, angles), 0, SERVER_VERSION))
 
-    def _status(self):
-        if self._refused or not self.present('joint_states'):
+    def _point(self, client, angles, now):
+        """Return the pending request of a set-point, (azimuth, elevation) [deg], None for an angle that is kept."""
+        try:
+            before = client.set_point or self.controller.pointing.earth_angles()
+        except Refused as refused:
+            return PendingRequest([], now, refused.outcome, refused.reason)
+        set_point = tuple(angle if given is None else given for given, angle in zip(angles, before))
+        pending = self.controller.go(client.name, *set_point, now)
+        client.set_point = set_point if pending.outcome is None else client.set_point
+        return pending
+
+    def _angles(self, client, line):
+        """Return the angles [deg] of the antenna, None while they are unknown."""
+        try:
+            angles = self.controller.pointing.earth_angles()
+        except Refused as refused:
+            self.refuse(client, 'query', line, refused.reason)
+            return None
+        client.refusals.pop('query', None)
+        return angles
+
+    def _status(self, client, angles):
+        if client.refused or angles is None:
             return easycomm.STATUS_ERROR
         moving = any(abs(rate) > 0.01 for rate in self.rates())
         return easycomm.STATUS_MOVING if moving else easycomm.STATUS_IDLE

@@ -32,9 +32,10 @@ class FramesNode(shell.Shell):
         try:
             from tf2_msgs.msg import TFMessage
         except ImportError:
-            self.get_logger().info('publishes no frames, because tf2_msgs is not installed; '
-                                   'robot_state_publisher can publish them')
+            print('frames: robot_description; no tf, because tf2_msgs is not installed: robot_state_publisher can '
+                  'publish it', flush=True)
             return
+        print('frames: robot_description, tf', flush=True)
         self._frames, self._published_stamp = FrameSource(self), 0
         self._tf = self.create_publisher(TFMessage, 'tf', QoSProfile(depth=TF_QUEUE_DEPTH))
         self.every(FRAME_PERIOD_S, self._publish_frames)

@@ -120,7 +120,7 @@ class LiveNode(shell.Shell):
                                                        server_listener=self._new_subscriptions)
         except RuntimeError as error:
             raise ValueError(f'{p.address}:{p.port}: {error}') from None
-        self.get_logger().info(f'listens on {p.address}:{self._server.port}')
+        print(f'foxglove: ws://{p.address}:{self._server.port}', flush=True)
         self.every(POLL_PERIOD_S, self._look)
         self.every(FRAME_PERIOD_S, self._publish_frames)
 

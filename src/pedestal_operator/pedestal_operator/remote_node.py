@@ -106,9 +106,13 @@ class Remote(Shell, Antenna):
         """Return the Reply to a request once, None before it arrives."""
         return self._requests.replied(number)
 
-    def present(self, name):
-        """Return True if the last message of a topic or node is not stale."""
-        return name in self.arrivals and time.monotonic() - self.arrivals[name] < MAX_MESSAGE_AGE_S
+    def present(self, name, age=MAX_MESSAGE_AGE_S):
+        """Return True if the last message of a topic or node is younger than an age [s]."""
+        return name in self.arrivals and time.monotonic() - self.arrivals[name] < age
+
+    def exists(self, name):
+        """Return True if a topic has a publisher, or had one."""
+        return name in self.arrivals or self.count_publishers(self._link(name)[1]) > 0
 
     def query(self, names):
         """Return a Query for parameters of the commanded node."""
@@ -120,16 +124,19 @@ class Query:
 
     def __init__(self, client, names):
         self._client, self._request = client, GetParameters.Request(names=names)
-        self._request_time, self._future = -math.inf, None
+        self._request_time = -math.inf
         self.values = None
 
     def look(self):
         """Request the parameters, and repeat the request until the reply arrives."""
         now = time.monotonic()
-        if self.values is None and self._future and self._future.done():
-            self.values = [value.double_value for value in self._future.result().values] or None
-        elif self.values is None and now - self._request_time > REPLY_TIMEOUT_S and self._client.service_is_ready():
-            self._request_time, self._future = now, self._client.call_async(self._request)
+        if self.values is None and now - self._request_time > RETRY_PERIOD_S and self._client.service_is_ready():
+            self._request_time = now
+            self._client.call_async(self._request).add_done_callback(self._take)
+
+    def _take(self, future):
+        """Take a reply, which may be that of an earlier request."""
+        self.values = self.values or [value.double_value for value in future.result().values] or None
 
 
 class RemoteSession:

@@ -7,14 +7,16 @@ import sys
 
 from pedestal_common import parameters
 from pedestal_common.node import shell
-from pedestal_operator.rotator import controller, rotctld
+from pedestal_operator.rotator import outcomes, rotctld
 from pedestal_operator.rotator.line_server import Client
-from pedestal_operator.rotator.rotctld import RESULT_BUSY, RESULT_INVALID, RESULT_OK, RESULT_REJECTED, RESULT_TIMEOUT
+from pedestal_operator.rotator.outcomes import Refused
+from pedestal_operator.rotator.rotctld import RESULT_INVALID, RESULT_OK, RESULT_REJECTED
 from pedestal_operator.rotator.server_node import ServerNode, ServerParameters, tcp_port
 
-RESULT_BY_OUTCOME = {controller.OUTCOME_DONE: RESULT_OK, controller.OUTCOME_REFUSED: RESULT_REJECTED,
-                     controller.OUTCOME_OUT_OF_REACH: RESULT_INVALID, controller.OUTCOME_BUSY: RESULT_BUSY,
-                     controller.OUTCOME_NO_REPLY: RESULT_TIMEOUT}
+RESULT_BY_OUTCOME = {outcomes.OUTCOME_DONE: RESULT_OK, outcomes.OUTCOME_REFUSED: RESULT_REJECTED,
+                     outcomes.OUTCOME_OUT_OF_REACH: RESULT_INVALID, outcomes.OUTCOME_BUSY: rotctld.RESULT_BUSY,
+                     outcomes.OUTCOME_NO_REPLY: rotctld.RESULT_TIMEOUT,
+                     outcomes.OUTCOME_NO_POSITION: rotctld.RESULT_IO_ERROR}
 """{outcome of a request: result of the protocol}."""
 
 VERB_BY_COMMAND = {'park': 'stow', 'reset': 'acu/reset_faults'}
@@ -31,8 +33,8 @@ class RotctldParameters(ServerParameters):
 
 
 class RotctldClient(Client):
-    """request, pending: the rotctld.Request without an answer, and its controller.PendingRequest."""
-    request = pending = None
+    """line, request, pending: line without an answer, its rotctld.Request, and its controller.PendingRequest."""
+    line = request = pending = None
 
 
 class RotctldNode(ServerNode):
@@ -43,34 +45,50 @@ class RotctldNode(ServerNode):
 
     def serve(self, client, now):
         """Answer the lines in order; a command of the antenna is answered after the reply of the control unit."""
+        client.end_line(rotctld.is_complete)
         while client.pending or client.lines:
             if client.pending:
                 outcome = client.pending.look(self, now)
                 if outcome is None:
                     return
-                client.pending = None
-                client.queue_answer(rotctld.answer(client.request, RESULT_BY_OUTCOME[outcome]))
-                continue
-            line = client.lines.popleft()
-            request = rotctld.read(line) if line is not None else rotctld.Request('', error=RESULT_INVALID)
-            if request is None:
-                continue
-            if request.error == RESULT_OK and request.name == 'quit':
-                client.gone = ''
-                client.lines.clear()
-            elif request.error != RESULT_OK:
-                client.queue_answer(rotctld.answer(request, request.error))
-            elif request.name in rotctld.SET_COMMANDS:
-                self._move(client, request, now)
+                pending, client.pending = client.pending, None
+                self._answer(client, RESULT_BY_OUTCOME[outcome], pending.reason)
             else:
-                client.queue_answer(rotctld.answer(request, RESULT_OK, self._lines(request)))
+                self._begin(client, client.lines.popleft(), now)
+
+    def _begin(self, client, line, now):
+        """Answer a line, None for a line that is too long, or begin its request."""
+        request = rotctld.Request('', error=RESULT_INVALID) if line is None else rotctld.read(line)
+        if request is None:
+            return
+        client.line, client.request = line, request
+        if request.error != RESULT_OK:
+            self._answer(client, request.error, rotctld.ERROR_REASONS[request.error] if line is not None else
+                         f'more than {rotctld.MAX_LINE_BYTES} bytes')
+        elif request.name == 'quit':
+            client.gone = ''
+            client.lines.clear()
+        elif request.name in rotctld.SET_COMMANDS:
+            self._move(client, request, now)
+        else:
+            try:
+                self._answer(client, RESULT_OK, lines=self._lines(request))
+            except Refused as refused:
+                self._answer(client, RESULT_BY_OUTCOME[refused.outcome], refused.reason)
+
+    def _answer(self, client, result, reason='', lines=()):
+        """Answer the line of a client; log a refusal with its reason."""
+        client.queue_answer(rotctld.answer(client.request, result, lines))
+        if result == RESULT_OK:
+            client.refusals.pop(client.request.name, None)
+        else:
+            self.refuse(client, client.request.name, client.line, reason)
 
     def _move(self, client, request, now):
         if self.parameters.read_only:
-            client.queue_answer(rotctld.answer(request, RESULT_REJECTED))
+            self._answer(client, RESULT_REJECTED, 'this server is read only (parameter read_only)')
             return
         control, name = self.controller, client.name
-        client.request = request
         if request.name == 'set_pos':
             client.pending = control.go(name, *request.values, now)
         elif request.name == 'move':
@@ -83,12 +101,14 @@ class RotctldNode(ServerNode):
             client.pending = control.do(name, VERB_BY_COMMAND[request.name], now)
 
     def _lines(self, request):
-        """Return [(name, text)], the values in the answer to a request without motion."""
-        pointing, limits = self.controller.pointing, self.controller.pointing.limits
+        """Return [(name, text)], the values in the answer to a request without motion. Raises Refused."""
+        pointing = self.controller.pointing
         if request.name == 'get_pos':
             return rotctld.position(*pointing.earth_angles(), self.parameters.raw_azimuth)
         if request.name == 'get_info':
-            return [('Info', f'pedestal, {self.texts.get("acu/mode", "no control unit")}'[:63])]
+            mode = self.texts.get('acu/mode', 'no mode') if self.present('acu') else 'no control unit'
+            return [('Info', f'pedestal, {mode}'[:63])]
+        limits = pointing.limits
         if request.name == 'get_status':
             return [('Status flags', rotctld.flags(self.rates(), pointing.earth_angles(), limits))]
         if request.name == 'dump_caps':

@@ -93,6 +93,30 @@ def test_lines_are_cut_and_long_ones_kept_out_of_memory():
     assert lines.take(b'x\np\n') == [None, 'p']
 
 
+def unterminated(lines):
+    return lines.take_unterminated(rotctld.is_complete)
+
+
+@pytest.mark.parametrize('command', ('p', 'P  10.00   20.00', '+p', '\\dump_state', 'S', 'P 10,5 20,5'))
+def test_a_complete_command_of_a_program_without_line_ends_is_a_line(command):
+    """gpredict for Windows sends no line ends."""
+    lines = Lines(rotctld.MAX_LINE_BYTES)
+    for _ in range(2):
+        assert lines.take(command.encode()) == [] and unterminated(lines) == [command] and unterminated(lines) == []
+
+
+@pytest.mark.parametrize('text', ('P', 'P 10', 'P 10 x', '\\dump', 'xyz', '', '#p'))
+def test_half_a_command_is_no_line(text):
+    lines = Lines(rotctld.MAX_LINE_BYTES)
+    assert lines.take(text.encode()) == [] and unterminated(lines) == []
+
+
+def test_a_program_with_line_ends_is_never_cut():
+    lines = Lines(rotctld.MAX_LINE_BYTES)
+    assert lines.take(b'p\nP 12 3') == ['p'] and unterminated(lines) == []
+    assert lines.take(b'0\n') == ['P 12 30']
+
+
 def test_status_words():
     limits = Limits((-180.0, 360.0), (0.0, 90.0))
     assert rotctld.flags((0.0, 0.0), (10.0, 10.0), limits) == ''

@@ -2,7 +2,7 @@
 
 Every client may stop the antenna, and may send any command while control is free.
 """
-from pedestal_common.wire.commands import Reply
+from pedestal_common.wire.commands import HELD_REFUSAL, Reply
 
 CONTROL_ROLES = ('operator', 'supervisor')
 """Roles of a client; a supervisor takes control from any holder."""
@@ -20,14 +20,14 @@ class Authority:
     def admit(self, command):
         """Raise ValueError for a Command from a client that does not hold control."""
         if self.holder and command.who != self.holder and command.verb not in (*UNRESTRICTED_COMMANDS, 'take'):
-            raise ValueError(f'control is held by {self.holder}')
+            raise ValueError(f'{HELD_REFUSAL} {self.holder}')
 
     def take(self, who, role) -> Reply:
         """Give control to the client `who`. Raise ValueError if another holds it, except for a supervisor."""
         if not who:
             raise ValueError('a client that takes control must have a name')
         if self.holder not in ('', who) and role != 'supervisor':
-            raise ValueError(f'control is held by {self.holder}')
+            raise ValueError(f'{HELD_REFUSAL} {self.holder}')
         before, self.holder = self.holder, who
         return Reply(True, f'control is with {who}' + (f', taken from {before}' if before not in ('', who) else ''))
 

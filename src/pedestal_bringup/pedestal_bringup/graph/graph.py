@@ -2,6 +2,7 @@
 import pathlib
 
 from pedestal_bringup.graph.processes import Graph
+from pedestal_bringup.graph.start import START_LEAD_TIME_S
 from ship_motion_sim.sea import motion
 
 
@@ -35,14 +36,20 @@ def read_files(plan):
     return plan.tracks
 
 
-def run(plan, bag, progress):
+def run(plan, bag, progress, servers=None):
     """Run the scenario of a program.Plan to its end, or until Ctrl-C, and return its Outcome.
 
+    servers: {name: processes.ServerProcess} beside the nodes.
     progress: a context with a function of the time of the run [s], which is called during the run. Raises RunError
     when the run cannot continue. The recording up to then stays readable.
     """
     tracks = read_files(plan)
-    with Graph(plan.scenario, bag) as graph, progress as advance:
+    with Graph(plan.scenario, bag, servers) as graph:
+        graph.start_servers()
+        if servers:
+            print(f'the servers are usable as soon as the antenna runs, in {START_LEAD_TIME_S:g} s at the soonest',
+                  flush=True)
         # This import loads rclpy. It must wait until the nodes have been forked from this process (child).
         from pedestal_bringup.graph import watch
-        return watch.run(graph, tracks, advance)
+        with progress as advance:
+            return watch.run(graph, tracks, advance)

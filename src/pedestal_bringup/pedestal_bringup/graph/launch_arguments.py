@@ -58,20 +58,20 @@ def load_scenario(given):
 
 
 def servers(given, chosen):
-    """Return [(Server, its parameters)] of the requested servers. Raises ValueError in lockstep, and where a library
-    is missing."""
-    wanted = {name: given[name] for name in operator_servers.SERVERS if given[name].lower() != SERVER_OFF}
-    operator_servers.check(wanted, chosen.header, '{}:=')
-    started = []
-    for name, text in wanted.items():
-        server, values = operator_servers.SERVERS[name], {'graph.beams': chosen.header.graph_beams}
-        if server.port:
-            try:
-                values['port'] = server.port if text.lower() == SERVER_ON else operator_servers.port(text)
-            except ValueError:
-                raise ValueError(f'{name}:={text}: must be {SERVER_OFF}, {SERVER_ON} or a port, 1 to 65535') from None
-        started.append((server, values))
-    return started
+    """Return [(Server, its parameters)] of the requested servers. Raises ValueError, see operator_servers.check."""
+    ports = {name: _port(name, given[name]) for name in operator_servers.SERVERS if given[name].lower() != SERVER_OFF}
+    operator_servers.check(ports, chosen.header, '{}:=')
+    return [(operator_servers.SERVERS[name], {'graph.beams': chosen.header.graph_beams,
+                                              **({'port': port} if port else {})}) for name, port in ports.items()]
+
+
+def _port(name, text):
+    """Return the port of a server, 0 for a server without one. Raises ValueError."""
+    default = operator_servers.SERVERS[name].port
+    try:
+        return default if text.lower() == SERVER_ON or not default else operator_servers.port(text)
+    except ValueError:
+        raise ValueError(f'{name}:={text}: must be {SERVER_OFF}, {SERVER_ON} or a port, 1 to 65535') from None
 
 
 def prepare(given, chosen):

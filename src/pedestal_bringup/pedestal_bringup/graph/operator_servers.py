@@ -2,17 +2,15 @@
 graph."""
 import contextlib
 import importlib.util
-import json
-import signal
-import subprocess
 import sys
 import typing
 
-from pedestal_bringup.graph.processes import RunError, log_folder
+from pedestal_bringup.graph.processes import ServerProcess
+from pedestal_operator import tcp_port
 from pedestal_operator.page.page_security import PAGE_ROLES
 
-SERVER_STOP_TIMEOUT_S = 5.0
-"""Grace period of a server at its end [s]."""
+SERVER_ADDRESS = '127.0.0.1'
+"""Address of the servers of a run, their default."""
 
 
 class Server(typing.NamedTuple):
@@ -21,14 +19,14 @@ class Server(typing.NamedTuple):
     module       module of the node; executable: its name for ROS 2
     port         default port; 0: it has none
     does         its task, for the help
-    first_lines  number of first lines on its standard output that are for the user
+    first_lines  number of lines that it prints for the user when it serves, each with its name
     library      Python package that it needs; extra: its name for pip
     """
     module: str
     executable: str
     port: int
     does: str
-    first_lines: int = 0
+    first_lines: int = 1
     library: str = ''
     extra: str = ''
 
@@ -55,7 +53,7 @@ def add_arguments(parser):
     for name, server in SERVERS.items():
         if server.port:
             parser.add_argument(f'--{name}', nargs='?', type=port, const=server.port, metavar='PORT',
-                                help=f'in realtime: {server.does} on 127.0.0.1; default port: {server.port}')
+                                help=f'in realtime: {server.does} on {SERVER_ADDRESS}; default port: {server.port}')
         else:
             parser.add_argument(f'--{name}', action='store_const', const=0, help=f'in realtime: {server.does}')
 
@@ -68,59 +66,31 @@ def port(text):
     return port
 
 
-def check(names, header, option='--{} '):
-    """Raise ValueError where servers are requested in lockstep, or a library is missing. option: format of an option
-    with a value."""
-    for name in names:
-        requested = option.format(name).strip()
-        if header.pacing != 'realtime':
-            raise ValueError(f'{requested} needs {option.format("pacing")}realtime')
-        library = SERVERS[name].library
-        if library and not importlib.util.find_spec(library):
-            raise ValueError(f"{requested} needs {library}: pip install '{SERVERS[name].extra}'")
+def check(ports, header, option='--{} '):
+    """Raise ValueError where servers are requested in lockstep, a library is missing, or a port is in use.
 
-
-@contextlib.contextmanager
-def servers(options, header, bag):
-    """Run the servers of the options while the context is open. Raises ValueError in lockstep, and where a library is
-    missing."""
-    wanted = {name: getattr(options, name) for name in SERVERS if getattr(options, name) is not None}
-    check(wanted, header)
-    if wanted:
-        log_folder(bag).mkdir(parents=True, exist_ok=True)
-    processes = []
-    try:
-        for name, port in wanted.items():
-            server = SERVERS[name]
-            with open(log_folder(bag) / f'{name}.out', 'wb') as output:
-                processes.append(subprocess.Popen(
-                    [sys.executable, '-m', server.module, '--ros-args', '-p', f'graph.beams:={header.graph_beams}',
-                     *(['-p', f'port:={port}'] if port else [])], text=True,
-                    stdin=subprocess.DEVNULL, stdout=subprocess.PIPE if server.first_lines else output,
-                    stderr=output if server.first_lines else subprocess.STDOUT, start_new_session=True))
-            if server.first_lines:
-                _pass_on(name, processes[-1], server.first_lines)
-            else:
-                print(f'{name}: 127.0.0.1:{port}' if port else f'{name}: robot_description, tf', flush=True)
-        yield
-    finally:
-        for process in processes:
-            process.send_signal(signal.SIGTERM)
-        for process in processes:
+    ports: {server: port, 0 without one}; option: format of an option with a value.
+    """
+    with contextlib.ExitStack() as probes:
+        for name, number in ports.items():
+            requested = option.format(name).strip()
+            if header.pacing != 'realtime':
+                raise ValueError(f'{requested} needs {option.format("pacing")}realtime')
+            library = SERVERS[name].library
+            if library and not importlib.util.find_spec(library):
+                raise ValueError(f"{requested} needs {library}: pip install '{SERVERS[name].extra}'")
             try:
-                process.wait(SERVER_STOP_TIMEOUT_S)
-            except subprocess.TimeoutExpired:
-                process.kill()
-                process.wait()
-            if process.stdout:
-                process.stdout.close()
+                if number:
+                    probes.enter_context(tcp_port.listen(SERVER_ADDRESS, number))
+            except OSError as error:
+                raise ValueError(f'{requested}: {error}: {option.format(name)}PORT selects another port') from None
 
 
-def _pass_on(name, process, lines):
-    """Print the first lines of a server. Raises RunError for a server that ends instead, with the error that it
-    prints."""
-    for _ in range(lines):
-        line = process.stdout.readline()
-        if not line.startswith(name):
-            raise RunError(f'--{name}: {json.loads(line)["error"] if line else "it did not start"}')
-        print(line, end='', flush=True)
+def selected(options, header) -> dict:
+    """Return {name: ServerProcess} of the servers of the options. Raises ValueError, see `check`."""
+    ports = {name: getattr(options, name) for name in SERVERS if getattr(options, name) is not None}
+    check(ports, header)
+    return {name: ServerProcess(
+        [sys.executable, '-m', SERVERS[name].module, '--ros-args', '-p', f'graph.beams:={header.graph_beams}',
+         *(['-p', f'port:={number}'] if number else [])], SERVERS[name].first_lines)
+        for name, number in ports.items()}

@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import time
+import typing
 
 from pedestal_bringup.graph.child import Child
 from pedestal_common.graph import nodes
@@ -22,11 +23,27 @@ RESERVED_LOG_BYTES = 64 * 1024
 """Disk space that a log reserves in advance, so that the cause of an end is stored even on a full disk [bytes]."""
 
 FALLOC_FL_KEEP_SIZE = 1
+
+SERVER_START_TIMEOUT_S = 60.0
+"""Longest time from the start of a server to its announcement [s]."""
+
+SERVER_POLL_PERIOD_S = 0.02
+"""Period of the check for announcements at the start of a run [s]."""
+
+SERVER_LOG_MODE = 0o600
+"""Access to the log of a server: its user only, because the announcement of the page holds its tokens."""
+
 _libc = ctypes.CDLL(None)
 
 
 class RunError(RuntimeError):
     """Error of a run that ended too early; the message holds the node, the reason and its last log lines."""
+
+
+class ServerProcess(typing.NamedTuple):
+    """Server beside the nodes. first_lines: number of lines that it prints for the user when it serves."""
+    command: list
+    first_lines: int
 
 
 def command_line(node, module, file):
@@ -66,8 +83,9 @@ class Graph:
     any node that ignores it. Raises RunError when the folder beside the bag cannot be written.
     """
 
-    def __init__(self, scenario, bag):
+    def __init__(self, scenario, bag, servers=None):
         self.scenario = scenario
+        self.servers, self._unannounced = servers or {}, set()
         self.bag = pathlib.Path(bag)
         self.log = log_folder(bag)
         self.file = self.log / 'parameters.yaml'
@@ -98,6 +116,29 @@ class Graph:
         self._reaper.stdin.close()
         self._reaper.wait()
 
+    def start_servers(self):
+        """Start the servers, and wait until each is announced. Raises RunError for a server that ends instead."""
+        for name in self.servers:
+            self.start(name)
+        deadline = time.monotonic() + SERVER_START_TIMEOUT_S
+        while self._unannounced:
+            time.sleep(SERVER_POLL_PERIOD_S)
+            self.announce()
+            for name in sorted(self._unannounced):
+                code = self.processes[name].poll()
+                if code is not None:
+                    raise RunError(f'--{name}: {self.result(name).get("error", exit_description(code))}')
+                if time.monotonic() > deadline:
+                    raise RunError(f'--{name}: no announcement within {SERVER_START_TIMEOUT_S:g} s')
+
+    def announce(self):
+        """Print the announcements of the servers that have begun to serve since the last call."""
+        for name in sorted(self._unannounced):
+            lines = [line for line in self._lines(name) if line.startswith((f'{name}:', f'{name},'))]
+            if len(lines) >= self.servers[name].first_lines:
+                self._unannounced.remove(name)
+                print(*lines, sep='\n', flush=True)
+
     def write(self, parameters):
         """Write the text of the ROS 2 parameter file with which every node starts."""
         with self._disk_errors_named():
@@ -106,8 +147,9 @@ class Graph:
     def begin(self, parameters):
         """Start the nodes with the text of their parameter file."""
         self.write(parameters)
-        for process in self.processes.values():
-            process.begin()
+        for node, process in self.processes.items():
+            if node not in self.servers:
+                process.begin()
 
     def start(self, node):
         """Start a node again; it appends to its log."""
@@ -119,8 +161,14 @@ class Graph:
             self._log_starts[node] = size = output.seek(0, os.SEEK_END)
             _libc.fallocate(output.fileno(), FALLOC_FL_KEEP_SIZE, ctypes.c_long(size),
                             ctypes.c_long(RESERVED_LOG_BYTES))
-            self.processes[node] = Child(command_line(node, self.scenario.row(node).module, self.file),
-                                         output.fileno(), functools.partial(_load_laws, self.scenario, node))
+            if node in self.servers:
+                os.fchmod(output.fileno(), SERVER_LOG_MODE)
+                self._unannounced.add(node)
+                command, rehearse = self.servers[node].command, lambda: None
+            else:
+                command = command_line(node, self.scenario.row(node).module, self.file)
+                rehearse = functools.partial(_load_laws, self.scenario, node)
+            self.processes[node] = Child(command, output.fileno(), rehearse)
         with contextlib.suppress(OSError):
             self._reaper.stdin.write(b'%d\n' % self.processes[node].pid)
             self._reaper.stdin.flush()

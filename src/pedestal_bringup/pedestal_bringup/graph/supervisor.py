@@ -60,7 +60,8 @@ class Supervisor:
         self._graph, self._operator = graph, operator
         self._start, self._end = start, start + round(header.duration * NS_PER_SECOND)
         self._limits = header.restart
-        self.restarts = Restarts(self._limits.attempts, self._limits.within, self._limits.delay)
+        self.restarts, self._server_restarts = (
+            Restarts(self._limits.attempts, self._limits.within, self._limits.delay) for _ in range(2))
         self._silence, self.losses = Silence(), Losses()
         self._called = set()
         self._dead = set()
@@ -103,20 +104,31 @@ class Supervisor:
         for node, code in self._graph.ended().items():
             if node not in self._dead and not self._is_nearly_over():
                 self._handle_exit(node, code, now)
-        for node in self.restarts.due(now):
+        with contextlib.suppress(OSError):
+            self._graph.announce()
+        for node in (*self.restarts.due(now), *self._server_restarts.due(now)):
             self._dead.discard(node)
             self._graph.start(node)
 
     def _handle_exit(self, node, code, now):
-        """Schedule the restart of a node that has died, or end the run. Raises RunError."""
+        """Schedule the restart of a node that has died, or end the run. Raises RunError.
+
+        A server that died too often stays off.
+        """
         limits = self._limits
         reason = ('was silent and was killed' if node in self._called and code == -signal.SIGKILL
                   else exit_description(code))
         self._dead.add(node)
         self._called.discard(node)
         self._silence.remove(node)
-        self.losses.note_death(now)
-        number = self.restarts.note_death(node, now)
+        server = node in self._graph.servers
+        if not server:
+            self.losses.note_death(now)
+        number = (self._server_restarts if server else self.restarts).note_death(node, now)
+        if not number and server:
+            report(f'{node} {reason}{self._graph.cause(node, code)}, after {limits.attempts} starts within '
+                   f'{limits.within:g} s: it stays off')
+            return
         if not number:
             raise RunError(self._graph.exit_report(node, f'{reason}, after {limits.attempts} starts within '
                                                 f'{limits.within:g} s'))

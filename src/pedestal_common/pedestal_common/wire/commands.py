@@ -18,6 +18,10 @@ SERVICE_CLIENT, SCHEDULE_CLIENT = 'service', 'scenario'
 RESERVED_KEYS = ('granted', 'reply')
 """Keys of a reply beside the arguments."""
 
+HELD_REFUSAL, LIMITS_REFUSAL, RANGE_REFUSAL = 'control is held by', 'outside limits', 'must be'
+"""Parts of the texts of refusals by which a program distinguishes them: another client has control; the angles are
+outside the limits; an argument is outside its range."""
+
 MAX_TEXT_CHARACTERS = 200
 """Largest length of a name or value [characters]."""
 

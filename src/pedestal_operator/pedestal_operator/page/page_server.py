@@ -12,7 +12,6 @@ import json
 import math
 import pathlib
 import queue
-import socket
 import threading
 import time
 import typing
@@ -24,6 +23,7 @@ from starlette.routing import Mount, Route, WebSocketRoute
 from starlette.staticfiles import StaticFiles
 from starlette.websockets import WebSocketDisconnect
 
+from pedestal_operator import tcp_port
 from pedestal_operator.page import page_security
 from pedestal_operator.page.page_security import Refused
 
@@ -121,8 +121,7 @@ class PageServer:
 
     def __init__(self, address, port, names, most, history):
         self.pages, self.requests = 0, queue.Queue(MAX_QUEUED_REQUESTS)
-        family = socket.AF_INET6 if ':' in address else socket.AF_INET
-        self._socket = socket.create_server((address, port), family=family)
+        self._socket = tcp_port.listen(address, port)
         self.access = page_security.Access(address, self._socket.getsockname()[1], names)
         self._most, self._history = most, history
         self._clients, self._sections, self._revision, self._named = set(), {}, 0, 0

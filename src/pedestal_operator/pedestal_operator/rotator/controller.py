@@ -4,6 +4,15 @@ One program at a time is in control. Set-points become a motion. A jog lasts unt
 """
 import math
 
+from pedestal_common.wire.commands import HELD_REFUSAL, LIMITS_REFUSAL, RANGE_REFUSAL
+from pedestal_operator.rotator.outcomes import (
+    OUTCOME_BUSY,
+    OUTCOME_DONE,
+    OUTCOME_NO_REPLY,
+    OUTCOME_OUT_OF_REACH,
+    OUTCOME_REFUSED,
+    Refused,
+)
 from pedestal_operator.rotator.pointing import Pointing
 
 CLIENT_REPLY_TIMEOUT_S = 1.5
@@ -15,16 +24,16 @@ CONTROL_TIMEOUT_S = 10.0
 JOG_REPEAT_PERIOD_S = 0.2
 """Period of the repetition of a jog [s], less than half of the jog timeout of the control unit."""
 
-OUTCOME_DONE, OUTCOME_REFUSED, OUTCOME_OUT_OF_REACH, OUTCOME_BUSY, OUTCOME_NO_REPLY = range(5)
-"""Outcomes of a request; OUTCOME_BUSY: another client is in control."""
-
 
 class PendingRequest:
-    """Pending request of a client. outcome: an outcome above, None before it is known."""
+    """Pending request of a client.
 
-    def __init__(self, numbers, deadline, outcome=None):
-        self.numbers, self.deadline, self.outcome = list(numbers), deadline, outcome
-        self._refusal = ''
+    outcome   an outcome of `outcomes`, None before it is known
+    reason    of a refusal, one line
+    """
+
+    def __init__(self, numbers, deadline, outcome=None, reason=''):
+        self.numbers, self.deadline, self.outcome, self.reason = list(numbers), deadline, outcome, reason
 
     def look(self, remote, now):
         """Take the replies. Return the outcome."""
@@ -32,18 +41,21 @@ class PendingRequest:
             reply = remote.replied(number)
             if reply is not None:
                 self.numbers.remove(number)
-                self._refusal = self._refusal or ('' if reply.granted else reply.text)
-        if self.outcome is None and (not self.numbers or now >= self.deadline):
-            self.outcome = OUTCOME_NO_REPLY if self.numbers else _outcome(self._refusal)
+                self.reason = self.reason or ('' if reply.granted else reply.text)
+        if self.outcome is None and not self.numbers:
+            self.outcome = _outcome(self.reason)
+        elif self.outcome is None and now >= self.deadline:
+            self.outcome = OUTCOME_NO_REPLY
+            self.reason = self.reason or f'the control unit did not reply within {CLIENT_REPLY_TIMEOUT_S:g} s'
         return self.outcome
 
 
 def _outcome(refusal):
     if not refusal:
         return OUTCOME_DONE
-    if 'control is held' in refusal:
+    if HELD_REFUSAL in refusal:
         return OUTCOME_BUSY
-    return OUTCOME_OUT_OF_REACH if 'outside limits' in refusal or 'must be' in refusal else OUTCOME_REFUSED
+    return OUTCOME_OUT_OF_REACH if LIMITS_REFUSAL in refusal or RANGE_REFUSAL in refusal else OUTCOME_REFUSED
 
 
 class Controller:
@@ -55,9 +67,18 @@ class Controller:
         self._holder, self._last_command_time = '', 0.0
         self._jog, self._last_jog_time, self._was_jogging = None, 0.0, False
 
+    @property
+    def holder(self):
+        """Name of the client in control, '' without one."""
+        return self._holder
+
     def go(self, client, azimuth, elevation, now) -> PendingRequest:
         """Point the antenna to a direction [deg]."""
-        return self._request(client, now, lambda: self.pointing.go(azimuth, elevation, now))
+        try:
+            target = self.pointing.target(azimuth, elevation, now)
+        except Refused as refused:
+            return PendingRequest([], now, refused.outcome, refused.reason)
+        return self._request(client, now, lambda: self.pointing.go(target, now))
 
     def do(self, client, verb, now) -> PendingRequest:
         """Send a command without arguments."""
@@ -103,16 +124,13 @@ class Controller:
 
     def _request(self, client, now, send, continues=True):
         if self._holder not in ('', client):
-            return PendingRequest([], now, OUTCOME_BUSY)
+            return PendingRequest([], now, OUTCOME_BUSY, f'{HELD_REFUSAL} {self._holder}')
         if not continues:
             self.pointing.reset()
         self._jog, self._remote.who = None, client
         numbers = [] if self._holder else [self._remote.request('take')]
         self._holder, self._last_command_time = client, now
-        number = send()
-        if number is None:
-            return PendingRequest([], now, OUTCOME_OUT_OF_REACH)
-        return PendingRequest([*numbers, number], now + CLIENT_REPLY_TIMEOUT_S)
+        return PendingRequest([*numbers, send()], now + CLIENT_REPLY_TIMEOUT_S)
 
 
 def _rates(rates):

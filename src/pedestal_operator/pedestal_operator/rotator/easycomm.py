@@ -1,22 +1,34 @@
 """Requests and answers of the EasyComm protocols I, II and III. No sockets, no ROS here.
 
 A line has words of two letters and a value, separated by spaces. A query is answered with the same letters and the
-value (azimuth 0 to 360 deg), a setting is not answered (hamlib/rotators/easycomm, easycomm.txt).
+value (azimuth 0 to 360 deg), a setting is not answered (hamlib/rotators/easycomm, easycomm.txt). A line with a word
+that cannot be read is refused as a whole.
 """
 import re
 import typing
 
+from pedestal_operator.rotator.numerals import number
+
 MAX_LINE_BYTES = 256
 """Largest length of a line [bytes]."""
+
+QUERY_WORDS = 'AZ', 'EL', 'GS', 'GE', 'VE'
+"""Words that are answered: azimuth, elevation, status, errors, version."""
 
 VERB_BY_WORD = {'SA': 'stop', 'SE': 'stop', 'RESET': 'acu/reset_faults', 'PARK': 'stow'}
 """{word: command of the control unit}."""
 
-MOVE_DIRECTIONS: dict[str, tuple] = {'ML': (-1, 0), 'MR': (1, 0), 'MU': (0, 1), 'MD': (0, -1)}
-"""{word of a move at the jog rate: direction (azimuth, elevation)}."""
+RATE_DIRECTIONS = {'L': (0, -1), 'R': (0, 1), 'U': (1, 1), 'D': (1, -1)}
+"""{second letter of a move at the jog rate (ML) or of a velocity (VL0500, in mdeg/s): (axis, sign)}."""
 
-VELOCITY_DIRECTIONS = {'VL': (-1, 0), 'VR': (1, 0), 'VU': (0, 1), 'VD': (0, -1)}
-"""{word of a velocity: direction (azimuth, elevation)}; its value is in mdeg/s."""
+IGNORED_WORDS = 'UP', 'DN', 'UM', 'DM', 'UR', 'DR', 'AO', 'LO', 'OP', 'IP', 'AN', 'ST', 'CR', 'CW'
+"""Words of frequencies, modes, signals, ports, the time and the configuration, which an antenna control unit ignores.
+
+The word after one of them may be the mode of a radio.
+"""
+
+RADIO_MODE_PATTERN = '[A-Z]{1,6}(-[A-Z]{1,3})?'
+"""Pattern of the mode of a radio: FM, USB, FM-N, or XXX from Hamlib."""
 
 STATUS_IDLE, STATUS_MOVING, STATUS_POINTING, STATUS_ERROR = 1, 2, 4, 8
 """Status numbers in the answer to GS."""
@@ -39,28 +51,59 @@ class LineRequest(typing.NamedTuple):
 
 
 def read(line) -> LineRequest:
-    """Return the LineRequest of a line; all other words (frequencies, modes, time) are ignored."""
-    queries, angles, verb, rates, scaled = [], {}, '', None, True
+    """Return the LineRequest of a line. Raises ValueError with the word that cannot be read, for the whole line."""
+    queries, verbs, before = [], set(), ''
+    angles: dict = {}
+    moves: dict = {}
+    velocities: dict = {}
     for word in line.replace(';', ' ').upper().split():
-        name, value = word[:2], word[2:]
-        if word in VERB_BY_WORD:
-            verb = VERB_BY_WORD[word]
-        elif name in ('AZ', 'EL'):
-            if not value:
-                queries.append(name)
-            elif re.fullmatch(r'[+-]?\d{1,4}(\.\d{0,9})?', value):
-                angles[name] = float(value)
-        elif word in ('GS', 'GE', 'VE'):
+        name = word[:2]
+        if word in QUERY_WORDS:
             queries.append(word)
-        elif word in MOVE_DIRECTIONS:
-            rates, scaled = MOVE_DIRECTIONS[word], True
-        elif name in VELOCITY_DIRECTIONS and re.fullmatch(r'\d{1,6}', value):
-            rates, scaled = tuple(part * int(value) / 1000.0 for part in VELOCITY_DIRECTIONS[name]), False
-    return LineRequest(tuple(queries), angles.get('AZ'), angles.get('EL'), verb, rates, scaled)
+        elif word in VERB_BY_WORD:
+            verbs.add(VERB_BY_WORD[word])
+        elif name in ('AZ', 'EL'):
+            _put(angles, name, word, number)
+        elif name[:1] == 'V' and name[1:] in RATE_DIRECTIONS:
+            axis, sign = RATE_DIRECTIONS[name[1]]
+            _put(velocities, axis, word, lambda text, sign=sign: sign * _speed(text))
+        elif word[:1] == 'M' and word[1:] in RATE_DIRECTIONS:
+            axis, sign = RATE_DIRECTIONS[word[1]]
+            _put(moves, axis, word, lambda text, sign=sign: sign)
+        elif name not in IGNORED_WORDS and not (before in IGNORED_WORDS and re.fullmatch(RADIO_MODE_PATTERN, word)):
+            raise ValueError(f'{word!r} is unknown')
+        before = name
+    if len(verbs) + bool(angles) + bool(moves) + bool(velocities) > 1:
+        raise ValueError('more than one of: set-point, move, velocity, stop, reset, park')
+    rates = moves or velocities
+    return LineRequest(tuple(queries), angles.get('AZ'), angles.get('EL'), ''.join(verbs),
+                       (rates.get(0, 0), rates.get(1, 0)) if rates else None, not velocities)
+
+
+def _put(values, key, word, convert):
+    """Put the value of a word under a key. Raises ValueError for a wrong value, and for a second value."""
+    if key in values:
+        raise ValueError(f'{word!r} is the second value of its axis')
+    try:
+        values[key] = convert(word[2:])
+    except ValueError as error:
+        raise ValueError(f'{word!r}: {error}') from None
+
+
+def _speed(text):
+    """Return the value of a velocity [deg/s]."""
+    if not re.fullmatch('[0-9]{1,6}', text):
+        raise ValueError(f'{text!r} is not a whole number of mdeg/s')
+    return int(text) / 1000.0
 
 
 def answer(request, angles, status, errors, version) -> bytes:
-    """Return the answer to a LineRequest. angles: (azimuth, elevation) [deg]; status, errors: of GS and GE."""
-    values = {'AZ': f'AZ{round(angles[0] % 360.0, 1) % 360.0:.1f}', 'EL': f'EL{angles[1]:.1f}', 'GS': f'GS{status}',
-              'GE': f'GE{errors}', 'VE': f'VE{version}'}
-    return f'{" ".join(values[word] for word in request.queries)}\n'.encode() if request.queries else b''
+    """Return the answer to a LineRequest.
+
+    angles: (azimuth, elevation) [deg], None if unknown: then AZ and EL are not answered; status, errors: of GS and GE.
+    """
+    values = {'GS': f'GS{status}', 'GE': f'GE{errors}', 'VE': f'VE{version}'}
+    if angles is not None:
+        values |= {'AZ': f'AZ{round(angles[0] % 360.0, 1) % 360.0:.1f}', 'EL': f'EL{angles[1]:.1f}'}
+    words = [values[word] for word in request.queries if word in values]
+    return f'{" ".join(words)}\n'.encode() if words else b''

@@ -3,14 +3,19 @@ import collections
 import contextlib
 import os
 import selectors
-import socket
+import time
 import tty
+
+from pedestal_operator import tcp_port
 
 MAX_UNREAD_BYTES = 65_536
 """Largest size of unread answers of a client [bytes]; further answers are dropped."""
 
 MAX_WAITING_LINES = 100
 """Largest number of waiting lines of a client; further input is left unread."""
+
+LINE_END_TIMEOUT_S = 0.05
+"""Time without a byte after which a complete command of a program without line ends counts as a line [s]."""
 
 READ_CHUNK_BYTES = 65_536
 """Largest size of one read [bytes]."""
@@ -21,17 +26,26 @@ class Lines:
 
     def __init__(self, longest):
         self._longest, self._remainder, self._skips_line = longest, b'', False
+        self._has_line_ends = False
 
     def take(self, data):
         """Return the lines that bytes complete, None for a line that is too long."""
         *lines, self._remainder = (self._remainder + data).replace(b'\r', b'\n').split(b'\n')
-        found = []
+        found, self._has_line_ends = [], self._has_line_ends or bool(lines)
         for line in lines:
             too_long, self._skips_line = self._skips_line or len(line) > self._longest, False
             found.append(None if too_long else line.decode('ascii', 'replace'))
         if len(self._remainder) > self._longest:
             self._remainder, self._skips_line = b'', True
         return found
+
+    def take_unterminated(self, is_complete):
+        """Return [the bytes without a line end] of a program that never sent one, if is_complete(line), else []."""
+        line = self._remainder.decode('ascii', 'replace')
+        if self._has_line_ends or self._skips_line or not is_complete(line):
+            return []
+        self._remainder = b''
+        return [line]
 
 
 class Client:
@@ -41,12 +55,14 @@ class Client:
     lines     unanswered lines
     dropped   number of answers dropped because they were not read
     gone      reason of its end, None while it is connected
+    refusals  {command: reason of its last refusal}, as they were logged
     """
 
     def __init__(self, stream, name, longest):
         self.stream, self.name = stream, name
         self.lines, self.dropped, self.gone = collections.deque(), 0, None
-        self._splitter, self._out = Lines(longest), bytearray()
+        self._splitter, self._out, self._receive_time = Lines(longest), bytearray(), 0.0
+        self.refusals = {}
 
     def receive(self):
         """Read the available bytes."""
@@ -59,8 +75,17 @@ class Client:
             return
         if data:
             self.lines += self._splitter.take(data)
+            self._receive_time = time.monotonic()
         else:
             self.gone = ''
+
+    def end_line(self, is_complete):
+        """Take the bytes of a program without line ends after LINE_END_TIMEOUT_S as a line, if is_complete(line).
+
+        This serves gpredict for Windows.
+        """
+        if not self.lines and time.monotonic() - self._receive_time > LINE_END_TIMEOUT_S:
+            self.lines += self._splitter.take_unterminated(is_complete)
 
     def queue_answer(self, data):
         """Queue an answer behind the waiting answers."""
@@ -81,30 +106,33 @@ class Client:
 
 
 class LineServer:
-    """Clients of one TCP port (port < 0: none), and of a serial device ('': none). Raises OSError.
+    """Clients of one TCP port, and of a serial device ('': none). Raises OSError.
 
     kind: start of the names of the clients; most: largest number of clients; longest: largest length of a line
     [bytes]; make_client(stream, name, longest) -> a Client.
     """
 
     def __init__(self, kind, address, port, most, longest, device='', make_client=Client):
-        self._kind, self._most, self._longest, self._make = kind, most, longest, make_client
+        self._most, self._longest, self._make = most, longest, make_client
         self._selector, self.clients, self.refused_count = selectors.DefaultSelector(), [], 0
-        self._server = None
-        if port >= 0:
-            self._server = socket.create_server((address, port), backlog=most)
-            self._server.setblocking(False)
-            self._selector.register(self._server, selectors.EVENT_READ)
+        self._server, self._device_name = tcp_port.listen(address, port, most), f'{kind} {device}'
+        self._server.setblocking(False)
+        self._selector.register(self._server, selectors.EVENT_READ)
+        self._prefix = f'{kind} {self.port} from '
         if device:
             stream = open(device, 'r+b', buffering=0, opener=lambda path, flags: os.open(
                 path, flags | os.O_NOCTTY | os.O_NONBLOCK))
             tty.setraw(stream)
-            self._add(stream, f'{kind} {device}')
+            self._add(stream, self._device_name)
 
     @property
     def port(self):
         """Number of the TCP port."""
         return self._server.getsockname()[1]
+
+    def is_own(self, name):
+        """Return True if a name is that of a client of this server, or of an earlier process with the same port."""
+        return name.startswith(self._prefix) or name == self._device_name
 
     def look(self):
         """Accept new clients, and read from all clients."""
@@ -128,8 +156,7 @@ class LineServer:
         """Close every connection and the port."""
         for client in list(self.clients):
             self._drop(client)
-        if self._server:
-            self._server.close()
+        self._server.close()
 
     def _accept(self):
         with contextlib.suppress(OSError):
@@ -139,7 +166,7 @@ class LineServer:
                 connection.close()
                 return
             connection.setblocking(False)
-            self._add(connection, f'{self._kind} {host}:{port}')
+            self._add(connection, f'{self._prefix}{host}:{port}')
 
     def _add(self, stream, name):
         client = self._make(stream, name, self._longest)

@@ -10,11 +10,18 @@ import numpy as np
 
 from pedestal_common.geometry import line_of_sight
 from pedestal_common.graph import topics
+from pedestal_operator.rotator.outcomes import OUTCOME_NO_POSITION, OUTCOME_OUT_OF_REACH, Refused
 from pedestal_operator.rotator.rotctld import Limits, turn
 from pedestal_operator.rotator.set_point_filter import SetPointFilter
 
 SLAVE_DURATION_S = 3600.0
 """Time for which a `slave` direction on a ship is valid [s]."""
+
+MAX_ANGLE_AGE_S = 0.5
+"""Age after which angles and attitude are stale [s]; they are published at each step of the drive."""
+
+MAX_AZIMUTH_DEG, MAX_SHIP_ELEVATION_DEG = 720.0, 180.0
+"""Largest azimuth of a set-point; largest elevation of a set-point on a ship [deg], in both directions."""
 
 ATTITUDE_TOPIC = 'ship/imu/data'
 """Topic of the attitude, which exists on a ship only."""
@@ -34,8 +41,8 @@ class Pointing:
 
     @property
     def on_ship(self):
-        """True if the antenna is on a ship."""
-        return self._remote.present(ATTITUDE_TOPIC)
+        """True if the antenna is on a ship, also while the attitude is stale."""
+        return self._remote.exists(ATTITUDE_TOPIC)
 
     @property
     def _mode(self):
@@ -43,9 +50,9 @@ class Pointing:
 
     @property
     def limits(self):
-        """Limits of the axes [deg] from the parameters of the control unit, default Limits before the reply."""
+        """Limits of the axes [deg] from the parameters of the control unit. Raises Refused before its reply."""
         if self._query.values is None:
-            return Limits()
+            raise Refused(OUTCOME_NO_POSITION, 'the limits of the antenna are unknown: no reply of the control unit')
         angles = [math.degrees(angle) for angle in self._query.values]
         return Limits(tuple(angles[:2]), tuple(angles[2:]))
 
@@ -56,8 +63,13 @@ class Pointing:
             self.settle(now)
 
     def earth_angles(self):
-        """Return earth angles (azimuth, elevation) [deg] of the antenna, NaN if stale."""
+        """Return earth angles (azimuth, elevation) [deg] of the antenna. Raises Refused if they are stale."""
+        stale = [topic for topic in ('joint_states', *([ATTITUDE_TOPIC] if self.on_ship else []))
+                 if not self._remote.present(topic, MAX_ANGLE_AGE_S)]
         angles = self._remote.angles('joint_states')
+        if stale or not all(map(math.isfinite, angles)):
+            raise Refused(OUTCOME_NO_POSITION, f'the position of the antenna is unknown: no {" and ".join(stale)}'
+                          if stale else 'the position of the antenna is unknown: joint_states is not a number')
         if not self.on_ship:
             return angles
         deck_to_earth = np.zeros((3, 3))
@@ -65,19 +77,32 @@ class Pointing:
         beam = line_of_sight.direction(*np.radians(angles))
         return tuple(np.degrees(line_of_sight.earth_angles(*(deck_to_earth @ beam))))
 
-    def go(self, azimuth, elevation, now):
-        """Command a set-point [deg] at the time now [s]. Return the number of the request, None if out of reach."""
-        low, high = self.limits.elevation
-        if not (-720.0 <= azimuth <= 720.0 and (self.on_ship or low <= elevation <= high) and abs(elevation) <= 180.0):
-            return None
+    def target(self, azimuth, elevation, now):
+        """Return the set-point (azimuth, elevation) [deg] for a direction at the time now [s], on the nearest turn.
+
+        Raises Refused if it is out of reach, or if the position or the limits of the antenna are unknown.
+        """
+        limits = self.limits
+        low, high = (-MAX_SHIP_ELEVATION_DEG, MAX_SHIP_ELEVATION_DEG) if self.on_ship else limits.elevation
+        self._check('azimuth', azimuth, -MAX_AZIMUTH_DEG, MAX_AZIMUTH_DEG)
+        self._check('elevation', elevation, low, high)
+        self.earth_angles()
         near = (self._filter.set_point if self._filter.continues(now) else self._remote.angles('joint_states'))[0]
         if self.on_ship:
-            azimuth = near + (azimuth - near + 180.0) % 360.0 - 180.0 if math.isfinite(near) else azimuth
-        else:
-            azimuth = turn(azimuth, near if math.isfinite(near) else 0.0, self.limits.azimuth)
-            if azimuth is None:
-                return None
-        return self._request(*self._filter.take((azimuth, elevation), now))
+            return near + (azimuth - near + 180.0) % 360.0 - 180.0, elevation
+        turned = turn(azimuth, near, limits.azimuth)
+        if turned is None:
+            self._check('azimuth', azimuth, *limits.azimuth)
+        return turned, elevation
+
+    def go(self, target, now):
+        """Command a set-point of `target` at the time now [s]. Return the number of the request."""
+        return self._request(*self._filter.take(target, now))
+
+    @staticmethod
+    def _check(name, angle, low, high):
+        if not low <= angle <= high:
+            raise Refused(OUTCOME_OUT_OF_REACH, f'{name} {angle:g} deg: must be {low:g} to {high:g}')
 
     def settle(self, now):
         """Stop at the last set-point, because no other follows; do nothing after a change of mode."""

@@ -4,16 +4,20 @@ Written for Hamlib 4.5.4 (rotctl -m 2, rotctld -m 1) and gpredict. The reference
 with three differences. A command with too few arguments is refused at once and does not take the next line. An unknown
 command is answered. Numbers must be finite.
 """
-import math
-import re
 import typing
+
+from pedestal_operator.rotator.numerals import number
 
 MAX_LINE_BYTES = 256
 """Largest length of a line [bytes]."""
 
-(RESULT_OK, RESULT_INVALID, RESULT_NOT_IMPLEMENTED, RESULT_TIMEOUT, RESULT_REJECTED, RESULT_NOT_AVAILABLE,
- RESULT_BUSY) = (0, -1, -4, -5, -9, -11, -14)
+(RESULT_OK, RESULT_INVALID, RESULT_NOT_IMPLEMENTED, RESULT_TIMEOUT, RESULT_IO_ERROR, RESULT_REJECTED,
+ RESULT_NOT_AVAILABLE, RESULT_BUSY) = (0, -1, -4, -5, -6, -9, -11, -14)
 """Results n of `RPRT n` (hamlib/rig.h)."""
+
+ERROR_REASONS = {RESULT_INVALID: 'invalid arguments', RESULT_NOT_IMPLEMENTED: 'unknown command',
+                 RESULT_NOT_AVAILABLE: 'an antenna control unit has no such function'}
+"""{result of a line that cannot be read: its reason in the log}."""
 
 
 class Row(typing.NamedTuple):
@@ -46,8 +50,8 @@ _DIRECTION_NUMBERS = {'UP': 2, 'DOWN': 4, 'LEFT': 8, 'CCW': 8, 'RIGHT': 16, 'CW'
 
 class Limits(typing.NamedTuple):
     """Limits (low, high) of the axes [deg]."""
-    azimuth: tuple = (-180.0, 360.0)
-    elevation: tuple = (0.0, 90.0)
+    azimuth: tuple
+    elevation: tuple
 
 
 class Request(typing.NamedTuple):
@@ -102,16 +106,13 @@ def _values(name, given):
         if direction not in MOVE_DIRECTIONS or not (speed == -1 or 1 <= speed <= 100):
             raise ValueError
         return direction, speed
-    return tuple(_number(text) for text in given)
+    return tuple(number(text) for text in given)
 
 
-def _number(text):
-    if not re.fullmatch(r'[+-]?(\d{1,9}([.,]\d*)?|[.,]\d+)([eE][+-]?\d{1,2})?', text):
-        raise ValueError(text)
-    number = float(text.replace(',', '.'))
-    if not math.isfinite(number):
-        raise ValueError(text)
-    return number
+def is_complete(line) -> bool:
+    """Return True if a line without its end is a valid command with all its arguments."""
+    request = read(line)
+    return request is not None and request.error == RESULT_OK
 
 
 def answer(request, result, lines=()) -> bytes:

@@ -37,9 +37,9 @@ class ServerNode(Remote):
         super().__init__(name, name, parameters_type=parameters_type)
         p = self.parameters
         self.controller = Controller(self)
+        self._checked_arrival = None
         self._server = LineServer(name, p.address, p.port, p.clients, longest, self.device, make_client)
-        self.get_logger().info(f'listens on {p.address}:{self._server.port}'
-                               + (f' and {self.device}' if self.device else ''))
+        print(f'{name}: {p.address}:{self._server.port}' + (f' and {self.device}' if self.device else ''), flush=True)
         self.every(POLL_PERIOD_S, self._serve_clients)
 
     def serve(self, client, now):
@@ -49,6 +49,7 @@ class ServerNode(Remote):
     def _serve_clients(self):
         now = time.monotonic()
         self._server.look()
+        self._release_lost_control()
         self.controller.look(now)
         for client in self._server.clients:
             self.serve(client, now)
@@ -58,7 +59,32 @@ class ServerNode(Remote):
             if client.gone or dropped:
                 self.get_logger().warning(f'{client.name}: {", ".join(filter(None, (client.gone, dropped)))}')
 
+    def _release_lost_control(self):
+        """Release control that the control unit holds for a client of an earlier process of this server.
+
+        Each arrival of the diagnostics is checked once.
+        """
+        arrival = self.arrivals.get('acu')
+        if arrival == self._checked_arrival:
+            return
+        self._checked_arrival, holder = arrival, self.diagnostics_of('acu').get('control', '')
+        if self._server.is_own(holder) and holder != self.controller.holder:
+            self.who = holder
+            self.request('release')
+
+    def refuse(self, client, command, line, reason):
+        """Log the refusal of a line, None for a line that was too long.
+
+        A repeated reason is logged again after the next success of the command.
+        """
+        if client.refusals.get(command) != reason:
+            client.refusals[command] = reason
+            refused = 'refused a line' if line is None else f'refused {line!r}'
+            self.get_logger().warning(f'{client.name}: {refused}: {reason.removeprefix("refused: ")}')
+
     def close(self):
-        """Close the port, then the node."""
+        """Release the control of the clients, and close the port, then the node."""
+        if self.controller.holder:
+            self.controller.leave(self.controller.holder, time.monotonic())
         self._server.close()
         super().close()

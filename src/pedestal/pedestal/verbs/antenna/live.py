@@ -33,6 +33,6 @@ def main(options: argparse.Namespace) -> int:
         return 0
     from pedestal_operator import live_node
     port = DEFAULT_PORT if options.port is None else options.port
-    print(f'ws://127.0.0.1:{port} until Ctrl-C; layouts: pedestal live --layouts DIR', flush=True)
+    print('layouts: pedestal live --layouts DIR; Ctrl-C ends the server', flush=True)
     return live_node.main(['--ros-args', '--log-level', 'warn', '-p', f'port:={port}',
                            '-p', f'graph.beams:={options.beams or 0}'])

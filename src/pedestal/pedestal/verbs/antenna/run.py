@@ -64,11 +64,11 @@ def main(options: argparse.Namespace) -> int:
         return 0
     bag = graph.new_bag(options.bag, chosen.name)
     console.check_json(options.json)
+    servers = operator_servers.selected(options, chosen.header)
     plan = Plan(chosen)
     for line in plan.announced():
         print(line)
-    with operator_servers.servers(options, chosen.header, bag):
-        outcome = graph.run(plan, bag, console.progress_of_run(chosen.header.duration))
+    outcome = graph.run(plan, bag, console.progress_of_run(chosen.header.duration), servers)
     # Because these modules import scipy, which takes half a second, they are loaded after the run.
     from pedestal_analysis.results import results
     from pedestal_recording.bag import read

@@ -1,0 +1,17 @@
+"""TCP port of a server."""
+import errno
+import socket
+
+
+def listen(address, port, clients=None) -> socket.socket:
+    """Return a socket that listens on a port, 0: a free port; clients: number of clients that may wait.
+
+    Raises OSError; for a port in use its text names the port.
+    """
+    try:
+        return socket.create_server((address, port), family=socket.AF_INET6 if ':' in address else socket.AF_INET,
+                                    backlog=clients)
+    except OSError as error:
+        if error.errno != errno.EADDRINUSE:
+            raise
+        raise OSError(f'port {port} of {address} is in use') from None
