@@ -43,6 +43,6 @@ def run(plan, bag, progress):
     """
     tracks = read_files(plan)
     with Graph(plan.scenario, bag) as graph, progress as advance:
-        # This import loads rclpy. It must wait until the nodes have been forked from this process (child).
+        # Imported late, because it imports rclpy, after which no node can be a copy of this process (child).
         from pedestal_bringup.graph import watch
         return watch.run(graph, tracks, advance)
