@@ -10,8 +10,6 @@ from collections.abc import Mapping
 
 import numpy as np
 
-import numpy as np
-
 from pedestal_common.graph import topics
 
 
