@@ -37,6 +37,7 @@ class Report:
     """Result of `verify`.
 
     topics            [TopicCheck]
+    foreign           lines about the foreign messages, which are left out
     problems          of the whole bag, texts
     steps, period     number of steps of the run, and their period [s], NaN with fewer than two steps
     made              origin of the bag, one line
@@ -52,6 +53,7 @@ class Report:
     end: int
     planned_end: int | None
     lost: tuple | None
+    foreign: list
 
     @property
     def complete(self):
@@ -92,7 +94,7 @@ class Report:
         for check in self.topics:
             lines.append(f'{check.name:{width}} {check.count:9} {check.first:14.6f} {check.last:14.6f}')
             lines += [f'  {problem}' for problem in check.problems]
-        lines += [*self.problems, self.made]
+        lines += [*self.problems, *self.foreign, self.made]
         if self.loss:
             lines.append(self.loss)
         if self.aborted:
@@ -129,14 +131,16 @@ def verify(bag) -> Report:
     graph, planned = bag.graph, bag.planned_end
     of_steps = {name: stamp for name, stamp in stamps.items()
                 if name in graph and graph[name].rate == 'step' and stamp.size}
-    grid = _grid(of_steps)
+    believed = {name: stamp[rows[name].stamp == rows[name].log] for name, stamp in of_steps.items()}
+    realtime = bag.metadata.get('pacing') == 'realtime'  # there the log time replaces an implausible stamp
+    grid = _grid({name: stamp for name, stamp in believed.items() if stamp.size} if realtime else of_steps)
     checks = [TopicCheck(name, stamp.size, stamp[0] / 1e9 if stamp.size else np.nan,
                          stamp[-1] / 1e9 if stamp.size else np.nan, _problems(bag, rows[name], name, stamp, grid))
               for name, stamp in stamps.items()]
     problems = [bag.damage] if bag.damage else []
     if not of_steps:
         problems.append('no topic of the steps of the drive has a message')
-    counts = {check.name: check.count for check in checks}
+    counts = {name: bag.recorded(name).size for name in bag.topics}
     if bag.statistics is not None and bag.statistics != counts:
         problems.append(f'the summary counts {_differences(bag.statistics, counts)}')
     problems += _unrecorded_steps([rows[name] for name in of_steps], bag.start, grid)
@@ -147,7 +151,7 @@ def verify(bag) -> Report:
     planned = planned - bag.start if of_steps and planned is not None else None
     return Report(str(bag.path), checks, bag.breaks + problems, grid.steps,
                   grid.period / 1e9 if grid.period else np.nan, configuration.line(bag), grid.last, planned,
-                  None if None in lost else lost)
+                  None if None in lost else lost, bag.foreign)
 
 
 def count(text):
@@ -161,7 +165,7 @@ def _problems(bag, rows, name, stamp, grid):
     rate = topic.rate if topic else ''
     if bag.metadata.get('pacing') == 'realtime' and rate == 'step':
         # Missing steps of the graph, and messages of foreign publishers, are no fault of the recording.
-        return ([] if stamp.size else ['no message']) + _numbering(rows)
+        return ([] if stamp.size else ['no message']) + _numbering(bag.recorded(name))
     problems = _order(stamp) if topic and len(topic.writers) == 1 else []
     if rate == 'step':
         problems += _steps(stamp, 'adu' in topic.writers, grid)
@@ -174,7 +178,7 @@ def _problems(bag, rows, name, stamp, grid):
     if topic and bag.topics[name] != topic.type:
         problems.append(f'type {bag.topics[name]}, must be {topic.type}')
     if ours:
-        problems += _numbering(rows)
+        problems += _numbering(bag.recorded(name))
     return problems
 
 
@@ -276,21 +280,22 @@ def _unrecorded_steps(of_steps, start, grid):
 
 
 def _numbering(rows):
-    """Return the problems of the sequence numbers of a topic; they begin with 1 in each file."""
-    file = rows.channel >> 16
-    return [problem for number in np.unique(file) for problem in _sequence(rows.sequence[file == number])]
+    """Return the problems of the sequence numbers of a topic, from its rows of the index.
 
-
-def _sequence(sequence):
-    """Return the problems of sequence numbers. The recorder counts from 1, with a gap for each lost message."""
-    if not sequence.size:
-        return []
-    steps = np.diff(sequence, prepend=0)
-    lost = int(np.sum(steps[steps > 1] - 1))
-    problems = [f'{lost} messages lost, by the sequence numbers'] if lost else []
-    if np.any(steps <= 0):
-        problems.append(f'{np.sum(steps <= 0)} sequence numbers go back or repeat')
-    return problems
+    The recorder counts from 1 in each file, with a gap for each lost message; 0 marks a message of another publisher.
+    A tool that splits a recording continues the numbers of the file before.
+    """
+    lost = back = before = 0
+    file, numbers = rows.channel >> 16, rows.sequence
+    for number in np.unique(file):
+        sequence = numbers[(file == number) & (numbers > 0)]
+        if sequence.size:
+            steps = np.diff(sequence, prepend=before if sequence[0] > before else 0)
+            lost += int(np.sum(steps[steps > 1] - 1))
+            back += int(np.sum(steps <= 0))
+            before = sequence[-1]
+    return ([f'{lost} messages lost, by the sequence numbers'] if lost else []) + (
+        [f'{back} sequence numbers go back or repeat'] if back else [])
 
 
 def _metadata_file(bag, counts):
