@@ -14,12 +14,12 @@ from pedestal_common.graph.steps import NS_PER_SECOND, GraphError
 from pedestal_common.node import middleware, shell, subscriptions
 from pedestal_common.node.unit import LEVEL_ERROR, LEVEL_OK, LEVEL_WARN, Diagnosis
 from pedestal_common.realtime.publisher_gate import PublisherGate
-from pedestal_common.realtime.streams import Streams
 from pedestal_common.text_files import files
 from pedestal_common.wire import messages
 from pedestal_common.wire.cdr import STAMPED_TYPES
 from pedestal_recording import configuration
 from pedestal_recording.bag import BagError
+from pedestal_recording.publishers import TopicPublishers
 from pedestal_recording.recorder_params import RecorderParameters
 from pedestal_recording.step_order import OrderError, StepOrder
 from pedestal_recording.writer import Writer
@@ -70,7 +70,7 @@ class RecorderNode(shell.Shell):
             configuration.records(self.parameters.scenario_yaml, self.parameters.parameters_yaml))
         self._order = StepOrder(recorded, names, self._bag.write)
         self._lost = collections.Counter()
-        self._streams = {}
+        self._heard = {}
         self._stamp = self.graph.start
         self._without_stamp = 0
         self._received = [0] * len(recorded)
@@ -112,9 +112,10 @@ class RecorderNode(shell.Shell):
         def take(data, info):
             received[index] += 1
             try:
-                if checked:
-                    count(info)
-                put(data, info)
+                if not checked or count(data, info):
+                    put(data, info)
+                else:
+                    self._bag.write_foreign(index, self._stamp, info['source_timestamp'], data)
             except (BagError, OrderError) as error:
                 self._fail(str(error))
         return take
@@ -123,7 +124,7 @@ class RecorderNode(shell.Shell):
         """Return a check of lockstep: the numbers of the only publisher rise by 1, on a step topic from 1 on."""
         expected = 1 if topic.rate == 'step' and self.graph.members else 0
 
-        def count(info):
+        def count(_, info):
             nonlocal expected
             number = info['publication_sequence_number']
             if number is not None and expected != 0 and number not in (1, expected):
@@ -135,18 +136,20 @@ class RecorderNode(shell.Shell):
                     self._bag.skip(index, number - expected)
                     self._fail(self._losses())
             expected = (number or 0) + 1
+            return True
         return count
 
     def _realtime_counter(self, index, topic):
-        """Return a counter of the messages missing in realtime, from the sequence numbers of each publisher."""
-        publishers = self._streams[topic.name] = Streams()
+        """Return a counter of the messages missing in realtime, which returns False for another publisher."""
+        publishers = self._heard[topic.name] = TopicPublishers(self, topic)
 
-        def count(info):
+        def count(data, info):
             before = publishers.lost
-            publishers.of(info['publication_sequence_number'], info['source_timestamp'], time.monotonic_ns())
+            ours = publishers.take(data, info)
             if publishers.lost > before:
                 self._lost[topic.name] = publishers.lost
                 self._bag.skip(index, publishers.lost - before)
+            return ours
         return count
 
     def _losses(self):
@@ -259,7 +262,7 @@ class RecorderNode(shell.Shell):
         level, message = LEVEL_OK, 'recording'
         if self._without_stamp or self._order.unplaced:
             level, message = LEVEL_WARN, 'recording; some messages have no valid stamp or no place in a step'
-        doubled = [name for name, publishers in self._streams.items() if publishers.several(time.monotonic_ns())]
+        doubled = [name for name, publishers in self._heard.items() if publishers.several(time.monotonic_ns())]
         if doubled:
             level, message = LEVEL_WARN, f'recording; {", ".join(doubled)}: more than one publisher'
         if self._lost:

@@ -66,6 +66,16 @@ def subscribe(node, link, ros_name, take, role):
     return [open_with(latched, take_once, event_callbacks=unmatched), open_with(volatile, take_once)]
 
 
+def foreign_publishers(node, link, ros_name):
+    """Return the names of the nodes that publish a topic and are no publisher of its nodes.Link.
+
+    Return None in a graph without a publisher of the link. An undiscovered node may be foreign.
+    """
+    if not any(writer in node.graph.members for writer in link.writers):
+        return None
+    return [name for name in node.writers_of(ros_name) if name not in link.writers and name != nodes.REPLAY_NODE]
+
+
 class TopicSubscriber:
     """Hears one topic and hands on what its Intake takes: take(message, whether it begins anew).
 
@@ -121,10 +131,7 @@ class TopicSubscriber:
 
     def strangers(self):
         """Names of the nodes that write this topic and should not; none in a graph without those that should."""
-        if not self._expected:
-            return []
-        return [name for name in self._node.writers_of(self._ros_name)
-                if name not in self.link.writers and name != nodes.REPLAY_NODE]
+        return foreign_publishers(self._node, self.link, self._ros_name) or []
 
     def _count(self):
         """As Intake wants it. Who is not discovered yet may be a stranger."""
