@@ -333,8 +333,8 @@ class Bag:
 
     @property
     def end(self):
-        """Log time of the last message [s]."""
-        return self.index.log.max() / 1e9
+        """Log time of the last message since the start [s]."""
+        return (self.index.log.max() - self.start) / 1e9
 
     @property
     def planned_end(self):
