@@ -79,7 +79,7 @@ class Steps:
                 self._due[name] = awaited.popleft()
 
     def begin_anew(self, topic):
-        """Realtime: the next message of this topic does not continue those before; of the trigger, no message does."""
+        """The next message of this topic does not continue those before; of the trigger, no message does."""
         for name in (topic,) if topic != self.trigger else self._last:
             self._last[name] = None
             for queue in (self._awaited, self._arrived):
@@ -88,7 +88,8 @@ class Steps:
             if name in self._due:
                 self._due[name] = None
         if topic == self.trigger:
-            self._pending = None
+            self._pending = self._period = None
+            self._ahead.clear()
 
     def _refuse(self, reason):
         if self._lockstep:
