@@ -34,8 +34,8 @@ MAX_SHOWN_FOREIGN_MESSAGES = 3
 INDEX_BLOCK_ROWS = 65_536
 """Number of rows of a block of the index."""
 
-INDEX_FIELDS = [(name, 'i8') for name in ('channel', 'sequence', 'log', 'publish', 'stamp', 'foreign', 'chunk', 'start',
-                                              'stop')]
+INDEX_FIELDS = [(name, 'i8') for name in ('channel', 'sequence', 'log', 'publish', 'stamp', 'foreign', 'chunk',
+                                              'start', 'stop')]
 _UNREADABLE, _OTHER_PUBLISHER = 1, 2
 _DECLARED = (Opcode.HEADER, Opcode.SCHEMA, Opcode.CHANNEL, Opcode.STATISTICS, Opcode.METADATA)
 _NUMBERED = re.compile(r'(.+)_(\d+)\.mcap')

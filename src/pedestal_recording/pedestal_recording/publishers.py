@@ -32,8 +32,8 @@ class TopicPublishers:
     def take(self, data, info):
         """Return False for a message of another publisher than that of the graph.
 
-        This needs a publisher of the graph that sends, and a foreign publisher that the graph names. A doubtful message
-        counts as a message of the graph.
+        This needs a publisher of the graph that sends, and a foreign publisher that the graph names. A doubtful
+        message counts as a message of the graph.
         """
         now, utc = self._node.clock()
         taken = self._gate.take(data, info['publication_sequence_number'], info['source_timestamp'], now, utc)

@@ -36,7 +36,8 @@ def copied(folder, parts=((-1.0, 1e9),), pack=bytes, names=None, metadata=True, 
                 writer.add_metadata(record.name, record.metadata)
             schemas = {key: writer.register_schema(schema.name, schema.encoding, schema.data)
                        for key, schema in summary.schemas.items()}
-            channels = {key: writer.register_channel(channel.topic, 'cdr', schemas[channel.schema_id], channel.metadata)
+            channels = {key: writer.register_channel(channel.topic, 'cdr', schemas[channel.schema_id],
+                                                     channel.metadata)
                         for key, channel in summary.channels.items()}
             for _, channel, message in rows:
                 if begin <= message.log_time / 1e9 < end:
@@ -83,14 +84,16 @@ def test_file_compressed_as_a_whole_is_refused_with_the_cure(tmp_path, capsys, n
     file.write_bytes(pack(plain.read_bytes()))
     plain.unlink()
     for path in (folder, file):
-        assert all(f'{file}: {cure} {file} > {plain}` decompresses it' in text for text in verbs(path, capsys).values())
+        for text in verbs(path, capsys).values():
+            assert f'{file}: {cure} {file} > {plain}` decompresses it' in text
     renamed = shutil.copy(file, tmp_path / 'renamed.mcap')
     assert cure in verbs(renamed, capsys)['verify']
 
 
 @pytest.mark.parametrize('options', [
-    {'use_chunking': False}, {'use_chunking': False, **BARE}, {'chunk_size': 2000}, {'compression': CompressionType.LZ4},
-    {'names': ['other.mcap']}, {'parts': ((-1, 0.5), (0.5, 1), (1, 1e9))}, {'metadata': False}],
+    {'use_chunking': False}, {'use_chunking': False, **BARE}, {'chunk_size': 2000},
+    {'compression': CompressionType.LZ4}, {'names': ['other.mcap']},
+    {'parts': ((-1, 0.5), (0.5, 1), (1, 1e9))}, {'metadata': False}],
     ids=['unchunked', 'bare', 'small chunks', 'lz4', 'renamed', 'split', 'no metadata'])
 def test_copies_of_other_tools_are_read(tmp_path, options):
     whole, copy = bag.read(REFERENCE), bag.read(copied(tmp_path / 'copy', **options))

@@ -124,7 +124,7 @@ def _attitude(bag):
 
 
 def _modes(bag):
-    """[(start, stop [s], mode)], one for each change; of a recording that begins during a run, also the mode before."""
+    """[(start, stop [s], mode)], one for each change; the first begins with the recording."""
     stated = table(bag, 'acu/mode')
     changes = list(zip(stated['t'].tolist(), stated['data'])) if stated else []
     joints = table(bag, 'joint_states')

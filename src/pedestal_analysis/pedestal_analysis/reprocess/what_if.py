@@ -125,7 +125,7 @@ class TruthComparison:
 COMPARISON_RESULTS = (
     Result('autotrack_from_s', 's', 'answers', lambda acu: acu.autotrack[0] if acu.autotrack.size else math.nan,
            'When the ACU came to autotrack.'),
-    Result('tracked_percent', '%', 'answers', 
+    Result('tracked_percent', '%', 'answers',
            lambda acu: 100.0 * acu.autotrack.size / acu.known if acu.known else math.nan,
            'Share of the steps in autotrack.'),
     Result('recorded_pointing_rms_deg', 'deg', 'truth', lambda acu: known_rms(acu.true) * DEG_PER_RAD,

@@ -11,8 +11,6 @@ Errors are per axis and sample: both axes together are all samples of both, not 
 import math
 import typing
 
-import numpy as np
-
 from pedestal_analysis.results import consistency, isolation, known_attitude, tracking
 from pedestal_analysis.results.tracking import DEG_PER_RAD, known_rms, largest
 

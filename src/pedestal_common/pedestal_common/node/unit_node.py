@@ -17,7 +17,6 @@ from pedestal_common.node.unit import LEVEL_ERROR, LEVEL_WARN
 from pedestal_common.realtime import priority
 from pedestal_common.wire import commands, messages, records
 
-
 REPLAY_POLL_S = 0.2
 """Time between two searches for another replay [s]."""
 
