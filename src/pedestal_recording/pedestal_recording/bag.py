@@ -102,9 +102,9 @@ def locate(path) -> list:
         raise compressed_messages(path, described.get('compression_format'))
     if len(files) == 1 or files and files[0].suffix not in ('.mcap', '.db3'):
         return files[:1]
-    numbered = {file: _NUMBERED.fullmatch(file.name) for file in files}
-    if files and all(numbered.values()) and len({match[1] for match in numbered.values()}) == 1:
-        return sorted(files, key=lambda file: int(numbered[file][2]))
+    numbered = [(match[1], int(match[2]), file) for file in files if (match := _NUMBERED.fullmatch(file.name))]
+    if files and len(numbered) == len(files) and len({name for name, _, _ in numbered}) == 1:
+        return [file for _, _, file in sorted(numbered)]
     named = described.get('relative_file_paths')
     if files and isinstance(named, list) and sorted(map(str, named)) == [file.name for file in files]:
         return [path / name for name in named]
