@@ -55,7 +55,7 @@ class Operated(RuleBasedStateMachine):
     def go(self, seconds):
         count = round(seconds * 1e9 / self.loop.period_ns)
         for unit in self.loop.units.values():
-            unit.obey_due(self.k * self.loop.period_ns)
+            unit.execute_due(self.k * self.loop.period_ns)
         steps, truth = records.empty(closed_loop.STEP_DTYPE, count), np.zeros(count, closed_loop.TRUTH_DTYPE)
         memories = tuple(self.loop.units[name].block(count) if name in self.loop.units else None
                          for name in closed_loop.UNIT_ORDER)

@@ -125,7 +125,7 @@ CASES = {
                     '': ('the file ends at byte',)},
     empty: {'': ('_0.mcap: empty file',)},
     no_message: {'verify': 'no topic of the steps of the drive has a message', 'report': None,
-                 'recover': 'no message in it is readable', 'rerun': 'holds no configuration'},
+                 'recover': 'no message in it is readable', 'rerun': 'contains no configuration'},
     text: {'': ('notes.mcap: not an MCAP file',)},
     encrypted: {'': ('x.mcap: not an MCAP file',)},
     sqlite: {'': ('x_0.db3: an SQLite bag, not an MCAP file', '`ros2 bag convert`')},
@@ -134,10 +134,10 @@ CASES = {
     no_bag: {'': ('0 .mcap files in it, must be one',)},
     missing: {'': ('No such file or directory',)},
     wrong_type: {'verify': 'type geometry_msgs/msg/Vector3Stamped, must be sensor_msgs/msg/JointState',
-                 'report': None, 'recover': None, 'rerun': 'holds no configuration'},
+                 'report': None, 'recover': None, 'rerun': 'contains no configuration'},
     backwards: {'verify': '1 stamps go back, the first from 1.495000 to 1.450000 s',
                 'report': 'the stamps of joint_states go back, the first from 1.495000 to 1.450000 s',
-                'recover': None, 'rerun': 'holds no configuration'},
+                'recover': None, 'rerun': 'contains no configuration'},
     being_written: {'': ('is being written; wait until its recorder has ended',)},
 }
 """{maker of a bag: {verb: text of its error, None for success}}; '' stands for all other verbs."""

@@ -45,7 +45,7 @@ COMMAND_LINES = {
     'no such pass': (['leo_pass', '--pass', '99'], ['--pass 99: there are 26 passes above 10 deg']),
     'station': (['leo_pass', '--station', '47.4,8.5'], ["--station '47.4,8.5': must be LATITUDE,LONGITUDE,HEIGHT"]),
     'latitude': (['leo_pass', '--station', '95,8.5,0'], ['target.station.latitude_deg = 95 deg: must be -90 to 90']),
-    'pass of a UAV': (['uav_flyby', '--pass', '1'], ['the target of uav_flyby is a flyby, which is no satellite']),
+    'pass of a UAV': (['uav_flyby', '--pass', '1'], ['the target of uav_flyby is a flyby, must be a satellite']),
     'pass of an array': (['phased_array_four', '--pass', '1'], ['phased_array_four has 4 beams']),
     'no file': (['/nowhere/run.yaml'], ['/nowhere/run.yaml: No such file']),
 }
@@ -90,7 +90,7 @@ TRACKS = {
     'text': ([*ROWS[:5], '5,north,8.52,1500', *ROWS[6:]], ['line 7', 'north']),
     'NaN': ([*ROWS[:5], '5,nan,8.52,1500', *ROWS[6:]], ['line 7', 'nan']),
     'short row': ([*ROWS[:5], '5,47.4', *ROWS[6:]], ['line 7']),
-    'no rows': ([], ['0 rows']),
+    'no rows': ([], ['0 fixes']),
 }
 
 
@@ -118,7 +118,7 @@ def test_recorded_ship_is_read_before_the_run(capsys, one_line, tmp_path):
     changes = ('motion=recorded', 'heading_deg=0', 'sea_state=0', 'speed=0', f'recorded.path={tmp_path}/ship.csv')
     line = refused(capsys, one_line, 'run', 'ship_pass', '--bag', tmp_path / 'bag',
                    *(part for change in changes for part in ('--param', f'ship_motion.ship.{change}')))
-    assert f"{tmp_path}/ship.csv: line 1: column 'time_s' is missing" in line
+    assert f"{tmp_path}/ship.csv: line 1: column 'time': must end with a known unit" in line
     assert not (tmp_path / 'bag.log').exists()
 
 

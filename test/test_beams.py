@@ -101,7 +101,7 @@ def test_every_node_of_a_beam_recomputes_identically(runs, name, beam):
 
 def test_report_and_export_of_one_beam(runs, tmp_path):
     page = write_report(runs['four'].bag, tmp_path / 'report.html', beam='beam_2').read_text()
-    assert f'Tracking run: {FOUR}/beam_2' in page and 'Not compared' not in page
+    assert f'Tracking run: {FOUR}/beam_2' in page and 'No comparison' not in page
     name = 'beam_3/tracking_receiver/angle_error'
     [(file, rows, _)] = export.export(runs['four'].bag, output=tmp_path, names=[name])
     assert rows == 301 and file.read_text().splitlines()[0] == 't [s],stamp [ns],x [rad],y [rad],z [dB-Hz]'
@@ -116,7 +116,7 @@ def test_a_beam_has_the_beamwidth_of_its_own_antenna(views):
 def test_a_node_of_another_beam_is_not_recomputed(runs):
     recording = recompute.Recording(runs['four'].bag, beam='beam_2')
     assert recompute.chosen(recording, ['beam_2/acu'], None) == ['acu']
-    with pytest.raises(recompute.RecomputeError, match='--node beam_3/acu: .* say --beam beam_3 --node acu'):
+    with pytest.raises(recompute.RecomputeError, match='--node beam_3/acu: .* use --beam beam_3 --node acu'):
         recompute.chosen(recording, ['beam_3/acu'], None)
 
 
@@ -127,7 +127,7 @@ def test_ctrl_c_ends_an_array_in_order(start_run):
         assert time.monotonic() < deadline
         time.sleep(0.02)
     done = run.interrupt()
-    assert (done.returncode, done.stderr) == (130, f'pedestal: stopped; what was recorded is in {run.bag}\n')
+    assert (done.returncode, done.stderr) == (130, f'pedestal: stopped; the recorded part is in {run.bag}\n')
     assert run.pids() == {}
     recorded = bags.read(run.bag)
     assert all(len(recorded.rows(f'{beam}/joint_states')) > 50 for beam in BEAMS) and not recorded.damage

@@ -63,7 +63,7 @@ def test_a_run_with_an_operator_is_made_again_to_the_byte(scheduled, start_proce
 
 
 @pytest.mark.parametrize(('schedule', 'said'), (
-    ('2 presett', "unknown verb 'presett'; did you mean 'preset'?"),
+    ('2 presett', "unknown command 'presett'; did you mean 'preset'?"),
     ('2 preset azimuth=nan', 'preset: azimuth = nan rad: must be -20 to 20')))
 def test_a_wrong_schedule_is_refused_before_anything_runs(schedule, said, pedestal):
     code, _, errors = pedestal('run', 'uav_flyby', '--param', f'acu.commands={schedule}')

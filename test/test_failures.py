@@ -99,7 +99,7 @@ def test_what_a_kill_left_is_recovered(killed, target, pedestal):
 def test_ctrl_c_ends_in_order(killed):
     run, result = killed['pedestal']
     assert result.returncode == 130
-    assert result.stderr == f'pedestal: stopped; what was recorded is in {run.bag}\n'
+    assert result.stderr == f'pedestal: stopped; the recorded part is in {run.bag}\n'
     assert run.pids() == {}
     assert_readable(run)
     assert verify(load(run.bag)).problems == []

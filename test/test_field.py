@@ -163,7 +163,7 @@ def test_a_second_writer_of_the_command_moves_nothing_and_is_named(standing, con
 
     def said():
         return [status.level for array in standing.heard['diagnostics'][first:] for status in array.status
-                if status.name == 'adu' and 'another writer: stranger' in status.message]
+                if status.name == 'adu' and 'another publisher: stranger' in status.message]
     stranger_writes(standing, connect, 'acu/rate_command', time.time_ns, 1.5, said, velocity=(0.5, 0.5))
     assert set(said()) == {2}
     np.testing.assert_allclose(standing.joints.position, before, atol=1e-4)
@@ -248,14 +248,14 @@ def test_the_other_nodes_may_be_killed_too(moving):
 
 @pytest.mark.parametrize('node', ['acu', 'adu'])
 def test_after_a_freeze_the_axes_do_not_jump(moving, node):
-    """And the node says that it was held up."""
+    """And the node reports its stall."""
     moving.until(lambda: moving.mode in ('program', 'autotrack') and moving.state == 'enabled')
     moving.wait(0.5)
     moving.station.signal(node, signal.SIGSTOP)
     time.sleep(2.5)
     count = len(moving.heard['joint_states'])
     moving.station.signal(node, signal.SIGCONT)
-    moving.status(node, 'was held up for')
+    moving.status(node, 'stalled for')
     moving.fresh('acu/rate_command')
     moving.wait(1.0)
     rates = np.array([message.velocity for message in moving.heard['joint_states'][count:]])

@@ -108,7 +108,7 @@ def test_rows_and_report(runs, told, run_process, pedestal):
     assert pedestal('report', run.bag)[0] == 0
     page = (run.bag / 'report.html').read_text()
     assert '<figure id="probabilities"><h3>Motion models</h3><figcaption>' in page
-    assert 'Azimuth: ' in page and 'of honest filters have' in page
+    assert 'Azimuth: ' in page and 'of consistent filters have' in page
 
 
 def test_a_filter_changed_while_it_tracks_makes_no_bump(runs):
@@ -136,7 +136,7 @@ def test_a_topic_nobody_measures_is_not_waited_for(override, text):
 
 def test_a_model_of_an_ins_that_tells_its_error_is_refused():
     chosen = ['acu.tracker.attitude.tilt_noise=1e-4']
-    with pytest.raises(scenario.ScenarioError, match='acu: tracker.attitude.tilt_noise: the INS tells it; it is of '
-                                                     'use with ins.error_told = false'):
+    with pytest.raises(scenario.ScenarioError, match='acu: tracker.attitude.tilt_noise: the INS publishes its errors; '
+                                                     'this parameter needs ins.error_told = false'):
         scenario.load('ship_pass', chosen)
     assert scenario.load('ship_pass', [*chosen, 'ins.error_told=false']).node_parameters('acu').ins_error is False

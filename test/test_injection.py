@@ -56,8 +56,8 @@ def test_a_node_with_faults_is_recomputed(injected, node, pedestal):
 
 
 @pytest.mark.parametrize(('inject', 'said'), (
-    ('ins.inject=2 drop', 'ins: inject: drop of ins: its attitude does not come; in lockstep everybody would wait'),
-    ('adu.inject=2 gost', "inject = '2 gost': unknown verb 'gost'; did you mean 'gust'?")))
+    ('ins.inject=2 drop', 'ins: inject: drop of ins: the INS publishes no attitude; every lockstep node would wait'),
+    ('adu.inject=2 gost', "inject = '2 gost': unknown command 'gost'; did you mean 'gust'?")))
 def test_a_fault_that_cannot_be_is_refused_before_anything_runs(inject, said, pedestal):
     code, _, errors = pedestal('run', 'ship_pass', '--param', inject)
     assert code == 1 and said in errors

@@ -183,4 +183,4 @@ def test_live_commands_are_answered_recorded_and_recomputed(start_run, connect, 
     assert told == [('preset', 'anna', True), ('preset', 'anna', False), ('dance', 'anna', False),
                     ('acu/program', 'service', True)]
     assert len(list(bags.read(run.bag).raw('acu/command'))) == 3
-    assert 'preset azimuth=0.2 elevation=0.4 asked for at' in pedestal('recompute', run.bag, '--node', 'acu')[1]
+    assert 'preset azimuth=0.2 elevation=0.4 requested at' in pedestal('recompute', run.bag, '--node', 'acu')[1]

@@ -94,5 +94,5 @@ def test_samples_are_never_overwritten(tmp_path, capsys, one_line):
     (tmp_path / 'new' / 'ship.csv').write_text('mine')
     (tmp_path / 'new' / 'flight.csv').unlink()
     assert cli.main(['samples', str(tmp_path / 'new')]) == 1
-    assert 'ship.csv is there already' in one_line(capsys.readouterr().err)
+    assert 'ship.csv already exists' in one_line(capsys.readouterr().err)
     assert not (tmp_path / 'new' / 'flight.csv').exists()

@@ -147,7 +147,7 @@ def test_a_wrong_mode_is_named(runs, rewrite, pedestal):
     code, said, _ = pedestal(rewrite(runs['leo'].bag, changed(MODE, 0, change)), '--node', 'acu', '--ignore',
                              'acu/r*', '--ignore', 'acu/e*')
     assert code == 1
-    assert any('acu/stow asked for at 0.000000 s' in line for line in said.splitlines())
+    assert any('acu/stow requested at 0.000000 s' in line for line in said.splitlines())
     assert 'DIFFERS' in said
 
 
@@ -228,7 +228,7 @@ def test_a_recording_from_before_the_truth_is_read_by_its_encoders(runs, rewrite
         assert old[name][0] == pytest.approx(whole[f'encoder_{name}'][0], rel=1e-12)
         assert old[name] != whole[name]
     code, said, _ = pedestal(path, '--node', 'tracking_receiver', '--absolute', '5e-3', '--relative', '0')
-    assert code == 0 and 'no adu/truth in it: joint_states stands for it' in said
+    assert code == 0 and 'no adu/truth in the recording: joint_states replaces it' in said
     assert said.splitlines()[-1] == 'tracking_receiver: equal within tolerance'
     assert pedestal(path, '--node', 'acu', *EXACT)[0] == pedestal(path, '--node', 'adu', *EXACT)[0] == 0
     _, said, _ = pedestal(path, '--param', 'acu.azimuth.filter.kind=ca')
@@ -245,7 +245,7 @@ def test_a_bag_with_inputs_only_gets_its_outputs(inputs_only, runs, pedestal, tm
     output = tmp_path / 'with_outputs'
     code, said, _ = pedestal(inputs_only, '--node', 'acu', '--output', output)
     assert code == 0
-    assert 'none of its outputs is in the recording: nothing to compare' in said
+    assert 'the recording has no output of the node, so there is no comparison' in said
     assert any(line.startswith('noise_reduction ') for line in said.splitlines())
     whole, made = bags.read(runs['leo'].bag), bags.read(output)
     for topic in OUTPUTS[:3]:
@@ -269,7 +269,7 @@ def test_a_changed_parameter_on_a_ship_and_rows_alone_on_the_standard_output(run
 def test_a_bag_with_inputs_only_and_a_changed_parameter(inputs_only, pedestal):
     code, said, _ = pedestal(inputs_only, '--node', 'acu', '--param', 'azimuth.filter.imm.dwell=2')
     assert code == 0
-    assert 'old is recomputed with the parameters unchanged' in said
+    assert 'old: recomputed with unchanged parameters' in said
     assert lines_of(said, ESTIMATE)[1].split()[0] == 'azimuth.position'
 
 
@@ -344,8 +344,8 @@ def test_what_was_asked_for_is_found_and_asked_for_again(requested, pedestal):
     code, said, _ = pedestal(path, '--node', node, *EXACT)
     assert code == 0, said
     for step, service in requests.items():
-        assert f'{service} asked for at {step * 0.005:.6f} s' in said
-    assert f'{len(requests)} requests fed' in said
+        assert f'{service} requested at {step * 0.005:.6f} s' in said
+    assert f'{len(requests)} requests repeated' in said
     table = bags.read(path).table(topic)
     assert [text for text, t in zip(table['data'], table['t']) if t > 1.9][:len(states)] == states
 
@@ -356,7 +356,7 @@ def test_the_process_of_the_node_says_the_same(requested, run_process, reserve_d
     done = run_process([*PEDESTAL, 'recompute', path, '--node', node, '--live', *EXACT], 120.0,
                        ROS_DOMAIN_ID=str(reserve_domain()))
     assert done.returncode == 0, done.stdout + done.stderr
-    assert f'compared is what the process of {node} published' in done.stdout
+    assert f'compared: messages that the process of {node} published' in done.stdout
     assert done.stdout.splitlines()[-1] == f'{node}: identical'
 
 
@@ -366,8 +366,8 @@ def test_what_was_never_exercised_fails(runs, rewrite, pedestal):
     code, said, _ = pedestal(path)
     assert code == 1
     assert [line for line in said.splitlines() if 'NOT exercised' in line] == [
-        'tracking_receiver: NOT exercised: the receiver never locked (--allow-idle lets it pass)',
-        'acu: NOT exercised: the receiver never locked (--allow-idle lets it pass)']
+        'tracking_receiver: NOT exercised: the receiver never locked (allowed with --allow-idle)',
+        'acu: NOT exercised: the receiver never locked (allowed with --allow-idle)']
     assert pedestal(path, '--allow-idle')[0] == 0
 
 
@@ -390,7 +390,7 @@ def test_a_drive_that_was_never_told_to_move_fails(runs, rewrite, pedestal):
         return rows
     code, said, _ = pedestal(rewrite(runs['leo'].bag, change), '--node', 'adu')
     assert code == 1
-    assert 'adu: NOT exercised: the drive was never told to move' in said
+    assert 'adu: NOT exercised: no rate was ever commanded' in said
 
 
 def test_speed_is_measured(runs):
@@ -403,10 +403,10 @@ BAD = {
     'parameter': (('--node', 'acu', '--param', 'tracker.gates=9'), "did you mean 'tracker.gate'?"),
     'value': (('--node', 'acu', '--param', 'tracker.gate=-1'), 'tracker.gate = -1'),
     'no node of the parameter': (('--param', 'alpha=1'), "--param 'alpha=1': must be node.key=value"),
-    'another node': (('--node', 'acu', '--param', 'adu.period=0.01'), 'adu is not recomputed; that is acu'),
+    'another node': (('--node', 'acu', '--param', 'adu.period=0.01'), 'adu is not recomputed; must be one of acu'),
     'file': (('--params-file', 'nowhere.yaml'), '--params-file nowhere.yaml: '),
-    'node not there': (('--node', 'ins'), 'no ship/imu/data_raw in it, which the node hears'),
-    'live and changed': (('--live', '--param', 'acu.tracker.gate=9'), '--param does not go with it'),
+    'node not there': (('--node', 'ins'), 'no ship/imu/data_raw in the bag, an input of the node'),
+    'live and changed': (('--live', '--param', 'acu.tracker.gate=9'), 'it cannot be combined with --param'),
     'live in realtime': (('--live', '--pacing', 'realtime', '--node', 'acu'), '--live feeds in lockstep'),
     'output': (('--output', '.'), '--output . exists already'),
 }

@@ -201,7 +201,7 @@ def test_pause_step_and_quit_from_the_keyboard(run, connect, terminal, domain):
                 count, since = len(heard), time.monotonic()
         return count
 
-    client.until(lambda: replay.said('paused   space: pause, go on   n or right arrow: one step   q: quit'))
+    client.until(lambda: replay.said('paused   space: pause, resume   n or right arrow: one step   q: quit'))
     assert rests() == 0
     for count, key in enumerate((b'n', b'\x1b[C', b'\x1bOC', b'x', b'nn'), 1):
         replay.press(key)
@@ -246,17 +246,17 @@ def test_a_topic_that_has_a_writer_is_refused(run, connect, run_process, one_lin
     client.node.create_publisher(middleware.message_class(topic.type), topic.name, middleware.qos(topic.rate))
     done = run_process([*PEDESTAL, 'replay', run.bag, '--node', 'acu'], 60.0, ROS_DOMAIN_ID=str(domain))
     assert done.returncode == 1 and done.stdout == ''
-    assert one_line(done.stderr) == ('pedestal: error: joint_states already has a writer, client: its messages would '
+    assert one_line(done.stderr) == ('pedestal: error: joint_states already has a publisher, client: messages would '
                                      'come twice')
 
 
-def test_a_topic_that_nobody_reads_is_named(run, run_process, one_line, domain):
-    for options, who in ((['--node', 'acu'], 'acu'), (['--topics', 'joint_states'], 'anyone')):
+def test_a_topic_without_subscriber_is_named(run, run_process, one_line, domain):
+    for options, node in ((['--node', 'acu'], 'acu'), (['--topics', 'joint_states'], 'any node')):
         done = run_process([*PEDESTAL, 'replay', run.bag, *options, '--deadline', '1'], 60.0,
                            ROS_DOMAIN_ID=str(domain))
         assert done.returncode == 1 and done.stdout == ''
-        assert one_line(done.stderr) == (f'pedestal: error: nobody reads joint_states after 1 s; waited for {who}; '
-                                         'present: no node')
+        assert one_line(done.stderr) == (f'pedestal: error: no subscriber of joint_states after 1 s; waited for '
+                                         f'{node}; present: no node')
 
 
 def test_a_reader_that_goes_ends_it(run, connect, start_process, one_line, domain):
@@ -269,4 +269,4 @@ def test_a_reader_that_goes_ends_it(run, connect, start_process, one_line, domai
     client.spin(0.1)                                                        # its executor lets go of it
     output, errors = replay.communicate(timeout=60.0)
     assert replay.returncode == 1 and output == ''
-    assert 'joint_states is no longer read by anyone, at 0.' in one_line(errors)
+    assert 'joint_states lost its subscriber at 0.' in one_line(errors)

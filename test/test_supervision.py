@@ -38,7 +38,7 @@ def test_a_run_that_is_told_to_end_does_so_in_order_with_a_result(begun):
     run.process.send_signal(signal.SIGTERM)
     result = run.finish()
     assert result.returncode == 130
-    assert result.stderr == f'pedestal: stopped; what was recorded is in {run.bag}\n'
+    assert result.stderr == f'pedestal: stopped; the recorded part is in {run.bag}\n'
     assert 'restarts' in result.stdout
     assert run.pids() == {}
     assert bags.load(run.bag).damage == ''

@@ -127,12 +127,13 @@ def test_of_several_beams_the_file_is_for_pedestal_run(pedestal, folder):
         alpha] * 4
 
 
-def test_a_best_value_at_the_end_of_its_range_is_told():
+def test_an_optimum_at_the_end_of_its_range_has_a_remark():
     score = tune.Score(np.ones(2), np.ones(2), np.ones(2), {})
-    source = types.SimpleNamespace(kept='on the pieces kept apart')
+    source = types.SimpleNamespace(kept='on the reserved pieces')
     for noise, said in ((1e3, True), (1.0, False), (1e-9, True)):
         found = tune._remarks(source, score, score, ('azimuth',), {'azimuth.filter.cv.noise': noise})
-        assert found == said * ['azimuth.filter.cv.noise is at the end of its range: the best lies there or beyond']
+        assert found == said * ['azimuth.filter.cv.noise is at the end of its range: the optimum may be outside '
+                                 'the range']
 
 
 def test_a_node_loads_the_file(tuned_bag, start_node, connect):
@@ -184,6 +185,6 @@ def test_refused(pedestal, one_line, monkeypatch, tmp_path, case):
 
 def test_refuses_a_bag_without_errors_of_the_receiver_and_a_file_that_is_there(pedestal, one_line, silent, tuned_bag):
     code, _, errors = pedestal('tune', silent, '--filter', 'cv')
-    assert code == 1 and 'no tracking_receiver/angle_error in it' in one_line(errors)
+    assert code == 1 and 'no tracking_receiver/angle_error in the bag' in one_line(errors)
     code, _, errors = pedestal('tune', BAG, '--filter', 'cv', '--output', tuned_bag[0])
-    assert code == 1 and 'exists already; it is not overwritten' in one_line(errors)
+    assert code == 1 and 'exists already; the file is not overwritten' in one_line(errors)

@@ -1,6 +1,6 @@
-"""The pages of the documentation that are made of the code: parameters of every node, verbs, laws.
+"""The pages of the documentation that are generated from the code: parameters of every node, verbs, laws.
 
-`python -m tools.book FOLDER` (make book) copies docs/ there and writes these pages under reference/.
+`python -m tools.book FOLDER` (make book) copies docs/ into the folder and writes the pages under reference/ in it.
 CONTRIBUTING.md, which lies outside docs/, becomes the page contributing.md.
 """
 import argparse
@@ -22,9 +22,10 @@ LAW_PACKAGES = ('pedestal_common', 'tracking_receiver_sim', 'acu_tracker', 'adu_
 
 
 def parameter_page():
-    """Every parameter of every node: default, range, unit, meaning."""
+    """Return the lines of the page of parameters: default, range, unit and meaning of every parameter."""
     lines = ['# Parameters', '', 'Every parameter of every node, as the node declares it. `pedestal parameters NODE` '
-             'prints the same. All is SI and radians; a name that ends in `_deg` or `_dbhz` says so.']
+             'prints the same. The units are SI units and radians. A name that ends in `_deg` or `_dbhz` has this '
+             'unit instead.']
     kinds = {node: scenario.parameters_of(node) for node in
              ('scenario', *(node.name for node in nodes.NODES if node.module), 'beam_steering')}
     for node, kind in {**kinds, 'graph, of every node': GraphParameters}.items():
@@ -40,8 +41,8 @@ def parameter_page():
 
 
 def verb_page():
-    """Every verb of `pedestal`: what it does and its options, as its --help says it."""
-    lines = ['# Verbs', '', 'What `pedestal VERB --help` says.']
+    """Return the lines of the page of verbs: purpose and options of every verb, as its --help prints them."""
+    lines = ['# Verbs', '', 'The help texts that `pedestal VERB --help` prints.']
     for name in cli.VERBS:
         verb = cli.module_of(name)
         summary, _, more = inspect.cleandoc(verb.__doc__).partition('\n\n')
@@ -54,9 +55,9 @@ def verb_page():
 
 
 def law_page(root):
-    """Every law: the module's docstring with its equations and symbols, its compiled functions, and its tests."""
-    lines = ['# Laws', '', 'Every control law, filter, motor and wave is a compiled function in a small module. What '
-             'stands here is what stands in the module: the equation, the symbols, the source.']
+    """Return the lines of the page of laws: docstring, compiled functions and tests of every module with laws."""
+    lines = ['# Laws', '', 'Every control law, filter, motor and wave is a compiled function in a small module. This '
+             'page is a copy of the docstrings of these modules: equations, symbols, sources.']
     for package in LAW_PACKAGES:
         folder = root / 'src' / package
         tests = {test.name: set(_imported(test)) for test in sorted((folder / 'test').glob('test_*.py'))}
@@ -65,26 +66,27 @@ def law_page(root):
             laws = _laws(module)
             if laws is not None:
                 name = '.'.join(module.relative_to(folder).with_suffix('').parts)
-                judged = [test for test, modules in tests.items() if name in modules]
+                importing = [test for test, modules in tests.items() if name in modules]
                 lines += ['', f'### {name}', '', '```text', _docstring(module), '```', '',
                           *(f'- `{law}`: {first}' for law, first in laws),
-                          *([f'- tests: {", ".join(f"`{test}`" for test in judged)}'] if judged else [])]
+                          *([f'- tests: {", ".join(f"`{test}`" for test in importing)}'] if importing else [])]
     return lines
 
 
 def _docstring(module):
+    """Return the docstring of a module, a path."""
     return ast.get_docstring(ast.parse(module.read_text())) or ''
 
 
 def _imported(test):
-    """Dotted names of what a test imports."""
+    """Yield the dotted names that a test imports."""
     for node in ast.walk(ast.parse(test.read_text())):
         if isinstance(node, ast.ImportFrom):
             yield from (node.module, *(f'{node.module}.{alias.name}' for alias in node.names))
 
 
 def _laws(module):
-    """[(signature, first sentence)] of the public compiled functions of a module; None where none is compiled."""
+    """Return [(signature, first sentence)] of the public compiled functions of a module, or None."""
     compiled = [node for node in ast.parse(module.read_text()).body if isinstance(node, ast.FunctionDef) and any(
         ast.unparse(decorator) in ('compiled', 'inlined') for decorator in node.decorator_list)]
     return [(f'{node.name}({", ".join(argument.arg for argument in node.args.args)})',

@@ -1,7 +1,7 @@
-"""The rules of language that a program can check: `python -m tools.language [PATH ...]` prints what breaks them.
+"""Check of the language: `python -m tools.language [PATH ...]` prints the texts that break a rule of CONTRIBUTING.md.
 
-Read are README.md, CHANGELOG.md, docs/, and in Python the docstrings, comments and texts; the rules stand in
-CONTRIBUTING.md.
+Without PATH it reads README.md, CONTRIBUTING.md, CHANGELOG.md, docs/, and the docstrings, comments and texts of all
+modules.
 """
 import ast
 import io
@@ -15,6 +15,10 @@ FORBIDDEN_WORD = re.compile(r'\b(told|tells|says|asked|anew|strangers?|whoever|s
 """Words of a private language, in which machines speak and actors have no name."""
 
 ALLOWED = {
+    ('src/pedestal_studies/pedestal_studies/papers/phased_array.py', 'best-told-10ms-less'):
+        'a case of --json, which programs read',
+    ('tools/language.py', 'told|tells'): 'the list of the forbidden words itself',
+    ('tools/language.py', 'best-told-10ms-less'): 'the exception of the case above',
 }
 """{(path, part of a text): reason why that text may break a rule}."""
 

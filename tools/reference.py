@@ -1,6 +1,6 @@
 """The tables of README.md and docs/, written from the tables of the code and from docs/rows.json: `make docs`.
 
-A table stands between <!-- table NAME --> and <!-- end --> in a file; a test holds the files against it.
+A table stands between <!-- table NAME --> and <!-- end --> in a file. A test compares the files with the code.
 """
 import pathlib
 import re
@@ -22,6 +22,7 @@ from pedestal_studies.rigs.fault_expectations import FAULT_EXPECTATIONS
 
 GENERATED_PAGES = ('README.md', *(f'docs/{name}.md' for name in (
     'acquisition', 'budget', 'faults', 'graph', 'measured', 'operating', 'papers', 'parameters', 'studies', 'tools')))
+"""Files with generated tables."""
 TABLE_PARAMETERS = (
     'scenario.pacing', 'scenario.seed', 'adu.period', 'adu.transport_delay', 'adu.command_timeout',
     'adu.azimuth.speed_loop.proportional', 'adu.azimuth.bias.schedule',
@@ -37,24 +38,25 @@ TABLE_PARAMETERS = (
     'ship_motion.ship.spectrum', 'ship_motion.nmea.port', 'ins.method', 'ins.latency')
 """The parameters in the table of docs/parameters.md."""
 
-RATE_TEXTS = {'step': 'step', 'once': 'once, latched or not', 'second': '1 Hz', 'change': 'on change, latched',
-              'reply': 'after each request', 'command': 'when somebody asks'}
+RATE_TEXTS = {'step': 'every step', 'once': 'once, latched or not', 'second': '1 Hz', 'change': 'on change, latched',
+              'reply': 'after each request', 'command': 'on request'}
+"""{rate of a topic: text in the table of topics}."""
 
 
 def _table(head, rows):
-    """Lines of a Markdown table."""
+    """Return the lines of a Markdown table."""
     return ['| ' + ' | '.join(head) + ' |', '|' + '---|' * len(head), *('| ' + ' | '.join(row) + ' |' for row in rows)]
 
 
 def node_table():
-    """Every node: executable, what it is, what takes its place on a real antenna."""
+    """Return the table of the nodes: executable, function, and the equipment for which it stands on a real antenna."""
     rows = [(f'`{node.name}`', f'`{node.executable}` ({node.package})' if node.module else '', node.doc,
              node.stands_for) for node in (*nodes.NODES, nodes.ARRAY_DRIVE)]
-    return _table(('node', 'executable (package)', 'what it is', 'stands for'), rows)
+    return _table(('node', 'executable (package)', 'function', 'stands for'), rows)
 
 
 def topic_table():
-    """Every topic: type, who writes and reads it, when, what it holds."""
+    """Return the table of the topics: type, publishers, subscribers, rate, content."""
     links = nodes.links()
     rows = []
     for topic in topics.TOPICS:
@@ -66,74 +68,74 @@ def topic_table():
 
 
 def service_table():
-    """The services of every node."""
+    """Return the table of the services of every node."""
     rows = [(f'`{node.name}` ({node.executable})', ', '.join(f'`{name}`' for name in node.unit_type().REQUESTS))
             for node in nodes.UNIT_NODES if node.unit_type().REQUESTS]
     return _table(('node', 'services (std_srvs/Trigger)'), rows)
 
 
 def command_table():
-    """What every node can be asked for on its topic of commands."""
+    """Return the table of the commands of every node on its topic of commands."""
     rows = [(f'`{node.obeys}`', f'`{verb.name}`', ', '.join(map(_argument, verb.arguments)), verb.doc)
             for node in nodes.UNIT_NODES if node.obeys and node.name not in INJECTED_FAULTS
             for verb in node.unit_type().VERBS]
-    return _table(('topic', 'verb', 'arguments', 'what it does'), rows)
+    return _table(('topic', 'command', 'arguments', 'effect'), rows)
 
 
 def injection_table():
-    """What every simulated node can be broken by."""
+    """Return the table of the faults that can be injected into every simulated node."""
     rows = [(f'`{node}`', f'`{fault.name}`', ', '.join(map(_defaulted, fault.arguments[:-1])), fault.doc,
              '' if fault.lockstep else 'no') for node, faults in INJECTED_FAULTS.items() for fault in faults]
-    return _table(('node', 'fault', 'arguments', 'what it breaks', 'in lockstep'), rows)
+    return _table(('node', 'fault', 'arguments', 'effect', 'in lockstep'), rows)
 
 
 def _defaulted(argument):
-    """An argument of a fault: its default, range, unit and meaning."""
+    """Return an argument of a fault with its default, range, unit and meaning."""
     text = f'{argument.name} = {argument.default}' if argument.options else f'{argument.name} = {argument.default:g}'
     return f'`{text}` ({argument.range} {argument.unit}; {argument.doc})'.replace(' ;', ';')
 
 
 def expectation_table():
-    """What is expected of every fault; modes of which the same is expected together."""
+    """Return the table of the expectations for every fault; modes with the same expectation share a line."""
     rows = []
     for fault, of_modes in FAULT_EXPECTATIONS.items():
         alike = {}
         for mode, expected in of_modes.items():
-            alike.setdefault(expected.sentence('the same mode'), []).append(mode)
-        rows += [(f'`{fault}`', ', '.join(modes), sentence) for sentence, modes in alike.items()]
-    return _table(('fault', 'in', 'expected'), rows)
+            alike.setdefault(expected.texts(mode), []).append(mode)
+        rows += [(f'`{fault}`', ', '.join(modes), *texts) for texts, modes in alike.items()]
+    return _table(('fault', 'in', 'report', 'largest error', 'ends in'), rows)
 
 
 def _argument(argument):
-    """An argument with its range and unit; in brackets where it may be left out."""
+    """Return an argument with its range and unit, in brackets if it is optional."""
     text = f'{argument.name} = {argument.range} {argument.unit}'.rstrip()
     return f'`{text}`' if argument.default is None else f'[`{text}`]'
 
 
 def mode_table():
-    """The modes of the control unit."""
-    return _table(('mode', 'the axes follow', 'entered', 'left by itself'),
+    """Return the table of the modes of the control unit."""
+    return _table(('mode', 'the axes follow', 'entered', 'ends by itself'),
                   [(f'`{mode.name}`', mode.doc, mode.entry, mode.exit) for mode in modes.MODE_ROWS])
 
 
 def filter_table():
-    """The kinds of target filter."""
-    return _table(('`filter.kind`', 'what it is'), [(f'`{name}`', kind.doc) for name, kind in FILTER_KINDS.items()])
+    """Return the table of the kinds of target filter."""
+    return _table(('`filter.kind`', 'model'), [(f'`{name}`', kind.doc) for name, kind in FILTER_KINDS.items()])
 
 
 def fault_table():
-    """The faults on which the drive trips."""
+    """Return the table of the faults on which the drive trips."""
     return _table(('fault, per axis', 'from', 'parameter'),
                   [(f'`{fault.name}`', fault.doc, ', '.join(f'`{name}`' for name in fault.parameters))
                    for fault in faults.AXIS_FAULTS])
 
 
 def alarm_table():
-    """The alarms of the control unit; those of both axes in one line."""
+    """Return the table of the alarms of the control unit; an alarm of both axes has one line."""
     def both(text):
         return text.replace(f'{topics.AXES[0]} ', 'AXIS ')
-    return _table(('alarm', 'priority', 'delay on, off [s]', 'latched', 'stands under', 'what is wrong',
-                   'what the operator shall do'),
+    return _table(('alarm', 'priority', 'delay on, off [s]', 'latched', 'consequence of', 'meaning',
+                   'action of the operator'),
                   [(f'`{both(alarm.name)}`', alarm.priority, f'{alarm.on_delay:g}, {alarm.off_delay:g}',
                     'yes' if alarm.latched else '', ', '.join(both(name) for name in alarm.cause
                                                               if not name.startswith(topics.AXES[1])),
@@ -142,18 +144,18 @@ def alarm_table():
 
 
 def scenario_table():
-    """The scenarios that come with the product."""
-    return _table(('scenario', 'what happens'), [(f'`{name}`', title) for name, title in scenario.available().items()])
+    """Return the table of the scenarios that come with the product."""
+    return _table(('scenario', 'events'), [(f'`{name}`', title) for name, title in scenario.available().items()])
 
 
 def study_table():
-    """The studies."""
-    return _table(('study', 'what it measures'),
+    """Return the table of the studies."""
+    return _table(('study', 'measurement'),
                   [(f'`{name}`', line) for name, line in pedestal_studies.descriptions().items()])
 
 
 def parameter_table():
-    """The parameters of TABLE_PARAMETERS."""
+    """Return the table of TABLE_PARAMETERS."""
     rows = []
     for name in TABLE_PARAMETERS:
         node, _, key = name.partition('.')
@@ -167,24 +169,26 @@ def parameter_table():
 
 
 def result_table(table=results.RESULTS):
-    """The results of a run: name, unit, what it is, target."""
-    return _table(('result', 'unit', 'what it is', 'target'),
+    """Return the table of the results of a run: name, unit, meaning, target."""
+    return _table(('result', 'unit', 'meaning', 'target'),
                   [(f'`{name}`', unit, sentence, target) for name, unit, sentence, target in
                    results.documented(table)])
 
 
 REFERENCE_TABLES = {'nodes': node_table, 'studies': study_table, 'scenarios': scenario_table, 'topics': topic_table,
-                    'services': service_table,
-                    'modes': mode_table, 'commands': command_table, 'faults that can be injected': injection_table,
-         'expected of faults': expectation_table,
-                    'filter kinds': filter_table, 'drive faults': fault_table,
-                    'alarms': alarm_table, 'results': result_table,
-                    'recomputed results': lambda: result_table(what_if.COMPARISON_RESULTS),
+                    'services': service_table, 'modes': mode_table, 'commands': command_table,
+                    'faults that can be injected': injection_table, 'expected of faults': expectation_table,
+                    'filter kinds': filter_table, 'drive faults': fault_table, 'alarms': alarm_table,
+                    'results': result_table, 'recomputed results': lambda: result_table(what_if.COMPARISON_RESULTS),
                     'first parameters': parameter_table}
+"""{name of a table: function -> its lines}."""
 
 
 def with_tables(text, rows):
-    """A file's text with its tables written again; rows: published.Rows. Raises KeyError for an unknown table."""
+    """Return the text of a file with its tables written again; rows: published.Rows.
+
+    Raises KeyError for an unknown table.
+    """
     def table(match):
         name = match[1]
         lines = _table(*published.TABLES[name](rows)) if name in published.TABLES else REFERENCE_TABLES[name]()

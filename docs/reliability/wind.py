@@ -1,4 +1,4 @@
-"""Wind and brakes in standby: how near the antenna comes to the alarm of motion unasked.
+"""Wind and brakes in standby: how near the antenna comes to the alarm of uncommanded motion.
 
     python docs/reliability/wind.py [SEEDS] [SECONDS]
 
@@ -6,7 +6,7 @@ The closed loop of an antenna in standby, ashore and on a ship in sea state 6, S
 (default 20) gusts. The drive is disabled and enabled again every 20 s, so that the brakes fall in and are released in
 the wind. The mean torque is that of both axes, its gusts have the spectrum of Davenport at 20 m/s. Prints for each
 wind in how many runs it tripped the drive, how often the alarm was raised in these and in the others, and of these
-others the largest rate that stayed for as long as the alarm takes (unasked.TIME) while it was watching.
+others the largest rate that stayed for as long as the alarm takes (MIN_EXCESS_TIME_S) while it was watching.
 """
 import argparse
 import sys
@@ -35,13 +35,12 @@ def loop_of(name, torque, intensity, seed, seconds):
 
 
 def watched(t, enabled, rates):
-    """Of rates (n, 2) [rad/s] at t (n,) [s] the largest that stayed for unasked.TIME while the alarm was watching."""
+    """Return the largest of rates (n, 2) [rad/s] at t (n,) [s] that lasted as long as the alarm needs while armed."""
     ready = np.maximum.accumulate(np.where(enabled, -np.inf, t))
     stay = round(uncommanded_motion.MIN_EXCESS_TIME_S / (t[1] - t[0])) + 1
     windows = np.lib.stride_tricks.sliding_window_view(np.abs(rates).max(axis=1), stay).min(axis=1)
-    settled = (t - ready >= uncommanded_motion.RESTART_SETTLING_TIME_S)[stay
-                                                                        - 1:] & (t[stay
-                                                                                   - 1:] >= uncommanded_motion.RESTART_SETTLING_TIME_S)
+    least = uncommanded_motion.RESTART_SETTLING_TIME_S
+    settled = (t - ready >= least)[stay - 1:] & (t[stay - 1:] >= least)
     return windows[settled].max()
 
 

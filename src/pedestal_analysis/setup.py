@@ -17,6 +17,6 @@ setup(
     zip_safe=False,
     maintainer='pedestal maintainers',
     maintainer_email='pedestal@example.org',
-    description='What recordings and trials of the antenna show: results, reports, reprocessing, trials, tuning.',
+    description='Analysis of recordings and scenarios of the antenna: results, reports, reprocessing, trials, tuning.',
     license='Apache-2.0',
 )

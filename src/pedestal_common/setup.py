@@ -17,7 +17,7 @@ setup(
     zip_safe=False,
     maintainer='pedestal maintainers',
     maintainer_email='pedestal@example.org',
-    description='What the packages of the pedestal share: line-of-sight geometry, parameters, topic table '
+    description='Code that the packages of the pedestal share: line-of-sight geometry, parameters, topic table '
                 'and node shell.',
     license='Apache-2.0',
 )

@@ -1,4 +1,4 @@
-"""ROS node of the antenna control unit: answers every receiver error with a rate command; modes by service."""
+"""ROS node of the antenna control unit: a rate command for each drive step, modes by service and by acu/command."""
 import pedestal_common.entry  # noqa: F401
 
 # isort: split
@@ -8,7 +8,7 @@ from pedestal_common.node import unit_node
 
 
 def main(args=None):
-    """Run the node until it is stopped; args: of the command line, None for sys.argv."""
+    """Run the node until it is stopped; args: those of the command line, None for sys.argv."""
     return unit_node.main('acu_tracker.acu_node', args)
 
 

@@ -1,10 +1,10 @@
-"""The antenna control unit: one `step` per drive step, from encoders, receiver error and attitude to the rate command.
+"""Antenna control unit: one `step` per drive step, from encoders, receiver error and attitude to the rate command.
 
 The estimate lives in earth angles, near the zenith in those of a tilted `estimate_frame`. docs/architecture.md shows
-the order of a step. Each part of the state is written by its own module; here they are brought together.
+the order of a step. Each part of the state is written by its own module; this module connects the parts.
 
-s, c, u, o: records of STATE_DTYPE, CONSTANTS_DTYPE, signals.INPUTS and OUTPUTS; of_all: the Tables; gap: the
-outage.Outage.
+s, c, u, o: records of STATE_DTYPE, CONSTANTS_DTYPE, signals.INPUTS_DTYPE and OUTPUTS_DTYPE; all_tables: the Tables;
+gap: the outage.Outage.
 """
 import math
 
@@ -41,12 +41,18 @@ CONSTANTS_DTYPE = np.dtype([('p', record_type(SharedParameters)), ('axis', AXIS_
                             ('tracker', tracker.CONSTANTS_DTYPE), ('lookahead', planner.CONSTANTS_DTYPE),
                             ('floor', floor.FLOOR_DTYPE)],
                            align=True)
-"""p: the parameters; notch: coefficients; reaction, braking: time [s] given in
-front of a limit, deceleration there [rad/s2]; lead: t_m - t_k [s]."""
+"""Constants of the control unit, and among them those of each axis.
+
+p          parameters
+notch      coefficients of the filter
+reaction   time in front of a limit [s]; see AcuParameters.reaction
+braking    deceleration in front of a limit [rad/s2]
+lead       t_m - t_k [s]
+"""
 
 
 def axis_constants(params, period, reaction) -> np.ndarray:
-    """Constants (1,) of AxisParameters, for steps of period [s]; reaction [s]: see position_loop.follow."""
+    """Return the constants (1,) of AxisParameters for steps of period [s]; reaction [s]: see position_loop.follow."""
     c, n = np.zeros(1, AXIS_CONSTANTS_DTYPE), params.notch
     c['p'] = record(params, AxisParameters)
     c['notch'] = notch.coefficients(n.frequency, n.width, n.depth, period)
@@ -55,7 +61,7 @@ def axis_constants(params, period, reaction) -> np.ndarray:
 
 
 def constants(params) -> np.ndarray:
-    """Constants (1,) of AcuParameters."""
+    """Return the constants (1,) of AcuParameters."""
     c, axes = np.zeros(1, CONSTANTS_DTYPE), (params.azimuth, params.elevation)
     c['p'] = record(params, SharedParameters)
     c['lead'] = params.command_delay + 0.5 * params.period
@@ -68,7 +74,7 @@ def constants(params) -> np.ndarray:
 
 
 def initial_state(params) -> np.ndarray:
-    """State (1,) before the first step of AcuParameters: standby, the initial mode pending."""
+    """Return the state (1,) before the first step of AcuParameters: standby, the initial mode pending."""
     s = np.zeros(1, STATE_DTYPE)
     s['stamp'] = -math.inf
     mode_change.initialise(s['mode'], params)
@@ -81,34 +87,37 @@ def initial_state(params) -> np.ndarray:
 
 @compiled
 def latched(s):
-    """Bits of the alarms whose fault waits for a reset."""
+    """Return the bits of the alarms whose latched fault waits for a reset."""
     return supervision.latched(s.unasked.moves, s.frozen.frozen, s.tracking.divergence.diverged)
 
 
 @compiled
-def request(s, c, u, o, of_all, mode):
-    """Request a mode (its code) between two steps; True when granted. Sets outputs.mode and outputs.reason.
+def request(s, c, u, o, all_tables, mode):
+    """Request a mode (its code) between two steps; return True if it is accepted. Set outputs.mode and outputs.reason.
 
-    The decision uses the inputs of the last step; it takes effect on the command of the next.
+    The decision uses the inputs of the last step. It takes effect on the command of the next step.
     """
-    result, _ = _change(s, c, u, o, of_all, mode, _outage(s, c))
+    result, _ = _change(s, c, u, o, all_tables, mode, _outage(s, c))
     o.mode, o.reason = s.mode.now, s.mode.reason
     return result == modes.REQUEST_ACCEPTED
 
 
 @compiled
-def refusals(s, c, u, of_all, why):
-    """Put into why (len(MODES),) for each mode NONE or why `request` would refuse it now."""
+def refusals(s, c, u, all_tables, why):
+    """Put into why (len(MODES),) for each mode NONE, or the reason why `request` would refuse the mode now."""
     for mode in range(len(why)):
-        now, _ = _situation(s, c, u, of_all, mode, _outage(s, c))
+        now, _ = _situation(s, c, u, all_tables, mode, _outage(s, c))
         why[mode] = modes.obstacle(mode, now)
 
 
 @compiled
 def reset(s):
-    """Reset what is latched, between two steps: annunciator.NONE, or the index of an alarm whose cause is still there,
-    and nothing is changed. A mode that waited to be entered is forgotten: nothing moves until one is asked for."""
-    alarms, t, waited = s.supervision.alarms, s.stamp, latched(s) != 0
+    """Reset the latched faults and alarms between two steps.
+
+    Return annunciator.NO_ALARM, or the index of an alarm whose cause is still there; then nothing is changed. A reset
+    also discards a mode that waits to be entered: in standby nothing moves until a mode is commanded.
+    """
+    alarms, t, fault = s.supervision.alarms, s.stamp, latched(s) != 0
     if s.unasked.moves and uncommanded_motion.beyond(s.unasked, t):
         return supervision.UNCOMMANDED_MOTION_ALARM
     cause = annunciator.persisting_alarm(alarms, supervision.LATCHED_FAULT_BITS)
@@ -117,17 +126,17 @@ def reset(s):
     uncommanded_motion.release(s.unasked)
     frozen.release(s.frozen, t)
     divergence.release(s.tracking.divergence)
-    if supervision.reset(alarms, t) or waited:
+    if supervision.reset(alarms, t) or fault:
         mode_change.set_pending(s.mode, modes.NO_REQUEST)
         resumption.cancel(s.resumption)
     return annunciator.NO_ALARM
 
 
 @compiled
-def step(s, c, u, o, of_all):
+def step(s, c, u, o, all_tables):
     """Run one drive step.
 
-    A stamp that does not advance (or is NaN) changes nothing: the last command stands, `stamp` is flagged.
+    A stamp that does not advance (or is NaN) changes nothing: the last command stays in force, `stamp` is flagged.
     """
     dt = u.stamp - s.stamp
     if not (dt > 0.0 and math.isfinite(u.stamp)):
@@ -137,18 +146,18 @@ def step(s, c, u, o, of_all):
     signals.clear(o)
     silence = c.p.step_gap < dt < math.inf
     if silence and s.mode.now != Mode.STANDBY:
-        # The axes stand. The mode goes on, from where they are, if the silence was short enough.
+        # The axes have stopped. After a short silence the mode continues from their actual angles.
         mode_change.continue_in(s.mode, resumption.mode_after(s.resumption, s.mode.now, s.stamp, u.stamp,
                                                               c.p.resume_time))
     s.stamp = u.stamp
-    flags = _observe(s, c, u, o, tables.of_mode(of_all, s.mode.table), silence)
+    flags = _observe(s, c, u, o, tables.of_mode(all_tables, s.mode.table), silence)
     gap, begins = _outage(s, c), _rests(s, c, u) or dt > c.p.step_gap
     waiting = s.mode.pending if s.mode.now == Mode.STANDBY else modes.NO_REQUEST
-    _, of_tables = _change(s, c, u, o, of_all, waiting, gap)
+    _, of_tables = _change(s, c, u, o, all_tables, waiting, gap)
     _wait(s, c, u, o)
     if encoders.taken(s.tracking.encoders, s.stamp):
         _start_from_actual(s, c, u, begins, silence)
-    program = tables.of_mode(of_all, s.mode.table)
+    program = tables.of_mode(all_tables, s.mode.table)
     _move(s, c, u, o, program, gap, begins, c.p.period if dt > c.p.step_gap else dt)
     _write_outputs(s, c, u, o, flags | of_tables)
     if guidance.look_ahead(s.guidance, s.tracking, c, s.mode.now, program, gap, s.stamp):
@@ -158,8 +167,10 @@ def step(s, c, u, o, of_all):
 
 @compiled
 def _observe(s, c, u, o, program, silence):
-    """Take in what has come for the step: encoders, attitude, receiver, preset, and what watches over them. Gives the
-    bits of signals.INVALID_INPUTS. silence: whether the step before is long ago."""
+    """Take the inputs of the step: encoders, attitude, receiver, preset; run the monitors on them.
+
+    Return the bits of signals.INVALID_INPUTS. silence: whether the step comes after a gap.
+    """
     g, k, mode = s.guidance, s.tracking, s.mode.now
     way = bridge.way(g.bridge, program)
     tracker.transfer(k.target.tracker, c.p.tracker, c.tracker)
@@ -176,13 +187,13 @@ def _observe(s, c, u, o, program, silence):
 
 @compiled
 def _take_attitude(s, c, u):
-    """Take the attitude of this step, also into the mean of the look-ahead; flags of what is not valid."""
+    """Take the attitude of this step, also into the mean of the look-ahead. Return the flags of invalid values."""
     h = s.guidance.lookahead
     if tracking.take_place(s.tracking, u):
         planner.clear_plan(h)
     flags, new = measurements.take_attitude(s.tracking.attitude, c.p, u)
     if new:
-        # While the INS aligns its heading is not known: the mean begins with the first one after that.
+        # While the INS aligns, its heading is not known. The mean begins with the first attitude after the alignment.
         levelled_deck.take(h.deck, u.attitude_stamp, attitude.newest(s.tracking.attitude), c.p.keyhole.mean_time,
                            u.aligning)
     return flags
@@ -190,7 +201,7 @@ def _take_attitude(s, c, u):
 
 @compiled
 def _take_receiver(s, c, u, o, way):
-    """Take the error of the receiver of this step; a flag where it is not accepted, else 0."""
+    """Take the receiver's error of this step. Return a flag where the error is not accepted, else 0."""
     g, k, mode = s.guidance, s.tracking, s.mode.now
     flags, used, at = tracking.used_error(k, c, u, modes.USES_SIGNAL_LEVEL[mode], g.pointing_offset)
     if not used:
@@ -199,27 +210,29 @@ def _take_receiver(s, c, u, o, way):
         guidance.check_slope(g, k, c, u, at, way)
     restart_gap = math.inf if _outage(s, c).permitted else c.p.tracker.restart_gap
     return tracking.take_error(k, c, u, o, at, restart_gap, mode == Mode.AUTOTRACK,
-                               supervision.axes_obey_commands(s.supervision))
+                               supervision.axes_follow_commands(s.supervision))
 
 
 @compiled
 def _outage(s, c):
-    """The Outage of the receiver at s.stamp."""
+    """Return the Outage of the receiver at s.stamp."""
     return outage.now(s.outage, s.tracking.target.tracker.stamp, s.stamp, c.p)
 
 
 @compiled
 def _rests(s, c, u):
-    """Whether the mode commands no motion."""
+    """Return True if the mode commands no motion."""
     return stow.commands_no_motion(s.stow, c.p.stow_pins, u.pins, s.mode.now)
 
 
 @compiled
-def _change(s, c, u, o, of_all, request, gap):
-    """Run the mode machine at s.stamp with a `request` or NO_REQUEST, and what follows from it: (result, flags of the
-    tables)."""
+def _change(s, c, u, o, all_tables, request, gap):
+    """Run the mode machine at s.stamp with a `request` or NO_REQUEST, and apply the consequences of a change.
+
+    Return (result, flags of the tables).
+    """
     g, k, before, table = s.guidance, s.tracking, s.mode.now, s.mode.table
-    now, flags = _situation(s, c, u, of_all, request, gap)
+    now, flags = _situation(s, c, u, all_tables, request, gap)
     if now.conditions.slope != Reason.NONE:
         divergence.latch(k.divergence)
     o.locked = now.conditions.lock == Reason.NONE
@@ -232,7 +245,7 @@ def _change(s, c, u, o, of_all, request, gap):
     if mode != before:
         if modes.USES_SIGNAL_LEVEL[mode]:
             if before == Mode.AUTOTRACK and not gap.coasting:
-                guidance.bridge_to(g, k, c, tables.of_mode(of_all, s.mode.table), s.stamp)
+                guidance.bridge_to(g, k, c, tables.of_mode(all_tables, s.mode.table), s.stamp)
             guidance.begin_by_level(g, k, c, before, mode, s.stamp)
         if before == Mode.AUTOTRACK and now.conditions.track != Reason.NONE:
             tracker.stop(k.target.tracker)
@@ -241,15 +254,15 @@ def _change(s, c, u, o, of_all, request, gap):
 
 
 @compiled
-def _situation(s, c, u, of_all, request, gap):
-    """(modes.Situation at s.stamp, flags of the tables); a table is evaluated only where it matters."""
+def _situation(s, c, u, all_tables, request, gap):
+    """Return (modes.Situation at s.stamp, flags of the tables). A table is evaluated only where it matters."""
     m, g, k, t = s.mode, s.guidance, s.tracking, s.stamp
     unstable, pins = tracking.unstable(k, c, u, t), stow.obstacle(s.stow, c.p.stow_pins, u.pins)
-    lock, slope, track = tracking.conditions(k, c, t, gap,
-                                             m.now == Mode.AUTOTRACK and supervision.axes_obey_commands(s.supervision))
+    closed = m.now == Mode.AUTOTRACK and supervision.axes_follow_commands(s.supervision)
+    lock, slope, track = tracking.conditions(k, c, t, gap, closed)
     if track == Reason.NONE and signal_level_modes.in_side_lobe(g.acquisition, c, t):
         track = Reason.SIDE_LOBE
-    # There is no coasting on a filter that has begun anew.
+    # A filter without an estimate cannot coast.
     chosen = m.fallback if m.fallback != Mode.AUTOTRACK or k.target.tracker.running else Mode.PROGRAM
     falls_back = m.now == Mode.SEARCH or (m.now == Mode.AUTOTRACK and track != Reason.NONE)
     wanted = request, m.now, m.table if falls_back else m.now, chosen if falls_back else m.now
@@ -257,12 +270,12 @@ def _situation(s, c, u, of_all, request, gap):
     flags = flag = 0
     if unstable == Reason.NONE:
         if Mode.PROGRAM in wanted:
-            program, flags = reachability.table(k.attitude, c, u, Mode.PROGRAM, of_all, t, g.azimuth)
+            program, flags = reachability.table(k.attitude, c, u, Mode.PROGRAM, all_tables, t, g.azimuth)
         if Mode.TLE in wanted:
-            tle, flag = reachability.table(k.attitude, c, u, Mode.TLE, of_all, t, g.azimuth)
+            tle, flag = reachability.table(k.attitude, c, u, Mode.TLE, all_tables, t, g.azimuth)
             flags |= flag
         if Mode.SUN in wanted:
-            sun, flag = reachability.table(k.attitude, c, u, Mode.SUN, of_all, t, g.azimuth)
+            sun, flag = reachability.table(k.attitude, c, u, Mode.SUN, all_tables, t, g.azimuth)
             flags |= flag
     why = modes.Conditions(
         nothing=Reason.NONE, stow=reachability.outside(c, c.axis[0].p.stow, c.axis[1].p.stow),
@@ -274,14 +287,13 @@ def _situation(s, c, u, of_all, request, gap):
     return modes.Situation(
         encoder_valid=encoders.taken(k.encoders, t), attitude=unstable, pins=pins, table=m.table, chosen=chosen,
         drive=supervision.drive_refusal(u.drive_ready, s.unasked.moves, s.frozen.frozen), conditions=why,
-        handover=signal_level_modes.found(g.acquisition, m.now,
-                                          c) if modes.USES_SIGNAL_LEVEL[m.now] else c.p.tracker.handover != 0
-    ), flags
+        handover=(signal_level_modes.found(g.acquisition, m.now, c) if modes.USES_SIGNAL_LEVEL[m.now]
+                  else c.p.tracker.handover != 0)), flags
 
 
 @compiled
 def _wait(s, c, u, o):
-    """Wait for the stow pins, and for a drive that ended a mode, which is resumed."""
+    """Wait for the stow pins, and for a drive that ended a mode, to resume the mode."""
     m = s.mode
     if c.p.stow_pins and stow.step(s.stow, c, u, m.now):
         mode_change.mark_stowed(m)
@@ -292,7 +304,7 @@ def _wait(s, c, u, o):
 
 @compiled
 def _start_from_actual(s, c, u, begins, silence):
-    """Start both axes from where they are where they begin anew, and one that does not obey."""
+    """Start both axes from their actual angles where they begin to move, and each axis that ignores its command."""
     if begins:
         guidance.start_from(s.guidance, u.position[0])
     watched = s.supervision.axis
@@ -301,7 +313,7 @@ def _start_from_actual(s, c, u, begins, silence):
 
 @compiled
 def _move(s, c, u, o, program, gap, begins, dt):
-    """Move the axes, or let them rest. begins: whether they stood up to now; dt [s]: for how long they move."""
+    """Move the axes, or let them rest. begins: whether they rested up to now; dt [s]: duration of the motion."""
     g, k, m, t = s.guidance, s.tracking, s.mode, s.stamp
     actual = axes.now(s.axis)
     order = guidance.Order(m.now, m.begins or begins, actual.azimuth.angle, t)
@@ -314,7 +326,7 @@ def _move(s, c, u, o, program, gap, begins, dt):
         V = tracking.deck_rates(k, c, t, actual.azimuth.angle, actual.elevation.angle)
         axes.follow(s.axis, c, u, o, motion, now, (k.error, V, m.now == Mode.AUTOTRACK))
         mode_change.mark_started(m)
-        if _explained(s, c) and m.now == Mode.AUTOTRACK and not gap.coasting:
+        if _note_outage_reason(s, c) and m.now == Mode.AUTOTRACK and not gap.coasting:
             guidance.bridge_to(g, k, c, program, t)
         o.blocked, o.coasting = s.outage.blocked, m.now == Mode.AUTOTRACK and gap.coasting
     for i in range(2):
@@ -323,9 +335,11 @@ def _move(s, c, u, o, program, gap, begins, dt):
 
 
 @compiled
-def _explained(s, c):
-    """Note why the receiver may be without signal: the target is hidden, or the beam slews through the keyhole.
-    Whether it may."""
+def _note_outage_reason(s, c):
+    """Note the reason why the receiver may be without signal. Return True if there is one.
+
+    The target may be hidden, or the beam may slew through the keyhole.
+    """
     g, follows = s.guidance, modes.FOLLOWS_TARGET[s.mode.now]
     hidden = follows and blockage.blocked(c.lookahead.sectors, g.target_angles[0], g.target_angles[1])
     reason = outage.watch(s.outage, hidden, follows and planner.slewing(g.lookahead, s.stamp), s.stamp)
@@ -340,16 +354,16 @@ def _write_outputs(s, c, u, o, flags):
     for i in range(2):
         o.time_to_limit[i] = ends.time_to(u.position[i], u.velocity[i], of_axes[i])
     o.mode, o.reason, o.invalid_input = s.mode.now, s.mode.reason, flags
-    o.pins, o.pins_wrong = s.stow.asked, stow.misplaced_pins(s.stow, c, u) if c.p.stow_pins else 0
+    o.pins, o.pins_wrong = s.stow.requested, stow.misplaced_pins(s.stow, c, u) if c.p.stow_pins else 0
     tracking.write_outputs(s.tracking, c, s.stamp, o)
 
 
 @compiled
 def _supervise(s, c, u, o, dt):
-    """Bring the alarms to this step, dt [s] after the one before."""
+    """Bring the alarms to this step, dt [s] after the previous one."""
     jumped, deck = dt > c.p.step_gap, s.tracking.attitude
     ship = deck.stabilised and deck.history.count > 0
-    # Autotrack is without signal, and nothing explains it.
+    # Autotrack is without signal, and no hidden sector or keyhole explains it.
     signal_lost = s.mode.reason == Reason.SIGNAL_LOST or (o.coasting and not _outage(s, c).permitted)
     facts = conditions.Facts(
         0.0 if jumped else dt, dt if jumped else 0.0, dt > 1.5 * c.p.period, latched(s),

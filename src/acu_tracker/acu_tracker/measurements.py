@@ -1,6 +1,6 @@
-"""What a step hears: the encoders, the ship's attitude, the error of the receiver, a preset.
+"""Measurements of a step: the encoders, the attitude of the ship, the error of the receiver, a preset.
 
-u, o: records of signals.INPUTS and OUTPUTS; flags: bits of signals.INVALID_INPUTS.
+u, o: records of signals.INPUTS_DTYPE and OUTPUTS_DTYPE; flags: bits of signals.INVALID_INPUTS.
 """
 import math
 
@@ -14,18 +14,22 @@ MAX_OFFSET_BEAMWIDTHS = 0.5
 """Largest intended pointing offset [beamwidths] at which the receiver's error is still used."""
 
 UNKNOWN_POINTING = encoders.Pointing(math.nan, math.nan, math.nan, math.nan)
+"""Pointing of the beam where no error is used."""
 
 
 @compiled
 def take_encoders(s, u):
-    """Take the encoders of this step into ENCODERS; signals.Flag.ENCODER where they are not valid, else 0."""
+    """Take the encoders of this step into ENCODERS_DTYPE. Return signals.Flag.ENCODER if they are invalid, else 0."""
     return 0 if u.encoder_valid and encoders.take(s, u.stamp, u.position, u.velocity) else signals.Flag.ENCODER
 
 
 @compiled
 def take_attitude(s, p, u):
-    """Take the attitude of this step into ATTITUDE, and what its INS says of its error: (flags signals.Flag.ATTITUDE,
-    ATTITUDE_ERROR of what is not valid; whether it is a new one). p: record of SharedParameters."""
+    """Take the attitude of this step, and the error of it that the INS states, into ATTITUDE_DTYPE.
+
+    Return (flags signals.Flag.ATTITUDE and ATTITUDE_ERROR of invalid values, True if the attitude is a new one). p:
+    record of SharedParameters.
+    """
     if not u.stabilised:
         return 0, False
     flags = 0
@@ -39,8 +43,10 @@ def take_attitude(s, p, u):
 
 @compiled
 def _wrong_level(s, u):
-    """The flag of a message, of a locked receiver or not, that a mode goes by the level of and must not believe,
-    else 0."""
+    """Return the flag of a message whose level must not be used by a mode that relies on the level, else 0.
+
+    The receiver may be locked or not.
+    """
     if not u.error_came:
         return 0
     if not math.isfinite(u.cn0_dbhz):
@@ -51,12 +57,12 @@ def _wrong_level(s, u):
 
 @compiled
 def error_at(s, receiver, u, by_level, offset):
-    """(flags of what the receiver says, whether its error is used, the Pointing of the beam that it belongs to).
+    """Return (flags of the receiver's message, True if its error is used, the Pointing of the beam at the error).
 
-    The error is a mean of samples that were taken while a beam jumped from step to step, so that target and beam each
-    have an instant that the mean belongs to. Linear interpolation between two steps is exact for a ramp, whatever the
-    weights of the samples are. No error is used while the beam is off the target by an intended offset [rad].
-    s: ENCODERS; by_level: whether the mode goes by the level of the signal.
+    The error is a mean of samples that were taken while a beam jumped from step to step. Target and beam therefore
+    each have an instant that the mean belongs to. Linear interpolation between two steps is exact for a ramp, whatever
+    the weights of the samples are. No error is used while the beam is off the target by an intended offset [rad]. s:
+    ENCODERS_DTYPE; by_level: whether the mode uses the level of the signal.
     """
     wrong = _wrong_level(s, u) if by_level else 0
     if wrong or not u.error_valid:
@@ -71,11 +77,11 @@ def error_at(s, receiver, u, by_level, offset):
 
 @compiled
 def write_innovation(o, outcome, innovation):
-    """Put the Innovation of an error into the outputs; the flag of its outcome of target.take, 0: it is accepted."""
+    """Put the Innovation of an error into the outputs. Return the flag of its outcome, 0 for accepted."""
     for i in range(2):
-        one = innovation.axis[i]
-        o.innovation[i], o.rate_innovation[i], o.nis[i] = one.nu, one.rate, measurement.nis(one)
-        o.innovation_sigma[i] = math.nan if math.isnan(o.nis[0]) else math.sqrt(one.S)
+        axis = innovation.axis[i]
+        o.innovation[i], o.rate_innovation[i], o.nis[i] = axis.nu, axis.rate, measurement.nis(axis)
+        o.innovation_sigma[i] = math.nan if math.isnan(o.nis[0]) else math.sqrt(axis.S)
     if outcome == target.OUTCOME_NO_ATTITUDE:
         return signals.Flag.ATTITUDE
     if outcome == target.OUTCOME_STALE:
@@ -87,7 +93,7 @@ def write_innovation(o, outcome, innovation):
 
 @compiled
 def take_preset(s, u):
-    """Take a new preset into a DIRECTION; signals.Flag.PRESET where it is not finite, else 0."""
+    """Take a new preset into a DIRECTION_DTYPE. Return signals.Flag.PRESET where it is not finite, else 0."""
     if not u.preset_valid:
         return 0
     if not math.isfinite(u.preset[0] + u.preset[1]):

@@ -1,4 +1,4 @@
-"""The mode machine: which target the antenna follows, and why. A pure transition function over one table."""
+"""Mode machine: a pure transition function over one table decides which target the antenna follows, and why."""
 from collections import namedtuple
 
 from pedestal_common.codes import codes
@@ -15,8 +15,11 @@ _FALLBACK = tuple(MODES.index(row.fallback) if row.fallback else Mode.STANDBY fo
 
 FALLBACK_MODES = {'coast': Mode.AUTOTRACK, 'memory': Mode.STOP, 'program': Mode.PROGRAM, 'tle': Mode.TLE,
                   'search': Mode.SEARCH, 'preset': Mode.PRESET, 'standby': Mode.STANDBY}
-"""{what can be chosen for the loss of the track: the mode it is}; coast is to stay in autotrack on the filter alone,
-memory to stand where the target was seen last, program to go back to the table that was followed last."""
+"""{choice for the loss of the track: mode}.
+
+`coast` stays in autotrack on the prediction of the filter. `memory` stops where the target was seen last. `program`
+returns to the table that was followed last.
+"""
 
 FALLBACK_NAMES = {mode: name for name, mode in FALLBACK_MODES.items()}
 
@@ -28,12 +31,12 @@ REASON_TEXTS = dict(
     BEFORE_PROGRAM='before program track', AFTER_PROGRAM='after program track', NOT_LOCKED='receiver not locked',
     OUTSIDE_LIMITS='outside limits', UNKNOWN_MODE='unknown mode', BAD_STAMP='stamp does not advance',
     DRIVE_NOT_READY='drive not ready', INS_ALIGNING='INS aligning', BLOCKED='blocked', KEYHOLE='keyhole',
-    SILENCE='silence', MOVES_UNASKED='moves unasked', DIVERGED='diverged', NO_DIRECTION='no direction',
+    SILENCE='silence', UNCOMMANDED_MOTION='uncommanded motion', DIVERGED='diverged', NO_DIRECTION='no direction',
     FOUND='found', NOT_FOUND='not found', WRONG_SLOPE='wrong slope', SIDE_LOBE='side lobe',
     PINNED='stow pins not out', PIN_FAILED='stow pin failed', PINS_IN='stow pins in', PINS_OUT='stow pins out',
     NO_ELEMENTS='no elements', TOO_OLD='elements too old', BELOW_HORIZON='below the horizon',
     PROGRAM_GAP='gap in the program track', NO_UTC='UTC unknown', DRIVE_FROZEN='drive frozen')
-"""What is said of each reason, by its name."""
+"""{name of a reason: its text in replies and diagnostics}."""
 
 REASONS = tuple(REASON_TEXTS.values())
 Reason = codes(REASON_TEXTS)
@@ -42,32 +45,47 @@ NO_REQUEST, REQUEST_REFUSED, REQUEST_ACCEPTED = -1, 0, 1
 
 
 Conditions = namedtuple('Conditions', 'nothing stow pin preset direction program tle sun lock slope track level')
-"""Of each condition of a mode NONE, or the reason that it does not hold.
+"""For each condition of a mode: NONE, or the reason why the condition does not hold.
 
-nothing: always holds; stow, preset: these angles can be pointed at; pin: one is not out; direction: one was given and
-holds; program, tle, sun: the table can be followed; lock: autotrack can begin; slope: nothing has diverged; track:
-autotrack has its target; level: so has a mode that goes by the level."""
+nothing    always holds
+stow       the stow angles can be reached
+pin        at least one stow pin is not out
+preset     the preset angles can be reached
+direction  a direction was commanded and is valid
+program, tle, sun  the table can be followed
+lock       autotrack can begin
+slope      autotrack has not diverged
+track      autotrack has its target
+level      the running mode, which uses the signal level, has neither failed nor lost its signal
+"""
 
 _NEEDS, _ENDS = (tuple(Conditions._fields.index(name or 'nothing') for name in names)
                  for names in zip(*((row.needs, row.ends) for row in MODE_ROWS)))
 
 Situation = namedtuple('Situation', 'encoder_valid drive attitude pins handover table chosen conditions')
-"""What a change of mode is decided by.
+"""Facts that decide on a change of mode.
 
-drive: NONE, or why it follows no commands; a mode that runs ends with it, and none begins without it. attitude: NONE
-or why it is not known; pins: NONE or why the stow pins forbid the axes to move; handover: whether a mode may hand over
-by itself; table: the mode whose table was followed last; chosen: the mode for the loss of the track, AUTOTRACK: none;
-conditions: the Conditions."""
+encoder_valid  the encoders of this step are valid
+drive      NONE, or why the drive follows no commands; ends a running mode, and no mode begins
+attitude   NONE, or why the attitude is not known
+pins       NONE, or why the stow pins forbid motion
+handover   a mode may hand over by itself
+table      mode whose table was followed last
+chosen     mode for the loss of the track; AUTOTRACK: stay in autotrack
+conditions  the Conditions
+"""
 
 
 Decision = namedtuple('Decision', 'mode reason result')
-"""The mode from now on; reason: NONE where nothing happened; result: NO_REQUEST, REQUEST_REFUSED or
-REQUEST_ACCEPTED."""
+"""Mode from now on, its reason and the result of a request.
+
+reason is NONE where nothing happened; result is NO_REQUEST, REQUEST_REFUSED or REQUEST_ACCEPTED.
+"""
 
 
 @compiled
 def obstacle(request, now):
-    """Why a mode cannot be entered in a Situation, NONE if it can."""
+    """Return the reason why a mode cannot be entered in a Situation, or NONE."""
     if request == Mode.STANDBY:
         return Reason.NONE
     if request < Mode.STANDBY or request >= len(FOLLOWS_TARGET):
@@ -85,15 +103,17 @@ def obstacle(request, now):
 
 @compiled
 def _end(mode, now):
-    """Why a mode ends in a Situation, NONE if it goes on. A table that leads outside the limits cannot be entered, but
-    is not ended by that."""
+    """Return the reason why a mode ends in a Situation, or NONE.
+
+    A table that leads outside the limits cannot be entered, but a running mode continues on it.
+    """
     why = now.conditions[_ENDS[mode]]
     return Reason.NONE if FOLLOWS_TABLE[mode] and why == Reason.OUTSIDE_LIMITS else why
 
 
 @compiled
 def next_mode(mode, request, now):
-    """The Decision of one step in a Situation; request: a mode or NO_REQUEST."""
+    """Return the Decision of one step in a Situation; request: a mode or NO_REQUEST."""
     why, result = Reason.NONE, NO_REQUEST
     if request != NO_REQUEST:
         why = obstacle(request, now)

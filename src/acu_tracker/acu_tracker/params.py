@@ -1,4 +1,4 @@
-"""Parameters of the antenna control unit: those of both axes, and the groups of its rooms."""
+"""Parameters of the antenna control unit: those of each axis, those shared by both, and those of its subpackages."""
 import dataclasses
 import math
 
@@ -32,13 +32,13 @@ from pedestal_common.wire.commands import SCHEDULE_DOC, schedule
 
 @dataclasses.dataclass(frozen=True)
 class AxisParameters(Parameters):
-    """One axis."""
+    """Parameters of one axis."""
 
-    stow: float = parameter(0.0, -20.0, 20.0, 'rad', 'deck angle of mode stow')
-    preset: float = parameter(0.0, -20.0, 20.0, 'rad', 'deck angle of mode preset until one is received')
+    stow: float = parameter(0.0, -20.0, 20.0, 'rad', 'deck angle in mode stow')
+    preset: float = parameter(0.0, -20.0, 20.0, 'rad', 'deck angle in mode preset before the first preset command')
     filter: FilterParameters = group(FilterParameters)
-    controller: str = choice('feedforward', CONTROLLERS, 'of the position loop; may be changed while it runs; of '
-                             'an array always beam, and of no other drive')
+    controller: str = choice('feedforward', CONTROLLERS, 'law of the position loop, changeable at run time; '
+                             'beam is for an electronic array, and an array allows no other')
     pid: PidParameters = group(PidParameters)
     feedforward: FeedforwardParameters = group(FeedforwardParameters)
     adrc: AdrcParameters = group(AdrcParameters)
@@ -48,7 +48,7 @@ class AxisParameters(Parameters):
     limits: LimitsParameters = group(LimitsParameters)
 
     def check(self):
-        """Raise ParameterError where stow or preset is outside the limits, or the shaper exceeds them."""
+        """Raise ParameterError if stow or preset is outside the limits, or the shaper exceeds them."""
         for name in ('stow', 'preset'):
             if not self.limits.low <= getattr(self, name) <= self.limits.high:
                 raise ParameterError(f'{name} = {getattr(self, name):g} rad: must be limits.low to limits.high, '
@@ -61,36 +61,36 @@ class AxisParameters(Parameters):
 
 @dataclasses.dataclass(frozen=True)
 class ElevationParameters(AxisParameters):
-    """Elevation: a lighter axis on its own limits."""
+    """Parameters of the elevation axis: lighter, with its own limits."""
 
-    stow: float = parameter(0.5 * math.pi, -20.0, 20.0, 'rad', 'deck angle of mode stow')
-    preset: float = parameter(0.5, -20.0, 20.0, 'rad', 'deck angle of mode preset until one is received')
+    stow: float = parameter(0.5 * math.pi, -20.0, 20.0, 'rad', 'deck angle in mode stow')
+    preset: float = parameter(0.5, -20.0, 20.0, 'rad', 'deck angle in mode preset before the first preset command')
     feedforward: FeedforwardParameters = group(FeedforwardParameters, inertia=288.0, friction=45.0)
     shaper: ShaperParameters = group(ShaperParameters, rate=1.4, acceleration=20.0)
     limits: LimitsParameters = group(LimitsParameters, low=-0.09, high=1.66, rate=1.57)
 
 
 @dataclasses.dataclass(frozen=True)
-class SharedParameters(topic_flags(nodes.row('acu').reads)):
-    """What belongs to no axis alone."""
+class SharedParameters(topic_flags(nodes.row('acu').reads)):  # type: ignore[misc]  # a field per flag of the topics
+    """Parameters that belong to no axis alone."""
 
     period: float = parameter(0.005, 1e-4, 1.0, 's', 'drive step T')
     step_gap: float = parameter(0.05, 1e-3, 10.0, 's', 'gap between drive steps after which targets := actual')
-    resume_time: float = parameter(10.0, 0.0, 3600.0, 's', 'a mode is kept through a silence of the drive, or of the '
-                                   'control unit, of up to this; 0: never')
-    unasked_rate: float = parameter(0.05, 1e-4, 10.0, 'rad/s', 'rate beyond those commanded lately at which '
-                                    'the antenna moves unasked')
+    resume_time: float = parameter(10.0, 0.0, 3600.0, 's', 'longest silence of the drive or of the control unit '
+                                   'through which a mode is kept; 0: no mode is kept')
+    unasked_rate: float = parameter(0.05, 1e-4, 10.0, 'rad/s', 'excess over the recently commanded rates that counts '
+                                    'as uncommanded motion')
     command_delay: float = parameter(0.0, 0.0, 1.0, 's', 'known delay from t_k until the command is in force')
     receiver_latency: float = parameter(0.0, 0.0, 0.5, 's', "known latency of the receiver's errors")
-    attitude_latency: float = parameter(0.005, 0.0, 0.5, 's', 'lockstep: latency of the attitude')
-    initial_mode: str = choice('standby', MODES, 'mode entered as soon as it can be')
+    attitude_latency: float = parameter(0.005, 0.0, 0.5, 's', 'latency of the attitude in lockstep')
+    initial_mode: str = choice('standby', MODES, 'mode after the start, entered as soon as its conditions hold')
     stow_window: float = parameter(1.75e-3, 1e-5, 0.1, 'rad', 'largest distance of an axis from its stow angle at '
-                                   'which the pins are asked to go in')
-    stow_timeout: float = parameter(20.0, 0.1, 3600.0, 's', 'time within which the pins must be where they were '
-                                    'asked to be')
+                                   'which the pins are commanded in')
+    stow_timeout: float = parameter(20.0, 0.1, 3600.0, 's', 'time within which the pins must reach their commanded '
+                                    'position')
     prediction: PredictionParameters = group(PredictionParameters)
     fallback: str = choice('program', FALLBACK_MODES,
-                           'what follows the loss of the track, until another one is chosen')
+                           'mode after the loss of the track, until an operator chooses another')
     points: str = text('', POINTS_DOC)
     commands: str = text('', SCHEDULE_DOC)
     attitude_timeout: float = parameter(0.2, 1e-3, 10.0, 's', 'age of the ship attitude at which it counts as lost')
@@ -107,14 +107,13 @@ class SharedParameters(topic_flags(nodes.row('acu').reads)):
 
 @dataclasses.dataclass(frozen=True)
 class AcuParameters(SharedParameters):
-    """The antenna control unit."""
+    """Parameters of the antenna control unit."""
 
     azimuth: AxisParameters = group(AxisParameters)
     elevation: ElevationParameters = group(ElevationParameters)
 
     def check_graph(self, beams, lockstep):
-        """Raise ParameterError unless both controllers are `beam` where the drive is an array (beams > 0), else
-        neither."""
+        """Raise ParameterError unless both controllers are `beam` for an array (beams > 0), or neither for motors."""
         array = beams > 0
         for axis in ('azimuth', 'elevation'):
             controller = getattr(self, axis).controller
@@ -127,13 +126,15 @@ class AcuParameters(SharedParameters):
 
     @property
     def reaction(self):
-        """Time [s] that an axis is given to react in front of a limit: e tau, tau the delay of its command, a period
-        until it is measured and one until it is in force. A delayed axis x' = -f(x(t - tau)) with f <= x / (e tau)
-        does not overshoot."""
+        """Reaction time [s] of an axis in front of a limit: e tau.
+
+        tau is the delay of a command plus two periods: one until it is measured, one until it is in force. A delayed
+        axis x' = -f(x(t - tau)) with f <= x / (e tau) does not overshoot.
+        """
         return math.e * (self.command_delay + 2.0 * self.period)
 
     def _check_travel(self):
-        """Raise ParameterError where an axis cannot brake from its full rate inside its travel, or stow or preset is
+        """Raise ParameterError if an axis cannot brake from its full rate inside its travel, or if stow or preset is
         below the floor."""
         for name in ('azimuth', 'elevation'):
             axis = getattr(self, name)
@@ -141,7 +142,7 @@ class AcuParameters(SharedParameters):
             d = ends.braking_distance(axis.shaper.rate, a, self.reaction)
             if 2.0 * d > axis.limits.high - axis.limits.low:
                 raise ParameterError(f'{name}.limits.braking = {a:g} rad/s2: from shaper.rate = '
-                                     f'{axis.shaper.rate:g} rad/s the axis stops in {d:g} rad; must be at most half '
+                                     f'{axis.shaper.rate:g} rad/s the axis stops in {d:g} rad, must be at most half '
                                      f'its travel, {0.5 * (axis.limits.high - axis.limits.low):g} rad')
         for name in ('stow', 'preset'):
             A, E = getattr(self.azimuth, name), getattr(self.elevation, name)
@@ -151,13 +152,17 @@ class AcuParameters(SharedParameters):
                                      f'azimuth.{name} = {A:g} rad')
 
     def check(self):
-        """Raise ParameterError for a delay longer than the histories, a notch beyond half the step rate, an attitude
-        that times out before it is used, or a step_gap that every step would exceed."""
+        """Raise ParameterError for parameters that do not go together.
+
+        A delay must fit into the histories, a notch lie below half the step rate, and an attitude be used before it
+        times out. `step_gap` must be longer than a step.
+        """
         sectors(self.blockage)
         schedule('commands', self.commands, ACU_COMMANDS)
         points(self.points)
         kept = ['receiver_latency', 'attitude_latency']
-        if {self.azimuth.controller, self.elevation.controller} != {'beam'}:  # which keeps no reference so long
+        # A beam keeps no history of its reference.
+        if {self.azimuth.controller, self.elevation.controller} != {'beam'}:
             kept.append('command_delay')
         for name in kept:
             if getattr(self, name) > (HISTORY_LENGTH - 4) * self.period:
@@ -170,8 +175,9 @@ class AcuParameters(SharedParameters):
         for name in ('age', 'beam_age'):
             age = getattr(self.tracker.receiver, name)
             if self.receiver_latency + age > (HISTORY_LENGTH - 4) * self.period:
-                raise ParameterError(f'tracker.receiver.{name} = {age:g} s: with receiver_latency must be 0 to '
-                                     f'{HISTORY_LENGTH - 4} periods, {(HISTORY_LENGTH - 4) * self.period:g} s')
+                longest = (HISTORY_LENGTH - 4) * self.period - self.receiver_latency
+                raise ParameterError(f'tracker.receiver.{name} = {age:g} s: must be 0 to {HISTORY_LENGTH - 4} periods '
+                                     f'less receiver_latency, {longest:g} s')
         longest = self.attitude_timeout - self.command_delay - 0.5 * self.period
         if self.attitude_latency >= longest:
             raise ParameterError(f'attitude_latency = {self.attitude_latency:g} s: must be below attitude_timeout - '

@@ -1,4 +1,4 @@
-"""What the control unit takes and answers in one step."""
+"""Inputs and outputs of the control unit in one step."""
 import math
 
 import numpy as np
@@ -12,46 +12,48 @@ from pedestal_common.wire import inputs
 
 INVALID_INPUTS = ('stamp', 'encoder', 'error', 'error_stamp', 'error_gated', 'attitude', 'program', 'preset',
                   'step_gap', 'error_noisy', 'attitude_error')
-"""Bit i of outputs.invalid_input stands for INVALID_INPUTS[i]."""
+"""Names of the bits of outputs.invalid_input: bit i stands for INVALID_INPUTS[i]."""
 Flag = bits(INVALID_INPUTS)
 
 DRIVE_STATES = topics.TOPIC_BY_NAME['adu/state'].texts
 DRIVE_READY = len(topics.ENABLED_STATES) - 1
 DRIVE_EMERGENCY_STOP, FIRST_DRIVE_FAULT = DRIVE_STATES.index('emergency stop'), len(DRIVE_STATES)
-"""Codes of adu/state: up to DRIVE_READY the drive follows commands, from FIRST_DRIVE_FAULT on it tells a fault. A
-drive that has
-sent none, topics.SILENT, counts as ready."""
+"""Codes of adu/state.
+
+Up to DRIVE_READY the drive follows commands; from FIRST_DRIVE_FAULT on the code stands for a fault. A drive that has
+published no state, topics.NO_TEXT_CODE, counts as ready.
+"""
 
 INPUT_TOPICS = nodes.row('acu').reads
 
 INPUTS_DTYPE = np.dtype([
-    *inputs.fields(INPUT_TOPICS),                             # see the rows of topics.TOPICS
+    *inputs.fields(INPUT_TOPICS),                                               # see the rows of topics.TOPICS
     ('stamp', 'f8'), ('encoder_valid', 'i8'),                                   # t_k [s]
-    ('error_valid', 'i8'),                                                      # 0: none came, or unlocked
+    ('error_valid', 'i8'),                                                      # 0: no error, or unlocked
     ('stabilised', 'i8'), ('attitude_valid', 'i8'),                             # 1: the pedestal stands on a ship
     ('aligning', 'i8'), ('drive_ready', 'i8'),          # 1: the INS is still aligning; the drive follows the commands
     ('unpredicted', 'i8', (sum(row.table for row in MODE_ROWS),)),    # of the modes that follow a table: NONE or why
-                                                        # there is none
+                                                        # there is no table
     ('gap', 'i8'), ('turnaround', 'i8'),                # 1: rows of the program are missing here; the last segment
-                                                        # was refused because it asked for too fast a turnaround
+                                                        # was refused because its turnaround is too fast
     ('preset', 'f8', (2,)), ('preset_valid', 'i8'),                             # deck angles
 ], align=True)
 
 OUTPUTS_DTYPE = np.dtype([
-    ('mode', 'i8'), ('reason', 'i8'),                                            # codes of MODES and REASONS
+    ('mode', 'i8'), ('reason', 'i8'),                                           # codes of MODES and REASONS
     ('rate', 'f8', (2,)), ('torque', 'f8', (2,)),                               # command [rad/s], feed-forward [Nm]
     ('estimate', 'f8', (2, 3)),                                                 # target at t_k; NaN: no estimate
-    ('reference', 'f8', (2, 3)),                                               # deck angle, rate, acceleration at t_k;
-                                                                                # of a beam at t_m: the command
-    ('covariance', 'f8', (2, 3)),                                              # p11, p12, p22 at t_k
-    ('probability', 'f8', (2, len(MODEL_NAMES))),                                   # of MODELS
-    ('innovation', 'f8', (2,)), ('rate_innovation', 'f8', (2,)),                # nu of angle, rate; NaN: none came
+    ('reference', 'f8', (2, 3)),                        # deck angle, rate, acceleration at t_k; of a beam: the
+                                                        # command at t_m
+    ('covariance', 'f8', (2, 3)),                                               # p11, p12, p22 at t_k
+    ('probability', 'f8', (2, len(MODEL_NAMES))),                               # of the motion models MODEL_NAMES
+    ('innovation', 'f8', (2,)), ('rate_innovation', 'f8', (2,)),                # nu of angle, rate; NaN: no error
     ('innovation_sigma', 'f8', (2,)),                                           # of the angle's, as predicted
     ('nis', 'f8', (2,)), ('gated', 'i8'),                                       # nu' S^-1 nu; errors gated so far
     ('rates_gated', 'i8'), ('ranges_gated', 'i8'),
     ('coasting', 'i8'), ('locked', 'i8'), ('blocked', 'i8'), ('invalid_input', 'i8'),
-    ('time_to_limit', 'f8', (2,)),                                              # at the present rates [s]; inf: never
-    ('alarms', 'i8'),                                                           # changes of the list of alarms so far
+    ('time_to_limit', 'f8', (2,)),                                              # at the present rates [s]; inf: none
+    ('alarms', 'i8'),                                                           # count of changes of the alarm list
     ('pins', 'i8'), ('pins_wrong', 'i8'),               # code of acu/stow_pins; bits of the axes whose pin failed
     ('angle_limited', 'i8', (2,)), ('rate_limited', 'i8', (2,)), ('acceleration_limited', 'i8', (2,)),
 ], align=True)

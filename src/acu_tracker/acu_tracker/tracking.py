@@ -1,6 +1,7 @@
-"""What is known of the target by the receiver: beam and deck in the last steps, the filter, what watches over it.
+"""State of the target as the receiver measures it: beam and deck of the last steps, the filter, the monitors.
 
-k: record of TRACKING_DTYPE; c, u, o: of control_unit.CONSTANTS, of signals.INPUTS and OUTPUTS; gap: the outage.Outage.
+k: record of TRACKING_DTYPE; c: record of control_unit.CONSTANTS_DTYPE; u, o: records of signals.INPUTS_DTYPE and
+OUTPUTS_DTYPE; gap: the outage.Outage.
 """
 import math
 
@@ -21,17 +22,17 @@ TRACKING_DTYPE = np.dtype([
     ('error', 'f8', (2,)),
     ('repetition', repetition.REPETITION_DTYPE), ('divergence', divergence.DIVERGENCE_DTYPE),
     ('slope_sign', slope_sign.SLOPE_SIGN_DTYPE)], align=True)
-"""error: of this step, in deck angles [rad], NaN: none came."""
+"""error: of this step, in deck angles [rad]; NaN: no error."""
 
 
 def initialise(k):
-    """No estimate; k: view of TRACKING_DTYPE."""
+    """Begin without an estimate; k: view of TRACKING_DTYPE."""
     target.initialise(k['target'])
 
 
 @compiled
 def take_place(k, u):
-    """Take whether the pedestal stands on a ship; another place ends the estimate. Whether it is another."""
+    """Take whether the pedestal stands on a ship. Return True if that has changed, which ends the estimate."""
     another = attitude.put(k.attitude, u.stabilised)
     if another:
         tracker.stop(k.target.tracker)
@@ -40,26 +41,31 @@ def take_place(k, u):
 
 @compiled
 def used_error(k, c, u, by_level, offset):
-    """(flags of what the receiver says, whether its error is used, the Pointing of the beam that it belongs to);
-    by_level, offset: as of intake.error_at."""
+    """Return (flags of the receiver's message, True if its error is used, the Pointing of the beam at the error).
+
+    by_level, offset: as of measurements.error_at.
+    """
     k.error[0] = k.error[1] = math.nan
-    flags, believed, at = measurements.error_at(k.encoders, c.p.tracker.receiver, u, by_level, offset)
-    return flags, believed and not repetition.take(k.repetition, u, at), at
+    flags, used, at = measurements.error_at(k.encoders, c.p.tracker.receiver, u, by_level, offset)
+    return flags, used and not repetition.take(k.repetition, u, at), at
 
 
 @compiled
-def take_error(k, c, u, o, at, restart_gap, closed, obeys):
-    """Filter y = encoder at the instant of the error, displaced by the error, and watch over it; a flag where it is
-    not accepted, else 0.
+def take_error(k, c, u, o, at, restart_gap, closed, follows):
+    """Filter y = encoder at the instant of the error, displaced by the error, and run the monitors.
 
-    at: Pointing of the beam; restart_gap: as in tracker.observe; closed: whether the loop is, on the errors; obeys:
-    whether the axes do.
+    at           Pointing of the beam
+    restart_gap  as in tracker.observe
+    closed       whether the loop is closed on the errors
+    follows        whether the axes follow their commands
+
+    Return a flag where the error is not accepted, else 0.
     """
     receiver = c.p.tracker.receiver
     measured = pointing.displaced(at.A, at.E, u.cross_elevation, u.elevation)
     k.error[0], k.error[1] = measured[0] - at.A, measured[1] - at.E
     outcome, innovation = target.take(k.target, c.p, c.tracker, k.attitude, u, at, measured, restart_gap)
-    if outcome != target.OUTCOME_NOISY and obeys:
+    if outcome != target.OUTCOME_NOISY and follows:
         divergence.take(k.divergence, innovation)
     if closed and outcome != target.OUTCOME_NO_ATTITUDE and slope_sign.near(u, receiver.beamwidth):
         _watch_slope(k, c, u, at)
@@ -68,7 +74,7 @@ def take_error(k, c, u, o, at, restart_gap, closed, obeys):
 
 @compiled
 def _watch_slope(k, c, u, at):
-    """Note an error that shows that the slope of autotrack is reversed; at: Pointing of the beam it belongs to."""
+    """Note an error that shows that the slope of autotrack is reversed; at: Pointing of the beam at the error."""
     p = c.p.tracker
     t = u.error_stamp - p.receiver.age
     _, deck = attitude.at(k.attitude, c.p, t)
@@ -80,7 +86,7 @@ def _watch_slope(k, c, u, at):
 
 @compiled
 def unstable(k, c, u, t):
-    """NONE, or why the attitude is not known when the command of t [s] is in force."""
+    """Return NONE, or the reason why the attitude is not known when the command of t [s] is in force."""
     if not k.attitude.stabilised:
         return Reason.NONE
     # Before the first attitude the state of the INS may not have arrived yet.
@@ -91,11 +97,14 @@ def unstable(k, c, u, t):
 
 @compiled
 def conditions(k, c, t, gap, closed):
-    """Conditions lock, slope and track of the modes at t [s]; closed: whether the loop is, on axes that obey."""
-    p, silent, running = c.p.tracker, not gap.permitted, k.target.tracker.running
-    spread_now = spread(k, c, t) if running and silent and gap.coasting else 0.0
-    lost = not running or (silent and coast.over(gap.since, p.coast_time, spread_now, p.receiver.beamwidth))
-    if k.divergence.diverged or (closed and divergence.diverges(k.divergence, gap.coasting and silent)):
+    """Return the Conditions lock, slope and track of the modes at t [s].
+
+    closed: whether the loop is closed on axes that follow their commands.
+    """
+    p, unexplained, running = c.p.tracker, not gap.permitted, k.target.tracker.running
+    spread_now = spread(k, c, t) if running and unexplained and gap.coasting else 0.0
+    lost = not running or (unexplained and coast.over(gap.since, p.coast_time, spread_now, p.receiver.beamwidth))
+    if k.divergence.diverged or (closed and divergence.diverges(k.divergence, gap.coasting and unexplained)):
         return Reason.DIVERGED, Reason.DIVERGED, Reason.DIVERGED
     lock = Reason.NONE if tracker.locked(k.target.tracker, p, gap.since) else Reason.NOT_LOCKED
     return lock, Reason.NONE, Reason.SIGNAL_LOST if lost else Reason.NONE
@@ -103,14 +112,14 @@ def conditions(k, c, t, gap, closed):
 
 @compiled
 def restart(k):
-    """A mode begins: nothing is held against filter and slope."""
+    """Restart the monitors of filter and slope: a mode begins."""
     divergence.restart(k.divergence)
     slope_sign.restart(k.slope_sign)
 
 
 @compiled
 def spread(k, c, t):
-    """Standard deviation of the estimate across the line of sight at t [s], in rad."""
+    """Return the standard deviation of the estimate across the line of sight at t [s], in rad."""
     estimate = target.read(k.target, c.p, c.tracker, k.attitude, t)
     azimuth, elevation = estimate.variances
     return coast.sigma(azimuth.p11, elevation.p11, estimate.motion.elevation.angle)
@@ -118,13 +127,13 @@ def spread(k, c, t):
 
 @compiled
 def sight(k, c, t):
-    """LineOfSight in ENU of the estimate at t [s]."""
+    """Return the LineOfSight in ENU of the estimate at t [s]."""
     return target.earth_outlook(k.target, c.tracker, t)
 
 
 @compiled
 def beam(k, c, t):
-    """(ENU unit vector along the beam at t [s], no rate)."""
+    """Return (ENU unit vector along the beam at t [s], zero rate)."""
     _, at = encoders.at(k.encoders, t)
     _, deck = attitude.at(k.attitude, c.p, t)
     return rotated(deck.mat, Vector(*pointing.direction(at.A, at.E))), place.ZERO_VECTOR
@@ -132,10 +141,12 @@ def beam(k, c, t):
 
 @compiled
 def deck_rates(k, c, t, A, E):
-    """(azimuth, elevation) rate [rad/s] at which the deck's motion moves an earth-fixed direction at deck angles A, E
-    [rad] at t [s]; 0 where no axis compensates for it."""
-    wanted = c.axis[0].p.beam.rate_compensation != 0.0 or c.axis[1].p.beam.rate_compensation != 0.0
-    if wanted and k.attitude.stabilised:
+    """Return the (azimuth, elevation) rate [rad/s] at which the deck moves an earth-fixed direction.
+
+    A, E: deck angles of the direction at t [s], in rad. The rates are 0 where no axis compensates for them.
+    """
+    compensated = c.axis[0].p.beam.rate_compensation != 0.0 or c.axis[1].p.beam.rate_compensation != 0.0
+    if compensated and k.attitude.stabilised:
         known, deck = attitude.at(k.attitude, c.p, t)
         if known:
             return deck_reference.fixed_rates(deck.w, A, E)
@@ -144,7 +155,7 @@ def deck_rates(k, c, t, A, E):
 
 @compiled
 def write_outputs(k, c, t, o):
-    """Put counts, and the estimate of the target at t [s] in earth angles of the antenna, into the outputs."""
+    """Put the counts of gated measurements and the estimate at t [s], in earth angles of the antenna, into outputs."""
     filtered = k.target.tracker
     o.gated, o.rates_gated, o.ranges_gated = filtered.gated, filtered.rates_gated, filtered.ranges_gated
     if filtered.running:

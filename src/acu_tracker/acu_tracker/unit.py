@@ -1,4 +1,4 @@
-"""The unit of the control unit: encoders, receiver and attitude in, rate command, estimate and mode out."""
+"""Unit of the control unit: encoders, receiver and attitude in; rate command, estimate and mode out."""
 import functools
 import math
 import typing
@@ -23,34 +23,33 @@ from pedestal_common.wire.commands import Reply, schedule
 from pedestal_common.wire.inputs import taking
 from pedestal_common.wire.records import NO_STAMP
 
-(JOINT_STATES_TOPIC, ANGLE_ERROR_TOPIC, ATTITUDE_TOPIC) = ('joint_states', 'tracking_receiver/angle_error',
-                                                           'ship/imu/data')
-ANGLE_RATE_TOPIC, RANGE_TOPIC = 'tracking_receiver/angle_rate', 'tracking_receiver/range'
-(RATE_COMMAND_TOPIC, ESTIMATE_TOPIC, REFERENCE_TOPIC, FILTER_TOPIC) = ('acu/rate_command', 'acu/estimate',
-                                                                       'acu/reference', 'acu/filter')
+JOINT_STATES_TOPIC, ATTITUDE_TOPIC = 'joint_states', 'ship/imu/data'
+ANGLE_ERROR_TOPIC, ANGLE_RATE_TOPIC = 'tracking_receiver/angle_error', 'tracking_receiver/angle_rate'
+RANGE_TOPIC, RATE_COMMAND_TOPIC = 'tracking_receiver/range', 'acu/rate_command'
+ESTIMATE_TOPIC, REFERENCE_TOPIC, FILTER_TOPIC = 'acu/estimate', 'acu/reference', 'acu/filter'
 MODE_TOPIC, KEYHOLE_TOPIC, BLOCKAGE_TOPIC, ALARMS_TOPIC = 'acu/mode', 'acu/keyhole', 'acu/blockage', 'acu/alarms'
 DRIVE_STATE_TOPIC, INS_STATE_TOPIC, STOW_PINS_TOPIC = 'adu/state', 'ins/state', 'acu/stow_pins'
 
 FILTER_COLUMN_COUNT, MODEL_COUNT = len(topics.FILTER_UNITS), len(topics.MOTION_MODELS)
-"""Numbers of an axis on acu/filter; the last of them are the probabilities of the motion models."""
+"""Count of the numbers of an axis on acu/filter; the last MODEL_COUNT are the probabilities of the motion models."""
 
 INS_ALIGNING = topics.TOPIC_BY_NAME[INS_STATE_TOPIC].texts.index('aligning')
-"""Code of this state; an INS that has not sent one, topics.SILENT, counts as aligned."""
+"""Code of the state `aligning`; an INS that has published no state, topics.NO_TEXT_CODE, counts as aligned."""
 
 
 RECORD_DTYPE = np.dtype([('state', control_unit.STATE_DTYPE), ('constants', control_unit.CONSTANTS_DTYPE),
                          ('inputs', signals.INPUTS_DTYPE), ('outputs', signals.OUTPUTS_DTYPE), ('invalid', 'i8')],
                         align=True)
-"""invalid: the bits of signals.INVALID_INPUTS that were set since the last diagnosis."""
+"""Memory of the control unit; invalid: bits of signals.INVALID_INPUTS that were set since the last diagnosis."""
 
 
 DRIVE_SILENT_ALARM, DRIVE_FAULT_ALARM = table.ALARM_INDEX['drive silent'], table.ALARM_INDEX['drive fault']
 MOTOR_LOST_ALARMS = tuple(table.ALARM_INDEX[f'{axis} motor lost'] for axis in topics.AXES)
-"""Alarms of which adu/state, or its silence, tells more."""
+"""Alarms to which adu/state, or its silence, adds detail."""
 
 
 class Memory(typing.NamedTuple):
-    """All the control unit works on."""
+    """Memory of the law."""
     record: np.ndarray
     tables: tables.Tables
 
@@ -60,8 +59,10 @@ _take = taking(signals.INPUT_TOPICS)
 
 @compiled
 def decode(u, stamp, inputs):
-    """Records of the messages of a step -> inputs of the control unit; an attitude stays until the next. A rate or a
-    range is used only with the error of its own stamp."""
+    """Convert the messages of a step into the inputs of the control unit.
+
+    An attitude stays until the next one. A rate or a range is used only with the error of the same stamp.
+    """
     _take(u, inputs)
     error, rate, distance = inputs[ANGLE_ERROR_TOPIC], inputs[ANGLE_RATE_TOPIC], inputs[RANGE_TOPIC]
     u.stamp, u.encoder_valid = stamp * 1e-9, 1
@@ -77,7 +78,7 @@ def decode(u, stamp, inputs):
 
 @compiled
 def encode(o, lookahead, stamp, outputs):
-    """Outputs of the control unit and counts of the look-ahead -> records of its messages."""
+    """Convert the outputs of the control unit and the counts of the look-ahead into the records of its messages."""
     command, estimate, reference = outputs[RATE_COMMAND_TOPIC], outputs[ESTIMATE_TOPIC], outputs[REFERENCE_TOPIC]
     command.stamp = estimate.stamp = reference.stamp = outputs[FILTER_TOPIC].stamp = stamp
     for i in range(2):
@@ -100,7 +101,7 @@ def encode(o, lookahead, stamp, outputs):
 
 @compiled
 def law(memory, stamp, inputs, outputs):
-    """Step k."""
+    """Run step k."""
     m = memory.record[0]
     decode(m.inputs, stamp, inputs)
     control_unit.step(m.state, m.constants, m.inputs, m.outputs, memory.tables)
@@ -111,21 +112,23 @@ def law(memory, stamp, inputs, outputs):
 
 @compiled
 def laws(memory, stamps, inputs, outputs):
-    """`law` over arrays."""
+    """Run `law` over arrays."""
     for k in range(len(stamps)):
         law(memory, stamps[k], inputs[k], outputs[k])
 
 
 @functools.lru_cache(1)
 def _initial(parameters):
-    """The record (1,) of a control unit before its first step, made once for trials in a row that differ in no
-    parameter of it."""
+    """Return the record (1,) of a control unit before its first step.
+
+    The cache serves successive trials with equal parameters.
+    """
     return joined(RECORD_DTYPE, state=control_unit.initial_state(parameters),
                   constants=control_unit.constants(parameters))
 
 
 class Acu(Unit):
-    """The control unit of an AcuParameters, on a ship where its graph has ship/imu/data."""
+    """Control unit of an AcuParameters, on a ship where its graph has ship/imu/data."""
     NODE, LAWS = nodes.row('acu'), {Memory: (law, laws)}
     LIVE = ('tracker', 'azimuth', 'elevation')
     REQUESTS = (*(f'acu/{mode}' for mode in modes.MODES), 'acu/acknowledge', 'acu/reset_faults')
@@ -144,13 +147,13 @@ class Acu(Unit):
         self.segments = segments.Segments([(axis.limits.rate, axis.limits.acceleration) for axis in (
             parameters.azimuth, parameters.elevation)])
         self.predictor, self.predicted = Predictor(parameters.prediction), {}
-        self.offset, self._laid = (0.0, 0.0, 0.0), (NEVER_DUE_NS, NO_STAMP)
+        self.offset, self._tables_valid = (0.0, 0.0, 0.0), (NEVER_DUE_NS, NO_STAMP)
         self.desk = AlarmDesk(self.parts['state'], control_unit.reset)
         self._silent = False
 
     @property
     def silent(self):
-        """Whether the drive stays away, which raises its alarm: no step comes in which that could be seen."""
+        """True if the drive is silent. Setting it raises the alarm, because no step comes that could detect it."""
         return self._silent
 
     @silent.setter
@@ -162,7 +165,7 @@ class Acu(Unit):
             self.outputs[ALARMS_TOPIC] = self.alarms['revision']
 
     def prepare(self):
-        """Compile what the commands of the alarms and the diagnosis call as well."""
+        """Compile also the functions behind the alarm commands and the diagnosis."""
         super().prepare()
         before = self.memory.record.copy()
         self.desk.prepare()
@@ -172,20 +175,22 @@ class Acu(Unit):
         self.memory.record[...] = before
 
     def prepare_ahead(self):
-        """What the commands and the diagnosis call."""
+        """Compile the functions behind the commands and the diagnosis."""
         self.request(self.REQUESTS[0])
         self.desk.prepare()
         self.diagnose()
 
     def configure(self, parameters):
-        """Take other values of LIVE parameters into the constants; the state stays."""
+        """Take new values of the LIVE parameters into the constants; the state stays."""
         super().configure(parameters)
         self.memory.record['constants'] = control_unit.constants(parameters)
-        self._laid = NEVER_DUE_NS, NO_STAMP
+        self._tables_valid = NEVER_DUE_NS, NO_STAMP
 
     def decode(self, topic, message):
-        """A program track: two or more points in earth angles; or a preset: one point in deck angles. Raises
-        ValueError."""
+        """Take a program track, two or more points in earth angles, or a preset, one point in deck angles.
+
+        Raise ValueError for a bad message.
+        """
         times, angles = rows(message)
         if len(angles) == 1:
             self.parts['inputs']['preset'], self.parts['inputs']['preset_valid'] = angles[0], 1
@@ -194,7 +199,7 @@ class Acu(Unit):
             self._append(times + start, angles)
 
     def _append(self, times, angles):
-        """Append a segment to the program track. Raises ValueError."""
+        """Append a segment to the program track. Raise ValueError."""
         state, inputs = self.parts['state'], self.parts['inputs']
         followed = state['mode']['now'] == Mode.PROGRAM
         try:
@@ -203,35 +208,37 @@ class Acu(Unit):
             inputs['turnaround'] = 1
             raise
         inputs['turnaround'] = 0
-        self.lay_tables()
+        self.update_tables()
 
     @property
     def next_due(self):
-        """Time [ns] of the next command of its schedule, or of the next laying of tables."""
-        return min(super().next_due, self._laid[1])
+        """Time [ns] of the next command of the schedule, or of the next update of the tables."""
+        return min(super().next_due, self._tables_valid[1])
 
-    def obey_due(self, stamp):
-        """Obey what is due before the step of a stamp [ns], on the tables for it."""
+    def execute_due(self, stamp):
+        """Execute the scheduled commands that are due before the step of a stamp [ns], on the tables for that step."""
         if self.epoch != self.predictor.epoch:
             self._predict_by(Predictor(self.predictor.parameters, self.epoch))
-        since, until = self._laid
+        since, until = self._tables_valid
         if not since <= stamp < until:
-            self.lay_tables(stamp)
-        super().obey_due(stamp)
+            self.update_tables(stamp)
+        super().execute_due(stamp)
 
     @property
     def now(self):
-        """The stamp [ns] of the last step, 0 before the first."""
+        """Stamp [ns] of the last step, 0 before the first."""
         stamp = float(self.parts['state']['stamp'])
         return round(stamp * 1e9) if math.isfinite(stamp) else 0
 
     def _predict_by(self, predictor):
-        """Predict by another Predictor."""
-        self.predictor, self.predicted, self._laid = predictor, {}, (NEVER_DUE_NS, NO_STAMP)
+        """Replace the Predictor."""
+        self.predictor, self.predicted, self._tables_valid = predictor, {}, (NEVER_DUE_NS, NO_STAMP)
 
-    def lay_tables(self, stamp=None):
-        """Bring the tables of the law to a stamp [ns], or now: the piece of the program that is due, what is
-        predicted, all of them shifted by the offset."""
+    def update_tables(self, stamp=None):
+        """Bring the tables of the law to a stamp [ns], or to now.
+
+        The tables are the due piece of the program and the predictions, all shifted by the offset.
+        """
         stamp = self.now if stamp is None else int(stamp)
         inputs, t = self.parts['inputs'], stamp * 1e-9
         for place, row in enumerate(tables.TABLE_MODES):
@@ -241,19 +248,19 @@ class Acu(Unit):
             inputs['unpredicted'][place] = known.reason if known else Reason.NONE
         piece, inputs['gap'], ends = self.segments.at(t - self.offset[0])
         until = min(ends + self.offset[0], *(known.until for known in self.predicted.values()))
-        self._laid = stamp, max(math.ceil(until * 1e9), stamp + 1) if until < math.inf else NEVER_DUE_NS
+        self._tables_valid = stamp, max(math.ceil(until * 1e9), stamp + 1) if until < math.inf else NEVER_DUE_NS
         self.memory = self.memory._replace(tables=tables.Tables(*(
             tables.shifted(self.predicted[row.name].track if row.predicted else piece, self.offset)
             for row in tables.TABLE_MODES)))
 
     def take_text(self, topic, text):
-        """Take a text topic; the drive's state is kept for the diagnosis."""
+        """Take a text topic; the state of the drive is kept for the diagnosis."""
         super().take_text(topic, text)
         if topic == DRIVE_STATE_TOPIC:
             self.drive_state = text
 
     def encode(self, topic, code):
-        """The text of a code on a text topic; the message on acu/alarms."""
+        """Return the text of a code on a text topic, or the message on acu/alarms."""
         lookahead = self.parts['state']['guidance']['lookahead']
         if topic == KEYHOLE_TOPIC:
             return announcement.keyhole(lookahead, self.parameters.tracker.receiver.beamwidth)
@@ -265,11 +272,11 @@ class Acu(Unit):
         return modes.MODES[code] if topic == MODE_TOPIC else super().encode(topic, code)
 
     def schedule(self):
-        """[(at [ns], Command)] of the parameter `commands`."""
+        """Return [(at [ns], Command)] of the parameter `commands`."""
         return schedule('commands', self.parameters.commands, ACU_COMMANDS)
 
-    def obey(self, command, arguments):
-        """The Reply to one of VERBS; a refusal names the reason and changes nothing."""
+    def execute(self, command, arguments):
+        """Return the Reply to a command of VERBS; a refusal states the reason and changes nothing."""
         verb, state = command.verb, self.parts['state']
         if verb in ALARM_COMMAND_NAMES:
             return getattr(self.desk, verb)(*arguments.values())
@@ -282,35 +289,35 @@ class Acu(Unit):
             return Reply(True, f'fallback is {arguments["mode"]}')
         if verb == 'offset':
             self.offset = (arguments['time'], *(arguments[axis] for axis in topics.AXES))
-            self.lay_tables()
+            self.update_tables()
             return Reply(True, 'program track shifted by {:g} s, {:g} and {:g} rad'.format(*self.offset))
         if verb == 'elements':
             self.take_elements(*arguments.values())
             return Reply(True, f'elements of satellite {self.predictor.number}')
-        asked, predictor = state['guidance'], self.predictor
-        before = {name: asked[name].copy() for name in ('preset', 'manual', 'slave')}
+        guidance, predictor = state['guidance'], self.predictor
+        before = {name: guidance[name].copy() for name in ('preset', 'manual', 'slave')}
         if verb in ARGUMENT_SETTERS:
             ARGUMENT_SETTERS[verb](self, arguments)
         reply = self.request(f'acu/{verb}')
         if not reply.granted:
             for name, value in before.items():
-                asked[name] = value
+                guidance[name] = value
             if self.predictor is not predictor:
                 self._predict_by(predictor)
-                self.lay_tables()
+                self.update_tables()
         return reply
 
     def take_elements(self, line_1, line_2):
-        """Predict by other elements, in whose lines _ stands for a blank. Raises ValueError."""
+        """Predict from other elements, in whose lines _ stands for a blank. Raise ValueError."""
         self._predict_by(self.predictor.with_elements(line_1.replace('_', ' '), line_2.replace('_', ' ')))
-        self.lay_tables()
+        self.update_tables()
 
     def admit(self, command):
-        """Raise ValueError where somebody else is in control."""
+        """Raise ValueError for a command of a client that does not hold control."""
         self.authority.admit(command)
 
     def request(self, name):
-        """The Reply to a mode, acknowledge or reset_faults; a refusal names the reason."""
+        """Return the Reply to a mode, acknowledge or reset_faults; a refusal states the reason."""
         mode = name.removeprefix('acu/')
         m, outputs = self.parts, self.parts['outputs']
         if mode == 'reset_faults':
@@ -318,8 +325,8 @@ class Acu(Unit):
         if mode == 'acknowledge':
             return self.desk.acknowledge()
         if self.silent and mode != 'standby':
-            return Reply(False,
-                         f'refused: no {JOINT_STATES_TOPIC}, the drive is silent; mode is {modes.MODES[outputs["mode"]]}')
+            return Reply(False, f'refused: no {JOINT_STATES_TOPIC}, the drive is silent; '
+                                f'mode is {modes.MODES[outputs["mode"]]}')
         m['inputs']['drive_ready'] = self.inputs[0][DRIVE_STATE_TOPIC] <= signals.DRIVE_READY
         code = modes.MODES.index(mode)
         granted = control_unit.request(m['state'], m['constants'], m['inputs'], outputs, self.memory.tables, code)
@@ -327,68 +334,74 @@ class Acu(Unit):
         return Reply(bool(granted), f'{refusal}mode is {modes.MODES[outputs["mode"]]}')
 
     def _refusal(self, mode, reason):
-        """Why a mode is refused, in words."""
+        """Return the text of the reason why a mode is refused."""
         more = self.predictor.refusal_details(mode, reason, self.now * 1e-9) if mode in (Mode.TLE, Mode.SUN) else ''
         return modes.REASONS[reason] + (f', {more}' if more else '')
 
     @property
-    def drive_told(self):
-        """The drive's state as it said it, or that it is silent."""
+    def drive_status(self):
+        """State of the drive as the drive published it, or 'silent'."""
         return 'silent' if self.silent else self.drive_state
 
     def refusals(self):
-        """{mode: why it would be refused now} of the modes that would be."""
+        """Return {mode: reason} of the modes that would be refused now."""
         m, why = self.parts, np.zeros(len(modes.MODES), int)
         control_unit.refusals(m['state'], m['constants'], m['inputs'], self.memory.tables, why)
         words = {code: modes.REASONS[code] for code in set(why) - {Reason.NONE}}
         if Reason.DRIVE_NOT_READY in words:
-            words[Reason.DRIVE_NOT_READY] += f': {self.drive_told}'
+            words[Reason.DRIVE_NOT_READY] += f': {self.drive_status}'
         return {mode: words[code] for mode, code in zip(modes.MODES, why) if code in words}
 
     def requests_for(self, topic, text):
-        """[the mode's service] for a text on acu/mode, else []."""
+        """Return [service of the mode] for a text on acu/mode, else []."""
         return [f'acu/{text}'] if topic == MODE_TOPIC and text in modes.MODES else []
 
     def diagnose(self):
-        """ERROR for invalid inputs since the last diagnosis, WARN for gated errors, overtravel or coasting."""
-        told = diagnosis.of(self)
+        """Return the Diagnosis and clear the bits of the invalid inputs.
+
+        ERROR: invalid inputs since the last diagnosis. WARN: gated errors, overtravel or coasting.
+        """
+        result = diagnosis.of(self)
         self.parts['invalid'] = 0
-        return told
+        return result
 
     @property
     def calls(self):
-        """The services of CALLS that it calls for now: all while the antenna moves unasked, else none."""
+        """Services of CALLS to call now: all during uncommanded motion, else none."""
         return self.CALLS if self.parts['state']['unasked']['moves'] else ()
 
     @property
     def alarms(self):
-        """The record of all alarms."""
+        """Record of all alarms."""
         return self.desk.alarms
 
     @property
     def faults(self):
-        """Names of the faults that wait for acu/reset_faults."""
+        """Names of the latched faults that wait for acu/reset_faults."""
         bits = control_unit.latched(self.parts['state'])
         return tuple(fault for fault in diagnosis.FAULT_TEXTS if bits >> table.ALARM_INDEX[fault] & 1)
 
     @property
     def urgent(self):
-        """What is told at once when it changes: faults, the mode, silence, the lock, the drive, pins, alignment."""
+        """Values whose change is published at once: faults, mode, silence, lock, drive, pins, alignment."""
         outputs, inputs = self.parts['outputs'], self.parts['inputs']
         return (control_unit.latched(self.parts['state']), outputs['mode'], outputs['reason'] == Reason.SILENCE,
                 outputs['locked'], inputs['drive'], inputs['pins'], inputs['aligning'])
 
     @staticmethod
     def idle(numbers):
-        """Not exercised where the receiver never locked or the mode was never autotrack."""
+        """Return the reason why a recording does not exercise the unit: the receiver never locked, or autotrack never
+        ran; or ''."""
         if not np.isfinite(numbers[ANGLE_ERROR_TOPIC][:, 0]).any():
             return 'the receiver never locked'
         return '' if 'autotrack' in numbers[MODE_TOPIC] else 'the ACU was never in autotrack'
 
 
 def rows(message):
-    """(times after the stamp (n,) [s], angles (n, 2) [rad]) of a JointTrajectory; raises ValueError where an axis or a
-    position is missing."""
+    """Return (times after the stamp (n,) [s], angles (n, 2) [rad]) of a JointTrajectory.
+
+    Raise ValueError where an axis or a position is missing.
+    """
     if not set(topics.AXES) <= set(message.joint_names):
         raise ValueError(f'joint_names {message.joint_names}: must hold {" and ".join(topics.AXES)}')
     columns = [message.joint_names.index(axis) for axis in topics.AXES]

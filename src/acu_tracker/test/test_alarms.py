@@ -206,9 +206,9 @@ def test_a_runaway_is_the_first_and_what_it_leads_to_stands_under_it(moving):
         moving.velocity[0] = -0.3
         moving.angle[0] -= 0.3 * T
         moving.step()
-    assert annunciated(moving) == ['azimuth runaway'] and 'moves unasked' in told(moving)
-    assert (moving.mode, moving.reason) == ('standby', 'moves unasked')
-    assert table.ALARM_NAMES[control_unit.reset(moving.state[0])] == 'moves unasked'
+    assert annunciated(moving) == ['azimuth runaway'] and 'uncommanded motion' in told(moving)
+    assert (moving.mode, moving.reason) == ('standby', 'uncommanded motion')
+    assert table.ALARM_NAMES[control_unit.reset(moving.state[0])] == 'uncommanded motion'
     moving.velocity[:] = 0.0
     moving.run(0.5)
     # its time off is not over
@@ -302,7 +302,7 @@ def test_commands_and_services():
     acu.take_text(DRIVE_STATE_TOPIC, 'fault: azimuth overspeed')
     step(acu, 3)
     assert not acu.command(Command('acknowledge', 'page', '1', {'alarm': 'drive falt'})).granted
-    assert "did you mean 'drive fault'" in acu.answered[-1][1].text
+    assert "did you mean 'drive fault'" in acu.pending_replies[-1][1].text
     assert acu.command(Command('acknowledge', 'page', '2', {'alarm': 'drive_fault'})) == (True, 'acknowledged')
     assert not acu.request('acu/acknowledge').granted
     why = {'alarm': 'drive fault', 'seconds': '60', 'reason': 'in repair'}
@@ -325,7 +325,7 @@ def test_a_schedule_obeys_alarm_verbs():
     schedule = '0.01 shelve alarm=INS_lost seconds=5 reason=tests; 0.02 reset'
     acu = Acu(build(AcuParameters, {'commands': schedule}), (JOINT_STATES_TOPIC,))
     step(acu, 6)
-    assert names(acu) == {'INS lost'} and [reply.granted for _, reply in acu.answered] == [True, True]
+    assert names(acu) == {'INS lost'} and [reply.granted for _, reply in acu.pending_replies] == [True, True]
 
 
 def test_the_silence_of_the_drive_is_told_without_a_step():

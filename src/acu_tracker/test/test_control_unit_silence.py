@@ -1,4 +1,4 @@
-"""The whole unit after a silence: of the drive, of the link, or because it was itself held up; and motion unasked."""
+"""The whole unit after a silence of the drive, of the link or of the unit itself; and uncommanded motion."""
 import numpy as np
 import pytest
 
@@ -101,14 +101,14 @@ def test_motion_in_standby_is_told_within_20_ms_and_stays_so(Rig, axis, rate):
         rig.step(velocity=velocity)
     assert rig.state['unasked']['moves'][0]
     rig.run(0.1)
-    assert not rig.ask(Mode.PROGRAM) and rig.reason == 'moves unasked'
+    assert not rig.ask(Mode.PROGRAM) and rig.reason == 'uncommanded motion'
 
 
 def test_motion_against_the_commands_ends_the_mode(Rig):
     rig = far_away(Rig, 'preset')
     for _ in range(4):
         rig.step(velocity=(-0.3, 0.3))
-    assert (rig.mode, rig.reason) == ('standby', 'moves unasked')
+    assert (rig.mode, rig.reason) == ('standby', 'uncommanded motion')
     rig.state['unasked']['moves'] = 0
     rig.run(0.1)
     assert rig.mode == 'standby'

@@ -123,7 +123,7 @@ def test_named_points():
 
 def test_an_offset_shifts_the_program_as_it_runs(axes):
     axes.unit.segments.append([-50.0, 100.0], [[0.05, 0.35], [0.8, 1.1]], 0.0, False)
-    axes.unit.lay_tables()
+    axes.unit.update_tables()
     assert axes.ask('program').granted
     axes.run(2.0)
     assert axes.angle == pytest.approx(np.array([0.3, 0.6]) + 0.005 * axes.k * T, abs=1e-4)

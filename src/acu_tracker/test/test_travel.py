@@ -94,7 +94,7 @@ def test_the_elevation_rises_over_a_hill_before_the_azimuth_goes_there(Rig, cont
 def test_a_jog_does_not_go_into_the_hill(Rig):
     rig = Rig(initial_mode='stop', at=(0.0, 0.05), floor=HILL)
     rig.run(0.1)
-    rig.state['guidance']['manual']['asked'], rig.state['guidance']['manual']['until'] = (1.5, -1.0), math.inf
+    rig.state['guidance']['manual']['requested'], rig.state['guidance']['manual']['until'] = (1.5, -1.0), math.inf
     assert rig.ask(Mode.RATE)
     assert heights(rig, 400).min() > -1e-3
     assert rig.angle[0] > 1.3

@@ -1,17 +1,17 @@
-"""The antenna drive unit: two axes, each with two motors that take the lash out of one bull gear.
+"""Antenna drive unit (ADU): two axes, each with two motors that remove the lash of one bull gear.
 
-    drive_unit    two axes, one control period T: commands in, encoders out (the column's `step`)
+    drive_unit    two axes over one control period T: commands in, encoders out (function `step`)
     drive_state   enable, brakes and faults: the state machine of both axes
-    stow_pins     the pins that hold the stowed axes: when they move, when one has failed
-    axis          one axis: sensors, speed loop, two current loops, plant, what it trips on
-    unit          the unit of the drive: its messages in, its law, its messages out
-    timekeeper_node   the node that owns the drive's time
-    speed_loop, disturbance_observer, bias, current_loop, pi, travel, encoder, faults    the controller's laws
-    motor, thermal, brake, gear_train, friction, structure, wind                         the plant's laws
-    wind_field        one wind over both axes, as they stand to it
-    gimbal            bodies that turn about two axes on a moving deck
-    mount             from the angles of the axes to where the beam points
-    electronic_beam, beam_unit    in the drive's place: the beam of a phased array, delay and hold; its unit
+    stow_pins     pins that hold the stowed axes: their motion and their failure
+    axis          one axis: sensors, speed loop, two current loops, plant, trip conditions
+    unit          unit of the drive: input messages, law, output messages
+    timekeeper_node   node that owns the time of the drive
+    speed_loop, disturbance_observer, bias, current_loop, pi, travel, encoder, faults    laws of the controller
+    motor, thermal, brake, gear_train, friction, structure, wind                         laws of the plant
+    wind_field        one wind over both axes, which depends on their angles
+    gimbal            rigid bodies that turn about two axes on a moving deck
+    mount             direction of the beam from the angles of the axes
+    electronic_beam, beam_unit    beam of a phased array instead of a drive, with delay and hold; its unit
 
 Angles, rates and torques of the load are deck angles: azimuth clockwise from the bow seen from above
 (it turns opposite to a REP 103 yaw), elevation up from the deck. Motor quantities are on the motor shaft.
@@ -25,15 +25,15 @@ Symbols
     i_d, i_q          phase currents in rotor coordinates, amplitude invariant [A]
     v_d, v_q          phase voltages in rotor coordinates [V]
     R, L, psi, p      phase resistance [ohm], inductance [H], flux linkage [Wb], pole pairs
-    K_t               torque constant 1.5 p psi [Nm/A]; psi_hat, K_t_hat: as the controller believes
+    K_t               torque constant 1.5 p psi [Nm/A]; psi_hat, K_t_hat: values in the controller
     K_p, K_i, K_d     gains of a PI controller; of the damping between the motors
-    w_o, d            bandwidth of the disturbance observer [rad/s]; torque it sees on a motor shaft [Nm];
+    w_o, d            bandwidth of the disturbance observer [rad/s]; estimated torque on a motor shaft [Nm];
                       omega_hat, d_hat its estimates, l_1, l_2 its gains
     J_dish            share of J that swings on k_dish [Nm/rad], c_dish [Nms/rad]
     k, c, delta       mesh stiffness [Nm/rad], damping [Nms/rad], deflection [rad], all on the load axis
     z                 LuGre bristle deflection [rad]; sigma_0, sigma_1 its stiffness and damping
     T_c, T_s, v_s     Coulomb and breakaway friction [Nm], Stribeck rate [rad/s]
-    x, tau            thermal load of a motor (1: T_rated for ever), time constant of its winding [s]
+    x, tau            thermal load of a motor (1: steady state at T_rated), time constant of its winding [s]
     alpha, dT         temperature coefficient of copper [1/K], rise of the winding at x = 1 [K]
     A, E              angles of the azimuth and the elevation axis [rad]
     v, V              turbulence along the mean wind, and the mean wind [m/s]

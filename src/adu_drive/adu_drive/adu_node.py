@@ -1,4 +1,4 @@
-"""ROS node of the antenna drive unit: owns the drive's time, publishes the encoders, obeys rate commands."""
+"""ROS node of the antenna drive unit: owns the time, publishes the encoders, executes rate commands."""
 import pedestal_common.entry  # noqa: F401
 
 # isort: split
@@ -11,7 +11,7 @@ from pedestal_common.node.unit import LEVEL_WARN
 
 
 class AduNode(Timekeeper):
-    """A drive that remembers where its plant was left."""
+    """A drive with a state file, which keeps the state of the plant over a restart."""
 
     def __init__(self):
         self.unsaved = ''
@@ -19,46 +19,49 @@ class AduNode(Timekeeper):
         super().__init__('adu_drive.adu_node')
 
     def prepare(self, unit):
-        """Compile the laws; then go on where the state file, if there is one, left the plant."""
+        """Compile the laws, then resume the plant state in the state file."""
         super().prepare(unit)
-        left = state_file.read(self.parameters.state_file) if self.parameters.state_file else None
-        if left is not None:
-            unit.resume(left)
-            self.get_logger().info(f'goes on at azimuth {left.azimuth:.6f}, elevation {left.elevation:.6f} rad, where '
-                                   f'{self.parameters.state_file} left it')
+        saved = state_file.read(self.parameters.state_file) if self.parameters.state_file else None
+        if saved is not None:
+            unit.resume(saved)
+            self.get_logger().info(f'resumes at azimuth {saved.azimuth:.6f}, elevation {saved.elevation:.6f} rad of '
+                                   f'{self.parameters.state_file}')
 
     def begin(self):
-        """Begin to make the steps, and to note once a second where the plant is."""
+        """Begin the steps, and save the plant state once per second."""
         super().begin()
         if self.parameters.state_file:
             self.every(1.0, self.save)
 
     def save(self):
-        """Note where the plant is. A run that ends disables the drive, which is nothing to go on with."""
-        left = self.unit.left()
+        """Save the plant state.
+
+        Because the end of a run disables the drive, `enabled` keeps its last value from before the end.
+        """
+        state = self.unit.plant_state()
         if self.stopping:
-            left = left._replace(enabled=self.saved.enabled if self.saved else False)
-        self.saved = left
+            state = state._replace(enabled=self.saved.enabled if self.saved else False)
+        self.saved = state
         try:
-            state_file.write(self.parameters.state_file, left)
+            state_file.write(self.parameters.state_file, state)
             self.unsaved = ''
         except OSError as error:
             self.unsaved = f'{self.parameters.state_file}: {error.strerror}'
 
     def draining(self):
-        """Note where the plant is as soon as the end comes: there may be no time for it in `close`."""
+        """Save the plant state as soon as the run ends, because `close` may come too late."""
         if self.parameters.state_file and not self.stopping:
             self.save()
         return super().draining()
 
     def close(self):
-        """Note where the plant is, then end."""
+        """Save the plant state and end."""
         if self.parameters.state_file:
             self.save()
         super().close()
 
     def diagnosed(self):
-        """The Diagnosis of the drive, a WARN where its state could not be written."""
+        """Return the Diagnosis of the drive, with level WARN if the state file could not be written."""
         diagnosis = super().diagnosed()
         if self.unsaved and diagnosis.level < LEVEL_WARN:
             return diagnosis._replace(level=LEVEL_WARN, message=self.unsaved)
@@ -66,7 +69,7 @@ class AduNode(Timekeeper):
 
 
 def main(args=None):
-    """Run the node to its end; the exit code."""
+    """Run the node to its end. Return the exit code."""
     return shell.main(AduNode, args)
 
 

@@ -1,7 +1,7 @@
 """One axis: encoders, speed loop, two current loops, two motors, gear train and load.
 
-`speed_control`, `current_control` and `plant_step` are called at their own periods by drive_unit.step; they work on
-the records `s` (state) and `c` (constants) of the axis, built here as nested dictionaries.
+drive_unit.step calls `speed_control`, `current_control` and `plant_step` at their own periods. They work on the
+records `s` (state) and `c` (constants) of the axis, which this module builds as nested dictionaries.
 """
 import math
 
@@ -13,53 +13,53 @@ from adu_drive.plant import brake, friction, gear_train, motor, structure, therm
 from pedestal_common.compiled import compiled, inlined
 
 CURRENT_LOOP_STEP_COUNT = 5
-"""Current-loop periods in one speed-loop period."""
+"""Number of current-loop periods in a speed-loop period."""
 
 BRAKE_CONDITIONS = BRAKE_WORKING, BRAKE_STUCK_ON, BRAKE_STUCK_OFF = range(3)
-"""What a brake does: what it is told, or whatever that is."""
+"""Conditions of a brake: it follows its command, or ignores it."""
 
 CURRENT_LOOP_PERIOD_S = SPEED_LOOP_PERIOD_S / CURRENT_LOOP_STEP_COUNT
+"""Period of the current loops [s]."""
 
 SECOND_PINION_OFFSET_RAD = 0.5 * math.pi
-"""By which the second pinion is mounted further than the first: their runouts do not add."""
+"""Angle by which the second pinion is mounted ahead of the first, so that their runouts do not add [rad]."""
 
 
 def _motor_constants(m, loop, heat, per_rad, h):
-    """psi, K_t, R are the motor's own; psi_hat, K_t_hat what the controller believes."""
+    """Return the constants of a motor; psi, K_t, R are true values, psi_hat, K_t_hat values in the controller."""
     w = 2.0 * math.pi * loop.bandwidth
     R, psi = m.resistance * (1.0 + m.drift.resistance), m.flux_linkage * (1.0 + m.drift.flux_linkage)
     return {'p': float(m.pole_pairs), 'psi': psi, 'L': m.inductance, 'K_t': 1.5 * m.pole_pairs * psi,
-            'h_L': h / m.inductance, 'h_R_L': h * R / m.inductance, 'rise': thermal.COPPER_COEFFICIENT_PER_K
-            * heat.rise,
-            'per_rated': 1.0 / heat.rated_torque, 'heat_gain': 1.0 - math.exp(-SPEED_LOOP_PERIOD_S
-                                                                              / heat.time_constant),
+            'h_L': h / m.inductance, 'h_R_L': h * R / m.inductance,
+            'rise': thermal.COPPER_COEFFICIENT_PER_K * heat.rise, 'per_rated': 1.0 / heat.rated_torque,
+            'heat_gain': 1.0 - math.exp(-SPEED_LOOP_PERIOD_S / heat.time_constant),
             'h_brake_J': h * m.brake / m.inertia, 'T_c': m.friction, 'per_v': 1.0 / m.friction_speed,
             'h_J': h / m.inertia, 'q_B': 1.0 / (1.0 + h * m.viscous / m.inertia),
             'T_cog': m.cogging, 'cogs': float(m.cogging_per_turn),
             'psi_hat': m.flux_linkage, 'K_t_hat': m.torque_constant, 'per_K_t_hat': 1.0 / m.torque_constant,
             'gain': 1.0 + m.drift.current_gain, 'offset': m.drift.current_offset,
             'K_p': w * m.inductance, 'K_iT': w * m.resistance * CURRENT_LOOP_PERIOD_S, 'v_max': m.voltage,
-            'limit': m.torque_limit, 'per_rad': per_rad, 'rad': 1.0 / per_rad, 'speed': 1.0 / per_rad
-            / SPEED_LOOP_PERIOD_S}
+            'limit': m.torque_limit, 'per_rad': per_rad, 'rad': 1.0 / per_rad,
+            'speed': 1.0 / per_rad / SPEED_LOOP_PERIOD_S}
 
 
 def _dish(p):
-    """Inertia, stiffness and damping of the flexible part of the load."""
+    """Return inertia, stiffness and damping of the flexible part of the load."""
     J_dish = p.structure.inertia_share * p.load.inertia
     return J_dish, *structure.spring_and_damper(J_dish, p.structure.frequency, p.structure.damping)
 
 
 def _uneven(p):
-    """Constants of what changes with the angle of motors and pinions."""
+    """Return the constants of effects that vary with the angles of motors and pinions."""
     g = p.gear_train
     return {'uneven': int(g.runout + g.tooth_error + p.motor_1.cogging + p.motor_2.cogging > 0.0), 'runout': g.runout,
             'tooth_error': g.tooth_error, 'teeth': float(g.pinion_teeth), 'per_reducer': 1.0 / g.reducer_ratio}
 
 
 def constants(p, h, varying=False):
-    """Hoisted constants of one axis (AxisParameters) for a plant sub-step h [s]: nested dictionary.
+    """Return the hoisted constants of an axis (AxisParameters) for a plant sub-step h [s]: nested dictionary.
 
-    varying: change_inertia tells its inertia, the first time before the first plant_step.
+    varying: True if change_inertia sets the inertia, first before the first plant_step.
     """
     per_rad = 2.0 ** p.encoder.load_bits / (2.0 * math.pi)
     motor_per_rad = 2.0 ** p.encoder.motor_bits / (2.0 * math.pi)
@@ -102,8 +102,10 @@ def constants(p, h, varying=False):
 
 
 def _motor_at_rest(m, g, T, total, theta, per_rad):
-    """A motor asked for T [Nm] at standstill, `total` of it by the integral of its speed loop, its pinion pressed on
-    the flank, load at theta."""
+    """Return the state of a motor that makes T [Nm] at standstill with its pinion on the flank, load at theta [rad].
+
+    total: part of T from the integral of the speed loop.
+    """
     i_ref = T / m.torque_constant
     i_q = (i_ref - m.drift.current_offset) / (1.0 + m.drift.current_gain)
     v_q = m.resistance * (1.0 + m.drift.resistance) * i_q
@@ -116,14 +118,19 @@ def _motor_at_rest(m, g, T, total, theta, per_rad):
 
 
 def initial_state(p, theta, external):
-    """State of one axis at rest at theta [rad], in balance with an external torque [Nm]: nested dictionary.
+    """Return the state of an axis at rest at theta [rad], in balance with an external torque [Nm]: nested dictionary.
 
-    reading: counts of the load encoder at t_k; external: torque [Nm] on the load, constant over a control period;
-    asked_rate, asked_torque: command obeyed in a speed-loop period [rad/s, Nm]. What is broken: motor_lost: 1 of a
-    motor whose amplifier is off, and says so; jump: counts that the load encoder reads too many, stuck: 1 when it
-    stays at its reading; brake_stuck: of BRAKE_CONDITIONS; toothless: 1 where a pinion has lost one of its `teeth`,
-    of which a
-    whole one has 0 here; gust: torque [Nm] on the load beside the wind.
+    reading        counts of the load encoder at t_k
+    external       torque on the load [Nm], constant over a control period
+    commanded_rate, commanded_torque    command that is executed in a speed-loop period [rad/s, Nm]
+
+    Fields of injected faults:
+
+    motor_lost     1 for a motor whose amplifier is off and reports it
+    jump, stuck    error of the load encoder [counts]; 1 if its reading is stuck
+    brake_stuck    one of BRAKE_CONDITIONS
+    toothless      1 if a pinion has lost a tooth; `teeth` is then its number of teeth, else 0
+    gust           torque on the load in addition to the wind [Nm]
     """
     per_rad = 2.0 ** p.encoder.motor_bits / (2.0 * math.pi)
     _, k_dish, _ = _dish(p)
@@ -135,7 +142,7 @@ def initial_state(p, theta, external):
             'motor_2': _motor_at_rest(p.motor_2, p.gear_train, T - T_b, total, theta, per_rad),
             'theta': theta, 'omega': 0.0, 'z': 0.0, 'h_J': 0.0, 'q_B': 0.0, 'h_J_dish': 0.0,
             'dish': theta + external / k_dish if k_dish else theta, 'omega_dish': 0.0, 'external': external,
-            'deck': 0.0, 'asked_rate': 0.0, 'asked_torque': 0.0,
+            'deck': 0.0, 'commanded_rate': 0.0, 'commanded_torque': 0.0,
             'bias': T_b, 'rate': 0.0, 'omega_hat': 0.0, 'd_hat': -T if observed else 0.0,
             'torque_limited': 0, 'voltage_limited': 0, 'end_stop': 0, 'stopping': 0,
             'faults': 0, 'present': 0, 'late': 0, 'slewing': 0, 'braked': 0, 'reading': 0.0,
@@ -145,13 +152,13 @@ def initial_state(p, theta, external):
 
 @inlined
 def _load_counts(s, c):
-    """What the load encoder reads [counts]."""
+    """Return the reading of the load encoder [counts]."""
     return s.reading if s.stuck else encoder.counts(encoder.reading(s.theta, c.encoder), c.per_rad) + s.jump
 
 
 @inlined
 def _measured_speed(m, k):
-    """Motor speed [rad/s]: encoder difference over the last speed-loop period (0.25 ms old on average)."""
+    """Return the motor speed [rad/s]: encoder difference over a speed-loop period (0.25 ms old on average)."""
     return (encoder.counts(m.theta, k.per_rad) - m.count) * k.speed
 
 
@@ -164,19 +171,19 @@ def _read_motor_sensors(m, k):
 
 @inlined
 def _measured_torque(m, k):
-    """Torque [Nm] as the current sensor and the believed torque constant have it."""
+    """Return the torque [Nm] from the current sensor and the torque constant in the controller."""
     return k.K_t_hat * (k.gain * m.i_q + k.offset)
 
 
 @inlined
 def _realised_torque(m, k):
-    """Torque [Nm] the motor made of what was asked: the current's own once the voltage circle has cut it."""
+    """Return the torque [Nm] that the motor made: its reference, or by its current if the voltage was limited."""
     return _measured_torque(m, k) if m.limited else m.torque_ref
 
 
 @inlined
 def _mean_motor_speed(s, omega_1, omega_2):
-    """Mean speed [rad/s] of the motors that work."""
+    """Return the mean speed [rad/s] of the working motors."""
     if s.faults & faults.Bit.MOTOR_1_LOST:
         return omega_2
     if s.faults & faults.Bit.MOTOR_2_LOST:
@@ -186,8 +193,10 @@ def _mean_motor_speed(s, omega_1, omega_2):
 
 @inlined
 def _torque_control(s, c, omega, feed_forward):
-    """Torque references of both motors from the rate s.rate, the mean speed and a torque [Nm] added to each; whether
-    one is at its limit. A motor that is alone makes the torque of both, as far as it can."""
+    """Set the torque references of both motors from s.rate, the mean speed and a torque [Nm] added to each.
+
+    Return True if a motor is at its limit. A single working motor makes the torque of both, up to its limit.
+    """
     m1, m2, k1, k2 = s.motor_1, s.motor_2, c.motor_1, c.motor_2
     alone = s.faults & faults.MOTORS_LOST_BITS
     omega_1, omega_2 = (m1.measured, m2.measured) if c.independent and not alone else (omega, omega)
@@ -215,14 +224,14 @@ def _torque_control(s, c, omega, feed_forward):
 
 @inlined
 def _squared_current(m, k):
-    """Square of the measured current [A2]."""
+    """Return the square of the measured current [A2]."""
     i_d, i_q = k.gain * m.i_d, k.gain * m.i_q + k.offset
     return i_d * i_d + i_q * i_q
 
 
 @inlined
 def _supervise(s, c, omega, free):
-    """Trip on what the drive measures; `free`: the motors may turn, so they must follow."""
+    """Set the faults that the drive measures. free: True if the motors may turn, and so must follow."""
     m1, m2, k = s.motor_1, s.motor_2, c.faults
     s.late = faults.late(s.late, c.N * s.rate - omega, k.error) if free else 0
     s.present |= faults.measured_faults(
@@ -236,7 +245,7 @@ def _supervise(s, c, omega, free):
 
 @inlined
 def _remove_torque(s, omega, free):
-    """No torque. Once the brakes hold, what the motors held before is kept: they need it when the brakes open."""
+    """Remove the torque. Once the brakes hold, keep the integrals, which the motors need when the brakes open."""
     s.motor_1.torque_ref = s.motor_2.torque_ref = s.motor_1.i_ref = s.motor_2.i_ref = 0.0
     s.motor_1.inhibited = s.motor_2.inhibited = s.stopping = s.slewing = 1
     s.rate, s.bias, s.omega_hat = 0.0, 0.0, omega
@@ -246,9 +255,9 @@ def _remove_torque(s, omega, free):
 
 @inlined
 def speed_control(s, c, rate, torque, enable, powered, free):
-    """One speed-loop period: load rate [rad/s] and feed-forward load torque [Nm] to the current references.
+    """Run one speed-loop period: load rate [rad/s] and feed-forward load torque [Nm] to the current references.
 
-    enable: follow, else stop and hold; powered: the motors may make torque; free: no brake holds them.
+    enable: follow, else stop and hold; powered: the motors may make torque; free: no brake holds the motors.
     """
     m1, m2, k1, k2 = s.motor_1, s.motor_2, c.motor_1, c.motor_2
     _read_motor_sensors(m1, k1)
@@ -266,7 +275,7 @@ def speed_control(s, c, rate, torque, enable, powered, free):
     feed_forward = 0.0
     if enable:
         wanted = min(max(rate, -c.rate_max), c.rate_max)
-        if s.slewing:       # whoever commands did not stop with the drive: meet the command within the ramp
+        if s.slewing:       # The commands continued while the drive stopped: reach the command within the ramp.
             slewed = s.rate + min(max(wanted - s.rate, -c.ramp), c.ramp)
             s.slewing = slewed != wanted
             wanted = slewed
@@ -294,8 +303,7 @@ def speed_control(s, c, rate, torque, enable, powered, free):
 
 @compiled
 def begin_period(s, c, grip):
-    """Once per control period: brakes, winding temperature, an inertia that does not vary, and the marks of what
-    happens within it."""
+    """Begin a control period: brakes, winding temperatures, constant inertia, and cleared flags."""
     m1, m2, k1, k2 = s.motor_1, s.motor_2, c.motor_1, c.motor_2
     if not c.varying:
         s.h_J, s.q_B, s.h_J_dish = c.h_J, c.q_B, c.h_J_dish
@@ -307,10 +315,10 @@ def begin_period(s, c, grip):
 
 @inlined
 def current_control(m, k):
-    """One current-loop period of one motor: current reference to phase voltages.
+    """Run one current-loop period of one motor: current reference to phase voltages.
 
-    Without torque the inverter is off, whatever a current sensor says: no current, the open terminals show the
-    back-EMF. The diodes that empty the inductance within a millisecond are not modelled.
+    Without torque the inverter is off, whatever a current sensor measures: there is no current, and the open terminals
+    show the back-EMF. The diodes that empty the inductance within a millisecond are not modelled.
     """
     v_d, v_q, sum_d, sum_q, limited = current_loop.voltages(
         k.gain * m.i_d, k.gain * m.i_q + k.offset, m.i_ref, k.p * m.measured, m.sum_d, m.sum_q, k.K_p, k.K_iT, k.L,
@@ -325,7 +333,7 @@ def current_control(m, k):
 
 @compiled
 def change_inertia(s, c, J):
-    """A varying load has the inertia J [kg m2] from now on; the part that swings on it keeps its share and spring."""
+    """Set the inertia J [kg m2] of a varying load; the flexible part keeps its share and its spring."""
     J_base = c.base_share * J
     s.h_J, s.q_B = c.h / J_base, 1.0 / (1.0 + c.h * c.B / J_base)
     if c.flexible:
@@ -334,9 +342,9 @@ def change_inertia(s, c, J):
 
 @inlined
 def plant_step(s, c, external):
-    """One plant sub-step h under an external load torque [Nm], which holds s.deck from the deck's acceleration.
+    """Advance the plant by a sub-step h under an external load torque [Nm], which includes s.deck.
 
-    Semi-implicit Euler, new currents into the speeds, new speeds into the angles; implicit in R, viscous friction and
+    Semi-implicit Euler: new currents give the speeds, new speeds the angles. Implicit in R, viscous friction and
     bristle.
     """
     m1, m2, k1, k2 = s.motor_1, s.motor_2, c.motor_1, c.motor_2
@@ -379,7 +387,7 @@ def plant_step(s, c, external):
 
 @compiled
 def read(s, c, y):
-    """Outputs of the axis now: what its sensors and controllers know, and the true load beside it."""
+    """Write the present outputs of the axis: values of its sensors and controllers, and the true load."""
     m1, m2, k1, k2 = s.motor_1, s.motor_2, c.motor_1, c.motor_2
     s.reading = _load_counts(s, c)
     y.position = c.rad * s.reading

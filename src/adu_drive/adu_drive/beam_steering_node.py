@@ -1,4 +1,4 @@
-"""ROS node of an electronically steered array: owns the time, publishes the beams in force, obeys references."""
+"""ROS node of an electronically steered array: owns the time, publishes the active beams, executes references."""
 import pedestal_common.entry  # noqa: F401
 
 # isort: split
@@ -10,13 +10,13 @@ from pedestal_common.node.unit import Diagnosis
 
 
 class BeamSteeringNode(Timekeeper):
-    """Runs a unit for each beam, and diagnoses them together."""
+    """Node with a unit for each beam and common diagnostics."""
 
     def __init__(self):
         super().__init__('adu_drive.beam_steering_node')
 
     def diagnosed(self):
-        """The angles of every beam, the state that they share, and the beam that is worst."""
+        """Return the Diagnosis of all beams: their angles, the common state, level and message of the worst beam."""
         of_beams = [(port, port.unit.diagnose()) for port in self.ports]
         port, worst = max(of_beams, key=lambda pair: pair[1].level)
         values = [(port.prefix + key, text) for port, diagnosis in of_beams for key, text in diagnosis.values
@@ -27,7 +27,7 @@ class BeamSteeringNode(Timekeeper):
 
 
 def main(args=None):
-    """Run the node to its end; the exit code."""
+    """Run the node to its end. Return the exit code."""
     return shell.main(BeamSteeringNode, args)
 
 

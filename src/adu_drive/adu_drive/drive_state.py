@@ -1,11 +1,11 @@
-"""Enable, brakes and faults of the drive: one state machine for both axes, advanced once per control period.
+"""Enable, brakes and faults of the drive: one state machine for both axes, which advances once per control period.
 
     enabled -> stopping -> engaging brakes -> disabled -> releasing brakes -> enabled
 
-The drive wants to be enabled while it is asked to be, no fault and no emergency stop is latched and the stow pins are
-out. It stops under control, lets the brakes grip while the motors still hold, and only then takes their torque away;
-then stow pins may move. Overcurrent, and a stop that takes too long, take the torque away at once and let the brakes
-fall in.
+The drive may be enabled after a request, without a latched fault or emergency stop, and with the stow pins out. To
+disable, it stops under control, applies the brakes while the motors still hold, and then removes the torque. After
+that the stow pins may move. Overcurrent, and a stop that takes too long, remove the torque and apply the brakes at
+once.
 """
 import math
 
@@ -21,47 +21,45 @@ REQUEST_ENABLE, REQUEST_DISABLE, REQUEST_EMERGENCY_STOP, REQUEST_RESET_FAULTS = 
 REQUEST_CODES = {'adu/enable': REQUEST_ENABLE, 'adu/disable': REQUEST_DISABLE,
                  'adu/emergency_stop': REQUEST_EMERGENCY_STOP,
                  'adu/reset_faults': REQUEST_RESET_FAULTS}
-"""What can be asked for, by the name of its service."""
+"""Requests to the drive, {name of the service: code}."""
 
 REPLY_ACCEPTED, REPLY_FAULT_LATCHED, REPLY_EMERGENCY_LATCHED, REPLY_AXES_MOVING, REPLY_CAUSE_PERSISTS = range(5)
 REFUSAL_REASONS = {
     REPLY_FAULT_LATCHED: 'a fault is latched (adu/reset_faults)',
     REPLY_EMERGENCY_LATCHED: 'an emergency stop is latched (adu/reset_faults)',
     REPLY_AXES_MOVING: 'the axes still move',
-    REPLY_CAUSE_PERSISTS: 'the cause is still there'}
-"""Answers to a request, and why it is not granted."""
+    REPLY_CAUSE_PERSISTS: 'the cause is still present'}
+"""Refusals of a request, {code: reason}."""
 
 STATE_TEXTS = topics.TOPIC_BY_NAME['adu/state'].texts
 STATE_CODE_EMERGENCY_STOP = STATE_TEXTS.index('emergency stop')
 PHASE_CODE_OFFSET = STATE_TEXTS.index(PHASES[PHASE_STOPPING]) - PHASE_STOPPING
-"""Codes of adu/state below len(STATE_TEXTS) are places in it: which motors are lost while it is enabled, then the
-phases."""
+"""Offset from a phase to its code of adu/state. A code below len(STATE_TEXTS) is an index of STATE_TEXTS."""
 
 FAULT_BIT, EMERGENCY_STOP_BIT = 16, 32
 AZIMUTH_FAULTS_SHIFT = 6
 ELEVATION_FAULTS_SHIFT = AZIMUTH_FAULTS_SHIFT + len(faults.AXIS_FAULTS)
-"""Bits of the other codes: that there are faults, emergency stop, fault words."""
+"""Bits of the other codes of adu/state: faults present, emergency stop, fault words of both axes."""
 
 STANDSTILL_RATE_RAD_S = 1e-3
-"""Load rate [rad/s] below which an axis stands."""
+"""Load rate below which an axis counts as standing [rad/s]."""
 
 
 @compiled
 def tripped(s):
-    """Whether an axis has a fault that stops the drive."""
+    """Return True if an axis has a fault that stops the drive."""
     return faults.stops(s.azimuth.faults) or faults.stops(s.elevation.faults)
 
 
 @compiled
 def permitted(s):
-    """Whether the drive may follow commands."""
+    """Return True if the drive may follow commands."""
     return s.wanted and not s.emergency and not tripped(s) and stow_pins.pins_out(s.pins)
 
 
 @compiled
 def condition(s):
-    """Code of adu/state, 0 for 'enabled': all that `described` tells, in one number, so that it changes when something
-    of it does."""
+    """Return the code of adu/state, 0 for 'enabled'. It changes with every change of `state_text`."""
     if tripped(s):
         return (FAULT_BIT | (EMERGENCY_STOP_BIT if s.emergency else 0)
                 | s.azimuth.faults << AZIMUTH_FAULTS_SHIFT | s.elevation.faults << ELEVATION_FAULTS_SHIFT)
@@ -76,7 +74,7 @@ def condition(s):
 
 
 def state_text(condition):
-    """'enabled' when the drive follows commands, with what it lacks; otherwise why it does not."""
+    """Return the text of a code: 'enabled', with any lost motor, or why the drive does not follow commands."""
     if condition < len(STATE_TEXTS):
         return STATE_TEXTS[condition]
     tripped = [f'{axis} {kind}' for axis, shift in (('azimuth', AZIMUTH_FAULTS_SHIFT),
@@ -87,7 +85,7 @@ def state_text(condition):
 
 @compiled
 def is_moving(axis, c):
-    """Whether an axis turns, by its motor encoders."""
+    """Return True if an axis turns, according to its motor encoders."""
     return abs(axis.motor_1.measured + axis.motor_2.measured) * c.per_2N > STANDSTILL_RATE_RAD_S
 
 
@@ -115,7 +113,7 @@ def _next(s, c):
 
 @compiled
 def _advance_pins(s, c, wanted):
-    """One control period of the stow pins, which move while the drive is off; wanted: code of acu/stow_pins."""
+    """Advance the stow pins, which move while the drive is off, by a period. wanted: code of acu/stow_pins."""
     az, el, k = s.azimuth, s.elevation, c.pins
     stow_pins.command_pins(s.pins, k, wanted, math.nan if is_moving(az, c.azimuth) else c.azimuth.rad * az.reading,
                            math.nan if is_moving(el, c.elevation) else c.elevation.rad * el.reading)
@@ -126,7 +124,7 @@ def _advance_pins(s, c, wanted):
 
 @compiled
 def advance(s, c, pins):
-    """One control period: the phase, and whether the brakes grip in it; pins: code of acu/stow_pins."""
+    """Advance the phase by a control period. Return True if the brakes grip. pins: code of acu/stow_pins."""
     if c.pins.fitted:
         _advance_pins(s, c, pins)
     phase = _next(s, c)
@@ -140,10 +138,10 @@ def advance(s, c, pins):
 
 @compiled
 def request(s, c, what):
-    """Ask something of the drive between two periods: REPLY_ACCEPTED, or why not. It acts in the next period.
+    """Execute a request between two periods. Return REPLY_ACCEPTED or the code of a refusal.
 
-    Faults and emergency stop can be reset when both axes stand and no cause is present; the drive is then enabled
-    again by itself if it was before.
+    The request takes effect in the next period. Faults and emergency stop can be reset while both axes stand and no
+    cause is present. A reset enables the drive again if it was enabled before.
     """
     if what == REQUEST_DISABLE:
         s.wanted = 0

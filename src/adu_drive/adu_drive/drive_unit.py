@@ -1,6 +1,6 @@
-"""The antenna drive unit: two axes over one control period T, from commands at t_k to encoders at t_k+1.
+"""Antenna drive unit: two axes over one control period T, from commands at t_k to encoders at t_k+1.
 
-Sub-steps inside: speed loop 0.5 ms, current loops 100 us, plant 50 us, all in one compiled call.
+The sub-steps run in one compiled call: speed loop 0.5 ms, current loops 100 us, plant 50 us.
 """
 import math
 
@@ -13,24 +13,29 @@ from adu_drive.plant import gimbal, mount, wind, wind_field
 from pedestal_common.compiled import compiled, inlined
 
 COMMAND_RING_SIZE = 256
-"""Commands kept for the transport delay: more than twice MAX_DELAY over the shortest period, once of its own and once
-injected."""
+"""Number of commands in the ring of the transport delay.
+
+It is more than 2 MAX_TRANSPORT_DELAY_S / shortest period: a configured delay and an injected delay.
+"""
 
 INITIAL_AGE_PERIODS = 1 << 40
-"""Periods since the brakes were last moved, at the start."""
+"""Initial number of periods since the last motion of the brakes."""
 
 MAX_PLAUSIBLE_INPUT = 1e6
-"""Inputs beyond this (rad/s, Nm, rad/s2), infinite or NaN are not believed."""
+"""Largest valid input (rad/s, Nm, rad/s2); an input beyond it, infinite or NaN is invalid."""
 
 _AXIS_INPUTS_DTYPE = np.dtype([('rate', 'f8'), ('torque', 'f8')], align=True)
 
 INPUTS_DTYPE = np.dtype([('azimuth', _AXIS_INPUTS_DTYPE), ('elevation', _AXIS_INPUTS_DTYPE),
                          ('base_acceleration', 'f8', (3,)), ('enable', 'i8'), ('base_rate', 'f8', (3,)),
-                         ('pins', 'i8')],
-                        align=True)
-"""Per axis: rate command [rad/s], feed-forward torque (both motors together, on the load axis) [Nm].
-base_acceleration, base_rate: angular acceleration [rad/s2] and rate [rad/s] of the deck, FLU.
-enable 1: follow, 0: controlled stop, at once whatever the delay. pins: code of acu/stow_pins."""
+                         ('pins', 'i8')], align=True)
+"""Inputs of a period.
+
+azimuth, elevation              rate command [rad/s], feed-forward torque of both motors on the load axis [Nm]
+base_acceleration, base_rate    angular acceleration [rad/s2] and rate [rad/s] of the deck, FLU
+enable                          1: follow, 0: controlled stop, without the transport delay
+pins                            code of acu/stow_pins
+"""
 
 _AXIS_OUTPUTS_DTYPE = np.dtype([
     ('position', 'f8'), ('velocity', 'f8'), ('torque', 'f8'),
@@ -40,40 +45,38 @@ _AXIS_OUTPUTS_DTYPE = np.dtype([
     ('load_position', 'f8'), ('load_velocity', 'f8'), ('true_torque', 'f8', (2,))], align=True)
 
 OUTPUTS_DTYPE = np.dtype([('azimuth', _AXIS_OUTPUTS_DTYPE), ('elevation', _AXIS_OUTPUTS_DTYPE),
-                          ('invalid_command', 'i8'),
-                          ('phase', 'i8'), ('following', 'i8'), ('wanted', 'i8'), ('emergency', 'i8'),
-                          ('braked', 'i8'),
-                          ('condition', 'i8'), ('pins', 'i8')], align=True)
-"""At t_k+1, per axis:
+                          ('invalid_command', 'i8'), ('phase', 'i8'), ('following', 'i8'), ('wanted', 'i8'),
+                          ('emergency', 'i8'), ('braked', 'i8'), ('condition', 'i8'), ('pins', 'i8')], align=True)
+"""Outputs at t_k+1, per axis:
 
 position          load encoder [rad]
 velocity          mean motor speed / N [rad/s], from the motor encoders over the last 0.5 ms
-torque            of both motors on the load axis, from their currents [Nm]
-motor_position, motor_velocity, motor_torque    of motor 1 and 2 on the shaft: encoder, its difference, K_t times
-                  the current as measured
+torque            torque of both motors on the load axis, from their currents [Nm]
+motor_position, motor_velocity, motor_torque    values of motors 1 and 2 on the shaft: encoder, encoder difference,
+                  K_t times the measured current
 bias              T_b [Nm]
-torque_limited, voltage_limited                 1 when it happened within the period
-end_stop          1 when the end of travel cut the rate command within the period
-stopping          1 when not enabled within the period: ramped to standstill, then held there
-faults            latched fault word, see faults.FAULTS
-thermal_load      of motor 1 and 2; 1 after rated torque for ever
-load_position, load_velocity                    the truth: where the beam points (the dish, where the structure is
-                  flexible) [rad] and how fast it turns [rad/s]; no controller knows it
-true_torque       K_t i_q of motor 1 and 2, for tests; never published
+torque_limited, voltage_limited                 1 if the limit was active in the period
+end_stop          1 if the end of travel reduced the rate command in the period
+stopping          1 if the axis was not enabled in the period: ramp to standstill, then hold
+faults            latched fault word, see faults.AXIS_FAULTS
+thermal_load      thermal load of motors 1 and 2; 1: steady state at rated torque
+load_position, load_velocity                    true angle [rad] and rate [rad/s] of the beam (of the dish, if the
+                  structure is flexible), unknown to the controllers
+true_torque       K_t i_q of motors 1 and 2, for tests; never published
 
-invalid_command   1 when an input of this call was not finite (or beyond MAX_PLAUSIBLE_INPUT): the command counts as
-enable 0,
-                  a disturbance as 0
-phase             of drive_state.PHASES; following: 1 when enabled and nothing stands against it at t_k+1
-wanted            1 unless the drive was asked to be disabled
-emergency         1 when an emergency stop is latched
-braked            1 when the brakes grip
-condition         see drive_state.condition; pins: stow_pins.told
+and of the drive:
+
+invalid_command   1 if an input of this call was invalid; the command is then taken as enable 0, a disturbance as 0
+phase             index of drive_state.PHASES; following: 1 if enabled and permitted at t_k+1
+wanted            0 after a request to disable
+emergency         1 while an emergency stop is latched
+braked            1 while the brakes grip
+condition         see drive_state.condition; pins: see stow_pins.state_code
 """
 
 
 def _record(values):
-    """A (1,) record of a nested dictionary: int -> i8, float -> f8, array and dictionary nested."""
+    """Return a nested dictionary as a record (1,): int -> i8, float -> f8, array and dictionary nested."""
     fields = {name: _record(value) if isinstance(value, dict) else np.asarray(value)[np.newaxis]
               for name, value in values.items()}
     record = np.zeros(1, np.dtype([(name, field.dtype, field.shape[1:]) for name, field in fields.items()],
@@ -108,25 +111,23 @@ def _initial_state(params):
     return _record({**axes, 'rate': np.zeros((COMMAND_RING_SIZE, 2)), 'torque': np.zeros((COMMAND_RING_SIZE, 2)),
                     'enable': np.ones(COMMAND_RING_SIZE, np.int64), 'k': 0, 'last_rate': np.zeros(2),
                     'phase': drive_state.PHASE_ENABLED if enabled else drive_state.PHASE_DISABLED, 'age': 0,
-                     'wanted': int(params.initially_enabled), 'emergency': 0, 'tick': -INITIAL_AGE_PERIODS,
-                    'late_ticks': 0,
-                     'applied': int(not enabled), 'brake_age': INITIAL_AGE_PERIODS, 'braked': int(not enabled),
-                    'following': 0,
-                     'pins': stow_pins.initial_state(params)})
+                    'wanted': int(params.initially_enabled), 'emergency': 0, 'tick': -INITIAL_AGE_PERIODS,
+                    'late_ticks': 0, 'applied': int(not enabled), 'brake_age': INITIAL_AGE_PERIODS,
+                    'braked': int(not enabled), 'following': 0, 'pins': stow_pins.initial_state(params)})
 
 
 CONSTANTS_DTYPE = _constants(AduParameters(), 2).dtype
 STATE_DTYPE = _initial_state(AduParameters()).dtype
-"""One dtype object for all records: numba knows it again at once, an equal one it compares anew (3 us a call)."""
+"""Dtype object of all state records. Because numba compares an equal copy of it in each call (3 us), one is shared."""
 
 
 def constants(params: AduParameters, substeps: int = 2) -> np.ndarray:
-    """Hoisted constants, (1,) record; `substeps` plant sub-steps in a current-loop period (2: h = 50 us)."""
+    """Return the hoisted constants, record (1,). substeps: plant sub-steps per current-loop period (2: h = 50 us)."""
     return _constants(params, substeps).view(CONSTANTS_DTYPE)
 
 
 def initial_state(params: AduParameters) -> np.ndarray:
-    """At rest at the initial angles, in balance with wind (t = 0) and unbalance, bias in place: (1,) record."""
+    """Return the state at rest at the initial angles, in balance with wind (t = 0) and unbalance, record (1,)."""
     return _initial_state(params).view(STATE_DTYPE)
 
 
@@ -137,19 +138,20 @@ def _plausible(x):
 
 @compiled
 def inertial_torques(azimuth, J_azimuth, J_elevation, x, y, z):
-    """Torques [Nm] on azimuth and elevation when the deck accelerates with (x, y, z) [rad/s2] about its FLU axes.
+    """Return the torques [Nm] on azimuth and elevation for a deck acceleration (x, y, z) [rad/s2] about its FLU axes.
 
-    The load lags behind the deck: -J (n . acceleration) about the axis n of growing angle: azimuth grows clockwise,
-    n = (0, 0, -1); elevation lifts the beam (cos A, -sin A, 0) towards +z, n = (-sin A, -cos A, 0).
+    The torque of the lagging load is -J (n . acceleration) about the axis n of growing angle. Azimuth grows clockwise,
+    n = (0, 0, -1). Elevation lifts the beam (cos A, -sin A, 0) towards +z, n = (-sin A, -cos A, 0).
     """
     return J_azimuth * z, J_elevation * (x * math.sin(azimuth) + y * math.cos(azimuth))
 
 
 @compiled
 def _apply_rigid_body_torques(s, c, w, w_dot):
-    """Set the inertia of azimuth and the torques that turning bodies put on both axes, constant over the period.
+    """Set the inertia of azimuth and the torques of the turning bodies on both axes, constant over the period.
 
-    An axis feels the other's acceleration of the period before: M_AE^2 < M_AA M_EE, so that dies out.
+    The coupling uses the acceleration of the other axis in the previous period. This loop is stable, because
+    M_AE^2 < M_AA M_EE.
     """
     az, el = s.azimuth, s.elevation
     M_AA, M_AE = gimbal.inertia(c.bodies, el.theta)
@@ -163,7 +165,7 @@ def _apply_rigid_body_torques(s, c, w, w_dot):
 
 @compiled
 def _external(s, c, u):
-    """External torques [Nm] on the two loads, constant over the period, and whether every input was believable."""
+    """Return the external torques [Nm] on both loads, constant over the period, and True for valid inputs."""
     x, y, z = u.base_acceleration[0], u.base_acceleration[1], u.base_acceleration[2]
     azimuth, elevation = s.azimuth.theta, s.elevation.theta
     T_azimuth, T_elevation = wind.torques(c.wind, s.k * c.period)
@@ -172,32 +174,32 @@ def _external(s, c, u):
         T_azimuth, T_elevation = T_azimuth + of_field[0], T_elevation + of_field[1]
     T_azimuth += s.azimuth.gust - c.azimuth.unbalance * math.cos(azimuth)
     T_elevation += s.elevation.gust - c.elevation.unbalance * math.cos(elevation)
-    believed = _plausible(x) and _plausible(y) and _plausible(z)
-    if not believed:
+    valid = _plausible(x) and _plausible(y) and _plausible(z)
+    if not valid:
         x = y = z = 0.0
     if c.bodies.rigid:
         _apply_rigid_body_torques(s, c, u.base_rate, (x, y, z))
     else:
         s.azimuth.deck, s.elevation.deck = inertial_torques(azimuth, c.azimuth.J, c.elevation.J, x, y, z)
-    return T_azimuth + s.azimuth.deck, T_elevation + s.elevation.deck, believed
+    return T_azimuth + s.azimuth.deck, T_elevation + s.elevation.deck, valid
 
 
 @compiled
-def _receive(s, u, disturbance_believed):
-    """Put the command of step k into the ring; returns whether it was believable."""
+def _receive(s, u, disturbance_valid):
+    """Put the command of step k into the ring. Return True if it is valid."""
     slot = s.k % COMMAND_RING_SIZE
-    believed = (disturbance_believed and _plausible(u.azimuth.rate) and _plausible(u.azimuth.torque)
-                and _plausible(u.elevation.rate) and _plausible(u.elevation.torque))
-    s.enable[slot] = 1 if believed and u.enable == 1 else 0
-    if believed:
+    valid = (disturbance_valid and _plausible(u.azimuth.rate) and _plausible(u.azimuth.torque)
+             and _plausible(u.elevation.rate) and _plausible(u.elevation.torque))
+    s.enable[slot] = 1 if valid and u.enable == 1 else 0
+    if valid:
         s.rate[slot, 0], s.rate[slot, 1] = u.azimuth.rate, u.elevation.rate
         s.torque[slot, 0], s.torque[slot, 1] = u.azimuth.torque, u.elevation.torque
-    return believed
+    return valid
 
 
 @compiled
 def _beam_from_axes(c, azimuth, elevation):
-    """Turn the angles and rates of the axes into those of the beam, in the outputs of both."""
+    """Replace the angles and rates of the axes by those of the beam, in the outputs of both."""
     angles, rates = mount.beam(c.mount, azimuth.load_position, elevation.load_position, azimuth.load_velocity,
                                elevation.load_velocity)
     azimuth.load_position, elevation.load_position = angles
@@ -206,7 +208,7 @@ def _beam_from_axes(c, azimuth, elevation):
 
 @compiled
 def read(s, c, y):
-    """Outputs y as they are now, nothing integrated: at t_0, before the first step. Records of this module."""
+    """Write the present outputs y without integration, for t_0 before the first step. Records of this module."""
     axis.read(s.azimuth, c.azimuth, y.azimuth)
     axis.read(s.elevation, c.elevation, y.elevation)
     if not c.mount.true:
@@ -218,7 +220,7 @@ def read(s, c, y):
 
 @compiled
 def request(s, c, y, what):
-    """drive_state.request between two periods; the outputs read back what is now."""
+    """Execute drive_state.request between two periods and update the outputs. Return its reply."""
     answer = drive_state.request(s, c, what)
     read(s, c, y)
     return answer
@@ -226,9 +228,9 @@ def request(s, c, y, what):
 
 @compiled
 def _begin_period(s, c, u, y):
-    """What happens once in a period, at its beginning: external torques, the command, brakes and windings."""
-    s.azimuth.external, s.elevation.external, believed = _external(s, c, u)
-    y.invalid_command = 0 if _receive(s, u, believed) else 1
+    """Begin a period: external torques, command, brakes and windings."""
+    s.azimuth.external, s.elevation.external, valid = _external(s, c, u)
+    y.invalid_command = 0 if _receive(s, u, valid) else 1
     s.braked = drive_state.advance(s, c, u.pins)
     axis.begin_period(s.azimuth, c.azimuth, s.braked)
     axis.begin_period(s.elevation, c.elevation, s.braked)
@@ -238,25 +240,25 @@ def _begin_period(s, c, u, y):
 
 @compiled
 def _apply_command(s, c, u, j):
-    """Take the command that is obeyed in speed-loop period j out of the ring; 1 where that enables the drive."""
-    s.tick = max(s.tick, s.k * c.speed_ticks + j - c.delay_ticks - s.late_ticks)    # late: the last one stays
-    slot = (s.tick // c.speed_ticks) % COMMAND_RING_SIZE     # before the first command: a slot still empty, rate 0
+    """Take the command of speed-loop period j out of the ring. `following` is 1 if it enables the drive."""
+    s.tick = max(s.tick, s.k * c.speed_ticks + j - c.delay_ticks - s.late_ticks)    # a growing delay repeats a command
+    slot = (s.tick // c.speed_ticks) % COMMAND_RING_SIZE     # An empty slot, before the first command, has rate 0.
     s.following = s.enable[slot] if s.phase == drive_state.PHASE_ENABLED and u.enable == 1 else 0
     az, el = s.azimuth, s.elevation
-    az.asked_rate, az.asked_torque = s.rate[slot, 0], s.torque[slot, 0]
-    el.asked_rate, el.asked_torque = s.rate[slot, 1], s.torque[slot, 1]
+    az.commanded_rate, az.commanded_torque = s.rate[slot, 0], s.torque[slot, 0]
+    el.commanded_rate, el.commanded_torque = s.rate[slot, 1], s.torque[slot, 1]
 
 
 @inlined
 def _speed_control(s, a, c):
-    """One speed-loop period of axis a of a drive s."""
-    axis.speed_control(a, c, a.asked_rate, a.asked_torque, s.following, s.phase != drive_state.PHASE_DISABLED,
+    """Run one speed-loop period of axis a of a drive s."""
+    axis.speed_control(a, c, a.commanded_rate, a.commanded_torque, s.following, s.phase != drive_state.PHASE_DISABLED,
                        not s.braked)
 
 
 @compiled
 def between_speed_periods(s, c, substeps):
-    """Current loops and plant of one axis, or of lanes of them, from one speed-loop period to the next."""
+    """Run current loops and plant of one axis, or of lanes of axes, from one speed-loop period to the next."""
     axes = range(count(s))
     for _ in range(axis.CURRENT_LOOP_STEP_COUNT):
         for i in axes:
@@ -269,9 +271,11 @@ def between_speed_periods(s, c, substeps):
 
 @compiled
 def step(s, c, u, y):
-    """One control period from t_k to t_k+1. Records STATE_DTYPE, CONSTANTS_DTYPE, INPUTS_DTYPE, OUTPUTS_DTYPE, or
-    lanes.Lanes of them, whose
-    periods and sub-steps are those of the first; s and y are written."""
+    """Advance one control period from t_k to t_k+1. s and y are written.
+
+    Arguments are records STATE_DTYPE, CONSTANTS_DTYPE, INPUTS_DTYPE, OUTPUTS_DTYPE, or lanes.Lanes of them. All lanes
+    have the period and sub-steps of the first lane.
+    """
     drives = range(count(s))
     for i in drives:
         _begin_period(at(s, i), at(c, i), at(u, i), at(y, i))

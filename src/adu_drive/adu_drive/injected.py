@@ -1,4 +1,4 @@
-"""The faults that can be injected into the drive and its plant: what each of them breaks."""
+"""Injected faults of the drive and its plant: their effects on the records of the drive."""
 import numpy as np
 
 from adu_drive import axis
@@ -10,18 +10,23 @@ DRIVE_MESSAGE_FAULT_CODES = message_faults.codes('adu')
 Fault = codes([fault.name for fault in table.INJECTED_FAULTS['adu']])
 
 STUCK_BRAKE_CONDITIONS = axis.BRAKE_STUCK_ON, axis.BRAKE_STUCK_OFF
-"""By the option of brake_stuck."""
+"""Conditions of a stuck brake, in the order of the options of fault brake_stuck."""
 
-DRIVE_INJECTED_DTYPE = np.dtype([('bias', 'f8', (2,)), ('said', message_faults.MESSAGE_FAULT_DTYPE)], align=True)
-"""bias: of the rates on joint_states [rad/s]; said: what spoils joint_states and, frozen, adu/motor_states; said.drop
-is 1 while no command is heard."""
+DRIVE_INJECTED_DTYPE = np.dtype([('bias', 'f8', (2,)), ('message_fault', message_faults.MESSAGE_FAULT_DTYPE)],
+                                align=True)
+"""Active faults of messages.
+
+bias             bias of the rates in joint_states [rad/s]
+message_fault    fault of joint_states and, for a frozen drive, of adu/motor_states; its drop is 1 while commands are
+                 lost
+"""
 
 JOINT_STATES_TOPIC, MOTOR_STATES_TOPIC = 'joint_states', 'adu/motor_states'
 
 
 @compiled
 def _clear_faults(s):
-    """Nothing of an axis is broken."""
+    """Clear the injected faults of an axis."""
     s.motor_lost[0] = s.motor_lost[1] = s.stuck = s.toothless = 0
     s.jump = s.gust = s.teeth[0] = s.teeth[1] = 0.0
     s.brake_stuck = axis.BRAKE_WORKING
@@ -29,10 +34,10 @@ def _clear_faults(s):
 
 @compiled
 def _apply_fault(m, fault, values):
-    """What a fault does to the records of the drive (unit.RECORD)."""
+    """Apply a fault to the record of the drive (unit.RECORD_DTYPE)."""
     i = int(values[0])
     s, c = (m.state.azimuth, m.constants.azimuth) if i == 0 else (m.state.elevation, m.constants.elevation)
-    message_faults.apply(m.injected.said, DRIVE_MESSAGE_FAULT_CODES, fault, values)
+    message_faults.apply(m.injected.message_fault, DRIVE_MESSAGE_FAULT_CODES, fault, values)
     if fault == Fault.MOTOR_LOSS:
         s.motor_lost[int(values[1])] = 1
     elif fault == Fault.ENCODER_JUMP:
@@ -55,11 +60,11 @@ def _apply_fault(m, fault, values):
 
 @compiled
 def apply_due_faults(m, stamp):
-    """Mend everything, then break what is broken in the step of a stamp [ns]."""
+    """Clear all faults, then apply the faults that are active at a stamp [ns]."""
     e = m.injected
     _clear_faults(m.state.azimuth)
     _clear_faults(m.state.elevation)
-    message_faults.clear(e.said)
+    message_faults.clear(e.message_fault)
     m.state.late_ticks = m.state.pins.stuck[0] = m.state.pins.stuck[1] = 0
     e.bias[0] = e.bias[1] = 0.0
     schedule.begin(m.schedule)
@@ -71,16 +76,16 @@ def apply_due_faults(m, stamp):
 
 @compiled
 def corrupt_messages(e, stamp, outputs):
-    """What the drive says of a step, spoilt."""
+    """Apply the active message faults to the messages of a step."""
     joints, motors = outputs[JOINT_STATES_TOPIC], outputs[MOTOR_STATES_TOPIC]
     for i in range(2):
         joints.velocity[i] += e.bias[i]
-        if e.said.sigma > 0.0:
-            joints.position[i] += message_faults.noise(e.said, stamp, i)
-    message_faults.numbers(e.said, joints.position, 0)
-    message_faults.numbers(e.said, joints.velocity, 2)
-    message_faults.numbers(e.said, joints.effort, 4)
-    if e.said.freeze != 0:
-        message_faults.numbers(e.said, motors.position, 6)
-        message_faults.numbers(e.said, motors.velocity, 10)
-        message_faults.numbers(e.said, motors.effort, 14)
+        if e.message_fault.sigma > 0.0:
+            joints.position[i] += message_faults.noise(e.message_fault, stamp, i)
+    message_faults.numbers(e.message_fault, joints.position, 0)
+    message_faults.numbers(e.message_fault, joints.velocity, 2)
+    message_faults.numbers(e.message_fault, joints.effort, 4)
+    if e.message_fault.freeze != 0:
+        message_faults.numbers(e.message_fault, motors.position, 6)
+        message_faults.numbers(e.message_fault, motors.velocity, 10)
+        message_faults.numbers(e.message_fault, motors.effort, 14)

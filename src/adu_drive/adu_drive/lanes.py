@@ -1,16 +1,18 @@
-"""The laws of the drive on many drives at once, from the same source: records beside each other on lanes.
+"""Lanes: the laws of the drive on many drives at once, from the same source.
 
-A record of 8-byte numbers becomes rows of one flat array, row r of lane i at r LANE_COUNT + i (a structure of
-arrays). A
-law that works on the attributes of a record, `s.omega += c.h * a`, compiles for one Lane as it stands; inlined into a
-loop over the lanes, LLVM turns it into vector instructions, which have the bits of the scalar ones. What works on
-records and on Lanes alike goes over them by
+A record of 8-byte numbers becomes rows of a flat array: word r of the record in lane i is at r LANE_COUNT + i (a
+structure of arrays). For a record (theta, omega) the array holds theta of all lanes, then omega of all lanes, and
+`s.omega` of lane i is its word LANE_COUNT + i.
+
+A law on the attributes of a record, `s.omega += c.h * a`, compiles for one Lane without changes. Inlined into a loop
+over the lanes, it becomes vector instructions of LLVM, which give the bits of the scalar code. A function for records
+and for Lanes loops by
 
     for i in range(count(s)):
         law(at(s, i), at(c, i))
 
-where count of a record is 1, and at gives it back. Nothing is boxed: Lanes exist in compiled code only, as pointers
-into the array that `view` was given, which must outlive them.
+For a single record, count is 1 and at returns the record. Lanes exist in compiled code only, as pointers into the
+array that `view` was given; this array must outlive them.
 """
 import hashlib
 import operator
@@ -31,15 +33,17 @@ from numba.extending import (
 )
 
 LANE_COUNT = 32
-"""Lanes of an array. With 16 LLVM does not vectorise, 64 need more of the nearest cache than there is."""
+"""Number of lanes of an array. With 16 lanes LLVM does not vectorise; 64 lanes exceed the first-level cache."""
 
 WORD_BYTES = 8
-"""Bytes of every number."""
+"""Size of each number [bytes]."""
 
 
 class _LanePointer(types.Type):
-    """A pointer to the first word of something in one lane. known: ((attribute, number), ...) that are the same in all
-    lanes and constants of the compiled code."""
+    """Pointer to the first word of a value of type `what` in one lane.
+
+    known: ((attribute, number), ...) that are equal in all lanes and constants of the compiled code.
+    """
     dtype = types.float64
 
     def __init__(self, what, known):
@@ -65,12 +69,12 @@ for place in (Lane, Lanes, LaneArray):
 
 
 def count(records):
-    """How many records there are: 1 of a record, LANE_COUNT of Lanes; constant in compiled code."""
+    """Return the number of records, a constant of compiled code: 1 for a record, LANE_COUNT for Lanes."""
     return 1
 
 
 def at(records, i):
-    """Record i of Lanes, or the record itself."""
+    """Return record i of Lanes, or the record itself."""
     return records
 
 
@@ -104,18 +108,18 @@ def _at(context, builder, signature, args):
 
 
 def _member(place, attribute):
-    """The type of an attribute of a Lane or of Lanes."""
+    """Return the type of an attribute of a Lane or of Lanes."""
     field = place.what.typeof(attribute)
     if isinstance(field, types.Record):
         return type(place)(field, place.known)
     number = field.dtype if isinstance(field, types.NestedArray) else field
     if not isinstance(number, types.Record) and number.bitwidth != 8 * WORD_BYTES:
-        raise NumbaTypeError(f'{attribute} is {number}: numbers on lanes have {WORD_BYTES} bytes')
+        raise NumbaTypeError(f'{attribute} is {number}: must have {WORD_BYTES} bytes on lanes')
     return LaneArray(field, place.known) if isinstance(field, types.NestedArray) else field
 
 
 def _offset_pointer(context, builder, pointer, words):
-    """A pointer some words, a constant or a value, further down its lane."""
+    """Return a pointer that is advanced by a number of words (a constant or a value) within its lane."""
     if isinstance(words, int):
         return builder.gep(pointer, [context.get_constant(types.intp, words * LANE_COUNT)], inbounds=True)
     rows = builder.mul(words, context.get_constant(types.intp, LANE_COUNT))
@@ -123,13 +127,13 @@ def _offset_pointer(context, builder, pointer, words):
 
 
 def _word(context, builder, pointer, field):
-    """A pointer as one to a number of a type."""
+    """Return a pointer cast to a pointer to a number of a type."""
     return builder.bitcast(pointer, context.get_data_type(field).as_pointer())
 
 
 class _Attributes(AttributeTemplate):
     def generic_resolve(self, place, attribute):
-        """The type of an attribute; a number has no meaning in all Lanes at once."""
+        """Return the type of an attribute; None for a number of all Lanes at once, which has no type."""
         if attribute in place.what.fields:
             member = _member(place, attribute)
             return member if isinstance(place, Lane) or isinstance(member, Lanes) else None
@@ -158,12 +162,12 @@ def _set(context, builder, signature, args, attribute):
 
 
 def _indices(index):
-    """The types of the indices of a getitem or setitem."""
+    """Return the types of the indices of a getitem or setitem."""
     return tuple(index) if isinstance(index, types.BaseTuple) else (index,)
 
 
 def _item(array, index):
-    """(type of an item of a LaneArray, of its index); None for what is no item."""
+    """Return (type of an item of a LaneArray, type of its index); None for an invalid index."""
     nested, indices = array.what, _indices(index)
     if len(indices) > nested.ndim or not all(isinstance(i, types.Integer) for i in indices):
         return None
@@ -192,7 +196,7 @@ class _SetItem(AbstractTemplate):
 
 
 def _item_pointer(context, builder, array, index_type, pointer, index):
-    """A pointer to an item of a LaneArray."""
+    """Return a pointer to an item of a LaneArray."""
     many = isinstance(index_type, types.BaseTuple)
     indices = tuple(builder.extract_value(index, i) for i in range(len(index_type))) if many else (index,)
     shape, words = array.what.shape, context.get_constant(types.intp, 0)
@@ -220,10 +224,10 @@ def _set_item(context, builder, signature, args):
 
 
 def view(dtype, known=()):
-    """A function for compiled code: the Lanes of records of this type in a flat array, as `beside` lays them.
+    """Return a function for compiled code that gives the Lanes of records of this type in a flat array of `to_lanes`.
 
-    known: {attribute: number} of flags, wherever in the record they stand, that have this number in every lane; the
-    code is compiled without what they switch off.
+    known: {attribute: number} of flags, at any depth of the record, with this number in every lane. Code that these
+    flags switch off is not compiled.
     """
     lanes = Lanes(numba.from_dtype(dtype), tuple(sorted(dict(known).items())))
 
@@ -236,18 +240,20 @@ def view(dtype, known=()):
 
 
 def to_lanes(records):
-    """Records (n,), n <= LANE_COUNT, as the flat array (words LANE_COUNT,) of their Lanes; lanes beyond n hold the
-    last one."""
+    """Return records (n,), n <= LANE_COUNT, as the flat array (words LANE_COUNT,) of their Lanes.
+
+    Lanes beyond n hold the last record.
+    """
     words = _words(records)
     lane = np.minimum(np.arange(LANE_COUNT), len(records) - 1)
     return np.ascontiguousarray(words[lane].T).reshape(-1)
 
 
 def from_lanes(flat, records):
-    """Put the first lanes of a flat array into records (n,)."""
+    """Copy the first lanes of a flat array into records (n,)."""
     _words(records)[...] = flat.reshape(-1, LANE_COUNT).T[:len(records)]
 
 
 def _words(records):
-    """View (n, words) of contiguous records (n,), each a row of 8-byte words."""
+    """Return a view (n, words) of contiguous records (n,), each a row of 8-byte words."""
     return records.view(np.float64).reshape(len(records), -1)

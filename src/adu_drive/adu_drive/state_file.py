@@ -1,4 +1,4 @@
-"""Where a simulated plant was left, in a small file: a restarted drive goes on there and is not teleported."""
+"""File with the state of the simulated plant: a restarted drive resumes there instead of at its initial angles."""
 import json
 import math
 import os
@@ -9,8 +9,11 @@ from pedestal_common.parameters import ParameterError
 
 
 class PlantState(typing.NamedTuple):
-    """Load angles [rad], turns included; enabled: whether the drive followed commands, or would once its brakes are
-    free; pinned: whether a stow pin was not out."""
+    """Load angles, turns included [rad].
+
+    enabled: True if the drive followed commands, or releases its brakes to do so; pinned: True if a stow pin was not
+    out.
+    """
     azimuth: float
     elevation: float
     enabled: bool
@@ -18,24 +21,24 @@ class PlantState(typing.NamedTuple):
 
 
 def read(path):
-    """The Left of a file, None where there is none. Raises ParameterError for a file that holds something else."""
+    """Return the PlantState in a file, None without a file. Raises ParameterError for invalid content."""
     try:
         values = json.loads(pathlib.Path(path).read_text())
-        left = PlantState(float(values['azimuth']), float(values['elevation']), values['enabled'] is True,
-                          values.get('pinned') is True)
-        if not math.isfinite(left.azimuth + left.elevation):
+        state = PlantState(float(values['azimuth']), float(values['elevation']), values['enabled'] is True,
+                           values.get('pinned') is True)
+        if not math.isfinite(state.azimuth + state.elevation):
             raise ValueError('an angle is not finite')
     except FileNotFoundError:
         return None
     except (OSError, ValueError, TypeError, KeyError) as error:
         raise ParameterError(f"state_file = '{path}': holds no state of a drive ({error}); move it away to start at "
                              'initial_azimuth and initial_elevation') from None
-    return left
+    return state
 
 
-def write(path, left):
-    """Put a Left into a file, whole or not at all. Raises OSError."""
+def write(path, state):
+    """Replace a file by one with a PlantState, in one operation. Raises OSError."""
     new = f'{path}.new'
     with open(new, 'w') as file:
-        json.dump(left._asdict(), file)
+        json.dump(state._asdict(), file)
     os.replace(new, path)

@@ -1,11 +1,11 @@
-"""Stow pins: one an axis, pushed into a hole of the turning part while the axis stands on its brakes.
+"""Stow pins: one per axis, pushed into a hole of the turning part while the brakes hold the axis.
 
-    n    periods of travel that a pin is in: 0 out, N in
-    t    periods for which it has been on its way
+    n    position of a pin in periods of travel: 0 out, N in
+    t    number of periods for which the pin has been moving
 
-They go in only once both axes stand within the window about their holes. From then on until both are out the drive is
-off: it stops, its brakes grip, and only then the pins move. A pin that is not where it was sent in time has failed,
-which is a fault of its axis; it is tried again once the faults are reset.
+The pins go in after both axes stand within the window about their holes. From then until both pins are out the drive
+is off: the drive stops, the brakes grip, then the pins move. A pin that does not reach its position in time has
+failed, which is a fault of its axis. A reset of the faults retries the motion.
 """
 import math
 
@@ -15,7 +15,7 @@ from pedestal_common.graph import topics
 
 PIN_STATES = topics.PIN_STATE_TEXTS
 PIN_OUT, PIN_MOVING, PIN_IN, PIN_FAILED = range(len(PIN_STATES))
-"""Of a pin, in the order in which adu/stow_pins tells them."""
+"""States of a pin, in the order of the texts of adu/stow_pins."""
 
 PIN_COMMAND_TEXTS = topics.TOPIC_BY_NAME['acu/stow_pins'].texts
 PIN_COMMAND_OUT, PIN_COMMAND_IN = (PIN_COMMAND_TEXTS.index(place) for place in ('out', 'in'))
@@ -23,7 +23,7 @@ PIN_COMMAND_OUT, PIN_COMMAND_IN = (PIN_COMMAND_TEXTS.index(place) for place in (
 
 
 def constants(params):
-    """Of AduParameters: nested dictionary."""
+    """Return the constants of the pins from AduParameters: nested dictionary."""
     p = params.pins
     return {'fitted': int(params.stow_pins), 'hole': [p.azimuth, p.elevation], 'window': p.window,
             'travel': max(math.ceil(p.travel_time / params.period - 1e-6), 1),
@@ -31,8 +31,11 @@ def constants(params):
 
 
 def initial_state(params):
-    """At the start: nested dictionary. ordered: where both pins belong; n, t: see the module; failed: 1 of a pin that
-    has; stuck: 1 of a pin that is broken so that it stays where it is."""
+    """Return the initial state: nested dictionary.
+
+    ordered: commanded position of both pins; n, t: see the module; failed: 1 for a failed pin; stuck: 1 for a pin with
+    the injected fault that it does not move.
+    """
     pin_in = int(params.stow_pins and params.pins.initially_in)
     n = pin_in * constants(params)['travel']
     return {'ordered': PIN_COMMAND_IN if pin_in else PIN_COMMAND_OUT, 'n': [n, n], 't': [0, 0], 'failed': [0, 0],
@@ -41,7 +44,7 @@ def initial_state(params):
 
 @compiled
 def state(s, c, i):
-    """Of the pin of axis i, of PIN_STATES."""
+    """Return the state of the pin of axis i, an index of PIN_STATES."""
     if s.failed[i]:
         return PIN_FAILED
     return PIN_OUT if s.n[i] == 0 else PIN_IN if s.n[i] == c.travel else PIN_MOVING
@@ -49,26 +52,28 @@ def state(s, c, i):
 
 @compiled
 def state_code(s, c):
-    """Code of adu/stow_pins."""
+    """Return the code of adu/stow_pins."""
     return len(PIN_STATES) * state(s, c, 0) + state(s, c, 1) if c.fitted else topics.NO_TEXT_CODE
 
 
 @compiled
 def pins_out(s):
-    """Whether the axes may move: both pins are out and stay there."""
+    """Return True if both pins are out and stay out, so that the axes may move."""
     return s.ordered == PIN_COMMAND_OUT and s.n[0] == 0 and s.n[1] == 0
 
 
 @compiled
 def holds(s, c, i):
-    """Whether the pin of axis i holds it as brakes do."""
+    """Return True if the pin of axis i holds the axis, as brakes do."""
     return s.n[i] == c.travel
 
 
 @compiled
 def command_pins(s, c, wanted, azimuth, elevation):
-    """Take an order of acu/stow_pins; azimuth, elevation: encoder angles [rad] of axes that stand, NaN of one that
-    moves. An order to go in waits until both are in the window."""
+    """Take a command of acu/stow_pins. The command `in` waits until both axes are in the window.
+
+    azimuth, elevation: encoder angles [rad] of standing axes, NaN for a moving axis.
+    """
     if wanted == PIN_COMMAND_OUT:
         _set_command(s, PIN_COMMAND_OUT)
     elif wanted == PIN_COMMAND_IN and (abs(azimuth - c.hole[0]) <= c.window
@@ -84,7 +89,7 @@ def _set_command(s, place):
 
 @compiled
 def advance(s, c, i):
-    """One period of the pin of axis i, whose drive is off: its fault word."""
+    """Advance the pin of axis i by a period while the drive is off. Return its fault word."""
     end = c.travel if s.ordered == PIN_COMMAND_IN else 0
     if s.n[i] == end or s.failed[i]:
         return faults.Bit.STOW_PIN if s.failed[i] else 0
@@ -98,6 +103,6 @@ def advance(s, c, i):
 
 @compiled
 def retry(s):
-    """Try again what has failed."""
+    """Clear the failures, so that the pins try again."""
     for i in range(2):
         s.failed[i] = s.t[i] = 0

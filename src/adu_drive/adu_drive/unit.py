@@ -1,4 +1,4 @@
-"""The unit of the drive: rate commands and the ship's motion in, encoders and motors out, enable and faults."""
+"""Unit of the drive: rate commands and the motion of the ship in, encoders and motors out, enable and faults."""
 import dataclasses
 import functools
 import math
@@ -17,42 +17,41 @@ from pedestal_common.node.unit import LEVEL_ERROR, LEVEL_OK, LEVEL_WARN, Diagnos
 from pedestal_common.wire.commands import Reply
 from pedestal_common.wire.records import NO_STAMP
 
-(CLOCK_TOPIC, RATE_COMMAND_TOPIC, SHIP_TRUTH_TOPIC, JOINT_STATES_TOPIC, MOTOR_STATES_TOPIC) = ('clock',
-                                                                                               'acu/rate_command',
-                                                                                               'ship/truth',
-                                                                                               'joint_states',
-                                                                                               'adu/motor_states')
-(DRIVE_TRUTH_TOPIC, DRIVE_STATE_TOPIC, PIN_STATES_TOPIC, PIN_COMMAND_TOPIC) = ('adu/truth', 'adu/state',
-                                                                               'adu/stow_pins', 'acu/stow_pins')
+CLOCK_TOPIC, RATE_COMMAND_TOPIC, SHIP_TRUTH_TOPIC = 'clock', 'acu/rate_command', 'ship/truth'
+JOINT_STATES_TOPIC, MOTOR_STATES_TOPIC, DRIVE_TRUTH_TOPIC = 'joint_states', 'adu/motor_states', 'adu/truth'
+DRIVE_STATE_TOPIC, PIN_STATES_TOPIC, PIN_COMMAND_TOPIC = 'adu/state', 'adu/stow_pins', 'acu/stow_pins'
 
 INVALID_INPUT_TOPICS = ('', RATE_COMMAND_TOPIC, SHIP_TRUTH_TOPIC)
-"""Topics that can hold what the drive does not believe."""
+"""Topics that can hold an invalid input, by the number in `invalid` of LINK_DTYPE."""
 
 LINK_DTYPE = np.dtype([('stamp', 'i8'), ('command_stamp', 'i8'), ('truth_stamp', 'i8'), ('deck_rate', 'f8', (3,)),
                        ('timeout', 'i8'), ('period', 'i8'), ('stale', 'i8'), ('invalid', 'i8')])
-"""Stamps [ns] of the last step, of the last command and of the last truth with a finite rate (FLU, rad/s); age [ns] at
-which a command is stale; period T [ns]; stale: 1 while it is; invalid: of INVALID_INPUT_TOPICS, since the last
-diagnosis."""
+"""State of the link to other nodes.
 
+stamp, command_stamp    stamps of the last step and of the last command [ns]
+truth_stamp, deck_rate  stamp [ns] and rate (FLU) [rad/s] of the last truth with a finite rate
+timeout, period         age at which a command is stale [ns]; period T [ns]
+stale                   1 while the command is stale
+invalid                 index of INVALID_INPUT_TOPICS since the last diagnosis
+"""
 
 MAX_CATCH_UP_NS = 2_000_000_000
-"""Time [ns] in which axes that are told nothing have stopped."""
+"""Longest time for which missed steps are made later; axes without commands stop within it [ns]."""
 
 RECORD_DTYPE = np.dtype([('state', drive_unit.STATE_DTYPE), ('constants', drive_unit.CONSTANTS_DTYPE),
-                         ('inputs', drive_unit.INPUTS_DTYPE),
-                         ('outputs', drive_unit.OUTPUTS_DTYPE), ('link', LINK_DTYPE),
-                         ('schedule', schedule.SCHEDULE_DTYPE),
+                         ('inputs', drive_unit.INPUTS_DTYPE), ('outputs', drive_unit.OUTPUTS_DTYPE),
+                         ('link', LINK_DTYPE), ('schedule', schedule.SCHEDULE_DTYPE),
                          ('injected', injected.DRIVE_INJECTED_DTYPE)], align=True)
 
 
 class Memory(typing.NamedTuple):
-    """All the drive works on."""
+    """Memory of the drive."""
     record: np.ndarray
 
 
 @compiled
 def deck_acceleration(u, m, ship):
-    """Angular acceleration of the deck [rad/s2, FLU] from two successive truths and their stamps."""
+    """Set rate and angular acceleration of the deck [rad/s2, FLU] from two successive truths and their stamps."""
     w, last = ship.twist_angular, m.truth_stamp
     if last != NO_STAMP and ship.stamp > last:
         for i in range(3):
@@ -65,15 +64,17 @@ def deck_acceleration(u, m, ship):
 
 @compiled
 def supervise(u, m):
-    """Commands that stay away, at the stamp of the last step, stop the axes."""
+    """Stop the axes if the command is stale at the stamp of the last step."""
     m.stale = m.command_stamp == NO_STAMP or m.stamp - m.command_stamp > m.timeout
     u.enable = 0 if m.stale else 1
 
 
 @compiled
 def decode(u, m, dropped, command, ship):
-    """Records of the messages -> inputs of the drive, which is at the stamp of the last step; dropped: the command
-    does not reach it."""
+    """Write the records of the messages into the inputs of the drive, at the stamp of the last step.
+
+    dropped: 1 if the command is lost by an injected fault.
+    """
     if command.stamp != NO_STAMP and dropped == 0:
         m.command_stamp = command.stamp
         u.azimuth.rate, u.elevation.rate = command.velocity[0], command.velocity[1]
@@ -85,15 +86,15 @@ def decode(u, m, dropped, command, ship):
 
 @compiled
 def record_invalid_topic(u, m):
-    """Remember which topic held no number."""
+    """Store the topic with the invalid input."""
     deck = u.base_acceleration
-    believed = max(abs(deck[0]), abs(deck[1]), abs(deck[2])) <= drive_unit.MAX_PLAUSIBLE_INPUT
-    m.invalid = 1 if believed else 2
+    valid = max(abs(deck[0]), abs(deck[1]), abs(deck[2])) <= drive_unit.MAX_PLAUSIBLE_INPUT
+    m.invalid = 1 if valid else 2
 
 
 @compiled
 def encode(y, stamp, outputs):
-    """Outputs of the drive -> records of its messages."""
+    """Write the outputs of the drive into the records of its messages."""
     joints, truth, motors = outputs[JOINT_STATES_TOPIC], outputs[DRIVE_TRUTH_TOPIC], outputs[MOTOR_STATES_TOPIC]
     joints.stamp = truth.stamp = motors.stamp = outputs[CLOCK_TOPIC].stamp = stamp
     for i in range(2):
@@ -109,18 +110,18 @@ def encode(y, stamp, outputs):
 
 @compiled
 def receive(m, stamp, inputs):
-    """Take what was said of step k - 1; False in the first step, where nothing was."""
+    """Take the messages of step k - 1. Return False in the first step, which has none."""
     if m.link.stamp == NO_STAMP:
         m.state.k = stamp // m.link.period
         return False
-    decode(m.inputs, m.link, m.injected.said.drop, inputs[RATE_COMMAND_TOPIC], inputs[SHIP_TRUTH_TOPIC])
+    decode(m.inputs, m.link, m.injected.message_fault.drop, inputs[RATE_COMMAND_TOPIC], inputs[SHIP_TRUTH_TOPIC])
     m.inputs.pins = inputs[PIN_COMMAND_TOPIC]
     return True
 
 
 @compiled
 def report(m, stamp, moved, outputs):
-    """Say how the drive is at t_k, to which it moved or at which it began."""
+    """Write the messages of the drive at t_k. moved: False in the first step."""
     if moved and m.outputs.invalid_command:
         record_invalid_topic(m.inputs, m.link)
     m.link.stamp = stamp
@@ -129,9 +130,10 @@ def report(m, stamp, moved, outputs):
 
 @compiled
 def advance_missed_steps(m, stamp):
-    """Make the steps before that of a stamp [ns] for which the node was too late, as in realtime it may be: an antenna
-    goes on meanwhile, by the last command until that is stale. Of a long time MAX_CATCH_UP_NS, after which it
-    stands."""
+    """Advance by the steps that a late node in realtime missed before a stamp [ns], at most by MAX_CATCH_UP_NS.
+
+    Because a real antenna continues meanwhile, these steps use the last command until it is stale.
+    """
     missed = (min(stamp - m.link.stamp, MAX_CATCH_UP_NS) // m.link.period - 1) if m.link.stamp != NO_STAMP else 0
     for _ in range(missed):
         supervise(m.inputs, m.link)
@@ -141,7 +143,7 @@ def advance_missed_steps(m, stamp):
 
 @compiled
 def law(memory, stamp, inputs, outputs):
-    """Step k: from t_k-1 to t_k, obeying what was said of step k - 1."""
+    """Advance from t_k-1 to t_k with the messages of step k - 1."""
     m = memory.record[0]
     advance_missed_steps(m, stamp)
     if schedule.pending(m.schedule, stamp):
@@ -156,23 +158,24 @@ def law(memory, stamp, inputs, outputs):
 
 @compiled
 def laws(memory, stamps, inputs, outputs):
-    """`law` over arrays."""
+    """Apply `law` to each element of arrays."""
     for k in range(len(stamps)):
         law(memory, stamps[k], inputs[k], outputs[k])
 
 
 LANE_FLAGS = {'uneven': 0, 'toothless': 0, 'stuck': 0, 'exact': 1}
-"""Flags of RECORD_DTYPE that drives on lanes have so: even gears and motors, whole pinions, encoders without errors.
-Their
-other values bring in sines, of which there are none for vectors."""
+"""Flags of RECORD_DTYPE in drives on lanes: even gears and motors, whole pinions, encoders without errors.
+
+Other values need sines, which have no vector instructions.
+"""
 
 DRIVE_LANES = lanes.view(RECORD_DTYPE, LANE_FLAGS)
-"""Drives in a flat array of lanes.beside(RECORD_DTYPE), for compiled code."""
+"""Function for compiled code that gives the drives in a flat array of lanes.to_lanes."""
 
 
 @compiled
 def law_of_lanes(drives, stamp, inputs, outputs):
-    """`law` of the first len(inputs) of DRIVE_LANES, which are at the same step and fit them (Adu.fits_lanes)."""
+    """Apply `law` to the first len(inputs) of DRIVE_LANES, which fit (Adu.fits_lanes) and are at the same step."""
     moved = False
     for i in range(len(inputs)):
         m = lanes.at(drives, i)
@@ -186,8 +189,7 @@ def law_of_lanes(drives, stamp, inputs, outputs):
 
 @functools.lru_cache(1)
 def _initial(parameters):
-    """The record (1,) of a drive before its first step, made once for trials in a row that differ in no parameter of
-    it."""
+    """Return the record (1,) of a drive before its first step, cached for trials with the same drive."""
     link = np.zeros(1, LINK_DTYPE)
     link['stamp'] = link['command_stamp'] = link['truth_stamp'] = NO_STAMP
     link['timeout'] = round(parameters.command_timeout * parameters.period * 1e9)
@@ -200,7 +202,7 @@ def _initial(parameters):
 
 
 class Adu(Simulated):
-    """The drive of an AduNodeParameters."""
+    """Unit of the drive, from AduNodeParameters."""
     NODE, COMMAND, LAWS = nodes.row(nodes.DRIVE_NODE), RATE_COMMAND_TOPIC, {Memory: (law, laws)}
     REQUESTS, VERBS = tuple(drive_state.REQUEST_CODES), table.INJECT_COMMANDS[NODE.name]
 
@@ -209,12 +211,12 @@ class Adu(Simulated):
         self.memory = Memory(_initial(parameters).copy())
 
     def latency(self, topic):
-        """How old a command is that a step reads [s]: that of the step before."""
+        """Return the age [s] of the command in a step: one period."""
         return self.parameters.period
 
     @property
     def fits_lanes(self):
-        """Whether it can run on lanes: its flags are those of LANE_FLAGS, and no fault will be injected."""
+        """True if the drive can run on lanes: it has the flags of LANE_FLAGS and no injected fault."""
         axes = [self.parts[part][axis] for part in ('state', 'constants') for axis in topics.AXES]
         flags = [flags[name] == value for name, value in LANE_FLAGS.items()
                  for flags in (*axes, *(c['encoder'] for c in axes[2:])) if name in flags.dtype.names]
@@ -222,43 +224,42 @@ class Adu(Simulated):
 
     @property
     def rests(self):
-        """Whether it stands on its brakes, without torque."""
+        """True if the brakes hold the axes without torque."""
         return bool(self.parts['outputs']['phase'] == drive_state.PHASE_DISABLED)
 
-    def resume(self, left):
-        """Stand on the brakes where a plant was left (resting.Left), before the first step; enabled from there if it
-        was."""
-        angles = {f'initial_{axis}': min(max(getattr(left, axis), limits.lower), limits.upper) for axis, limits in (
+    def resume(self, state):
+        """Restore a state_file.PlantState before the first step: brakes on, then enabled if the state was enabled."""
+        angles = {f'initial_{axis}': min(max(getattr(state, axis), limits.lower), limits.upper) for axis, limits in (
             (axis, getattr(self.parameters, axis).limits) for axis in topics.AXES)}
-        pins = dataclasses.replace(self.parameters.pins, initially_in=left.pinned)
+        pins = dataclasses.replace(self.parameters.pins, initially_in=state.pinned)
         parameters = dataclasses.replace(self.parameters, initially_enabled=False, **angles, pins=pins)
         self.memory.record['state'] = drive_unit.initial_state(parameters)
-        self.parts['state']['wanted'] = left.enabled
+        self.parts['state']['wanted'] = state.enabled
         drive_unit.read(*(self.parts[name] for name in ('state', 'constants', 'outputs')))
 
-    def left(self):
-        """Where it is and whether it is enabled, as `resume` takes it."""
+    def plant_state(self):
+        """Return the state_file.PlantState for `resume`."""
         o = self.parts['outputs']
         enabled = o['wanted'] and not (o['emergency'] or self.tripped)
         pinned = not stow_pins.pins_out(self.parts['state']['pins'])
         return state_file.PlantState(*(float(o[axis]['position']) for axis in topics.AXES), bool(enabled), pinned)
 
     def encode(self, topic, code):
-        """The text of a code of adu/state, else as any unit."""
+        """Return the text of a code of adu/state, or of another topic as in Unit."""
         return drive_state.state_text(code) if topic == DRIVE_STATE_TOPIC else super().encode(topic, code)
 
     @property
     def tripped(self):
-        """Whether an axis has a fault that stops the drive."""
+        """True if an axis has a fault that stops the drive."""
         return any(faults.stops(int(self.parts['outputs'][axis]['faults'])) for axis in topics.AXES)
 
     @property
     def condition(self):
-        """The text of adu/state as it is now, also between two steps."""
+        """Present text of adu/state, also between two steps."""
         return drive_state.state_text(int(self.parts['outputs']['condition']))
 
     def request(self, name):
-        """Do one of REQUESTS; the Reply names the state that follows, and why it is refused."""
+        """Execute one of REQUESTS. Return the Reply with the resulting state, and the reason for a refusal."""
         m = self.parts
         answer = drive_unit.request(m['state'], m['constants'], m['outputs'], drive_state.REQUEST_CODES[name])
         granted = answer == drive_state.REPLY_ACCEPTED
@@ -266,7 +267,7 @@ class Adu(Simulated):
         return Reply(granted, f'{refusal}drive is {self.condition}')
 
     def requests_for(self, topic, text):
-        """The services that lead to a text of adu/state."""
+        """Return the services that lead to a text of adu/state."""
         o = self.parts['outputs']
         tripped, stopped = 'fault' in text, 'emergency stop' in text
         latched = o['emergency'] or self.tripped
@@ -277,7 +278,7 @@ class Adu(Simulated):
         return [service for service, due in wanted.items() if due]
 
     def diagnose(self):
-        """How it is, with limits, faults and thermal load of both axes; what was refused is told once."""
+        """Return the Diagnosis with limits, faults and thermal load of both axes; an invalid input appears once."""
         outputs, link = self.parts['outputs'], self.parts['link']
         invalid, link['invalid'] = INVALID_INPUT_TOPICS[link['invalid']], 0
         axes = {axis: outputs[axis] for axis in topics.AXES}
@@ -294,7 +295,7 @@ class Adu(Simulated):
             return Diagnosis(LEVEL_ERROR, self.condition, values)
         if invalid:
             largest = f'{drive_unit.MAX_PLAUSIBLE_INPUT:g}'
-            return Diagnosis(LEVEL_ERROR, f'{invalid} holds NaN or infinity, or goes beyond {largest}: stopping',
+            return Diagnosis(LEVEL_ERROR, f'{invalid} holds NaN or infinity, or is not within +-{largest}: stopping',
                              values)
         if link['stale']:
             return Diagnosis(LEVEL_ERROR, f'no new {RATE_COMMAND_TOPIC} for {link["timeout"] / 1e9:g} s: stopping',
@@ -310,12 +311,12 @@ class Adu(Simulated):
 
     @property
     def urgent(self):
-        """What is told at once when it changes: an emergency stop, what is wrong with its commands, faults."""
+        """Values whose change is published at once: emergency stop, stale or invalid inputs, faults."""
         outputs, link = self.parts['outputs'], self.parts['link']
         return (outputs['emergency'], link['stale'], link['invalid'], outputs['azimuth']['faults'],
                 outputs['elevation']['faults'])
 
     @staticmethod
     def idle(numbers):
-        """Why a recording did not exercise it: no rate was ever commanded."""
-        return '' if (numbers[RATE_COMMAND_TOPIC][:, 2:4] != 0.0).any() else 'the drive was never told to move'
+        """Return the reason why a recording does not exercise the drive, '' if it does."""
+        return '' if (numbers[RATE_COMMAND_TOPIC][:, 2:4] != 0.0).any() else 'no rate was ever commanded'

@@ -150,7 +150,7 @@ def test_switches_stand_behind_the_way_in_which_the_axis_stops():
     limits = LimitParameters()
     way = 2.45**2 / 40.0 + 2.45 * 0.01
     assert limits.switches == pytest.approx((way, 1.5 * way, 1.5 * way + math.radians(2.0)))
-    with pytest.raises(ParameterError, match=r'final = 0.1 rad: must be at least 0.1746 rad, in which the axis stops '
+    with pytest.raises(ParameterError, match=r'final = 0.1 rad: must be at least 0.1746 rad, the stopping distance '
                        r'from rate = 2.45 rad/s with deceleration = 20 rad/s2'):
         LimitParameters(final=0.1)
     with pytest.raises(ParameterError, match='final = 0.2, emergency = 0.19, buffer = '):

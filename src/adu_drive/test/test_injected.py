@@ -175,5 +175,5 @@ def test_a_fault_asked_for_while_it_runs_is_answered_with_its_step():
 
 
 def test_a_wrong_parameter_is_refused():
-    with pytest.raises(ParameterError, match="inject = '1 gst': unknown verb 'gst'; did you mean 'gust'"):
+    with pytest.raises(ParameterError, match="inject = '1 gst': unknown command 'gst'; did you mean 'gust'"):
         build(AduNodeParameters, {'inject': '1 gst'})

@@ -71,12 +71,12 @@ def test_a_lost_motor_is_told_until_it_is_back_and_reset():
     run(20, 0.1)
     text = adu.encode(DRIVE_STATE_TOPIC, int(adu.outputs[0][DRIVE_STATE_TOPIC]))
     assert text == adu.condition == 'enabled: azimuth motor lost' and text in topics.ENABLED_STATES
-    assert adu.left().enabled
+    assert adu.plant_state().enabled
     diagnosis = adu.diagnose()
     assert diagnosis.level == 1 and diagnosis.message == text
     assert dict(diagnosis.values)['azimuth faults'] == 'motor 2 lost'
     assert adu.request('adu/reset_faults').text.startswith('refused: the axes still move')
     run(60, 0.0)
-    assert adu.request('adu/reset_faults').text.startswith('refused: the cause is still there')
+    assert adu.request('adu/reset_faults').text.startswith('refused: the cause is still present')
     run(40, 0.0)
     assert adu.request('adu/reset_faults') == (True, 'drive is enabled')

@@ -41,7 +41,7 @@ def test_a_plant_stands_on_its_brakes_where_it_was_left(enabled, state):
     outputs = adu.parts['outputs']
     assert outputs['azimuth']['position'] == pytest.approx(1.25, abs=2e-6)
     assert outputs['elevation']['position'] == pytest.approx(0.75, abs=2e-6)
-    assert adu.left() == (outputs['azimuth']['position'], outputs['elevation']['position'], enabled, False)
+    assert adu.plant_state() == (outputs['azimuth']['position'], outputs['elevation']['position'], enabled, False)
 
 
 def test_an_angle_beyond_the_travel_is_at_its_end():
@@ -52,6 +52,6 @@ def test_an_angle_beyond_the_travel_is_at_its_end():
 
 def test_an_emergency_stop_is_left_as_disabled():
     adu = drive()
-    assert adu.left().enabled
+    assert adu.plant_state().enabled
     adu.request('adu/emergency_stop')
-    assert not adu.left().enabled
+    assert not adu.plant_state().enabled

@@ -25,9 +25,9 @@ def order(d, place):
 
 
 def said(d):
-    """What the drive says of its pins, in order."""
-    codes = d.log['pins']
-    return [topics.TOPIC_BY_NAME['adu/stow_pins'].texts[code] for code in codes[np.flatnonzero(np.diff(codes, prepend=-9))]]
+    """Return the successive texts of adu/stow_pins."""
+    codes, texts = d.log['pins'], topics.TOPIC_BY_NAME['adu/stow_pins'].texts
+    return [texts[code] for code in codes[np.flatnonzero(np.diff(codes, prepend=-9))]]
 
 
 def test_the_pins_go_in_on_the_brakes_and_the_drive_stays_off_until_they_are_out(drive):
@@ -89,7 +89,7 @@ def test_a_drive_without_pins_does_not_hear_of_them(drive):
 def test_a_stowed_antenna_is_still_stowed_after_a_restart(tmp_path):
     p = build(AduNodeParameters, {**STOWED, 'pins.initially_in': True})
     unit = Adu(p, Adu.NODE.reads[:3])
-    state_file.write(tmp_path / 'left', unit.left())
+    state_file.write(tmp_path / 'left', unit.plant_state())
     again = Adu(build(AduNodeParameters, STOWED), Adu.NODE.reads[:3])
     assert again.parts['outputs']['pins'] == 0
     again.resume(state_file.read(tmp_path / 'left'))

@@ -1,4 +1,4 @@
-"""The tracking antenna as a library: load a scenario, change its parameters, run it, look at its numbers; no ROS.
+"""Library of the tracking antenna without ROS: load a scenario, change its parameters, run it, read its numbers.
 
 >>> import pedestal
 >>> scenario = pedestal.load('leo_pass', duration=6.0)
@@ -9,8 +9,8 @@
 >>> run.results['pointing_rms_deg'] < 0.05
 True
 
-The numbers of a run are those of `pedestal run` of the same scenario, parameters and seed, to the last bit: the same
-compiled laws, in the order of the graph. The first run compiles them, which takes some minutes once.
+A run gives the numbers of `pedestal run` with the same scenario, parameters and seed, to the last bit: the same
+compiled laws run in the order of the graph. The first run compiles the laws, which takes some minutes.
 """
 import importlib
 import typing
@@ -27,12 +27,12 @@ _MODULES = {'Trials': 'ensemble', 'trials': 'ensemble', 'Run': 'recording', 'Tab
 __all__ = ['Run', 'Scenario', 'Table', 'Trials', 'load', 'read_bag', 'run', 'scenarios', 'trials']
 
 
-def __getattr__(name):
-    """Import the module of a name when it is used: the command, which lives here too, starts without them."""
+def __getattr__(name: str) -> typing.Any:
+    """Return a public name after importing its module. This avoids slow imports at the start of the command line."""
     if name not in _MODULES:
         raise AttributeError(f'module {__name__!r} has no attribute {name!r}')
     return getattr(importlib.import_module(f'{__name__}.{_MODULES[name]}'), name)
 
 
-def __dir__():
+def __dir__() -> list[str]:
     return sorted({*globals(), *__all__})

@@ -1,7 +1,7 @@
-"""The command line `pedestal`.
+"""Command line `pedestal`.
 
-A verb is a module of the room `verbs`: its help is the module's docstring, `add_arguments(parser)` adds its arguments,
-and `main(options)` does the work and returns the exit code.
+A verb is a module in `verbs`. Its docstring is the help, `add_arguments(parser)` adds its arguments, and
+`main(options)` does the work and returns the exit code.
 """
 from pedestal import stop
 
@@ -13,6 +13,8 @@ import os
 import shlex
 import signal
 import sys
+import types
+from collections.abc import Sequence
 
 from pedestal_analysis.console import STDOUT_PATH
 from pedestal_common.parameters import ParameterError
@@ -22,27 +24,30 @@ VERBS = {'run': 'antenna', 'scenarios': 'design', 'samples': 'design', 'new': 'd
          'program': 'antenna', 'verify': 'recordings', 'recover': 'recordings', 'rerun': 'recordings',
          'report': 'recordings', 'study': 'design', 'trials': 'design', 'export': 'recordings',
          'recompute': 'recordings', 'tune': 'design', 'replay': 'recordings', 'bench': 'design'}
-"""{verb: its room of `verbs`} in the order of the help."""
+"""{verb: its package in `verbs`}, in the order of the help."""
 
 
-def module_of(verb):
+def module_of(verb: str) -> types.ModuleType:
     """Return the module of a verb."""
     return importlib.import_module(f'pedestal.verbs.{VERBS[verb]}.{verb}')
 
 
-def main(args=None) -> int:
-    """Run a verb: exit code 0; 1 with one line on stderr for an error; 2 for a wrong command line; 130 if stopped."""
+def main(args: Sequence[str] | None = None) -> int:
+    """Run a verb.
+
+    Return its exit code: 0; 1 with a line on stderr for an error; 2 for a wrong command line; 130 after a stop.
+    """
     options = _parser().parse_args(args)
     options.command = shlex.join(('pedestal', *(sys.argv[1:] if args is None else args)))
     stop.on_stop(signal.default_int_handler)
-    alone = getattr(options, 'json', None) == STDOUT_PATH
+    json_on_stdout = getattr(options, 'json', None) == STDOUT_PATH
     try:
-        with contextlib.redirect_stdout(sys.stderr) if alone else contextlib.nullcontext():
+        with contextlib.redirect_stdout(sys.stderr) if json_on_stdout else contextlib.nullcontext():
             code = options.main(options)
         sys.stdout.flush()
         return code
     except BrokenPipeError:
-        # Who read it, as `head` does, has enough; a second error, at the end of Python, would tell nobody.
+        # The reader of the pipe, such as `head`, has closed it. This avoids a second error at the exit of Python.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
     except (ParameterError, ValueError, RuntimeError, OSError) as error:
@@ -53,17 +58,18 @@ def main(args=None) -> int:
         return stop.STOP_EXIT_CODE
 
 
-def _parser():
-    parser = argparse.ArgumentParser(prog='pedestal', description='The control system of a tracking antenna: run it, '
-                                     'record it, look at it.')
+def _parser() -> argparse.ArgumentParser:
+    """Return the parser of the command line with all verbs."""
+    parser = argparse.ArgumentParser(prog='pedestal', description='Run, record and analyse the control system of a '
+                                     'tracking antenna.')
     verbs = parser.add_subparsers(title='verbs', required=True, metavar='VERB')
     for name in VERBS:
         verb = module_of(name)
-        summary, _, description = verb.__doc__.partition('\n\n')
-        described = verbs.add_parser(name, help=summary, description=description or summary,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
-        verb.add_arguments(described)
-        described.set_defaults(main=verb.main)
+        description = (verb.__doc__ or '').strip()
+        verb_parser = verbs.add_parser(name, help=description.partition('\n\n')[0], description=description,
+                                       formatter_class=argparse.RawDescriptionHelpFormatter)
+        verb.add_arguments(verb_parser)
+        verb_parser.set_defaults(main=verb.main)
     return parser
 
 

@@ -1,9 +1,9 @@
-"""Trials: a scenario many times, its results as arrays."""
+"""Trials: many runs of a scenario, with the results as arrays."""
 from __future__ import annotations
 
 import pathlib
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
@@ -15,12 +15,16 @@ from pedestal_analysis.trials import table as tables
 
 def trials(scenario: Scenario, runs: int = 100, vary: Mapping[str, str] | None = None, *, sobol: bool = False,
            workers: int | None = None, folder: str | pathlib.Path | None = None) -> Trials:
-    """Make trials of a scenario, each with a seed of its own.
+    """Run trials of a scenario, each with its own seed.
 
-    runs: how many; vary: {'node.key': distribution}: uniform(low, high), normal(mean, sigma) or choice(a, b, ...),
-    with an x behind it a factor of what the scenario says; sobol: the points of a Sobol sequence in the place of
-    independent draws; workers: processes, None for one per core; folder: keeps the table, so that a call that was
-    stopped goes on. Raises ValueError, one line, before anything runs.
+    runs      number of trials
+    vary      {'node.key': distribution}: uniform(low, high), normal(mean, sigma) or choice(a, b, ...); an x after the
+              distribution multiplies the value of the scenario by the drawn number
+    sobol     True to draw the points of a Sobol sequence instead of independent points
+    workers   number of processes, None for one per core
+    folder    place of the table; a repeated call with the same folder continues a stopped one
+
+    Raises ValueError with one line before the first trial.
 
     >>> scenario = pedestal.load('leo_pass', duration=4.0)
     >>> made = pedestal.trials(scenario, 3, {'adu.azimuth.load.inertia': 'normal(1, 0.1)x'}, workers=1)
@@ -36,17 +40,17 @@ def trials(scenario: Scenario, runs: int = 100, vary: Mapping[str, str] | None =
 
 
 class Trials(Mapping[str, np.ndarray]):
-    """Trials: made[result] is the array (runs,) of a result, NaN in a trial in which it was not measured."""
+    """Finished trials: made[result] is the array (runs,) of a result, NaN for a trial without a value of it."""
 
     def __init__(self, plan: plans.Plan, table: tables.Table) -> None:
         self._plan, self._table = plan, table
 
     def __getitem__(self, result: str) -> np.ndarray:
         if result not in self._table.there:
-            raise KeyError(f'no trial has {result!r}; there are {", ".join(self._table.there)}')
+            raise KeyError(f'no trial has {result!r}; must be one of {", ".join(self._table.there)}')
         return self._table.column(result)
 
-    def __iter__(self):
+    def __iter__(self) -> Iterator[str]:
         return iter(self._table.there)
 
     def __len__(self) -> int:
@@ -59,16 +63,16 @@ class Trials(Mapping[str, np.ndarray]):
 
     @property
     def parameters(self) -> dict[str, np.ndarray]:
-        """{'node.key': values (runs,)} of what was varied; of texts the place of each in order of appearance."""
+        """Varied parameters {'node.key': values (runs,)}; texts are numbered in order of their first trial."""
         return {name: self._table.column(name) for name in self._table.varied}
 
     @property
     def units(self) -> dict[str, str]:
-        """{result: unit}."""
+        """Units {result: unit}."""
         return {name: statistics.unit(name) for name in self}
 
     def summary(self) -> list[dict]:
-        """The rows of `pedestal trials --json`: percentiles, rates and sensitivities with their intervals.
+        """Return the rows of `pedestal trials --json`: percentiles, rates and sensitivities with their intervals.
 
         >>> rows = pedestal.trials(pedestal.load('leo_pass', duration=4.0), 2, workers=1).summary()
         >>> {row['metric']: row['value'] for row in rows}['tracked/rate']
@@ -79,7 +83,7 @@ class Trials(Mapping[str, np.ndarray]):
                 *statistics.of_sensitivity(case, self._table)]
 
     def worst(self, by: str = 'pointing_rms_deg', count: int = 10) -> list[str]:
-        """The commands that run the worst trials by a result in the graph, the worst first.
+        """Return the commands that repeat the worst trials in the graph, ranked by a result, the worst first.
 
         >>> pedestal.trials(pedestal.load('leo_pass', duration=4.0, seed=7), 1, workers=1).worst()
         ['pedestal run leo_pass --seed 7 --duration 4.0']
@@ -88,9 +92,11 @@ class Trials(Mapping[str, np.ndarray]):
         return [self._plan.command(place) for place in places]
 
     def against(self, other: Trials, by: str = 'pointing_rms_deg') -> str:
-        """One sentence on whether these trials or the others are better by a result, pair by pair. Raises ValueError
-        where their seeds differ."""
+        """Return a sentence that compares a result of these and other trials, pair by pair.
+
+        Raises ValueError for different seeds.
+        """
         if not np.array_equal(self.seeds, other.seeds):
-            raise ValueError('the trials have different seeds, so they are no pairs')
-        names = comparison.names(self._plan, other._plan)
-        return comparison.sentence(comparison.Sides(*names, self._table, other._table), by)
+            raise ValueError('the trials have different seeds and cannot be paired')
+        name, other_name = comparison.names(self._plan, other._plan)
+        return comparison.sentence(comparison.Sides(name, other_name, self._table, other._table), by)

@@ -1,4 +1,4 @@
-"""The figures of the report, panel by panel, on axes of the caller's."""
+"""Figures of the report, drawn on axes of the caller."""
 from __future__ import annotations
 
 import functools
@@ -13,7 +13,7 @@ if typing.TYPE_CHECKING:
 
 
 class Panel(typing.NamedTuple):
-    """draw(axes, RunData); needs: what the RunData must not lack; polar: whether it takes polar axes."""
+    """A figure: draw(axes, RunData); needs: required parts of the RunData; polar: True for polar axes."""
     draw: Callable[[Axes, run_data.RunData], None]
     needs: tuple[str, ...]
     polar: bool = False
@@ -30,18 +30,17 @@ PANELS: dict[str, Panel] = {
     'carrier': Panel(run_figures.draw_carrier, ('receiver',)),
     'sky': Panel(run_figures.draw_sky, ('truth',), polar=True),
 }
-"""{name: Panel}: what Run.plot draws."""
+"""Figures of Run.plot, {name: Panel}."""
 
 
 def draw(name: str, axes: Axes, data: run_data.RunData) -> None:
     """Draw a panel of PANELS on axes. Raises KeyError, ValueError."""
     if name not in PANELS:
-        raise KeyError(f'no figure {name!r};{did_you_mean(name, PANELS)} there are {", ".join(PANELS)}')
+        raise KeyError(f'unknown figure {name!r};{did_you_mean(name, PANELS)} there are {", ".join(PANELS)}')
     panel = PANELS[name]
     lack = data.lacks(panel.needs)
     if lack:
         raise ValueError(f'{name}: {lack}')
     if panel.polar != (axes.name == 'polar'):
-        raise ValueError(f'{name}: must be drawn on {"polar" if panel.polar else "rectilinear"} axes, these are '
-                         f'{axes.name}')
+        raise ValueError(f'{name}: axes are {axes.name}, must be {"polar" if panel.polar else "rectilinear"}')
     panel.draw(axes, data)

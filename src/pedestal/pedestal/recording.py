@@ -1,4 +1,4 @@
-"""Runs: what was said on every topic, as named arrays, from memory or from a recording."""
+"""Runs: the messages of every topic as named arrays, from memory or from a recording."""
 from __future__ import annotations
 
 import functools
@@ -19,16 +19,15 @@ from pedestal_recording import bag as bags
 if typing.TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-POINTING_COLUMNS = {'t': ('t', 's'), 'cross_elevation': ('cross_elevation', 'rad'), 'elevation': ('elevation_error',
-                                                                                                  'rad'),
-                    'range': ('range', 'm')}
-"""{column: (field of tracking.Tracking, unit)} of Run.pointing."""
+POINTING_COLUMNS = {'t': ('t', 's'), 'cross_elevation': ('cross_elevation', 'rad'),
+                    'elevation': ('elevation_error', 'rad'), 'range': ('range', 'm')}
+"""Columns of Run.pointing, {column: (field of tracking.Tracking, unit)}."""
 
 
 class Table(Mapping[str, np.ndarray]):
-    """Named arrays of equal length, a row each message: {column: array (n,)}; units {column: unit}, '' for none.
+    """Named arrays of equal length, {column: array (n,)}, with a row for each message.
 
-    't' [s] is when it was measured.
+    units: {column: unit}, '' for none. Column 't' is the time of the measurement [s].
     """
 
     def __init__(self, arrays: Mapping[str, np.ndarray], units: Mapping[str, str]) -> None:
@@ -51,7 +50,7 @@ class Table(Mapping[str, np.ndarray]):
 class Run:
     """A run: run[topic] is the Table of a topic.
 
-    name: of the scenario or the recording; beam: of several, else ''.
+    name: name of the scenario or of the recording; beam: name of the beam, '' for an antenna with a single beam.
     """
 
     def __init__(self, source: memory_recording.MemoryRecording | bags.Bag, name: str, beam: str = '') -> None:
@@ -59,7 +58,7 @@ class Run:
 
     @property
     def topics(self) -> tuple[str, ...]:
-        """Names of the topics that have numbers or texts.
+        """Names of the topics with numbers or texts.
 
         >>> pedestal.run(pedestal.load('leo_pass', duration=1.0)).topics[:3]
         ('clock', 'joint_states', 'adu/truth')
@@ -67,7 +66,7 @@ class Run:
         return tuple(name for name in self._source.topics if name not in ('diagnostics', 'acu/program_track'))
 
     def __getitem__(self, topic: str) -> Table:
-        """The Table of a topic. Raises KeyError for one that is not there."""
+        """Return the Table of a topic. Raises KeyError for a missing topic."""
         if topic not in self.topics:
             raise KeyError(f'{topic!r} is not in {self.name}; there are {", ".join(self.topics)}')
         arrays = {name: np.asarray(values) for name, values in self._source.table(topic).items()}
@@ -76,23 +75,23 @@ class Run:
 
     @functools.cached_property
     def tracking(self) -> tracking.Tracking:
-        """The run against the truth on the drive's steps, as every result is measured on it."""
+        """Run and truth at the steps of the drive, from which all results are computed."""
         return tracking.read(self._source)
 
     @property
     def pointing(self) -> Table:
-        """True pointing error on the drive's steps: cross_elevation, elevation [rad], the target off the beam.
+        """True pointing error at the steps of the drive: cross_elevation and elevation of the target off the beam.
 
         >>> pedestal.run(pedestal.load('leo_pass', duration=1.0)).pointing
         Table(t [s], cross_elevation [rad], elevation [rad], range [m])
         """
-        return Table({name: np.asarray(getattr(self.tracking, field)) for name,
-                      (field, _) in POINTING_COLUMNS.items()},
+        return Table({name: np.asarray(getattr(self.tracking, field))
+                      for name, (field, _) in POINTING_COLUMNS.items()},
                      {name: unit for name, (_, unit) in POINTING_COLUMNS.items()})
 
     @functools.cached_property
     def results(self) -> dict[str, float]:
-        """{name: value} of the results that `pedestal run` prints of the recording; the unit is the end of a name.
+        """Results of the recording as in `pedestal run`, {name: value}; a name ends with its unit.
 
         >>> round(pedestal.run(pedestal.load('leo_pass', duration=4.0)).results['lock_time_s'], 2)
         1.08
@@ -100,9 +99,9 @@ class Run:
         return {name: float(value) for name, (value, _) in results.measured(results.of_bag(self._source)).items()}
 
     def plot(self, figure: str, axes: Axes) -> None:
-        """Draw one of the report's figures on axes of the caller's; panels.PANELS says which there are.
+        """Draw a figure of the report on axes of the caller; panels.PANELS lists the figures.
 
-        Raises KeyError for an unknown one, ValueError where the run lacks what it shows.
+        Raises KeyError for an unknown figure, ValueError for wrong axes or for missing data in the run.
 
         >>> from matplotlib.figure import Figure
         >>> axes = Figure().subplots()
@@ -118,9 +117,9 @@ class Run:
 
 
 def run(scenario: Scenario, beam: str = '') -> Run:
-    """Run a scenario in memory; beam: of several, '' for the first.
+    """Run a scenario in memory. beam: name of a beam of several, '' for the first.
 
-    Equal scenarios give equal numbers, those of the lockstep recording of `pedestal run`.
+    Equal scenarios give equal numbers, and the numbers of the lockstep recording of `pedestal run`.
 
     >>> first, second = (pedestal.run(pedestal.load('leo_pass', duration=1.0, seed=2)) for _ in range(2))
     >>> bool((first['joint_states']['azimuth.position'] == second['joint_states']['azimuth.position']).all())
@@ -133,9 +132,9 @@ def run(scenario: Scenario, beam: str = '') -> Run:
 
 
 def read_bag(path: str | pathlib.Path, beam: str = '') -> Run:
-    """The Run of a recording, a folder or an .mcap file; beam: of several, '' for the first.
+    """Return the Run of a recording, a folder or an .mcap file. beam: name of a beam of several, '' for the first.
 
-    Raises ValueError, one line, for what cannot be read.
+    Raises ValueError with one line for an unreadable recording.
     """
     view = bags.read(path, beam)
     return Run(view, view.metadata.get('scenario', pathlib.Path(path).stem), beam)

@@ -1,20 +1,23 @@
-"""Files to begin with: a flight, a ship's motion, a satellite and an antenna, made up by closed forms.
+"""Sample files of `pedestal samples`: a flight, the motion of a ship, a satellite and an antenna.
 
-Each has the form in which a user would bring his own; `pedestal samples` writes them.
+Closed-form expressions give the numbers. Each file has the format in which a user provides such data.
 """
 import math
+from collections.abc import Callable
 
 from tracking_receiver_sim.params import LeoPassParameters
 
 METRES_PER_FOOT = 0.3048
+"""International foot [m]."""
+
 FLIGHT_TIMES_S = range(91)
-"""Of the flight [s]."""
+"""Times of the rows of the flight [s]."""
+
 ADSB_HEADER = 'timestamp,icao24,callsign,latitude,longitude,geoaltitude'
 
 
-def flight():
-    """ADS-B of a helicopter as CSV, one row a second: a turn of 2 km radius at 45 m/s that climbs at 2 m/s; rounded as
-    ADS-B is, to 1e-5 deg and 25 ft."""
+def flight() -> str:
+    """Return a climbing turn of a helicopter as CSV, with the resolution of ADS-B."""
     rows = [ADSB_HEADER]
     for t in FLIGHT_TIMES_S:
         phase = 0.0225 * t
@@ -25,9 +28,8 @@ def flight():
     return '\n'.join(rows) + '\n'
 
 
-def ship():
-    """Motion of a ship as CSV, four rows a second for 150 s: roll of 6 deg in 9 s, pitch of 2 deg in 7 s, yaw of 1 deg
-    in 13 s about a heading of 60 deg, heave of 1 m."""
+def ship() -> str:
+    """Return the sinusoidal motion of a ship as CSV."""
     rows = ['time_s,roll_deg,pitch_deg,heading_deg,heave_m']
     for k in range(601):
         t = 0.25 * k
@@ -37,13 +39,13 @@ def ship():
     return '\n'.join(rows) + '\n'
 
 
-def tle():
-    """The elements of the ISS on 2019-12-09 that the scenario leo_pass has too."""
+def tle() -> str:
+    """Return the TLE of the scenario leo_pass."""
     return f'ISS (ZARYA)\n{LeoPassParameters().line_1}\n{LeoPassParameters().line_2}\n'
 
 
 ANTENNA_FILE_TEXT = """\
-# An antenna of your own: what is not said here has its default; `pedestal parameters NODE` lists what there is.
+# An antenna of your own. Other parameters have their defaults; `pedestal parameters NODE` lists them.
 scenario:
   ros__parameters:
     title: the UAV through a heavier antenna with a narrower beam
@@ -53,7 +55,7 @@ scenario:
     target:
       kind: flyby
     antenna:
-      beamwidth: 0.012        # half power [rad]; the control unit is told the same
+      beamwidth: 0.012        # half power [rad]; also used by the control unit
     receiver:
       cn0_dbhz: 52.0          # on the beam axis at reference_range
       reference_range: 600.0  # [m]
@@ -62,11 +64,11 @@ scenario:
     initial_elevation: 0.19   # [rad]
     azimuth:
       load:
-        inertia: 320.0        # of dish and yoke about the axis [kg m2]
+        inertia: 320.0        # dish and yoke about the axis [kg m2]
       speed_loop:
-        load_inertia: 320.0   # what the speed loop knows of it
+        load_inertia: 320.0   # value for the speed loop [kg m2]
       gear_train:
-        lash: 0.0015          # of one mesh, on the load axis [rad]
+        lash: 0.0015          # play of one mesh, on the load axis [rad]
 /**/acu:
   ros__parameters:
     initial_mode: program
@@ -77,8 +79,16 @@ scenario:
         acceleration: 15.0    # [rad/s2]
 """
 
-SAMPLE_FILES = {'flight.csv': flight, 'ship.csv': ship, 'iss.tle': tle, 'my_antenna.yaml': lambda: ANTENNA_FILE_TEXT}
-"""{name: function that gives its text}."""
-FILE_DESCRIPTIONS = {'flight.csv': flight.__doc__, 'ship.csv': ship.__doc__, 'iss.tle': tle.__doc__,
-                     'my_antenna.yaml': 'A scenario: another antenna on the flight of uav_flyby.'}
-"""{name: sentence}."""
+SAMPLE_FILES: dict[str, Callable[[], str]] = {'flight.csv': flight, 'ship.csv': ship, 'iss.tle': tle,
+                                              'my_antenna.yaml': lambda: ANTENNA_FILE_TEXT}
+"""{name of a file: function that returns its text}."""
+
+FILE_DESCRIPTIONS = {
+    'flight.csv': 'ADS-B of a helicopter as CSV, one row a second: a turn of 2 km radius at 45 m/s that climbs at 2 '
+                  'm/s; rounded to 1e-5 deg and 25 ft, as ADS-B is.',
+    'ship.csv': 'Motion of a ship as CSV, four rows a second for 150 s: roll 6 deg in 9 s, pitch 2 deg in 7 s, yaw 1 '
+                'deg in 13 s about heading 60 deg, heave 1 m.',
+    'iss.tle': 'Elements of the ISS on 2019-12-09, which the scenario leo_pass also has.',
+    'my_antenna.yaml': 'A scenario: another antenna that tracks the flight of uav_flyby.',
+}
+"""{name of a file: its content in a sentence}."""

@@ -1,26 +1,33 @@
-"""A satellite and a station of the user's own: what --tle, --station and --pass of `pedestal run` change."""
+"""Changes of a scenario by --tle, --station and --pass of `pedestal run`: a satellite and a station of the user."""
 import datetime
 import json
+import pathlib
+import typing
 
 from pedestal_analysis import console
 from pedestal_analysis.report.subject import place
 from pedestal_common.geometry import orbit, passes
 from tracking_receiver_sim import elements
 
+if typing.TYPE_CHECKING:
+    from pedestal_bringup.scenario.scenario import Draft
+
 STATION_PARAMETERS = ('latitude_deg', 'longitude_deg', 'height')
 
 
-def tle_changes(path, name):
-    """Texts 'node.key=value' of a file of TLEs or OMMs, for the target and for mode tle; name: of the satellite, ''
-    where it holds but one. Raises TargetError."""
+def tle_changes(path: str | pathlib.Path, name: str) -> list[str]:
+    """Return texts 'node.key=value' for the target and for mode tle, from a file of TLEs or OMMs.
+
+    name: of the satellite, '' for a file of one satellite. Raises TargetError.
+    """
     _, line_1, line_2 = elements.read(path, name)
-    return [f'{known}.line_{number}={json.dumps(line)}'
-            for known in ('tracking_receiver.target.leo_pass', 'acu.prediction')
+    return [f'{prefix}.line_{number}={json.dumps(line)}'
+            for prefix in ('tracking_receiver.target.leo_pass', 'acu.prediction')
             for number, line in enumerate((line_1, line_2), 1)]
 
 
-def station_changes(text):
-    """Texts 'node.key=value' of a station 'LATITUDE,LONGITUDE,HEIGHT' in deg, deg, m. Raises ValueError."""
+def station_changes(text: str) -> list[str]:
+    """Return texts 'node.key=value' for a station 'LATITUDE,LONGITUDE,HEIGHT' [deg, deg, m]. Raises ValueError."""
     try:
         numbers = [float(part) for part in text.split(',')]
     except ValueError:
@@ -32,22 +39,25 @@ def station_changes(text):
 
 
 class PassSelection:
-    """The satellite and the station of a scenario.Draft, seen at `now` (datetime, UTC). Raises ValueError where its
-    target is no satellite."""
+    """Choice of a pass of the satellite over the station of a scenario.Draft at the time `now` (datetime, UTC).
 
-    def __init__(self, draft, now):
+    Raises ValueError for a scenario whose target is no satellite.
+    """
+
+    def __init__(self, draft: 'Draft', now: datetime.datetime) -> None:
         if draft.header.graph_beams > 1:
-            raise ValueError(f'--pass: {draft.name} has {draft.header.beams} beams; it takes a scenario of one')
+            raise ValueError(f'--pass: {draft.name} has {draft.header.beams} beams; must be a scenario of one beam')
         target = draft.target
         if target.kind != 'leo_pass':
-            raise ValueError(f'--tle, --pass: the target of {draft.name} is a {target.kind}, which is no satellite')
+            raise ValueError(f'--tle, --pass: the target of {draft.name} is a {target.kind}, must be a '
+                             'satellite (leo_pass)')
         self.satellite, self.station, self.now = orbit.satellite(target.leo_pass), target.station, now
 
-    def list(self):
-        """Print the passes that --pass takes by number."""
+    def print_passes(self) -> None:
+        """Print the passes with their numbers for --pass."""
         begin, old = passes.search_start(self.satellite, self.now)
         if old:
-            print(f'{old}: these are the passes of its own time')
+            print(f'{old}: the list begins at its epoch')
         found = passes.passes_after(self.satellite, self.station, begin)
         print(f'satellite {self.satellite.satnum_str} over {place(self.station)}, {passes.SEARCH_DAYS:g} days from '
               f'{begin:%Y-%m-%d %H:%M:%S} UTC, passes above {passes.MIN_CULMINATION_DEG:g} deg')
@@ -56,9 +66,11 @@ class PassSelection:
              f'{p.top:%H:%M:%S}', f'{p.set:%H:%M:%S}', f'{p.set_azimuth:.0f} deg, {p.duration:.0f} s')
             for n, p in enumerate(found, 1)])
 
-    def choose(self, which):
-        """(texts 'node.key=value', duration [s], line) of the pass that `which` names, from rise to set. Raises
-        TargetError."""
+    def choose(self, which: str) -> tuple[list[str], int, str]:
+        """Return (texts 'node.key=value', duration [s], line) of a pass from rise to set. Raises TargetError.
+
+        which: value of --pass: 'next', a number in the list, or a UTC.
+        """
         p = passes.chosen_pass(self.satellite, self.station, which, self.now)
         start = p.rise.replace(microsecond=0)
         line = (f'satellite {self.satellite.satnum_str} over {place(self.station)}: rises {p.rise:%Y-%m-%d %H:%M:%S} '

@@ -1,4 +1,4 @@
-"""Scenarios: what is run, with which parameters."""
+"""Scenarios with their parameters."""
 from __future__ import annotations
 
 import dataclasses
@@ -9,13 +9,13 @@ from collections.abc import Mapping
 import numpy as np
 
 from pedestal_bringup.scenario import scenario as bringup
-from pedestal_common import parameters
+from pedestal_common.parameters import Parameters, as_dict, flatten
 
 Value = float | int | bool | str
 
 
 def scenarios() -> dict[str, str]:
-    """{name: title} of the scenarios that come with the product.
+    """Return the scenarios that come with the product, {name: title}.
 
     >>> 'leo_pass' in pedestal.scenarios()
     True
@@ -25,10 +25,10 @@ def scenarios() -> dict[str, str]:
 
 def load(source: str | pathlib.Path, changes: Mapping[str, Value] | None = None, *, duration: float | None = None,
          seed: int | None = None) -> Scenario:
-    """The scenario of a name, or of the path of a .yaml file.
+    """Return the scenario of a name or of a .yaml file.
 
-    changes: {'node.key': value} in the place of the file's; duration [s] and seed: in the place of the file's.
-    Raises ValueError, one line, for anything unknown or out of range.
+    changes: {'node.key': value}. changes, duration [s] and seed replace values of the file.
+    Raises ValueError with one line for an unknown name or a value out of range.
 
     >>> pedestal.load('leo_pass', seed=3).seed
     3
@@ -42,9 +42,9 @@ def load(source: str | pathlib.Path, changes: Mapping[str, Value] | None = None,
 
 @dataclasses.dataclass(frozen=True)
 class Scenario:
-    """A scenario with some parameters changed; checked when it is made.
+    """A scenario with changed parameters, checked at its creation.
 
-    source: name or path; changes: {'node.key': value}; given_duration [s] and given_seed: None for those of the file.
+    source: name or path; changes: {'node.key': value}; given_duration [s] and given_seed: None for values of the file.
     """
     source: str
     changes: Mapping[str, Value]
@@ -52,16 +52,16 @@ class Scenario:
     given_seed: int | None = None
 
     def __post_init__(self) -> None:
-        self.checked  # noqa: B018  raises for what is not allowed
+        self.checked  # noqa: B018  raises ValueError for wrong values
 
     @functools.cached_property
     def checked(self) -> bringup.Scenario:
-        """What pedestal_bringup makes of it."""
+        """Scenario of pedestal_bringup with all changes applied."""
         return bringup.load(self.source, self.overrides, self.given_seed, self.given_duration)
 
     @property
     def overrides(self) -> list[str]:
-        """Its changes as `pedestal run --param` takes them.
+        """Changes as texts for `pedestal run --param`.
 
         >>> pedestal.load('leo_pass', {'acu.azimuth.filter.ca.noise': 0.05}).overrides
         ['acu.azimuth.filter.ca.noise=0.05']
@@ -71,7 +71,7 @@ class Scenario:
 
     def changed(self, changes: Mapping[str, Value] | None = None, *, duration: float | None = None,
                 seed: int | None = None) -> Scenario:
-        """This scenario with further changes; itself it stays as it is.
+        """Return this scenario with further changes; the original is not modified.
 
         >>> pedestal.load('leo_pass').changed({'acu.azimuth.filter.kind': 'imm'}, seed=2)['acu.azimuth.filter.kind']
         'imm'
@@ -81,7 +81,7 @@ class Scenario:
                         self.given_seed if seed is None else seed)
 
     def __getitem__(self, name: str) -> Value:
-        """The value of a parameter 'node.key'. Raises KeyError for an unknown one.
+        """Return the value of a parameter 'node.key'. Raises KeyError for an unknown name.
 
         >>> pedestal.load('leo_pass')['adu.period']
         0.005
@@ -91,7 +91,7 @@ class Scenario:
 
     @property
     def nodes(self) -> tuple[str, ...]:
-        """Names of the nodes that have parameters, and 'scenario' for the header.
+        """Names of the nodes with parameters, and 'scenario' for the header.
 
         >>> pedestal.load('ship_pass').nodes
         ('ship_motion', 'ins', 'tracking_receiver', 'acu', 'adu', 'recorder', 'scenario')
@@ -99,26 +99,26 @@ class Scenario:
         return (*(node for node in self.checked.nodes if node != 'operator'), 'scenario')
 
     def parameters(self, node: str) -> dict[str, Value]:
-        """{key: value} of all parameters of one of its nodes. Raises KeyError for another name."""
-        return parameters.as_dict(self._instance(node))
+        """Return all parameters of a node, {key: value}. Raises KeyError for a node outside the scenario."""
+        return as_dict(self._instance(node))
 
     def units(self, node: str) -> dict[str, str]:
-        """{key: unit} of the parameters of one of its nodes that have one.
+        """Return the units of the parameters of a node, {key: unit}, without dimensionless parameters.
 
         >>> pedestal.load('leo_pass').units('adu')['azimuth.load.inertia']
         'kg m2'
         """
-        return {key: field.metadata['unit'] for key, field in parameters.flatten(type(self._instance(node)))
+        return {key: field.metadata['unit'] for key, field in flatten(type(self._instance(node)))
                 if field.metadata.get('unit')}
 
-    def _instance(self, node: str) -> parameters.Parameters:
+    def _instance(self, node: str) -> Parameters:
         if node not in self.nodes:
             raise KeyError(f'{node!r} takes no part in {self.source}; there are {", ".join(self.nodes)}')
         return self.checked.header if node == 'scenario' else self.checked.node_parameters(node)
 
     @property
     def name(self) -> str:
-        """Its name, of a file the name of that."""
+        """Name of the scenario, or name of its file without suffix."""
         return self.checked.name
 
     @property
@@ -133,7 +133,7 @@ class Scenario:
 
     @property
     def beams(self) -> tuple[str, ...]:
-        """Names of its beams where there are several, else ('',).
+        """Names of the beams of an array, ('',) for a single beam.
 
         >>> pedestal.load('phased_array_four').beams
         ('beam_1', 'beam_2', 'beam_3', 'beam_4')

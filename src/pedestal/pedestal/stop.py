@@ -1,23 +1,25 @@
-"""How `pedestal` is stopped by Ctrl-C, SIGTERM, SIGHUP. To be imported by it before anything else, because the rest
-takes half a second to import: until then it ends at once, with the line that it always has.
+"""Stop of `pedestal` by Ctrl-C, SIGTERM or SIGHUP.
 
-Who imports the command line as a module keeps his handlers.
+The command line imports this module first, because the import of the rest takes half a second. A signal during that
+import ends the process at once, with the usual message. A program that imports the command line keeps its handlers.
 """
 import os
 import signal
 import sys
+import types
+from collections.abc import Callable
 
 STOP_MESSAGE, STOP_EXIT_CODE = 'pedestal: stopped', 130
 
 
-def on_stop(handler):
-    """What is done then, unless whoever started it has that ignored."""
+def on_stop(handler: Callable[[int, types.FrameType | None], object]) -> None:
+    """Set the handler of the three signals. A signal that the parent process ignores remains ignored."""
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         if signal.getsignal(number) is not signal.SIG_IGN:
             signal.signal(number, handler)
 
 
-def _end_at_once(*_):
+def _end_at_once(_number: int, _frame: types.FrameType | None) -> None:
     os.write(2, f'{STOP_MESSAGE}\n'.encode())
     os._exit(STOP_EXIT_CODE)
 

@@ -73,7 +73,7 @@ def test_every_figure_is_drawn_on_the_callers_axes(figure):
                    for kind in (('polar', None) if polar else (None, 'polar')))
     run.plot(figure, axes)
     assert axes.lines and len(axes.figure.axes) == 1
-    with pytest.raises(ValueError, match='must be drawn on'):
+    with pytest.raises(ValueError, match='must be (polar|rectilinear)'):
         run.plot(figure, other)
 
 

@@ -1,1 +1,1 @@
-"""What recordings and trials show: results, reports, reprocessing, many runs, tuning."""
+"""Analysis of recordings and scenarios: results, reports, reprocessing, trials, tuning."""

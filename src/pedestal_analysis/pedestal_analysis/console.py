@@ -9,24 +9,28 @@ import sys
 import textwrap
 
 EXIT_WRONG_COMMAND = 2
+"""Exit code of a verb with wrong arguments."""
 EXIT_DISTURBED = 3
+"""Exit code of a run that was disturbed."""
 
 STDOUT_PATH = pathlib.Path('/dev/stdout')
-"""What --json - stands for."""
+"""Path that --json - selects."""
 
 MAX_NAME_COLUMNS, MAX_CELL_COLUMNS, MIN_SENTENCE_COLUMNS = 44, 24, 40
-"""Columns that the name of a list and its other cells have to themselves, a longer one moves what follows; and the
-least that a sentence beside them has, which stands below them otherwise."""
+"""Widths of a list: largest width of the names, of the other cells, and smallest width of the sentences [columns].
+
+A longer cell moves the rest of its row. On a terminal too narrow for the sentences, they are printed below the cells.
+"""
 
 MIN_TABLE_COLUMNS = 150
-"""Columns that a table of results may take on any terminal, so that a row stays one line."""
+"""Smallest width of a table of results on any terminal, so that a row stays one line [columns]."""
 
 
 @contextlib.contextmanager
 def _bar(columns, advance, description, total=None, **fields):
-    """Context with a function that calls advance(bar, task, ...) on a terminal, and does nothing in a pipe.
+    """Yield a function that calls advance(bar, task, ...) on a terminal and does nothing in a pipe.
 
-    columns(rich.progress) -> those of the bar; description, total, fields: of its one task.
+    columns(rich.progress) -> columns of the bar; description, total, fields: of its only task.
     """
     if not sys.stderr.isatty():
         yield lambda *_: None
@@ -37,7 +41,7 @@ def _bar(columns, advance, description, total=None, **fields):
 
 
 def progress_of_run(duration):
-    """Context with a function progress(seconds of the run): a bar on a terminal, nothing in a pipe. duration [s]."""
+    """Return a context with progress(seconds of the run), a bar on a terminal, nothing in a pipe; duration [s]."""
     def columns(rich):
         return (rich.TextColumn('{task.description}'), rich.BarColumn(),
                 rich.TextColumn('{task.completed:.0f} / {task.total:.0f} s'), rich.TimeElapsedColumn())
@@ -48,18 +52,17 @@ def progress_of_run(duration):
 
 
 def progress_of_share():
-    """Context with a function progress(fraction done, what comes next): a bar on a terminal, nothing in a pipe."""
+    """Return a context with progress(fraction done, text of the next item), a bar on a terminal, nothing in a pipe."""
     def columns(rich):
         return rich.BarColumn(), rich.TextColumn('{task.description}'), rich.TimeElapsedColumn()
 
     def advance(bar, task, share, text):
         bar.update(task, completed=share, description=text)
-    return _bar(columns, advance, 'compiling the laws (the first time)', 1.0)
+    return _bar(columns, advance, 'compiling the laws (first time only)', 1.0)
 
 
 def progress_of_trials():
-    """Context with a function progress(trials done, in all): a bar with rate and time left on a terminal, nothing in a
-    pipe."""
+    """Return a context with progress(trials done, all trials), a bar with rate and time left on a terminal."""
     def columns(rich):
         return (rich.BarColumn(), rich.MofNCompleteColumn(), rich.TextColumn('trials, {task.fields[rate]}'),
                 rich.TimeElapsedColumn(), rich.TextColumn('left'), rich.TimeRemainingColumn())
@@ -68,32 +71,32 @@ def progress_of_trials():
         speed = bar.tasks[0].speed
         rate = {'rate': f'{speed:.1f} a second'} if speed else {}
         bar.update(task, completed=done, total=total, **rate)
-    return _bar(columns, advance, '', rate='compiling the laws (the first time)')
+    return _bar(columns, advance, '', rate='compiling the laws (first time only)')
 
 
 def add_json(parser):
-    """The option --json FILE of a verb that measures."""
+    """Add the option --json FILE to the parser of a verb that measures."""
     parser.add_argument('--json', type=lambda text: STDOUT_PATH if text == '-' else pathlib.Path(text), metavar='FILE',
-                        help='write the result rows; -: to the standard output, and all else to the standard error')
+                        help='file for the result rows; -: rows to standard output, all else to standard error')
 
 
 def check_json(path):
-    """Raises ValueError where --json cannot be written."""
+    """Raise ValueError if the file of --json cannot be written."""
     if path and (path.is_dir() or not path.parent.is_dir()):
         raise ValueError(f'--json {path}: must be a file in a directory that exists')
 
 
 def write_json(path, content):
-    """Write content as JSON to the path of --json; nothing where that is None."""
+    """Write content as JSON to the path of --json; do nothing for None."""
     if path:
         path.write_text(json.dumps(content, indent=1) + '\n')
 
 
 def show_list(rows):
-    """Print rows of texts in columns; on a terminal the last is wrapped to its width, in a pipe a row is a line."""
+    """Print rows of texts in columns; a terminal wraps the last column to its width, in a pipe a row is a line."""
     rows = list(rows)
-    widths = [min(max(len(row[i]) for row in rows), MAX_CELL_COLUMNS if i
-                  else MAX_NAME_COLUMNS) for i in range(len(rows[0]) - 1)]
+    widths = [min(max(len(row[i]) for row in rows), MAX_CELL_COLUMNS if i else MAX_NAME_COLUMNS)
+              for i in range(len(rows[0]) - 1)]
     indent = sum(widths) + 2 * len(widths)
     terminal = shutil.get_terminal_size().columns if sys.stdout.isatty() else None
     for *cells, sentence in rows:
@@ -101,7 +104,7 @@ def show_list(rows):
         if terminal is None:
             print(f'{head}  {sentence}')
         elif terminal < indent + MIN_SENTENCE_COLUMNS:
-            # Too narrow for a column of sentences: they go below.
+            # Because the terminal is too narrow for a column of sentences, they are printed below.
             fits = len(head.rstrip()) <= terminal
             below = (sentence,) if fits else ('  '.join(filter(None, cells[1:])), sentence)
             print(head.rstrip() if fits else cells[0],
@@ -112,8 +115,11 @@ def show_list(rows):
 
 
 def show_results(title, columns, results, whole, marks=()):
-    """Print a table of metrics. columns: heads, '' for a single one; results: {metric: (value, unit)} of each column;
-    whole: {metric: (value, unit)} of the run; marks: {metric: what is off about it} of each column."""
+    """Print a table of metrics.
+
+    columns: heads, '' for a single column; results: {metric: (value, unit)} of each column; whole: {metric: (value,
+    unit)} of the run; marks: {metric: note on a value that is off} of each column.
+    """
     from rich.console import Console
     from rich.table import Table
     from rich.text import Text
@@ -137,34 +143,34 @@ def show_results(title, columns, results, whole, marks=()):
 
 
 def measured(value):
-    """A number of a run as text: four digits, a large count whole."""
+    """Return a number of a run as text: four digits, all digits of a large count."""
     if not math.isfinite(value):
         return 'not measured'
     return f'{value:,.0f}' if abs(value) >= 1e4 and value == int(value) else number(value)
 
 
 def add_explain(parser):
-    """The option --explain of a verb that prints results."""
-    parser.add_argument('--explain', action='store_true', help='say of each result what it is, in a sentence')
+    """Add the option --explain to the parser of a verb that prints results."""
+    parser.add_argument('--explain', action='store_true', help='print the definition of each result as a sentence')
 
 
 def explain(table, names):
-    """Print what each result is, those of `names`. table: rows with name and sentence, such as results.RESULTS."""
+    """Print the definitions of the results in names; table: rows with name and sentence, such as results.RESULTS."""
     show_list((row.name, row.sentence) for row in table if row.name in names)
 
 
 def number(value):
-    """A number of a study's row as text, '-' for None."""
+    """Return a number of a study's row as text, '-' for None."""
     return '-' if value is None else f'{value:.4g}'
 
 
 def interval(row):
-    """The interval of a study's row as text, '' where it is of one run."""
+    """Return the interval of a study's row as text, '' for a row of one run."""
     return f'{number(row["ci_low"])} to {number(row["ci_high"])}' if 'runs' in row else ''
 
 
 def show_study(title, rows, missed):
-    """Print the table of a study's rows; missed(row) -> whether its target is not met."""
+    """Print the table of a study's rows; missed(row) -> True if the row misses its target."""
     from rich.box import SIMPLE_HEAD
     from rich.console import Console
     from rich.table import Table
@@ -179,7 +185,7 @@ def show_study(title, rows, missed):
 
 
 def show_trials(title, rows):
-    """Print what trials say of each result: rows of trials.statistics."""
+    """Print the statistics of each result over the trials: rows of trials.statistics."""
     from rich.box import SIMPLE_HEAD
     from rich.console import Console
     from rich.table import Table

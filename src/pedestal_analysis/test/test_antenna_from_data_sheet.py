@@ -50,7 +50,7 @@ def test_what_ships_tracks_within_a_twentieth_of_its_beam(name):
 
 @pytest.mark.parametrize('name', SHIPPED)
 def test_what_ships_is_made_by_the_commands_in_its_head(pedestal, tmp_path, name):
-    """`pedestal new`, then `tune --loops`: the same antenna, and the loops with the margins that are asked."""
+    """`pedestal new`, then `tune --loops`: the same antenna, and the loops with the required margins."""
     _, text = scenario.text(name)
     made, _, tuned, *_ = (line.removeprefix('# ') for line in text.splitlines())
     assert pedestal(*shlex.split(made.removeprefix('made by: '))[1:])[0] == 0
@@ -63,11 +63,11 @@ def test_what_ships_is_made_by_the_commands_in_its_head(pedestal, tmp_path, name
 
 
 @pytest.mark.parametrize('arguments, expected', [
-    (('--rate-azimuth', '400'), 'adu.azimuth: limits.rate = 6.98132 rad/s: the motors reach'),
+    (('--rate-azimuth', '400'), 'adu.azimuth: limits.rate = 6.98132 rad/s: must be at most'),
     (('--mirror', '400'), 'mirror = 400 m: must be 0.1 to 40'),
     (('--like', 'leo_pas'), "like = 'leo_pas': must be one of leo_pass, uav_flyby, ship_pass"),
     (('--motor-torque', '0.2'), 'adu.azimuth: motor_1.resistance = 128.706 ohm: must be 0.01 to 100'),
-    (('--motor-torque', '1', '--inertia-azimuth', '40000'), 'adu.azimuth: the motors cannot move it'),
+    (('--motor-torque', '1', '--inertia-azimuth', '40000'), 'adu.azimuth: the motors cannot move the axis'),
 ])
 def test_a_sheet_that_cannot_be_is_refused(pedestal, tmp_path, arguments, expected):
     code, output, errors = pedestal('new', 'my.yaml', *arguments)
@@ -77,5 +77,5 @@ def test_a_sheet_that_cannot_be_is_refused(pedestal, tmp_path, arguments, expect
 
 def test_no_file_is_overwritten(pedestal, tmp_path):
     (tmp_path / 'my.yaml').write_text('mine')
-    assert 'is there already' in pedestal('new', 'my.yaml')[2] and (tmp_path / 'my.yaml').read_text() == 'mine'
+    assert 'already exists' in pedestal('new', 'my.yaml')[2] and (tmp_path / 'my.yaml').read_text() == 'mine'
     assert 'must end in .yaml' in pedestal('new', 'my.txt')[2]

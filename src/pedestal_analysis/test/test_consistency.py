@@ -1,4 +1,4 @@
-"""NIS and NEES of a recording against made-up filters whose honesty is known."""
+"""NIS and NEES of a recording against simulated filters of known consistency."""
 import math
 
 import numpy as np
@@ -41,7 +41,7 @@ def made(rng, factor, n=6000, memory=0.98, freedoms=1):
         np.arange(n) > 100)
 
 
-@pytest.mark.parametrize('factor, words', [(1.0, 'honest:'), (2.0, 'too sure of itself:'), (0.5, 'too careful:')])
+@pytest.mark.parametrize('factor, words', [(1.0, 'consistent:'), (2.0, 'too sure:'), (0.5, 'too careful:')])
 @pytest.mark.parametrize('freedoms', [1, 2])
 def test_a_filter_is_what_it_was_made(factor, words, freedoms):
     found = made(np.random.default_rng(1), factor, freedoms=freedoms)
@@ -62,13 +62,13 @@ def test_a_filter_is_what_it_was_made(factor, words, freedoms):
             for name in ('nis', 'nees')} == {said}
 
 
-def test_the_band_holds_honest_filters_and_no_more():
-    """Of many honest filters with correlated errors 95 % are inside: the count of independent errors is right."""
+def test_the_band_holds_95_percent_of_consistent_filters():
+    """Of many consistent filters with correlated errors 95 % are inside: the count of independent errors is right."""
     rng = np.random.default_rng(3)
     inside = 0
     for series in np.stack([correlated(rng, 3000, 300, 0.95) for _ in range(2)]).transpose(2, 1, 0):
         nees = (series * series).sum(axis=1)
-        low, high = consistency.band(2, consistency.independent(nees))
+        low, high = consistency.band(2, consistency.effective_count(nees))
         inside += low <= nees.mean() <= high
     assert 0.88 <= inside / 300 <= 0.98
 
@@ -80,10 +80,10 @@ def test_band_of_fifty_runs():
 
 def test_independent_samples_of_a_series_with_known_memory():
     series = correlated(np.random.default_rng(5), 400_000, 1, 0.9)[:, 0]
-    assert consistency.independent(series) == pytest.approx(400_000 * 0.1 / 1.9, rel=0.1)
+    assert consistency.effective_count(series) == pytest.approx(400_000 * 0.1 / 1.9, rel=0.1)
     white = np.random.default_rng(6).standard_normal(20_000)
-    assert consistency.independent(white) == pytest.approx(20_000, rel=0.1)
-    assert consistency.independent(np.ones(10)) == 10.0
+    assert consistency.effective_count(white) == pytest.approx(20_000, rel=0.1)
+    assert consistency.effective_count(np.ones(10)) == 10.0
 
 
 def test_nothing_evaluated():

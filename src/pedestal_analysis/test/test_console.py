@@ -8,7 +8,7 @@ import pytest
 
 from pedestal_analysis import console
 
-ROWS = [('leo', '1', 'a satellite pass around its culmination, ashore, as seen by somebody who stands there'),
+ROWS = [('leo', '1', 'a satellite pass around its culmination, ashore, as seen by an observer at the station'),
         ('a.long.name.of.a.parameter', '', 'short'), ('empty', 'x' * 60, '')]
 
 
@@ -33,8 +33,8 @@ def test_on_a_narrow_terminal_each_cell_goes_below_the_name(capsys, monkeypatch)
         'short                        1']
 
 
-def test_who_reads_may_leave():
-    """As `pedestal scenarios | head` does: nothing is complained of."""
+def test_a_closed_pipe_is_no_error():
+    """`pedestal scenarios | head` closes the pipe; the verb prints no error."""
     reader, writer = os.pipe()
     os.close(reader)
     done = subprocess.run([sys.executable, '-m', 'pedestal.cli', 'scenarios'], stdout=writer,

@@ -67,5 +67,5 @@ def test_drive(sine):
 
 
 def test_refuses_a_period_that_does_not_fit():
-    with pytest.raises(ValueError, match='adu.period = 0.0035 s: must divide the 4 s'):
+    with pytest.raises(ValueError, match='adu.period = 0.0035 s: must divide 4 s'):
         identification.identify(scenario.load('leo_pass', ('adu.period=0.0035',), duration=0.7))

@@ -63,9 +63,9 @@ def test_the_design_is_that_of_a_rigid_drive():
 
 @pytest.mark.parametrize('arguments, expected', [
     (('phased_array_sway',), 'an electronic beam has no loops to tune'),
-    (('leo_pass', '--param', 'adu.elevation.load.unbalance=50000'), 'adu.elevation: the motors cannot move it'),
+    (('leo_pass', '--param', 'adu.elevation.load.unbalance=50000'), 'adu.elevation: the motors cannot move the axis'),
     (('leo_pass', '--phase-margin', '5'), 'phase_margin = 5 deg: must be 20 to 80'),
-    (('leo_pass', '--filter', 'ca'), '--filter: does not go with --loops'),
+    (('leo_pass', '--filter', 'ca'), '--filter: cannot be combined with --loops'),
     (('leo_pass', '--speed-bandwidth', '300', '--phase-margin', '75'),
      'azimuth: the speed loop cannot be closed with 75 deg and 6 dB: at 50.2 Hz it has'),
     (('leo_pass', *(part for text in SOFTER for part in ('--param', text))),

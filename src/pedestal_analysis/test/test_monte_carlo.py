@@ -1,4 +1,4 @@
-"""Workers of the studies: the same numbers whoever works, and an end that leaves nothing behind."""
+"""Workers of the studies: the same numbers on any pool, and an end that leaves no process behind."""
 import os
 import signal
 import subprocess
@@ -85,8 +85,8 @@ def test_ctrl_c_ends_a_study_and_its_workers(whom, tmp_path):
 
 @pytest.mark.parametrize('options, message', [
     ({'workers': 0}, '--workers 0: must be at least 1'),
-    ({'scheduler': 'nobody'}, '--scheduler nobody: must be an address'),
-    ({'scheduler': 'tcp://127.0.0.1:9'}, '--scheduler tcp://127.0.0.1:9: nobody answers as a Dask scheduler')])
+    ({'scheduler': 'host'}, '--scheduler host: must be an address'),
+    ({'scheduler': 'tcp://127.0.0.1:9'}, '--scheduler tcp://127.0.0.1:9: no Dask scheduler answers')])
 def test_a_pool_that_cannot_work_says_why(monkeypatch, options, message):
     monkeypatch.setattr(monte_carlo, 'SCHEDULER_TIMEOUT_S', 0.5)
     with pytest.raises((ValueError, RuntimeError), match=message), monte_carlo.Pool(**options):

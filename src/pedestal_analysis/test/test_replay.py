@@ -81,7 +81,7 @@ def test_start_and_duration_count_from_the_first_step_and_keep_what_holds(tmp_pa
     assert marks(played(recording, ALL, 3 * T / 1e9)) == [(4, ['program', 'g', 'i'])]
     assert marks(played(recording, ALL, T / 1e9, T / 1e9)) == [
         (2, ['g', 'stow', 'd', 'e', 'c', 'b', 'a']), (3, ['preset', 'program', 'h'])]
-    with pytest.raises(bag.BagError, match=r'bag: no message from 1 s on; it is 0\.015 s long'):
+    with pytest.raises(bag.BagError, match=r'bag: no message from 1 s on; the recording is 0\.015 s long'):
         played(recording, ALL, 1.0)
     with pytest.raises(bag.BagError, match='no message of ship/truth'):
         played(recording, ['ship/truth'])
@@ -108,11 +108,11 @@ REFUSED = {
     'start': (['--start', '-1'], '--start -1 s: must be 0 or more'),
     'duration': (['--duration', '0'], '--duration 0: must be above 0'),
     'deadline': (['--deadline', '-2'], '--deadline -2: must be above 0'),
-    'node': (['--node', 'acuu'], "--node acuu is no node; did you mean 'acu'? there are ship_motion, ins,"),
-    'lockstep with nobody': (['--lockstep'], '--lockstep: say with --node who answers the steps; there are'),
-    'lockstep with the INS': (['--lockstep', '--node', 'ins'], '--lockstep: ins answers no step at its stamp'),
-    'paused for ever': (['--paused'], '--paused: standard input is no terminal'),
-    'past the end': (['--start', '7'], 'no message from 7 s on; it is 0.015 s long'),
+    'node': (['--node', 'acuu'], "--node acuu: unknown node; did you mean 'acu'? must be one of ship_motion, ins,"),
+    'lockstep without a node': (['--lockstep'], '--lockstep: set --node to a node that answers the steps; must be'),
+    'lockstep with the INS': (['--lockstep', '--node', 'ins'], '--lockstep: ins does not answer steps at their stamp'),
+    'paused for ever': (['--paused'], '--paused: standard input must be a terminal'),
+    'past the end': (['--start', '7'], 'no message from 7 s on; the recording is 0.015 s long'),
 }
 
 
@@ -132,7 +132,7 @@ def test_a_node_whose_topics_are_not_there(tmp_path, capsys):
     writer.write(0, 0, 0, messages.serialize(messages.Clock(clock=messages.Time(sec=0, nanosec=0))))
     writer.close()
     assert cli.main(['replay', str(path), '--node', 'adu']) == 1
-    assert 'nothing in it for node adu, which reads ship/truth, acu/rate_command' in capsys.readouterr().err
+    assert 'no input of node adu in the bag; its inputs are ship/truth, acu/rate_command' in capsys.readouterr().err
 
 
 def test_a_type_that_is_not_the_topics(tmp_path, capsys):

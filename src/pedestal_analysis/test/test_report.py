@@ -187,21 +187,21 @@ def test_numbers_are_those_of_the_summary(page, whole):
     assert noise == pytest.approx(0.03, rel=0.1)
     assert read('pointing error, rms') == near(*rms)
     assert read('pointing error, largest') == near('cross_elevation_max_deg', 'elevation_max_deg', 'pointing_max_deg')
-    assert read('the same by the encoders, rms') == near(*(f'encoder_{key}' for key in rms))
-    assert read('the same by the encoders, largest')[1:2] == near('encoder_elevation_max_deg')
+    assert read('pointing error by the encoders, rms') == near(*(f'encoder_{key}' for key in rms))
+    assert read('pointing error by the encoders, largest')[1:2] == near('encoder_elevation_max_deg')
     assert values['encoder_cross_elevation_rms_deg'] == pytest.approx(
         math.degrees(math.hypot(TWIST, 0.0002 / math.sqrt(2.0)) * math.cos(0.8)), rel=0.05)
-    assert 'by the encoders:' not in page[0].text
+    assert 'those of the encoders:' not in page[0].text
     assert read("rms / receiver's single-sample noise") == near(*rms, scale=noise)
     assert read('noise reduction by the filter') == near(
         'noise_reduction_cross_elevation', 'noise_reduction_elevation', 'noise_reduction')
     assert read("receiver's single-sample noise") == near('single_sample_noise_deg')
     assert read('first lock') == near('lock_time_s') == [0.2]
     assert read('time in autotrack') == near('autotrack_time_s')
-    assert read("loop rate achieved (drive's time)") == pytest.approx([200.0])
+    assert read('loop rate achieved (time of the drive)') == pytest.approx([200.0])
     assert read('torque of motor 1, rms of the run') == [15.0, 13.0]
     assert read('load torque, rms of the run') == [100.0, 50.0]
-    assert rows['lost steps, made by the drive without the command for them'] == ['0']
+    assert rows['lost steps (steps of the drive without a command)'] == ['0']
     assert rows['steps missing in the recording'] == ['0'] and rows['steps'] == [str(STEPS)]
     assert rows['recording'][0].startswith('complete')
 
@@ -209,7 +209,7 @@ def test_numbers_are_those_of_the_summary(page, whole):
 def test_the_page_says_when_where_what_and_through_which_beam(page, tmp_path):
     assert 'beamwidth' not in page[0].rows
     leo = page_of(REFERENCES / 'leo_pass', output=tmp_path / 'leo.html')
-    assert leo.rows['target'] == ['satellite 25544, by its TLE']
+    assert leo.rows['target'] == ['satellite 25544, from its TLE']
     assert leo.rows['station'] == ['latitude 47.4, longitude 8.5 deg, height 500 m']
     assert leo.rows['beamwidth'] == ['1.003 deg']
     assert leo.rows['0 s is'][0].startswith('2019-12-09 16:4') and leo.rows['0 s is'][0].endswith(' UTC')
@@ -264,10 +264,10 @@ def test_missing_topics(tmp_path, names, drawn, said):
 
 def test_a_recording_from_before_the_truth_says_that_its_errors_are_those_of_the_encoders(page, tmp_path):
     old = page_of(make_bag(tmp_path / 'old', [name for name in ASHORE if name != 'adu/truth']))
-    assert f'Pointing errors by the encoders: {tracking.ENCODER_BEAM_NOTE}.' in old.text
-    assert 'the same by the encoders, rms' not in old.rows
+    assert f'Pointing errors are those of the encoders: {tracking.ENCODER_BEAM_NOTE}.' in old.text
+    assert 'pointing error by the encoders, rms' not in old.rows
     for name in ('rms', 'largest'):
-        assert old.rows[f'pointing error, {name}'] == page[0].rows[f'the same by the encoders, {name}']
+        assert old.rows[f'pointing error, {name}'] == page[0].rows[f'pointing error by the encoders, {name}']
 
 
 def test_never_locked(tmp_path):

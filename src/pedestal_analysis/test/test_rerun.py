@@ -1,4 +1,4 @@
-"""What can be made again, and how two recordings are compared; the run itself is tested in test/test_lockstep.py."""
+"""Reruns: refusals and the comparison of two recordings; the run itself is tested in test/test_lockstep.py."""
 import dataclasses
 
 import pytest
@@ -69,10 +69,10 @@ def test_another_version_with_equal_messages_is_named_as_such(tmp_path):
 
 def test_other_metadata_is_no_other_version(tmp_path):
     result, lines, verdict = compared(tmp_path, rows(), seed='9')
-    assert result.equal and lines == ['pedestal.seed: none -> 9'] and verdict == 'messages equal, metadata not'
+    assert result.equal and lines == ['pedestal.seed: none -> 9'] and verdict == 'messages equal, metadata differ'
 
 
-def test_the_first_difference_is_told_by_topic_stamp_and_field(tmp_path):
+def test_the_first_difference_has_topic_stamp_and_field(tmp_path):
     result, lines, verdict = compared(tmp_path, rows(velocity=(7, 1, 0.25), effort=(9, 0, 3.0)))
     assert not result.equal and verdict == 'NOT equal'
     assert lines == ['joint_states: 20 messages, 2 differ, the first at 0.035000 s: velocity[1] 0.0 -> 0.25']
@@ -85,7 +85,7 @@ def test_missing_and_more_messages_come_in_the_order_of_their_stamps(tmp_path):
     result, lines, _ = compared(tmp_path, now)
     assert not result.equal
     assert lines == ["joint_states: 20 messages, 1 differ, the first at 0.000000 s: name[1] 'elevation' -> 'tilt'",
-                     'clock: 20 messages, now 19, 1 differ, the first at 0.095000 s: not there any more',
+                     'clock: 20 messages, now 19, 1 differ, the first at 0.095000 s: no new message',
                      'acu/mode: 2 messages, now 3, 1 differ, the first at 0.095000 s: not recorded']
 
 
@@ -94,19 +94,19 @@ def test_another_order_in_the_file_is_a_difference(tmp_path):
     now[4], now[5] = now[5], now[4]
     result, lines, _ = compared(tmp_path, now)
     assert not result.equal
-    assert lines == ['clock: 20 messages, 0 differ, the first at 0.005000 s: its place in the file, '
-                     'now joint_states at 0.005000 s comes there']
+    assert lines == ['clock: 20 messages, 0 differ, the first at 0.005000 s: position in the file; '
+                     'the new file has joint_states at 0.005000 s there']
 
 
 def test_a_recording_that_breaks_off_is_equal_up_to_its_end(tmp_path):
     result = rerun.result(write(tmp_path / 'was', rows(12)), write(tmp_path / 'now', rows()))
     assert not result.equal
-    assert result.lines() == [f'{tmp_path}/now: NOT equal, but equal up to 0.055000 s, where the recording ends']
+    assert result.lines() == [f'{tmp_path}/now: NOT equal, but equal up to 0.055000 s, the end of the recording']
 
 
 @pytest.fixture
 def recorded(tmp_path):
-    """recorded(scenario, change of its parameters) -> Bag that says it was made so."""
+    """recorded(scenario, change of its parameters) -> Bag with this configuration."""
     def make(chosen, change=lambda values: None, **metadata):
         texts = configuration.recorder_parameters(chosen)
         values = yaml.safe_load(texts['parameters_yaml'])
@@ -139,12 +139,12 @@ def test_a_topic_that_the_recording_could_not_have_is_not_there(recorded):
 
 
 def test_what_cannot_be_made_again_is_refused(tmp_path, recorded):
-    with pytest.raises(bag.BagError, match='a_0.mcap: holds no configuration, so that it cannot be made again'):
+    with pytest.raises(bag.BagError, match='a_0.mcap: contains no configuration, so it cannot be rerun'):
         rerun.configured(write(tmp_path / 'a', rows()))
-    with pytest.raises(bag.BagError, match="made by a version with other parameters: acu: unknown parameter 'gone'"):
+    with pytest.raises(bag.BagError, match="by a version with other parameters: acu: unknown parameter 'gone'"):
         rerun.configured(recorded(scenario.load('leo_pass'), lambda values: values['acu'].update(gone=1.0)))
 
 
 def test_a_realtime_recording_is_refused(recorded):
-    with pytest.raises(bag.BagError, match='recorded in realtime, which is never the same twice; only a lockstep run'):
+    with pytest.raises(bag.BagError, match='pacing is realtime; must be lockstep to rerun'):
         rerun.configured(recorded(scenario.load('leo_pass', pacing='realtime'), pacing='realtime'))

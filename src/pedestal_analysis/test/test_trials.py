@@ -1,5 +1,5 @@
-"""Trials of a scenario: what is drawn, what is refused, the table that goes on, statistics against other routes, and
-the same numbers whoever works."""
+"""Trials of a scenario: draws, refusals, a continued table, statistics against other methods, and the same numbers on
+any pool."""
 import dataclasses
 import json
 import math
@@ -79,7 +79,7 @@ def test_rows_of_a_file_are_trials(tmp_path, pedestal):
 REFUSED = {
     'unknown node': ((f'{INERTIA[1:]}=normal(1, 0.1)',), "'du' is no node"),
     'unknown parameter': (('adu.azimuth.load.inertai=uniform(1, 2)',), "did you mean 'azimuth.load.inertia'?"),
-    'unknown distribution': ((f'{INERTIA}=gauss(1, 2)',), 'there are uniform(low, high), normal(mean, sigma)'),
+    'unknown distribution': ((f'{INERTIA}=gauss(1, 2)',), 'must be one of uniform(low, high), normal(mean, sigma)'),
     'no distribution': ((f'{INERTIA}=20',), 'must be one of uniform(low, high)'),
     'two ends': ((f'{INERTIA}=uniform(1, 2, 3)',), 'must be uniform(low, high)'),
     'no number': ((f'{INERTIA}=uniform(1, b)',), "'b' must be a number"),
@@ -91,8 +91,8 @@ REFUSED = {
     'crosses another': (('adu.azimuth.load.inertia=choice(text)',), 'must be a number'),
     'factor of text': (('acu.azimuth.filter.kind=normal(1, 0.1)x',), "a factor of 'imm' varies"),
     'twice': ((f'{INERTIA}=uniform(1, 2)', f'{INERTIA}=uniform(1, 3)'), 'is varied twice'),
-    'ashore': (('ins.latency=uniform(0, 0.01)',), 'ins takes no part in leo_pass'),
-    'seed': (('scenario.seed=uniform(1, 9)',), 'scenario.seed: is the same for every trial, or follows from its'),
+    'ashore': (('ins.latency=uniform(0, 0.01)',), 'ins is not in leo_pass; must be one of'),
+    'seed': (('scenario.seed=uniform(1, 9)',), 'scenario.seed: cannot vary, because trials share it or derive it'),
     'no file': (('rows.csv',), 'rows.csv: No such file'),
 }
 
@@ -107,21 +107,21 @@ def test_refused_before_anything_runs(pedestal, tmp_path, case):
 
 
 @pytest.mark.parametrize('options, expected', [
-    (('--runs', 0), '--runs 0: must be at least 1'), (('--sobol',), '--sobol: nothing is drawn'),
-    (('--seed', 2**31 - 3, '--runs', 4), 'from seed 2147483645 on there are 3 seeds'),
+    (('--runs', 0), '--runs 0: must be at least 1'), (('--sobol',), '--sobol: needs at least one --vary'),
+    (('--seed', 2**31 - 3, '--runs', 4), '--runs 4: must be at most 3, the number of seeds from 2147483645 on'),
     (('--against-param', 'acu.azimuth.filter.kind=cx'), "'cx': must be one of")])
 def test_options_that_cannot_be_met(pedestal, options, expected):
     code, output, errors = pedestal('trials', 'leo_pass', *options)
     assert (code, output) == (1, '') and expected in errors and errors.count('\n') == 1
 
 
-def test_a_table_goes_on_behind_its_last_whole_row(tmp_path):
+def test_a_table_continues_after_its_last_complete_row(tmp_path):
     def open_table(identity=None):
         return Table(tmp_path, 'trials', identity or {'--seed': '1'}, [INERTIA], ['loss_s', 'aligned_s'])
 
     with open_table() as table:
         table.append([[0, 1, 0.1 + 0.2, 1e-300, None], [1, 2, 0.5, math.nan, None]])
-        with pytest.raises(TableError, match='another process writes it'):
+        with pytest.raises(TableError, match='another process writes the file'):
             open_table().__enter__()
     with open(table.file, 'ab') as stream:
         stream.write(b'2,3,0.77')
@@ -130,7 +130,7 @@ def test_a_table_goes_on_behind_its_last_whole_row(tmp_path):
         table.append([[2, 3, 0.7, 2.0, None]])
         assert np.array_equal(table.column('loss_s'), [1e-300, math.nan, 2.0], equal_nan=True)
     assert table.file.read_text().splitlines()[-2:] == ['1,2,0.5,nan,', '2,3,0.7,2.0,']
-    with pytest.raises(TableError, match='holds other trials \\(--seed 1, not 2\\)'):
+    with pytest.raises(TableError, match='contains other trials \\(--seed 1, not 2\\)'):
         open_table({'--seed': '2'}).__enter__()
 
 
@@ -196,7 +196,7 @@ def test_a_command_that_was_stopped_goes_on(never_stopped, tmp_path, number):
     assert 4 <= done < 120
     if number == signal.SIGINT:
         assert process.returncode == 130
-        assert errors == f'pedestal: {done} of 120 trials are in cut; the same command goes on\npedestal: stopped\n'
+        assert errors == f'pedestal: {done} of 120 trials are in cut; the same command continues\npedestal: stopped\n'
     assert finish_many(tmp_path / 'cut') == never_stopped
 
 

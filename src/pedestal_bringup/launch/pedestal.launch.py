@@ -1,6 +1,6 @@
-"""The nodes of a scenario: ros2 launch pedestal_bringup pedestal.launch.py scenario:=uav_flyby
+"""Launch file of the nodes of a scenario: ros2 launch pedestal_bringup pedestal.launch.py scenario:=uav_flyby
 
-`ros2 launch pedestal_bringup pedestal.launch.py --show-args` lists what may be said. The launch ends with the drive.
+`ros2 launch pedestal_bringup pedestal.launch.py --show-args` lists its arguments. The launch ends with the drive.
 """
 import sys
 
@@ -24,7 +24,7 @@ from pedestal_common.graph import nodes
 
 
 def operator(context, scenario):
-    """What sends the program track, in the namespace of the nodes."""
+    """Return the process that sends the program track, in the namespace of the nodes."""
     namespace = context.launch_configurations.get('ros_namespace', '')
     remapped = ['--ros-args', '-r', f'__ns:=/{namespace.strip("/")}'] if namespace else []
     return [ExecuteProcess(cmd=[sys.executable, '-m', 'pedestal_bringup.graph.send_program', str(scenario), *remapped],
@@ -32,8 +32,9 @@ def operator(context, scenario):
 
 
 def start(context):
-    """The nodes of the scenario with the parameters `pedestal run` would give them."""
-    given = {argument.name: LaunchConfiguration(argument.name).perform(context) for argument in launch_arguments.ARGUMENTS}
+    """Return the nodes of the scenario with the parameters that `pedestal run` would give them."""
+    given = {argument.name: LaunchConfiguration(argument.name).perform(context)
+             for argument in launch_arguments.ARGUMENTS}
     chosen = launch_arguments.load_scenario(given)
     servers = launch_arguments.servers(given, chosen)
     file, whole = launch_arguments.prepare(given, chosen)
@@ -57,7 +58,7 @@ def start(context):
 
 
 def generate_launch_description():
-    """The launch description of a scenario, as ros2 launch asks for it."""
+    """Return the launch description of a scenario, for ros2 launch."""
     return LaunchDescription([
         *(DeclareLaunchArgument(argument.name, default_value=argument.default, description=argument.doc,
                                 choices=argument.choices or None) for argument in launch_arguments.ARGUMENTS),

@@ -31,7 +31,7 @@ def loops():
 
 @pytest.fixture(scope='module')
 def fitting():
-    """Loops that nobody runs."""
+    """Loops before their run."""
     return loops()
 
 
@@ -56,7 +56,8 @@ def test_every_trial_is_what_it_is_alone():
                                     'adu.inject=1 gust torque=100', 'scenario.ship=true', 'adu.period=0.01'])
 def test_what_does_not_fit_runs_alone(fitting, change):
     """One trial that is of another kind is enough."""
-    assert side_by_side.can_run_parallel(fitting) and not side_by_side.can_run_parallel(fitting[:side_by_side.MIN_PARALLEL_LOOPS - 1])
+    assert side_by_side.can_run_parallel(fitting)
+    assert not side_by_side.can_run_parallel(fitting[:side_by_side.MIN_PARALLEL_LOOPS - 1])
     other = closed_loop.Loop(scenario.load('leo_pass', [change], duration=3.0))
     assert not side_by_side.can_run_parallel([*fitting[1:], other])
 

@@ -1,13 +1,13 @@
-"""What two packages of the pedestal share, and nothing else.
+"""Code and tables that two or more packages of the pedestal share.
 
 Frames
     earth   ENU on topics (REP 103); azimuth clockwise from north where an angle of the earth is meant.
-    deck    FLU: x to the bow, y to port, z up. Mechanical azimuth is clockwise from the bow, as every
-            antenna is labelled, so it turns opposite to a REP 103 yaw; elevation is up from the deck.
-    beam    b along the beam, c cross-elevation (the way azimuth grows), e the way elevation grows.
+    deck    FLU: x to the bow, y to port, z up. Mechanical azimuth is clockwise from the bow, as on the labels of
+            antennas, so it turns opposite to a REP 103 yaw; elevation is up from the deck.
+    beam    b along the beam, c cross-elevation (direction of growing azimuth), e direction of growing elevation.
     ashore  the deck's bow points north: deck azimuth and earth azimuth are then the same number.
 
-Units are SI and radians; degrees and decibels appear only where a person reads or a name says so.
+Units are SI and radians; degrees and decibels appear only in texts for people, or where a name states them.
 
 Symbols
     A, E        azimuth, elevation                                    [rad]

@@ -1,7 +1,8 @@
-"""To be imported by an executable before anything else, because the rest takes half a second and more to import: told
-to end meanwhile, it ends at once and in silence. `shell.main` puts handlers of its own in the place of these.
+"""Signal handlers for the start of a node; an executable imports this module before anything else.
 
-Who imports an executable as a module keeps his handlers.
+The other imports take half a second and more. A signal that arrives meanwhile ends the process at once, without a
+message. `shell.main` then sets handlers of its own. A process that imports an executable as a module keeps its
+handlers.
 """
 import os
 import pathlib

@@ -1,4 +1,4 @@
-"""Han's time-optimal function, the heart of a tracking differentiator and of paper 001's control law."""
+"""Han's time-optimal function, the core of a tracking differentiator and of paper 001's control law."""
 import math
 
 from pedestal_common.compiled import compiled
@@ -6,7 +6,8 @@ from pedestal_common.compiled import compiled
 
 @compiled
 def fhan(x1, x2, r, h0):
-    """Time-optimal acceleration within +-r that brings x1'' = u to rest at 0, linear within h0 of it (Han 2009)."""
+    """Return the time-optimal acceleration within +-r that brings x1'' = u to rest at 0, linear within h0 of it (Han
+    2009)."""
     d = r * h0 * h0
     a0 = h0 * x2
     y = x1 + a0

@@ -1,8 +1,8 @@
-"""A law that others call is translated to LLVM's intermediate code, and no more; what is called from Python becomes
-one piece of machine code with all that it calls.
+"""Compiler of laws: a law that other laws call is only translated to LLVM's intermediate code; a law that Python calls
+becomes one piece of machine code with all the laws that it calls.
 
-Numba makes of each function machine code and a wrapper for Python, and optimises it anew in everyone that calls it: of
-500 laws, of which Python calls ten, that takes twice as long as all the rest.
+Numba makes machine code and a wrapper for Python of each function, and optimises the function again in each of its
+callers. Of 500 laws Python calls ten, so that doubles the time of compilation.
 """
 import functools
 import hashlib
@@ -27,7 +27,7 @@ from pedestal_common import law_cache
 
 
 class _Translation(JITCodeLibrary):
-    """The code of a Law for args, as numba translated it, to be linked with that of the laws it calls."""
+    """Code of a Law for args, as numba translated it, to be linked with that of the laws it calls."""
 
     def __init__(self, codegen, law, args):
         super().__init__(codegen, law.py_func.__qualname__)
@@ -40,15 +40,16 @@ class _Translation(JITCodeLibrary):
 
     @property
     def code(self):
-        """Its module, without what it calls."""
+        """Its module, without the laws that it calls."""
         return self._final_module
 
     def add_llvm_module(self, ll_module):
-        """Without the passes over each function: whoever is made executable optimises all."""
+        """Add a module without the passes over each function, because the whole is optimised when it is made
+        executable."""
         self._final_module.link_in(ll_module)
 
     def finalize(self):
-        """It is complete, numba's own functions in it."""
+        """Complete the code with numba's own functions."""
         for library in self._linking_libraries:
             if not isinstance(library, _Translation) and library is not rtsys.library:
                 self._final_module.link_in(library._get_module_for_linking(), preserve=True)
@@ -57,14 +58,14 @@ class _Translation(JITCodeLibrary):
         self._finalized = True
 
     def _get_module_for_linking(self):
-        """With all that it calls."""
+        """Return its module with all the laws that it calls."""
         if self._shared_module is None:
             parts = [self]
-            for part in parts:      # which grows meanwhile
+            for part in parts:      # grows in the loop
                 parts += [called for called in part.calls if called not in parts]
             modules = [part.code.clone() for part in parts]
             modules.append(rtsys.library._get_module_for_linking().clone())
-            while len(modules) > 1:     # in pairs: to link takes as long as both are large
+            while len(modules) > 1:     # in pairs, because the time of a link grows with both modules
                 for one, other in zip(modules[::2], modules[1::2]):
                     one.link_in(other)
                 modules = modules[::2]
@@ -74,16 +75,16 @@ class _Translation(JITCodeLibrary):
 
 
 def _relink(module, before, after):
-    """Change the linkage of functions that have the one before: with weak_odr one of equal ones is kept, with
-    linkonce_odr none that has been inlined everywhere."""
+    """Change the linkage of the functions that have the linkage `before`. With weak_odr one of equal functions is
+    kept; with linkonce_odr a function that has been inlined everywhere is dropped."""
     for function in module.functions:
         if not function.is_declaration and function.linkage == before:
             function.linkage = after
 
 
 class _Compiler(compiler.Compiler):
-    """Numba's, where a law has the same symbol in every process: one finds what another has translated. Numba's own
-    symbols number the laws and the types of records as they come."""
+    """Numba's compiler, with the same symbol for a law in every process, so that one process finds the translation of
+    another. Numba's own symbols number the laws and the types of records in the order of their use."""
 
     def __init__(self, *arguments):
         super().__init__(*arguments)
@@ -98,17 +99,17 @@ class _Compiler(compiler.Compiler):
 
 
 def _symbol(name, types, *, abi_tags=(), uid=None):
-    """Of a law; uid tells its types as well."""
+    """Return the symbol of a law; uid contains its types."""
     return default_mangler(name, (), uid=uid)
 
 
 def _has_name(qualname):
-    """Whether a module has it by this name; not what a function makes."""
+    """Return True if a module has the law by this name; a law that a function makes has none."""
     return '<' not in qualname
 
 
 class _Kept(NamedTuple):
-    """What is kept of a translation: its code as bitcode, and [(module, name, types)] of the laws that it calls."""
+    """Cached translation: its code as bitcode, and [(module, name, types)] of the laws that it calls."""
     args: tuple
     code: bytes
     calls: list
@@ -118,19 +119,19 @@ class _Kept(NamedTuple):
 
 
 class _Translated(law_cache.Contents):
-    """How a translation is kept."""
+    """Format of a cached translation."""
 
     def get_filename_base(self, fullname, abiflags):
-        """Numba asks for it: it lies beside the executable."""
+        """Return the name of the file, which is beside the executable."""
         return f'{super().get_filename_base(fullname, abiflags)}.ir'
 
     def check_cachable(self, cres):
-        """Whether whoever loads it would find it and what it calls by their names."""
+        """Return True if another process would find the law, and the laws that it calls, by their names."""
         return super().check_cachable(cres) and all(
             _has_name(part.law.py_func.__qualname__) for part in (cres.library, *cres.library.calls))
 
     def reduce(self, cres):
-        """It as what can be pickled."""
+        """Return a form of a CompileResult that can be pickled."""
         cres.fndesc.typemap = cres.fndesc.calltypes = None
         laws = [(part.law.py_func, part.args) for part in cres.library.calls]
         calls = [(function.__module__, function.__qualname__, args) for function, args in laws]
@@ -138,7 +139,7 @@ class _Translated(law_cache.Contents):
                      cres.signature)
 
     def rebuild(self, target_context, payload):
-        """A CompileResult of what `reduce` gave."""
+        """Return the CompileResult of a result of `reduce`."""
         fndesc = payload.fndesc
         library = _Translation(target_context.codegen(), _named(fndesc.modname, fndesc.qualname), payload.args)
         library._final_module = parse_bitcode(payload.code)
@@ -156,12 +157,12 @@ class _Translations(law_cache.Cache):
 
 
 def _named(module, name):
-    """The Law of this name in a module."""
+    """Return the Law of this name in a module."""
     return functools.reduce(getattr, name.split('.'), importlib.import_module(module))
 
 
 class _LawType(types.Dispatcher):
-    """Of a Law that compiled code names: a constant that it does not hold, else it could not be kept."""
+    """Type of a Law that compiled code names: a constant without its value, which could not be cached."""
 
 
 register_model(_LawType)(OpaqueModel)
@@ -173,13 +174,13 @@ def _law_constant(context, builder, law_type, law):
 
 
 class Law(CPUDispatcher):
-    """A compiled law: numba's dispatcher, of which every overload is translated, and executable when Python calls
-    it. Both are kept in caches."""
+    """Compiled law: numba's dispatcher, of which every overload is translated, and made executable when Python calls
+    it. Both are cached."""
 
     def __init__(self, *arguments, **keywords):
         super().__init__(*arguments, **keywords)
         self._type = _LawType(self)
-        self.typingctx._globals.pop(weakref.ref(self))     # the type that numba has given it
+        self.typingctx._globals.pop(weakref.ref(self))     # the type that numba gave it
         self.typingctx.insert_global(self, self._type)
         self._translated, self._translations = {}, NullCache()
 
@@ -188,12 +189,12 @@ class Law(CPUDispatcher):
         return self._type
 
     def enable_caching(self):
-        """Keep what is compiled, where there is a folder for it."""
+        """Cache the compiled law where there is a folder for it."""
         if law_cache.folder(self.py_func) is not None:
             self._cache, self._translations = law_cache.Cache(self.py_func), _Translations(self.py_func)
 
     def get_call_template(self, args, kws):
-        """Compiled code calls it: it need not be executable."""
+        """Return the template of a call from compiled code, for which the law need not be executable."""
         signature, args = self._compiler.fold_argument_types(args, kws)
         self.translation(tuple(args))
         name = self.py_func.__name__
@@ -201,12 +202,12 @@ class Law(CPUDispatcher):
         return template, signature, args, {}
 
     def get_overload(self, sig):
-        """What the target knows it by."""
+        """Return the library of a signature, for the target."""
         args, _ = sigutils.normalize_signature(sig)
         return self._translated[tuple(args)].library
 
     def compile(self, sig):
-        """Python calls it: its entry point for these types."""
+        """Return the entry point for these types, for a call from Python."""
         args, _ = sigutils.normalize_signature(sig)
         with global_compiler_lock:
             if args not in self.overloads:
@@ -219,7 +220,7 @@ class Law(CPUDispatcher):
             return self.overloads[args].entry_point
 
     def translation(self, args):
-        """It for arguments of these types, for others to call."""
+        """Return the translation for arguments of these types, for calls from other laws."""
         if args not in self._translated:
             made = self._translations.load_overload(args, self.targetctx)
             if made is None:
@@ -241,7 +242,7 @@ class Law(CPUDispatcher):
 
 
 def _executable(law):
-    """A translated law as a CompileResult with an entry point, of a library that holds all that it calls."""
+    """Return a translated law as a CompileResult with an entry point, of a library with all the laws that it calls."""
     context = law.target_context
     context.refresh()
     library = context.codegen().create_library(law.fndesc.qualname)
@@ -256,9 +257,10 @@ def _executable(law):
 
 
 def by_type(function, law_of):
-    """Let compiled code call a function that is the Law law_of(the type of its first argument), nothing for None.
+    """Let compiled code call a function that is the Law law_of(type of its first argument); None: the call does
+    nothing.
 
-    numba.extending.overload would make an executable of each.
+    numba.extending.overload would make an executable of each law.
     """
     @type_callable(function)
     def type_call(context):

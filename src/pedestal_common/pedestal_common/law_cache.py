@@ -1,6 +1,7 @@
-"""Where compiled laws are kept: a folder named after all sources of the product, which any checkout of them shares.
+"""Law cache: a folder named after all sources of the product, which all checkouts with these sources share.
 
-Numba's cache does not see that a callee in another file changed (numba documentation, "Notes on Caching").
+Numba's own cache does not notice a change of a called function in another file (numba documentation, "Notes on
+Caching").
 """
 import ast
 import contextlib
@@ -25,16 +26,17 @@ UPPER_PACKAGES = ('pedestal_bringup', 'pedestal_analysis', 'pedestal_studies')
 """Packages with laws above the columns; a law may call those of the packages before its own."""
 
 MAX_CACHE_AGE_DAYS = 7.0
-_ROOT = pathlib.Path(numba.config.CACHE_DIR or user_cache_dir()) / 'pedestal'
+"""Age after which an unused law cache is deleted [days]."""
+_ROOT = pathlib.Path(getattr(numba.config, 'CACHE_DIR', '') or user_cache_dir()) / 'pedestal'
 if not _ROOT.is_absolute():
-    # A user without a home, as in a container: '~' stays as it is.
+    # Without a home, as in a container, '~' is not expanded.
     _ROOT = pathlib.Path(tempfile.gettempdir()) / f'pedestal-{os.getuid()}'
 
 
 def digest(packages) -> str:
     """Return a digest of the code of packages, without docstrings and comments, and of the compiler's version.
 
-    To parse all sources takes 0.4 s, so the digest is kept in a file that is named after their bytes.
+    Because parsing all sources takes 0.4 s, the digest is kept in a file that is named after their bytes.
     """
     sources = list(_sources(packages))
     kept = _ROOT / f'digest-{_sha(sources)}'
@@ -50,7 +52,7 @@ def digest(packages) -> str:
 
 
 def _sources(packages):
-    """(name, bytes) of each module of packages."""
+    """Yield (name, bytes) of each module of packages."""
     for package in packages:
         spec = importlib.util.find_spec(package) if package != '__main__' else None
         if spec is not None and spec.origin is not None:
@@ -67,11 +69,11 @@ def _sha(named):
 
 
 def _code_of(source) -> bytes:
-    """The syntax tree of a module without docstrings, comments and line numbers."""
+    """Return the syntax tree of a module without docstrings, comments and line numbers."""
     tree = ast.parse(source)
     for node in ast.walk(tree):
         if isinstance(node, (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)):
-            # The text below a constant is its docstring: no text that stands alone is code.
+            # The text below a constant is its docstring: a statement that is only a text is never code.
             node.body = [part for part in node.body if not _is_text(part)]
     return ast.dump(tree).encode()
 
@@ -83,7 +85,7 @@ def _is_text(statement):
 
 @functools.cache
 def _folder_of(package) -> str | None:
-    """The cache of one package's laws: named after its own sources and all it may call."""
+    """Return the cache of one package's laws, named after its own sources and all that it may call."""
     below = () if package == 'pedestal_common' or package in COLUMN_PACKAGES else (
         *COLUMN_PACKAGES, *(UPPER_PACKAGES[:UPPER_PACKAGES.index(package)] if package in UPPER_PACKAGES
                             else UPPER_PACKAGES))
@@ -100,22 +102,22 @@ def _folder_of(package) -> str | None:
 
 
 def folder(thing) -> str | None:
-    """The cache of the package that a law or a type is of; None where there is none."""
+    """Return the cache of the package of a law or a type; None without one."""
     return _folder_of(thing.__module__.partition('.')[0])
 
 
 @contextlib.contextmanager
 def locked_file(path):
-    """Hold the lock of a file, which other processes wait for."""
+    """Hold the lock of a file, for which other processes wait."""
     with path.open('w') as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         yield
 
 
 class _Place(UserProvidedCacheLocator):
-    """The folder of a law is named after its module, not after the path of its file: a checkout finds what another of
-    the same sources has compiled. The place of a law has neither a line number nor the bytes of its file, which an
-    edited docstring changes; the folder of the package stands for its code."""
+    """Place of a law in the cache. Its folder is named after its module, not after the path of its file, so a checkout
+    finds the laws that another checkout of the same sources has compiled. The place contains neither a line number nor
+    the bytes of the file, because an edited docstring changes both; the folder of the package stands for the code."""
 
     def __init__(self, law, file):
         super().__init__(law, file)
@@ -123,10 +125,11 @@ class _Place(UserProvidedCacheLocator):
         self._code = law.__code__ if '<' in law.__qualname__ else None
 
     def get_source_stamp(self):
-        """Return nothing; numba asks for the bytes of the file."""
+        """Return nothing in the place of the bytes of the file, for numba."""
 
     def get_disambiguator(self):
-        """Return what tells laws of one name apart: those that one function makes may have other code."""
+        """Return a text that distinguishes laws of one name, because laws that one function makes may have different
+        code."""
         if self._code is None:
             return '0'
         constants = [value for value in self._code.co_consts if not inspect.iscode(value)]
@@ -134,25 +137,27 @@ class _Place(UserProvidedCacheLocator):
 
     @classmethod
     def from_function(cls, law, file):
-        """The place of a law; numba asks for it."""
+        """Return the place of a law, for numba."""
         return cls(law, file)
 
 
 class Contents(CompileResultCacheImpl):
-    """What is kept of a law; overridden where that is no executable."""
-    _locator_classes = (_Place,)
+    """Cached form of a law; overridden where that is no executable."""
+    _locator_classes = [_Place]
 
 
 class Cache(FunctionCache):
-    """Of two processes that save a law for two signatures at once one may lose its entry, or find the other's code
-    under it: numba reads the index, chooses a name, writes the index and then the code. Here one waits.
+    """Cache of a law, with a lock for saving. Numba reads the index, chooses a name, writes the index and then the
+    code. Without the lock, two processes that save one law for two signatures at once may lose an entry, or store the
+    code of the other under it.
 
-    To load a law numba makes ready to compile, for a third of a second and with all of scipy.linalg. What is loaded
-    asks for its runtime only; who compiles makes ready by himself."""
+    To load a law, numba prepares its compiler, which takes a third of a second and all of scipy.linalg. Here loading
+    initialises the NRT runtime only; the compiler is initialised at the first compilation.
+    """
     _impl_class = Contents
 
     def load_overload(self, sig, target_context):
-        """A law for these types; None where it is not kept."""
+        """Return a law for these types; None where it is not cached."""
         rtsys.initialize(target_context)
         with self._guard_against_spurious_io_errors():
             return self._load_overload(sig, target_context)

@@ -1,6 +1,6 @@
 """Parameters as frozen dataclasses: one declaration gives default, unit, range and description.
 
-The ROS side (declare, refuse, read) is in shell.py; this file knows no ROS.
+The ROS side (declare, refuse, read) is in shell.py. No ROS here.
 """
 import dataclasses
 import difflib
@@ -8,38 +8,40 @@ import functools
 import math
 import operator
 import typing
+from collections.abc import Callable, Iterable, Iterator, Mapping
 
 import numpy as np
 
 
 class ParameterError(ValueError):
-    """A parameter is unknown or outside its range; the message names it, its value and what is allowed."""
+    """Unknown parameter, or value outside its range; the message gives its name, its value and the allowed range."""
 
 
-def parameter(default, low, high, unit, doc, grid=None):
-    """A number (float or int, as annotated) between low and high inclusive. grid: (lowest, highest, points), even in
-    its logarithm, on which a search for its best value begins; None: it is not searched for."""
+def parameter(default: float, low: float, high: float, unit: str, doc: str,
+              grid: tuple[float, float, int] | None = None) -> typing.Any:
+    """Declare a number (float or int, as annotated) between low and high inclusive. grid: (lowest, highest, points),
+    spaced evenly in the logarithm, at which a search for its best value begins; None: no search."""
     return dataclasses.field(default=default, metadata={'low': low, 'high': high, 'unit': unit, 'doc': doc,
                                                         'grid': grid})
 
 
-def choice(default, options, doc):
-    """A string out of options."""
+def choice(default: str, options: Iterable[str], doc: str) -> typing.Any:
+    """Declare a string out of options."""
     return dataclasses.field(default=default, metadata={'options': tuple(options), 'doc': doc})
 
 
-def flag(default, doc):
-    """A bool."""
+def flag(default: bool, doc: str) -> typing.Any:
+    """Declare a bool."""
     return dataclasses.field(default=default, metadata={'doc': doc})
 
 
-def text(default, doc):
-    """A string that only its reader can judge (a file, a TLE line)."""
+def text(default: str, doc: str) -> typing.Any:
+    """Declare a string that only the code that uses it can check (a file, a TLE line)."""
     return dataclasses.field(default=default, metadata={'doc': doc})
 
 
-def group(cls, **changes):
-    """A nested dataclass, its defaults changed where named."""
+def group(cls: 'type[Parameters]', **changes: typing.Any) -> typing.Any:
+    """Declare a nested dataclass, with some of its defaults changed."""
     return dataclasses.field(default_factory=lambda: cls(**changes), metadata={'group': True})
 
 
@@ -47,23 +49,33 @@ def group(cls, **changes):
 class Parameters:
     """Base of every parameter dataclass; checks each field's range when it is made.
 
-    A subclass adds its cross-checks in `check`, raising ParameterError.
+    A subclass adds its checks between fields in `check`, which raises ParameterError.
     """
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         for field in dataclasses.fields(self):
             _check_field(field, getattr(self, field.name))
         self.check()
 
-    def check(self):
-        """Cross-checks between fields; overridden where two fields limit each other."""
+    def check(self) -> None:
+        """Check fields that limit each other; overridden where there are any."""
 
-    def check_graph(self, beams, lockstep):
-        """Overridden where parameters must fit the graph; beams as in nodes.links, lockstep: its pacing. Raises
-        ParameterError."""
+    def check_graph(self, beams: int, lockstep: bool) -> None:
+        """Raise ParameterError where parameters do not fit the graph; overridden where there are such parameters.
+        beams: as in nodes.links; lockstep: its pacing."""
 
 
-def _check_field(field, value):
+_P = typing.TypeVar('_P', bound=Parameters)
+_F = typing.TypeVar('_F', bound=Callable)
+
+
+def _cached(function: _F) -> _F:
+    """Return functools.cache of a function with its own type, because mypy takes the class of a dataclass for
+    unhashable."""
+    return typing.cast(_F, functools.cache(function))
+
+
+def _check_field(field: dataclasses.Field, value: typing.Any) -> None:
     meta, name = field.metadata, field.name
     if 'low' in meta:
         if isinstance(value, bool) or not isinstance(value, (int, float)):
@@ -80,14 +92,15 @@ def _check_field(field, value):
         raise ParameterError(f'{name} = {value!r}: must be text')
 
 
-@functools.cache
-def _group_type(field):
-    """The dataclass of a group."""
+@_cached
+def _group_type(field: dataclasses.Field) -> type[Parameters]:
+    """Return the dataclass of a group."""
+    assert field.default_factory is not dataclasses.MISSING
     return type(field.default_factory())
 
 
-def flatten(cls, prefix=''):
-    """Every leaf of a parameter dataclass as (dotted name, field); groups are walked."""
+def flatten(cls: type[Parameters], prefix: str = '') -> Iterator[tuple[str, dataclasses.Field]]:
+    """Yield (dotted name, field) of every leaf of a parameter dataclass, with the fields of its groups."""
     for field in dataclasses.fields(cls):
         name = prefix + field.name
         if field.metadata.get('group'):
@@ -96,38 +109,38 @@ def flatten(cls, prefix=''):
             yield name, field
 
 
-@functools.cache
-def _default(cls):
-    """An instance of a parameter dataclass with every default."""
+@_cached
+def _default(cls: type[_P]) -> _P:
+    """Return an instance of a parameter dataclass with every default."""
     return cls()
 
 
-def defaults(cls):
-    """{dotted name: default} of a parameter dataclass, a group's own defaults included."""
+def defaults(cls: type[Parameters]) -> dict[str, typing.Any]:
+    """Return {dotted name: default} of a parameter dataclass, with the changed defaults of its groups."""
     return as_dict(_default(cls))
 
 
-@functools.cache
-def _readers(cls):
-    """[(dotted name, function that reads it from an instance)] of every leaf of a parameter dataclass."""
+@_cached
+def _readers(cls: type[Parameters]) -> list[tuple[str, Callable[[Parameters], typing.Any]]]:
+    """Return [(dotted name, function that reads it from an instance)] of every leaf of a parameter dataclass."""
     return [(name, operator.attrgetter(name)) for name, _ in flatten(cls)]
 
 
-def as_dict(instance, prefix=''):
-    """{dotted name: value} of an instance."""
+def as_dict(instance: Parameters, prefix: str = '') -> dict[str, typing.Any]:
+    """Return {dotted name: value} of an instance."""
     return {prefix + name: read(instance) for name, read in _readers(type(instance))}
 
 
-def did_you_mean(name, known):
-    """' did you mean ...?' with the known name most like one that is not known; '' where none is."""
-    near = difflib.get_close_matches(name, known, n=1)
+def did_you_mean(name: str, known: Iterable[str]) -> str:
+    """Return ' did you mean ...?' with the known name most like an unknown name; '' without a similar name."""
+    near = difflib.get_close_matches(name, list(known), n=1)
     return f' did you mean {near[0]!r}?' if near else ''
 
 
-def build(cls, values, prefix=''):
-    """An instance from {dotted name: value}, every name beginning with `prefix`; names left out keep their default.
+def build(cls: type[_P], values: Mapping[str, typing.Any], prefix: str = '') -> _P:
+    """Return an instance of {dotted name: value}, every name beginning with `prefix`; other fields keep their default.
 
-    Raises ParameterError for an unknown name (with the nearest known one) or a refused value.
+    Raises ParameterError for an unknown name (with the nearest known name) or a refused value.
     """
     known = [name for name, _ in flatten(cls, prefix)]
     for name in values:
@@ -137,15 +150,15 @@ def build(cls, values, prefix=''):
     return _replace(_default(cls), values, prefix)
 
 
-def _number(value):
-    """An int, or text such as 2e-3 that YAML 1.1 does not take for a number, as a float; anything else as it is."""
+def _number(value: typing.Any) -> typing.Any:
+    """Return an int, or a text such as 2e-3 that is no number in YAML 1.1, as a float; any other value unchanged."""
     try:
         return float(value)
     except (TypeError, ValueError):
         return value
 
 
-def _replace(instance, values, prefix):
+def _replace(instance: _P, values: Mapping[str, typing.Any], prefix: str) -> _P:
     changes = {}
     for field in dataclasses.fields(instance):
         name = prefix + field.name
@@ -162,11 +175,11 @@ def _replace(instance, values, prefix):
         raise ParameterError(f'{prefix}{error}') from None
 
 
-@functools.cache
-def record_type(cls) -> np.dtype:
-    """The numpy record of a parameter dataclass: float -> f8, int and bool -> i8, a choice -> i8 (its
-    index among the options), a group -> nested record; free text is left out."""
-    fields = []
+@_cached
+def record_type(cls: type[Parameters]) -> np.dtype:
+    """Return the numpy record of a parameter dataclass: float -> f8, int and bool -> i8, a choice -> i8 (its index
+    among the options), a group -> nested record; other texts are left out."""
+    fields: list[tuple[str, str | np.dtype]] = []
     hints = typing.get_type_hints(cls)
     for field in dataclasses.fields(cls):
         if field.metadata.get('group'):
@@ -178,8 +191,8 @@ def record_type(cls) -> np.dtype:
     return np.dtype(fields, align=True)
 
 
-def _record_values(instance, cls):
-    values = []
+def _record_values(instance: Parameters, cls: type[Parameters]) -> tuple:
+    values: list[typing.Any] = []
     for field in dataclasses.fields(cls):
         value = getattr(instance, field.name)
         if field.metadata.get('group'):
@@ -191,8 +204,8 @@ def _record_values(instance, cls):
     return tuple(values)
 
 
-def record(instance, cls=None) -> np.ndarray:
-    """An instance as a record array of shape (1,): the form the compiled steps take. cls: only the fields of this
+def record(instance: Parameters, cls: type[Parameters] | None = None) -> np.ndarray:
+    """Return an instance as a record array of shape (1,), the form of the compiled steps. cls: only the fields of this
     base class, where the instance has more."""
     cls = cls or type(instance)
     return np.array([_record_values(instance, cls)], record_type(cls))

@@ -1,8 +1,9 @@
-"""Arithmetic on arrays that has the same bits on every processor: elementary functions as the C library has them,
-products and solutions of small matrices in one order.
+"""Array arithmetic with the same bits on every processor: elementary functions of the C library, products and
+solutions of small matrices in one order.
 
-numpy's own sin or ** end in other digits where there is AVX-512, its matrix products with another BLAS; a run would
-not give the same bytes on another machine. What is computed here once, before the first step, may be slow.
+With AVX-512 numpy's own sin or ** end in other digits, and with another BLAS its matrix products do. A run would then
+not give the same bytes on another machine. These functions are slow, because they are used once, before the first
+step.
 """
 import math
 
@@ -13,17 +14,18 @@ sin, cos, exp, arccos, arctan2, power = (np.vectorize(function, otypes=[float]) 
 
 
 def turned(rotation, vectors):
-    """Vectors (n, 3), each turned by a rotation (3, 3)."""
+    """Return vectors (n, 3), each turned by a rotation (3, 3)."""
     return np.einsum('ij,nj->ni', rotation, vectors)
 
 
 def geomspace(first, last, n):
-    """n numbers from the first to the last in equal ratios."""
+    """Return n numbers from the first to the last in equal ratios."""
     return first * power(last / first, np.arange(n) / (n - 1))
 
 
 def solution(A, b) -> list:
-    """x of A x = b, A (n, n) real or complex, b (n,): Gauss's elimination with the largest pivot of each column."""
+    """Return x of A x = b, A (n, n) real or complex, b (n,): Gauss's elimination with the largest pivot of each
+    column."""
     rows = [[*row, right] for row, right in zip(np.asarray(A).tolist(), np.asarray(b).tolist())]
     for i in range(len(rows)):
         pivot = max(range(i, len(rows)), key=lambda k: abs(rows[k][i]))
@@ -31,7 +33,7 @@ def solution(A, b) -> list:
         for k in range(i + 1, len(rows)):
             factor = rows[k][i] / rows[i][i]
             rows[k][i:] = [below - factor * above for below, above in zip(rows[k][i:], rows[i][i:])]
-    x = []
+    x: list[complex] = []
     for i in reversed(range(len(rows))):
         known = sum(rows[i][j] * value for j, value in zip(reversed(range(i + 1, len(rows))), reversed(x)))
         x.insert(0, (rows[i][-1] - known) / rows[i][i])

@@ -37,7 +37,7 @@ def test_a_reply_without_its_verdict_is_refused():
     ({f'a{i}': '1' for i in range(21)}, '21 arguments: must be at most 20'),
     ({'azimuth': 'x' * 201}, 'a text of 201 characters'),
     ({'azimuth': 'one\ntwo'}, 'all of them printable'),
-    ({'granted': 'true'}, 'none be called granted')))
+    ({'granted': 'true'}, 'none may be named granted')))
 def test_what_is_no_command_is_refused(arguments, said):
     with pytest.raises(ValueError, match=said):
         commands.of_message(commands.message(ASKED._replace(arguments=arguments)))
@@ -51,7 +51,7 @@ def test_values_are_checked_by_the_table():
 
 
 @pytest.mark.parametrize(('text', 'said'), (
-    ('pont azimuth=1', "unknown verb 'pont'; did you mean 'point'?"),
+    ('pont azimuth=1', "unknown command 'pont'; did you mean 'point'?"),
     ('point', 'point: azimuth is missing; must be -3 to 3 rad'),
     ('point azimuth=4', 'point: azimuth = 4 rad: must be -3 to 3'),
     ('point azimuth=nan', 'point: azimuth = nan rad: must be -3 to 3'),
@@ -71,9 +71,9 @@ def test_a_schedule_is_read_in_order_of_time():
 
 
 @pytest.mark.parametrize(('text', 'said'), (
-    ('halt', 'must be AT VERB'), ('-1 halt', 'must be AT VERB'), ('nan halt', 'must be AT VERB'),
-    ('3 stop', "unknown verb 'stop'"), ('3 point azimuth', 'must be name=value'),
-    ('3 point azimuth=1 azimuth=2', 'each once'), ('3 point azimuth=9', 'must be -3 to 3')))
+    ('halt', 'must be AT COMMAND'), ('-1 halt', 'must be AT COMMAND'), ('nan halt', 'must be AT COMMAND'),
+    ('3 stop', "unknown command 'stop'"), ('3 point azimuth', 'must be name=value'),
+    ('3 point azimuth=1 azimuth=2', 'each name once'), ('3 point azimuth=9', 'must be -3 to 3')))
 def test_a_wrong_schedule_names_the_part(text, said):
     with pytest.raises(ParameterError, match='commands = .*' + said):
         commands.schedule('commands', f'1 halt; {text}', VERBS)

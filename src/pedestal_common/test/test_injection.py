@@ -33,7 +33,7 @@ def test_every_node_of_the_table_hears_and_tells_of_its_faults():
 
 
 @pytest.mark.parametrize(('text', 'said'), (
-    ('12 encodr_jump', "unknown verb 'encodr_jump'; did you mean 'encoder_jump'?"),
+    ('12 encodr_jump', "unknown command 'encodr_jump'; did you mean 'encoder_jump'?"),
     ('12 encoder_jump size=4', 'encoder_jump: size = 4 rad: must be -3.2 to 3.2'),
     ('12 encoder_jump axis=z', 'encoder_jump: axis = z: must be one of azimuth, elevation'),
     ('12 encoder_jump length=4', "encoder_jump: unknown argument 'length'; there are axis, size, duration"),
@@ -46,7 +46,7 @@ def test_a_wrong_text_is_refused_with_name_value_and_range(text, said):
 
 
 def test_where_a_message_stays_away_lockstep_is_refused():
-    with pytest.raises(ParameterError, match='drop of ins: its attitude does not come; in lockstep everybody'):
+    with pytest.raises(ParameterError, match='drop of ins: the INS publishes no attitude; every lockstep node'):
         table.check_pacing('ins', '1 nan; 3 drop', True)
     table.check_pacing('ins', '1 nan; 3 drop', False)
     table.check_pacing('adu', '3 drop; 4 clear', True)

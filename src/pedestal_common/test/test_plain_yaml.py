@@ -24,7 +24,7 @@ def test_keys_are_texts():
 @pytest.mark.parametrize('text, problem', [
     ('a: &x [*x]', 'more than 200000 values'), ('a: *x', 'more than 200000 values'),
     ('a: !!int 5', 'tag tag:yaml.org,2002:int'),
-    ('a: 1\na: 2', "'a' is said twice"), ('? [1]\n: 2', 'a key must be a text'),
+    ('a: 1\na: 2', "'a' is given twice"), ('? [1]\n: 2', 'a key must be a text'),
     ('[' * 100_000, 'sections in sections'), ('- ' * 100_000, 'sections in sections'),
     ('a: ' + '9' * 20, 'more than 64 bits'), ('a: ' + '9' * 5000, 'more than 64 bits'),
     ('a: 9223372036854775808', 'more than 64 bits'), ('a: [', 'a'), ('--- 1\n--- 2', 'document'),

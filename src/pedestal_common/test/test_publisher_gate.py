@@ -1,4 +1,4 @@
-"""Which messages a realtime node takes: writers told apart by their numbers, stamps in order, what is dropped."""
+"""Messages that a realtime node accepts: publishers distinguished by sequence numbers, stamps in order, drops."""
 import importlib.util
 import pathlib
 
@@ -21,7 +21,7 @@ def decode(data):
 
 
 class Writer:
-    """Sends every `period` from `begin` on, its first number `number`; what it says is its stamp, ahead by `ahead`."""
+    """Publisher of a message every `period` from `begin`, its first number `number`, its stamp ahead by `ahead`."""
 
     def __init__(self, name, begin=0, end=10 * S, period=T, number=1, ahead=0, jitter=0.0, seed=1):
         self.name, self.ahead, self.number = name, ahead, number
@@ -35,45 +35,46 @@ class Writer:
 
 
 def run(*writers, strangers=lambda: 0):
-    """(Intake, {writer: times at which it was taken}, times at which a stream began anew) of writers together."""
+    """(PublisherGate, {publisher: times of its accepted messages}, times of the resets) of publishers together."""
     taken = {writer.name: [] for writer in writers}
-    anew = []
-    taker = PublisherGate(decode, FUTURE, strangers)
+    resets = []
+    gate = PublisherGate(decode, FUTURE, strangers)
     for time, number, stamp, name in sorted(message for writer in writers for message in writer.messages()):
-        if taker.take(stamp, number, UTC + time, time, UTC + time) is not None:
+        if gate.take(stamp, number, UTC + time, time, UTC + time) is not None:
             taken[name].append(time)
-            if taker.anew:
-                anew.append(time)
-    return taker, taken, anew
+            if gate.after_gap:
+                resets.append(time)
+    return gate, taken, resets
 
 
 def test_one_writer_is_taken_whole():
-    taker, taken, anew = run(Writer('acu', jitter=4 * MS))
-    assert len(taken['acu']) == 2000 and not anew and not taker.dropped
+    gate, taken, resets = run(Writer('acu', jitter=4 * MS))
+    assert len(taken['acu']) == 2000 and not resets and not gate.dropped
 
 
 @pytest.mark.parametrize('period', [T // 50, T, T + 1, 100 * MS, S])
 @pytest.mark.parametrize('number', [1, 350, 1_000_000])
 def test_a_second_writer_is_dropped_however_fast_it_is(period, number):
     stranger = Writer('stranger', begin=2 * S + 2 * MS, period=period, number=number)
-    taker, taken, anew = run(Writer('acu', jitter=MS), stranger)
-    assert not taken['stranger'] and not anew
+    gate, taken, resets = run(Writer('acu', jitter=MS), stranger)
+    assert not taken['stranger'] and not resets
     assert len(taken['acu']) > 1960
-    assert taker.dropped[publisher_gate.DROP_OTHER_PUBLISHER] >= 0.95 * len(stranger.times)
+    assert gate.dropped[publisher_gate.DROP_OTHER_PUBLISHER] >= 0.95 * len(stranger.times)
 
 
 @pytest.mark.parametrize('number', [201, 195, 199])
 def test_two_writers_that_cannot_be_told_apart_are_both_dropped(number):
     """A second control unit, with the numbers of the first at the same pace."""
-    taker, taken, _ = run(Writer('acu', jitter=MS), Writer('twin', begin=S, number=number, jitter=MS, seed=2))
+    gate, taken, _ = run(Writer('acu', jitter=MS), Writer('twin', begin=S, number=number, jitter=MS, seed=2))
     assert max(taken['acu'] + taken['twin']) < S + 10 * MS and len(taken['twin']) <= 1
-    assert taker.reason in publisher_gate.WARNING_DROP_REASONS
+    assert gate.reason in publisher_gate.WARNING_DROP_REASONS
 
 
 def test_of_twins_the_one_that_stays_is_taken_again_when_it_is_alone():
     _, taken, _ = run(Writer('acu'), Writer('twin', begin=S, end=2 * S, number=201))
     back = [time for time in taken['acu'] if time > 2 * S]
-    assert publisher_gate.CONFIRMED_TAKEOVER_NS <= back[0] - 2 * S <= publisher_gate.CONFIRMED_TAKEOVER_NS + 2 * publisher_gate.SILENCE_LIMIT_NS and len(back) > 1300
+    longest = publisher_gate.CONFIRMED_TAKEOVER_NS + 2 * publisher_gate.SILENCE_LIMIT_NS
+    assert publisher_gate.CONFIRMED_TAKEOVER_NS <= back[0] - 2 * S <= longest and len(back) > 1300
 
 
 @pytest.mark.parametrize('period', [T // 20, T // 2, 2 * T // 3])
@@ -82,8 +83,8 @@ def test_of_twins_the_one_that_stays_is_taken_again_when_it_is_alone():
 def test_a_stranger_that_overtakes_is_never_taken(period, jitter, begin):
     """Its numbers come from below, go through those of the one in charge, and on."""
     stranger = Writer('stranger', begin=begin, period=period, jitter=jitter, seed=2)
-    taker, taken, anew = run(Writer('acu', jitter=jitter), stranger)
-    assert not taken['stranger'] and not anew
+    gate, taken, resets = run(Writer('acu', jitter=jitter), stranger)
+    assert not taken['stranger'] and not resets
     assert len(taken['acu']) > 1870
     assert taken['acu'][-1] > 9.9 * S
 
@@ -95,8 +96,8 @@ def test_a_stranger_that_falls_back_while_it_comes_close_is_never_taken(period, 
     stranger = Writer('stranger', begin=S, period=period)
     rng = np.random.default_rng(seed)
     stranger.times = S + np.cumsum(rng.exponential(period, len(stranger.times))).astype(int)
-    _, taken, anew = run(Writer('acu', jitter=MS), stranger)
-    assert not taken['stranger'] and not anew
+    _, taken, resets = run(Writer('acu', jitter=MS), stranger)
+    assert not taken['stranger'] and not resets
 
 
 def _starved():
@@ -129,24 +130,24 @@ def test_who_speaks_first_after_a_pause_in_which_a_stranger_came_is_not_taken():
 
 
 @pytest.mark.parametrize('pause', [250 * MS, 3 * S])
-def test_a_writer_that_begins_anew_is_taken_at_once(pause):
-    _, taken, anew = run(Writer('old', end=2 * S), Writer('new', begin=2 * S + pause))
-    assert taken['new'][0] == anew[0] == 2 * S + pause and len(anew) == 1
+def test_a_publisher_that_restarts_is_taken_at_once(pause):
+    _, taken, resets = run(Writer('old', end=2 * S), Writer('new', begin=2 * S + pause))
+    assert taken['new'][0] == resets[0] == 2 * S + pause and len(resets) == 1
 
 
-def test_a_writer_that_begins_anew_without_a_pause_is_taken_after_the_silence():
-    _, taken, anew = run(Writer('old', end=2 * S), Writer('new', begin=2 * S))
-    assert 2 * S + publisher_gate.SILENCE_LIMIT_NS - 2 * T <= taken['new'][0] <= 2 * S + publisher_gate.SILENCE_LIMIT_NS + T
-    assert anew == taken['new'][:1]
+def test_a_publisher_that_restarts_without_a_pause_is_taken_after_the_silence():
+    _, taken, resets = run(Writer('old', end=2 * S), Writer('new', begin=2 * S))
+    assert -2 * T <= taken['new'][0] - 2 * S - publisher_gate.SILENCE_LIMIT_NS <= T
+    assert resets == taken['new'][:1]
 
 
 @pytest.mark.parametrize('strangers', [1, None])
 def test_a_stranger_that_spoke_before_is_not_in_charge(strangers):
     """The writer in charge dies, the stranger goes on, the writer is started again."""
     seen = iter([0])
-    _, taken, anew = run(Writer('old', end=2 * S), Writer('stranger', begin=S), Writer('new', begin=4 * S),
+    _, taken, resets = run(Writer('old', end=2 * S), Writer('stranger', begin=S), Writer('new', begin=4 * S),
                          strangers=lambda: next(seen, 1) if strangers else None)
-    assert not taken['stranger'] and anew == taken['new'][:1]
+    assert not taken['stranger'] and resets == taken['new'][:1]
     assert 4 * S <= taken['new'][0] <= 4 * S + publisher_gate.PUBLISHER_POLL_NS + T
 
 
@@ -167,92 +168,92 @@ def test_who_spoke_with_the_one_in_charge_is_taken_when_it_is_alone_for_long(str
     right = Writer('right', end=20 * S, number=5000)
     right.times = right.times[(right.times < S) | (right.times > 2 * S)]
     stranger = Writer('stranger', begin=3 * S // 2, end=4 * S)
-    _, taken, anew = run(stranger, right, strangers=strangers)
+    _, taken, resets = run(stranger, right, strangers=strangers)
     back = [time for time in taken['right'] if time > 4 * S]
     assert 4 * S + pause - 2 * T <= back[0] <= 4 * S + pause + publisher_gate.PUBLISHER_POLL_NS + T
     assert len(back) > 0.99 * (20 * S - back[0]) / T
 
 
 def test_a_cut_cable_is_no_other_writer():
-    taker = PublisherGate(decode, FUTURE)
+    gate = PublisherGate(decode, FUTURE)
     for k in [*range(400), *range(2400, 3000)]:
-        assert taker.take(UTC + k * T, k + 1, UTC + k * T, k * T, UTC + k * T) is not None
-        assert not taker.anew
-    assert taker.writers.lost == 2000
+        assert gate.take(UTC + k * T, k + 1, UTC + k * T, k * T, UTC + k * T) is not None
+        assert not gate.after_gap
+    assert gate.streams.lost == 2000
 
 
 @pytest.mark.parametrize('pause', [S, 10 * S, 600 * S])
 @pytest.mark.parametrize('lost', [1, 10, 19])
 def test_a_silent_writer_may_lose_some_when_it_speaks_again(pause, lost):
     """The cable was cut, and the first messages went while the hosts still looked for each other."""
-    taker = PublisherGate(decode, FUTURE)
+    gate = PublisherGate(decode, FUTURE)
     for k in [*range(400), 401, *range(402 + lost, 800)]:
         now = k * T + (pause if k > 400 else 0)
-        assert taker.take(UTC + now, k + 1, UTC + now, now, UTC + now) is not None and not taker.anew
-    assert taker.writers.lost == lost + 1
+        assert gate.take(UTC + now, k + 1, UTC + now, now, UTC + now) is not None and not gate.after_gap
+    assert gate.streams.lost == lost + 1
 
 
 def test_a_frozen_reader_takes_up_where_the_writer_is():
     """It finds what its queue kept, all at one time."""
-    taker = PublisherGate(decode, FUTURE)
+    gate = PublisherGate(decode, FUTURE)
     for k in range(400):
-        taker.take(UTC + k * T, k + 1, UTC + k * T, k * T, UTC + k * T)
+        gate.take(UTC + k * T, k + 1, UTC + k * T, k * T, UTC + k * T)
     wake = 4400 * T
     for k in range(4392, 4400):
-        assert taker.take(UTC + k * T, k + 1, UTC + k * T, wake, UTC + wake) is not None and not taker.anew
+        assert gate.take(UTC + k * T, k + 1, UTC + k * T, wake, UTC + wake) is not None and not gate.after_gap
 
 
 def test_stamps_of_the_future_are_dropped_and_do_no_harm():
-    taker = PublisherGate(decode, FUTURE)
+    gate = PublisherGate(decode, FUTURE)
     for k in range(1000):
         wrong = k in (300, 500)
         stamp = UTC + k * T + (3600 * S if wrong else 0)
-        assert (taker.take(stamp, k + 1, UTC + k * T, k * T, UTC + k * T) is None) == wrong
-    assert taker.dropped == {publisher_gate.DROP_FUTURE: 2}
-    assert '3600.000 s ahead' in taker.detail
+        assert (gate.take(stamp, k + 1, UTC + k * T, k * T, UTC + k * T) is None) == wrong
+    assert gate.dropped == {publisher_gate.DROP_FUTURE: 2}
+    assert '3600.000 s ahead' in gate.detail
 
 
 def test_a_future_within_the_limit_costs_no_more_than_its_time():
-    taker = PublisherGate(decode, FUTURE)
-    taken = [taker.take(UTC + k * T + (45 * MS if k == 300 else 0), k + 1, UTC + k * T, k * T, UTC + k * T) is not None
+    gate = PublisherGate(decode, FUTURE)
+    taken = [gate.take(UTC + k * T + (45 * MS if k == 300 else 0), k + 1, UTC + k * T, k * T, UTC + k * T) is not None
              for k in range(400)]
     assert taken == [True] * 301 + [False] * 9 + [True] * 90
-    assert taker.dropped == {publisher_gate.DROP_STALE: 9}
+    assert gate.dropped == {publisher_gate.DROP_STALE: 9}
 
 
 def test_stamps_that_went_back_for_good_are_believed_after_the_silence():
     """The clock of the writer's host was set back by an hour."""
-    taker = PublisherGate(decode, FUTURE)
+    gate = PublisherGate(decode, FUTURE)
     taken = {}
     for k in range(1000):
         stamp = UTC + k * T - (3600 * S if k >= 500 else 0)
-        taken[k] = taker.take(stamp, k + 1, UTC + k * T, k * T, UTC + k * T) is not None
-        assert taker.anew == (k == 540)
+        taken[k] = gate.take(stamp, k + 1, UTC + k * T, k * T, UTC + k * T) is not None
+        assert gate.after_gap == (k == 540)
     assert [k for k in taken if not taken[k]] == list(range(500, 540))
 
 
 def test_what_is_no_message_is_dropped_and_counted():
-    taker = PublisherGate(decode, FUTURE)
-    taken = [taker.take(None if k % 3 else UTC + k * T, k + 1, UTC + k * T, k * T, UTC + k * T) for k in range(300)]
+    gate = PublisherGate(decode, FUTURE)
+    taken = [gate.take(None if k % 3 else UTC + k * T, k + 1, UTC + k * T, k * T, UTC + k * T) for k in range(300)]
     assert sum(one is not None for one in taken) == 100
-    assert taker.dropped == {publisher_gate.DROP_UNDECODABLE: 200} and taker.detail == 'no message'
+    assert gate.dropped == {publisher_gate.DROP_UNDECODABLE: 200} and gate.detail == 'no message'
 
 
 def test_losses_of_two_writers_are_those_of_each():
-    taker, _, _ = run(Writer('acu'), Writer('stranger', begin=S, period=3 * MS, number=5000))
-    assert taker.writers.lost == 0
+    gate, _, _ = run(Writer('acu'), Writer('stranger', begin=S, period=3 * MS, number=5000))
+    assert gate.streams.lost == 0
 
 
 def test_beside_a_stranger_nothing_is_taken_of_a_topic_without_a_pace():
     """Its number fits the right writer as well, whose next text could have come at any time."""
     strangers = 0
-    taker = PublisherGate(lambda text: (None, text), FUTURE, lambda: strangers, paced=False)
+    gate = PublisherGate(lambda text: (None, text), FUTURE, lambda: strangers, paced=False)
 
     def take(text, number, time):
-        return taker.take(text, number, UTC + time, time, UTC + time)
+        return gate.take(text, number, UTC + time, time, UTC + time)
     assert take('enabled', 1, 0) == 'enabled'
     strangers = 1
-    assert take('disabled', 2, 60 * S) is None and taker.reason == publisher_gate.DROP_OTHER_PUBLISHER
+    assert take('disabled', 2, 60 * S) is None and gate.reason == publisher_gate.DROP_OTHER_PUBLISHER
     strangers = 0
     assert take('stopping', 2, 70 * S) == 'stopping'
 
@@ -271,25 +272,25 @@ def test_what_a_stranger_said_comes_late_and_is_not_taken(number, strangers):
     acu = Writer('acu', end=2 * S)
     spoken = Writer('spoken', begin=S, end=2 * S + 280 * MS, period=10 * MS)
     late = Writer('late', begin=2 * S + 300 * MS, end=2 * S + 900 * MS, period=3 * MS, number=number)
-    taker, taken, _ = run(acu, spoken, late, strangers=from_the_second_look(strangers))
+    gate, taken, _ = run(acu, spoken, late, strangers=from_the_second_look(strangers))
     assert len(taken['acu']) == 400 and not taken['spoken'] and not taken['late']
 
 
-def test_a_writer_that_begins_anew_beside_a_stranger_is_taken():
-    anew = Writer('anew', begin=2 * S + 500 * MS)
-    _, taken, _ = run(Writer('acu', end=2 * S), Writer('stranger', begin=S, period=3 * MS), anew,
+def test_a_publisher_that_restarts_beside_a_stranger_is_taken():
+    resets = Writer('resets', begin=2 * S + 500 * MS)
+    _, taken, _ = run(Writer('acu', end=2 * S), Writer('stranger', begin=S, period=3 * MS), resets,
                       strangers=from_the_second_look(1))
-    assert len(taken['acu']) == 400 and len(taken['anew']) > 1400 and not taken['stranger']
+    assert len(taken['acu']) == 400 and len(taken['resets']) > 1400 and not taken['stranger']
 
 
 @pytest.mark.parametrize('held', [50 * MS, 150 * MS, 500 * MS])
 def test_a_burst_after_a_pause_of_which_most_is_lost_is_the_same_writer(held):
     """Its writer was held up, and catches up faster than the reader's queue holds."""
-    taker = PublisherGate(decode, FUTURE, lambda: 0)
+    gate = PublisherGate(decode, FUTURE, lambda: 0)
 
     def take(number, time):
-        return taker.take(UTC + number * T, number, UTC + time, time, UTC + time) is not None
+        return gate.take(UTC + number * T, number, UTC + time, time, UTC + time) is not None
     assert all(take(number, number * T) for number in range(1, 401))
     began, missed = 400 * T + held, held // T
     assert take(401, began) and all(take(401 + missed - left, began + 3 * MS) for left in range(7, -1, -1))
-    assert all(take(401 + missed + i, began + i * T) for i in range(1, 400)) and not taker.dropped
+    assert all(take(401 + missed + i, began + i * T) for i in range(1, 400)) and not gate.dropped

@@ -96,12 +96,12 @@ def test_realtime_goes_on_without_a_silent_follower():
 
 def test_realtime_gives_up_the_step_that_waits():
     steps, answers = collect({'a': 0}, lockstep=False)
-    steps.give_up()
+    steps.answer_incomplete()
     assert answers == []
     steps.take('a', 0, 'a0')
     steps.take('trigger', 5 * MS, 1)
     assert answers == []
-    steps.give_up()
+    steps.answer_incomplete()
     assert answers == [(5, 1, {'a': 'a0'})] and steps.pending_stamp is None
     steps.take('a', 1000 * MS, 'a1')
     steps.take('trigger', 1000 * MS, 2)
@@ -130,7 +130,7 @@ def test_realtime_a_trigger_that_begins_anew_is_answered_whatever_its_stamp():
     steps, answers = collect({'a': 0}, lockstep=False)
     for topic in ('trigger', 'a'):
         steps.take(topic, 3600_000 * MS, topic)
-    steps.begin_anew('trigger')
+    steps.reset_after_gap('trigger')
     for topic in ('a', 'trigger'):
         steps.take(topic, 5 * MS, topic)
     assert answers == [(3600_000, 'trigger', {'a': 'a'}), (5, 'trigger', {'a': 'a'})]
@@ -139,7 +139,7 @@ def test_realtime_a_trigger_that_begins_anew_is_answered_whatever_its_stamp():
 def test_realtime_a_follower_that_begins_anew_is_heard_whatever_its_stamp():
     steps, answers = collect({'a': 0}, lockstep=False)
     steps.take('a', 3600_000 * MS, 'ahead')
-    steps.begin_anew('a')
+    steps.reset_after_gap('a')
     steps.take('trigger', 5 * MS, 0)
     steps.take('a', 5 * MS, 'a')
     assert answers == [(5, 0, {'a': 'a'})] and not steps.refused

@@ -12,6 +12,9 @@ class Antenna(abc.ABC):
     numbers   {topic: numbers of its last message}
     status    {node: its last DiagnosticStatus}
     """
+    beam: str
+    numbers: dict
+    status: dict
 
     @abc.abstractmethod
     def present(self, name):

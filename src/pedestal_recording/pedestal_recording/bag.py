@@ -5,10 +5,13 @@ import functools
 import logging
 import pathlib
 import re
+import typing
+from collections.abc import Iterable, Iterator, Mapping
 
 import numpy as np
 import yaml
 from mcap.opcode import Opcode
+from mcap.records import Channel
 
 from pedestal_common.graph import nodes
 from pedestal_common.parameters import did_you_mean
@@ -38,10 +41,14 @@ INDEX_FIELDS = [(name, 'i8') for name in ('channel', 'sequence', 'log', 'publish
                                               'start', 'stop')]
 _UNREADABLE, _OTHER_PUBLISHER = 1, 2
 _DECLARED = (Opcode.HEADER, Opcode.SCHEMA, Opcode.CHANNEL, Opcode.STATISTICS, Opcode.METADATA)
+Content = typing.TypeVar('Content')
+MetadataRecords = Mapping[str, Mapping[str, str]]
+"""Metadata records of a bag, {name: {text: text}}."""
+
 _NUMBERED = re.compile(r'(.+)_(\d+)\.mcap')
 
 
-def read(path, beam=None):
+def read(path: str | pathlib.Path, beam: str | None = None) -> 'Bag':
     """Return the Bag in a directory or an .mcap file. beam: view of one beam, '' for the first, None for all beams.
 
     The log has a warning for each topic with foreign messages. Raises BagError if the bag is missing, empty, damaged
@@ -56,7 +63,7 @@ def read(path, beam=None):
     return bag if beam is None else bag.view(beam)
 
 
-def chosen_topics(bag, names):
+def chosen_topics(bag: 'Bag', names: Iterable[str]) -> list[str]:
     """Return the topics of a Bag with these names, without the leading '/', each once.
 
     Raises BagError with the most similar name for a missing topic.
@@ -69,7 +76,7 @@ def chosen_topics(bag, names):
     return chosen
 
 
-def load(path):
+def load(path: str | pathlib.Path) -> 'Bag':
     """Return the readable part of the Bag in a directory or an .mcap file.
 
     `damage` is a line with place and reason of its early end, '' for a whole bag. Raises BagError if nothing is
@@ -82,7 +89,7 @@ def load(path):
         raise BagError(f'{path}: {mcap_file.reason(error)}') from None
 
 
-def locate(path) -> list:
+def locate(path: str | pathlib.Path) -> list[pathlib.Path]:
     """Return the MCAP files of a bag in their order; the bag is a directory or one file.
 
     Each restart of the recorder begins a new file: NAME_0.mcap, NAME_1.mcap and so on. Files with other names are in
@@ -112,7 +119,7 @@ def locate(path) -> list:
                    'order')
 
 
-def _described(path):
+def _described(path: pathlib.Path) -> dict[str, typing.Any]:
     """Return the content of the metadata.yaml of a bag, {} without a readable one."""
     try:
         return dict(plain_yaml.read(path / 'metadata.yaml')['rosbag2_bagfile_information'])
@@ -120,7 +127,7 @@ def _described(path):
         return {}
 
 
-def compressed_messages(path, name):
+def compressed_messages(path: pathlib.Path, name: str | None) -> BagError:
     """Return the BagError for messages that are compressed one by one in a format."""
     folder = path.parent if (path.parent / 'metadata.yaml').is_file() else path
     return BagError(f"{path}: its messages are compressed one by one ({name}); `ros2 bag convert -i {folder} -o "
@@ -128,12 +135,12 @@ def compressed_messages(path, name):
                     "all: true}]'")
 
 
-def start(metadata_records) -> int:
+def start(metadata_records: MetadataRecords) -> int:
     """Return time 0 of the scenario in the stamps of a bag [ns], UTC in realtime, from its metadata records."""
     return _nanoseconds(metadata_records.get('pedestal', {}).get('start')) or 0
 
 
-def planned_end(metadata_records):
+def planned_end(metadata_records: MetadataRecords) -> int | None:
     """Return the planned end of a run, a stamp [ns], from the metadata records of its bag; None if unknown."""
     planned = _nanoseconds(metadata_records.get('pedestal', {}).get('planned_end_ns'))
     if planned is None:  # older recordings have the parameter only
@@ -142,12 +149,12 @@ def planned_end(metadata_records):
     return None if planned is None else start(metadata_records) + planned
 
 
-def _nanoseconds(text):
+def _nanoseconds(text: str | None) -> int | None:
     """Return a text of the metadata as a time [ns], None if it is none."""
     return int(text) if text and text.isdecimal() and len(text) < 20 else None
 
 
-def foreign_encoding(file, channel):
+def foreign_encoding(file: pathlib.Path, channel: Channel) -> BagError:
     """Return the BagError for a channel with another encoding than CDR."""
     return BagError(f'{file}: {channel.topic} is encoded as {channel.message_encoding!r}: not a ROS 2 recording')
 
@@ -167,15 +174,24 @@ class Bag:
     beam               prefix of the beam of a view, ''
     """
 
-    def __init__(self, path, opened):
+    def __init__(self, path: pathlib.Path, opened: list[McapFile]) -> None:
         self.path, self.beam = path, ''
         self.files = [file.path for file in opened]
         self.file = self.files[0]
-        self.topics, self.metadata_records, self.statistics = {}, {}, {}
-        self.breaks, self.damage = [], ''
-        self._opened, self._cache, self._chunks = opened, {}, []
-        self._schemas, self._channels, self._stamped = {}, {}, []
-        self._judges, self._compressed = {}, 0
+        self.topics: dict[str, str] = {}
+        self.metadata_records: dict[str, dict[str, str]] = {}
+        self.statistics: dict[str, int] | None = None
+        self.breaks: list[str] = []
+        self.damage = ''
+        self._opened = opened
+        self._cache: dict[int, bytes] = {}
+        self._chunks: list[tuple[McapFile, int, int]] = []
+        self._schemas: dict[int, str] = {}
+        self._channels: dict[int, str] = {}
+        self._stamped: list[int] = []
+        self._counts: dict[str, int] = {}
+        self._judges: dict[int, Readable] = {}
+        self._compressed = 0
         blocks, ended = [np.zeros(0, INDEX_FIELDS)], True
         for number, file in enumerate(opened):
             try:
@@ -187,14 +203,15 @@ class Bag:
                     self.damage = text
                     break
                 self.breaks.append(text)
-        self.statistics = self.statistics if ended and self.statistics else None
+        if ended and self._counts:
+            self.statistics = self._counts
         self._recorded = np.concatenate(blocks).view(np.recarray)
         if self._compressed and self._compressed == len(self._recorded):
             raise compressed_messages(self.path, 'zstd')
         self._mark_other_publishers()
         self.index = self._recorded[self._recorded.foreign == 0]
 
-    def _mark_other_publishers(self):
+    def _mark_other_publishers(self) -> None:
         """Mark the messages that the recorder numbers 0, because another publisher than that of the graph sent them.
 
         A topic without any number was written by another tool.
@@ -205,7 +222,7 @@ class Bag:
             numbered = np.unique(rows.channel[~zero])
             rows.foreign[zero & np.isin(rows.channel, numbered) & (rows.foreign == 0)] = _OTHER_PUBLISHER
 
-    def _scan(self, number, file, blocks):
+    def _scan(self, number: int, file: McapFile, blocks: list[np.ndarray]) -> None:
         """Add the messages of a file to the blocks of the index. Raises EOFError if the file ends early."""
         for opcode, start, stop in file.pieces():
             try:
@@ -222,9 +239,10 @@ class Bag:
             except Exception as error:  # a decoder may raise anything on broken bytes
                 raise EOFError(f'broken record at byte {start}: {error}') from None
 
-    def _walk(self, number, data, offset, chunk):
+    def _walk(self, number: int, data: bytes, offset: int, chunk: int) -> Iterator[np.ndarray]:
         """Yield blocks of the index for the messages in the records `data`, which begin at an offset of the file."""
-        unpack, base, at, rows = MESSAGE_HEAD.unpack_from, number << 16, 0, []
+        unpack, base, at = MESSAGE_HEAD.unpack_from, number << 16, 0
+        rows: list[tuple[int, ...]] = []
         add, file = rows.append, self._opened[number]
         while at < len(data):
             if data[at] == Opcode.MESSAGE:
@@ -243,7 +261,7 @@ class Bag:
         if rows:
             yield self._block(file, rows, data, offset)
 
-    def _block(self, file, rows, data, offset):
+    def _block(self, file: McapFile, rows: list[tuple[int, ...]], data: bytes, offset: int) -> np.ndarray:
         """Return rows as a block of the index; a row with a header takes its stamp."""
         file.count(len(rows))
         block = np.array(rows, INDEX_FIELDS)
@@ -261,7 +279,7 @@ class Bag:
         block['stop'] += offset
         return block
 
-    def _judge(self, block, data):
+    def _judge(self, block: np.ndarray, data: bytes) -> None:
         """Mark the unreadable messages of a block of the index, and count the messages that are compressed one by one.
         """
         for channel in np.unique(block['channel']).tolist():
@@ -276,7 +294,7 @@ class Bag:
                     self._judges[channel] = Readable(name, self.topics[name], 'pacing' in self.metadata)
                 block['foreign'][rows[~self._judges[channel].mask(data, start, stop)]] = _UNREADABLE
 
-    def _declare(self, number, opcode, content):
+    def _declare(self, number: int, opcode: int, content: bytes) -> None:
         record, base = mcap_file.parsed(opcode, content), number << 16
         if opcode == Opcode.SCHEMA:
             self._schemas[base | record.id] = record.name
@@ -298,27 +316,27 @@ class Bag:
             for channel, name in self._channels.items():
                 if channel >> 16 == number:
                     count = record.channel_message_counts.get(channel & 0xffff, 0)
-                    self.statistics[name] = self.statistics.get(name, 0) + count
+                    self._counts[name] = self._counts.get(name, 0) + count
 
-    def _bytes(self, chunk, start, stop):
+    def _bytes(self, chunk: int, start: int, stop: int) -> bytes:
         """Return the bytes of a message from the place in its row of the index."""
         if chunk < 0:
             return self._opened[-1 - chunk].read(start, stop)
         if chunk not in self._cache:
-            file, *place = self._chunks[chunk]
-            data = file.chunk(*place, again=True)
+            file, first, last = self._chunks[chunk]
+            data = file.chunk(first, last, again=True)
             while self._cache and sum(map(len, self._cache.values())) + len(data) > MAX_CACHE_BYTES:
                 del self._cache[next(iter(self._cache))]
             self._cache[chunk] = data
         return self._cache[chunk][start:stop]
 
     @property
-    def metadata(self):
+    def metadata(self) -> dict[str, str]:
         """Metadata {text: text} of the run (record `pedestal`); empty in a foreign bag."""
         return self.metadata_records.get('pedestal', {})
 
     @property
-    def beams(self):
+    def beams(self) -> int:
         """Number of beams of the recorded array; 0 for a drive with motors."""
         several = sum(1 for name in self.topics if nodes.plain(name) == 'joint_states' != name)
         beams = self.metadata.get('beams', '0')
@@ -327,26 +345,26 @@ class Bag:
         return several or int(beams)
 
     @property
-    def start(self):
+    def start(self) -> int:
         """Time 0 of the scenario in the stamps [ns]: UTC in realtime, else 0."""
         return start(self.metadata_records)
 
     @property
-    def end(self):
+    def end(self) -> float:
         """Log time of the last message since the start [s]."""
-        return (self.index.log.max() - self.start) / 1e9
+        return float(self.index.log.max() - self.start) / 1e9
 
     @property
-    def planned_end(self):
+    def planned_end(self) -> int | None:
         """Planned end of the run, a stamp [ns]; None if unknown."""
         return planned_end(self.metadata_records)
 
     @property
-    def graph(self):
+    def graph(self) -> dict[str, nodes.Link]:
         """Links {name: Link} of the recorded graph."""
         return nodes.links(self.beams)
 
-    def view(self, beam=''):
+    def view(self, beam: str = '') -> 'Bag':
         """Return the Bag of one of several beams, '' for the first.
 
         It has the topics of the beam under their plain names, and the topics that all beams share. A Bag of one beam
@@ -361,7 +379,7 @@ class Bag:
         if not prefix:
             return self
 
-        def own(content):
+        def own(content: Mapping[str, Content]) -> dict[str, Content]:
             return {nodes.plain(name): value for name, value in content.items()
                     if nodes.beam_of(name) in ('', prefix[:-1])}
 
@@ -370,7 +388,7 @@ class Bag:
         view.topics = own(self.topics)
         view._channels = {channel: nodes.plain(name) for channel, name in self._channels.items()
                           if nodes.beam_of(name) in ('', prefix[:-1])}
-        view.index, view._recorded = (rows[np.isin(rows.channel, list(view._channels))]
+        view.index, view._recorded = (rows[np.isin(rows.channel, list(view._channels))].view(np.recarray)
                                       for rows in (self.index, self._recorded))
         view.statistics = None if self.statistics is None else own(self.statistics)
         view.metadata_records = {**self.metadata_records, 'pedestal': {**self.metadata, 'beams': '1'}}
@@ -384,13 +402,13 @@ class Bag:
         return view
 
     @functools.cached_property
-    def configuration(self):
+    def configuration(self) -> dict[str, typing.Any]:
         """Configuration of the run: {'scenario': its YAML, 'parameters': {node: {dotted name: value}}}.
 
         The values are '' and {} in a bag without a configuration. Raises BagError for invalid YAML, or for a node
         without a section of parameters.
         """
-        parameters = {}
+        parameters: dict[str, dict[str, typing.Any]] = {}
         for node, text in self.metadata_records.get('parameters', {}).items():
             try:
                 parameters[node] = plain_yaml.parse(text)
@@ -400,7 +418,7 @@ class Bag:
                 raise BagError(f'{self.file}: its record `parameters`: {node} must hold a value for each parameter')
         return {'scenario': self.metadata_records.get('scenario', {}).get('yaml', ''), 'parameters': parameters}
 
-    def where(self, topic):
+    def where(self, topic: str) -> np.ndarray:
         """Return the positions (m,) in `index` of the rows of a topic. Raises BagError for a missing topic."""
         name = topic.lstrip('/')
         if name not in self.topics:
@@ -408,17 +426,17 @@ class Bag:
         channels = [channel for channel, channel_name in self._channels.items() if channel_name == name]
         return np.flatnonzero(np.isin(self.index.channel, channels))
 
-    def rows(self, topic):
+    def rows(self, topic: str) -> np.recarray:
         """Return the rows of `index` of a topic."""
         return self.index[self.where(topic)]
 
-    def recorded(self, topic):
+    def recorded(self, topic: str) -> np.recarray:
         """Return the rows of all messages of a topic in the form of `index`, also those of foreign messages."""
         channels = [channel for channel, name in self._channels.items() if name == topic]
-        return self._recorded[np.isin(self._recorded.channel, channels)]
+        return self._recorded[np.isin(self._recorded.channel, channels)].view(np.recarray)
 
     @functools.cached_property
-    def foreign(self):
+    def foreign(self) -> list[str]:
         """Lines about the foreign messages, which are left out: one for each topic and reason.
 
         A foreign message is no message of its topic, or another publisher than that of the graph sent it.
@@ -432,7 +450,7 @@ class Bag:
                     lines.append(self._foreign_line(name, left_out, reason))
         return lines
 
-    def _foreign_line(self, name, rows, reason):
+    def _foreign_line(self, name: str, rows: np.recarray, reason: int) -> str:
         shown = ', '.join(f'{(row.log - self.start) / 1e9:.6f} s ({row.stop - row.start} bytes)'
                           for row in rows[:MAX_SHOWN_FOREIGN_MESSAGES])
         more = f' and {rows.size - MAX_SHOWN_FOREIGN_MESSAGES} more' if rows.size > MAX_SHOWN_FOREIGN_MESSAGES else ''
@@ -443,7 +461,7 @@ class Bag:
         count = f'{rows.size} foreign message{"s" if rows.size > 1 else ""}'
         return f'{name}: {count} left out, at {shown}{more}: {text}'
 
-    def last_values(self, node):
+    def last_values(self, node: str) -> dict[str, str]:
         """Return {key: value} of the last readable diagnostics of a node, {} without any."""
         rows = self.rows('diagnostics') if 'diagnostics' in self.topics else self.index[:0]
         for _, _, _, data in self.take(rows[:-MAX_SEARCHED_DIAGNOSTICS - 1:-1]):
@@ -453,18 +471,18 @@ class Bag:
                         return {value.key: value.value for value in status.values}
         return {}
 
-    def raw(self, topic=None):
+    def raw(self, topic: str | None = None) -> Iterator[tuple[str, int, int, bytes]]:
         """Yield (topic, log time, publish time [ns], CDR bytes) in the order of the file."""
         return self.take(self.index if topic is None else self.rows(topic))
 
-    def take(self, rows):
+    def take(self, rows: np.ndarray) -> Iterator[tuple[str, int, int, bytes]]:
         """Yield (topic, log time, publish time [ns], CDR bytes) of any rows of `index`, in their order."""
         names, take = self._channels, self._bytes
         for begin in range(0, len(rows), INDEX_BLOCK_ROWS):
             for channel, _, log, publish, _, _, *place in rows[begin:begin + INDEX_BLOCK_ROWS].tolist():
                 yield names[channel], log, publish, take(*place)
 
-    def messages(self, topic=None):
+    def messages(self, topic: str | None = None) -> Iterator[tuple[str, int, int, typing.Any]]:
         """Yield (topic, log time, publish time [ns], message) in the order of the file.
 
         Raises BagError for bytes that are no message of the type.
@@ -476,7 +494,7 @@ class Bag:
                 raise BagError(f'{self.path}: {name} at {log / 1e9:.6f} s: {error}') from None
             yield name, log, publish, message
 
-    def table(self, topic):
+    def table(self, topic: str) -> dict[str, np.ndarray]:
         """Return {column: array (n,)} of a topic, one row per message; for the names see columns.table.
 
         Raises BagError for bytes that are no message of the type.

@@ -7,7 +7,7 @@ from pedestal_common.parameters import ParameterError, parameter, text
 
 
 @dataclasses.dataclass(frozen=True)
-class RecorderParameters(topic_flags(topics.TOPIC_BY_NAME)):
+class RecorderParameters(topic_flags(topics.TOPIC_BY_NAME)):  # type: ignore[misc]  # a field per flag of the topics
     """Destination of the recording, and a description of the run for the metadata of the bag."""
     bag: str = text('recording',
                     'directory of the bag; must not exist, or hold the unfinished recording of this realtime run')

@@ -1,11 +1,10 @@
 """Studies of your own plant, `pedestal study servo|backlash|bode --scenario FILE`: both axes of a scenario, ashore.
 
-bode      the loops by trials/frequency_response, each axis for itself
-servo     a step of STEP_SIZE_RAD and a sine of SINE_AMPLITUDE_RAD at SINE_FREQUENCY_HZ in still air, a step of wind
-torque of GUST_TORQUE_SHARE of what the
-          motors have for a short time; of the true angle of the dish
-backlash  the standstill after that step, and what the sine leaves of its reversals, with the bias of the scenario and
-          without any
+  bode      the loops by pedestal_analysis/tuning/frequency_response.py, each axis by itself
+  servo     a step of STEP_SIZE_RAD, a sine of SINE_AMPLITUDE_RAD at SINE_FREQUENCY_HZ, and a step of wind torque of
+            GUST_TORQUE_SHARE of the torque limit of both motors; measured on the true angle of the dish, in still air
+  backlash  the standstill after that step, and the error of that sine at its reversals, with the bias of the
+            scenario and without bias
 """
 import math
 
@@ -22,23 +21,26 @@ from pedestal_studies.rigs.rows import Result
 from pedestal_studies.system import bode
 
 STEP_SIZE_RAD, SINE_AMPLITUDE_RAD, SINE_FREQUENCY_HZ, GUST_TORQUE_SHARE = 0.02, 0.02, 0.1, 0.2
-"""[rad], [rad], [Hz], share of both torque limits."""
+"""Size of the step [rad]; amplitude [rad] and frequency [Hz] of the sine; wind torque over both torque limits [-]."""
 
 RUN_DURATION_S, START_ANGLES_RAD, SETTLING_BAND, SINE_PERIODS = 10.0, (0.0, 0.6), 0.02, 3
-"""Of step and gust [s]; where the axes begin [rad]; of the settling time; of the sine, the first to settle."""
+"""Duration of the step and gust runs [s]; initial angles of the axes [rad]; band of the settling time [-]; periods
+of the sine, of which the first is not evaluated."""
 
 GUST_START_S, STANDSTILL_START_S = 4.0, 5.0
-"""When the gust begins, from when on an axis stands after the step [s]."""
+"""Start of the gust; start of the evaluated standstill after the step [s]."""
 
 BIAS_PARAMETERS = {'': {}, '/bias-off': {f'adu.{name}.bias.schedule': 'off' for name in AXES}}
-"""{end of the case's name: parameters}: as the scenario is, and without bias."""
+"""{suffix of a case: parameters}: with the bias of the scenario, and without bias."""
 
 REST_PARAMETERS = {**loops.STILL_AIR_PARAMETERS, 'scenario.program.source': 'none', 'acu.initial_mode': 'preset',
                    **{f'adu.initial_{name}': start for name, start in zip(AXES, START_ANGLES_RAD)},
                    **{f'acu.{name}.preset': start for name, start in zip(AXES, START_ANGLES_RAD)}}
+"""Parameters of axes at rest."""
 
-STEP_PARAMETERS = {**REST_PARAMETERS, **{f'acu.{name}.preset': start + STEP_SIZE_RAD for name,
-                                         start in zip(AXES, START_ANGLES_RAD)}}
+STEP_PARAMETERS = {**REST_PARAMETERS, **{f'acu.{name}.preset': start + STEP_SIZE_RAD
+                                         for name, start in zip(AXES, START_ANGLES_RAD)}}
+"""Parameters of a step of both axes."""
 
 SINE_PARAMETERS = {**loops.STILL_AIR_PARAMETERS, 'acu.tracker.handover': False, 'scenario.program.time_offset': 0.0,
                    'scenario.program.interval': 0.02, 'tracking_receiver.target.kind': 'sine',
@@ -46,26 +48,31 @@ SINE_PARAMETERS = {**loops.STILL_AIR_PARAMETERS, 'acu.tracker.handover': False, 
                    **{f'adu.initial_{name}': start for name, start in zip(AXES, START_ANGLES_RAD)},
                    **{f'tracking_receiver.target.angle.{name}': start for name, start in zip(AXES, START_ANGLES_RAD)},
                    **{f'tracking_receiver.target.angle.{name}_amplitude': SINE_AMPLITUDE_RAD for name in AXES}}
+"""Parameters of a sine of both axes."""
 
 
 def bode_study(source, progress):
-    """The Result of the study bode for a scenario, a name or a path. Raises LoopError, ScenarioError."""
+    """Return the Result of the study bode for a scenario, a name or a path. Raises LoopError, ScenarioError."""
     plant, responses = loops.Loops(source), {}
     for i, name in enumerate(AXES):
         progress(i / len(AXES), f'{name}: current, speed and position loop')
         for loop in ('current', 'speed', 'position'):
             found = plant.response(loop, name)
             if found is None:
-                raise loops.LoopError(f'{plant.name}, {name}: the drive trips while its {loop} loop is measured')
+                raise loops.LoopError(f'{plant.name}, {name}: the drive trips during the measurement of its {loop} '
+                                      'loop')
             responses[f'{loop}/{name}'] = found
-    figures = {loop: lambda loop=loop: bode.bode_figure(
-        f'{loop} loops of {plant.name}', {name: (responses[f'{loop}/{name}'], colour) for name, colour in
-                                          zip(AXES, (FILTERED_COLOUR, TRUTH_COLOUR))}, None) for loop in ('speed', 'position')}
-    return Result(bode.rows(responses), figures)
+
+    def drawn(loop):
+        curves = {name: (responses[f'{loop}/{name}'], colour)
+                  for name, colour in zip(AXES, (FILTERED_COLOUR, TRUTH_COLOUR))}
+        return lambda: bode.bode_figure(f'{loop} loops of {plant.name}', curves, None)
+
+    return Result(bode.rows(responses), {loop: drawn(loop) for loop in ('speed', 'position')})
 
 
 def servo_study(source, progress):
-    """The Result of the study servo for a scenario, a name or a path. Raises LoopError, ScenarioError."""
+    """Return the Result of the study servo for a scenario, a name or a path. Raises LoopError, ScenarioError."""
     plant = loops.Loops(source)
     torque = {name: GUST_TORQUE_SHARE * (p.axis.motor_1.torque_limit + p.axis.motor_2.torque_limit) * p.ratio
               for name, p in plant.plants.items()}
@@ -83,7 +90,7 @@ def servo_study(source, progress):
 
 
 def backlash_study(source, progress):
-    """The Result of the study backlash for a scenario, a name or a path. Raises LoopError, ScenarioError."""
+    """Return the Result of the study backlash for a scenario, a name or a path. Raises LoopError, ScenarioError."""
     plant, flown = loops.Loops(source), {}
     runs = {(kind, end): Case(kind, source, {**changes, **bias}, duration) for end, bias in BIAS_PARAMETERS.items()
             for kind, changes, duration in (('standstill', STEP_PARAMETERS, RUN_DURATION_S),
@@ -106,20 +113,20 @@ def backlash_study(source, progress):
 
 
 def _standstill(run, i):
-    """(times [s], angle less its mean [rad]) of an axis that stands."""
+    """Return (times [s], angle without its mean [rad]) of an axis at rest."""
     stands = run.t >= STANDSTILL_START_S
     angle = _angle(run, i)[stands]
     return run.t[stands], angle - np.mean(angle)
 
 
 def _reversals(run, i):
-    """(times [s], error without its fundamental [rad]) of an axis over the whole periods after the first."""
+    """Return (times [s], error without its fundamental [rad]) of an axis over the whole periods after the first."""
     steady = metrics.whole_periods(run.t, 1.0 / SINE_FREQUENCY_HZ, 1.0 / SINE_FREQUENCY_HZ)
     return run.t[steady], metrics.residual(run.t[steady], _sine_error(run, i)[steady], 1.0 / SINE_FREQUENCY_HZ)
 
 
 def _bias_figure(kind, cut, flown):
-    """What is left of both axes, with the scenario's bias and without one."""
+    """Draw the remaining motion of both axes, with the bias of the scenario and without bias."""
     figure, axes = new_panels(2, height=4.6, sharex=True,
                               y=f'{"error" if kind == "sine" else "angle"} [\N{MICRO SIGN}rad]')
     for i, (panel, name) in enumerate(zip(axes[:, 0], AXES)):
@@ -132,16 +139,17 @@ def _bias_figure(kind, cut, flown):
 
 
 def _angle(run, i):
-    """True angle (n,) [rad] of an axis from where it begins."""
+    """Return the true angle (n,) [rad] of an axis from its initial angle."""
     return run['adu/truth']['position'][:, i] - START_ANGLES_RAD[i]
 
 
 def _sine_error(run, i):
+    """Return the sine minus the true angle (n,) [rad] of an axis."""
     return SINE_AMPLITUDE_RAD * np.sin(2.0 * math.pi * SINE_FREQUENCY_HZ * run.t) - _angle(run, i)
 
 
 def _metrics(flown, i, torque):
-    """(metric, value, unit) of an axis."""
+    """Return [(metric, value, unit)] of an axis."""
     step, gust, sine = (flown[name] for name in ('step', 'gust', 'sine'))
     after, settled = _angle(gust, i)[gust.t >= GUST_START_S], sine.t >= 1.0 / SINE_FREQUENCY_HZ
     return [('step_overshoot_percent', metrics.overshoot_percent(_angle(step, i), STEP_SIZE_RAD), '%'),
@@ -153,7 +161,7 @@ def _metrics(flown, i, torque):
 
 
 def _figure(kind, run):
-    """Both axes over time, of the sine its error [mrad]."""
+    """Draw both axes over time: the angle, or the error of the sine [mrad]."""
     figure, axes = new_panels(2, height=4.6, y='error [mrad]' if kind == 'sine' else 'angle [mrad]', sharex=True)
     for i, (panel, name) in enumerate(zip(axes[:, 0], AXES)):
         values = _sine_error(run, i) if kind == 'sine' else _angle(run, i)
@@ -165,4 +173,4 @@ def _figure(kind, run):
 
 
 PLANT_STUDIES = {'backlash': backlash_study, 'bode': bode_study, 'servo': servo_study}
-"""{study: function(source, progress) -> Result} of those that measure any plant."""
+"""{study: function(source, progress) -> Result} of the studies that measure any plant."""

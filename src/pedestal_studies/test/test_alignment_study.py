@@ -1,4 +1,4 @@
-"""What an alignment says of its own accuracy, on the sea that the study `alignment` puts it on."""
+"""The accuracy that an alignment states, on the sea of the study `alignment`."""
 import math
 
 import numpy as np

@@ -1,4 +1,4 @@
-"""Scenarios of an electronic array: what the composed loop reaches, what is said once, what is refused."""
+"""Scenarios of an electronic array: accuracy of the composed loop, messages that are published once, refusals."""
 import math
 
 import numpy as np
@@ -69,12 +69,12 @@ def test_a_beam_that_only_leads_is_seen_at_the_beginning_of_its_intervals():
                                                     'feedforward, adrc: the drive has motors'),
     (FOUR, ['beam_2/acu.azimuth.controller=pid'], "beam_2/acu: azimuth.controller = 'pid': must be beam: the drive is "
                                                   'an array'),
-    (FOUR, ['beam_2/acu.period=0.001'], 'beam_2/acu: period = 0.001: must be 0.01, as is said elsewhere; leave it out '
-                                        'here'),
-    (FOUR, ['beam_3/tracking_receiver.duration=5.0'], 'beam_3/tracking_receiver: duration = 5.0: must be 30.0, as is '
-                                                      'said elsewhere; leave it out here'),
-    (FOUR, ['beam_3/acu.receiver_rate=true'], 'beam_3/acu: receiver_rate = True: must be False, as is said elsewhere; '
-                                              'leave it out here'),
+    (FOUR, ['beam_2/acu.period=0.001'], 'beam_2/acu: period = 0.001: must be 0.01, as for the other nodes; leave it '
+                                        'out here'),
+    (FOUR, ['beam_3/tracking_receiver.duration=5.0'], 'beam_3/tracking_receiver: duration = 5.0: must be 30.0, as for '
+                                                      'the other nodes; leave it out here'),
+    (FOUR, ['beam_3/acu.receiver_rate=true'], 'beam_3/acu: receiver_rate = True: must be False, as for the other '
+                                              'nodes; leave it out here'),
 ])
 def test_what_does_not_go_together_is_refused(name, overrides, line):
     with pytest.raises(scenario.ScenarioError) as error:
@@ -101,7 +101,7 @@ def test_every_beam_knows_the_age_of_its_own_errors():
 
 @pytest.mark.parametrize('delta, reading', [(0.0, 0.1408), (0.85, 0.0211)])
 def test_the_papers_loop_through_the_cores_reads_what_its_kernel_does(delta, reading):
-    """Figure 9: v T of the sway, and what the compensation leaves of it."""
+    """Figure 9: v T of the sway, and the rest of it with compensation."""
     of_axes = [f'acu.{axis}.beam.{key}={value}' for axis in ('azimuth', 'elevation')
                for key, value in (('form', 'type_1'), ('rate_compensation', delta))]
     run = composed(*QUIET, *of_axes, 'adu.transport_delay=0', duration=14.0)

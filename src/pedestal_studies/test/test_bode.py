@@ -64,7 +64,7 @@ def current_controller(m, bandwidth, j):
 
 
 def drive(p):
-    """One axis at 0.5 ms, its speed loop open: torque wanted of both motors [Nm] to what its encoders tell."""
+    """One axis at 0.5 ms, its speed loop open: commanded torque of both motors [Nm] to its encoders."""
     inner = control.interconnect(
         [control.sample_system(mechanics(p), CURRENT_PERIOD, 'zoh', name='sampled'),
          current_controller(p.motor_1, p.current_loop.bandwidth, 1),
@@ -146,7 +146,7 @@ def turning(p, f):
 
 
 def agrees(measured, loop, low, high, gain, phase, factor=None):
-    """Whether L is within gain (relative) and phase [deg] (and 50 us) of the model from low to high [Hz]."""
+    """Return True if L is within gain (relative) and phase [deg] (and 50 us) of the model from low to high [Hz]."""
     band = (low <= measured.frequency) & (measured.frequency <= high)
     f = measured.frequency[band]
     ratio = measured.open_loop[band] / model_at(loop, f) / (factor(f) if factor else 1.0)
@@ -214,7 +214,7 @@ def test_position_loop_of_the_paper():
 
 
 def test_flexible_structure_and_the_notch_against_it():
-    """The resonance takes the margins away, the notch brings them back."""
+    """The resonance removes the margins, the notch restores them."""
     ours = {}
     for name in ('structure', 'structure-notch'):
         case, axes = bode.LOOP_CASES[name]
@@ -255,7 +255,7 @@ def test_margins_of_a_known_loop():
 
 
 def test_response_of_a_known_filter_and_its_deviation():
-    """0.5 y' + 0.25 in front of white noise: the deviation tells how far the measured points lie off."""
+    """0.5 y' + 0.25 in front of white noise: the deviation is the distance of the measured points."""
     sweep = frequency.Sweep(1.0, 1.0, 400.0, 60, 1, 8, 1.0)
     x = sweep.signal(1e-3)
     assert np.abs(x).max() == pytest.approx(1.0)
@@ -281,4 +281,4 @@ def test_study_through_the_command_line(pedestal, tmp_path):
         assert values[case, 'crossover_hz'] > 1.0 and values[case, 'phase_margin_deg'] > 10.0
     figures = {path.stem: path.stat().st_size for path in (tmp_path / 'studies' / 'bode').glob('*.png')}
     assert {'current', 'speed', 'position', 'paper', 'structure'} <= set(figures) and min(figures.values()) > 10000
-    assert 'Linear: half the excitation' in output
+    assert 'with half the excitation no open loop changes' in output

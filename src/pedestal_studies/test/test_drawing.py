@@ -1,4 +1,4 @@
-"""What holds for every figure of a study: a legend that covers nothing, lines told apart in grey, plain numbers."""
+"""Every figure of a study: a legend that covers no curve, lines that differ in grey, plain numbers."""
 import matplotlib
 import numpy as np
 import pytest

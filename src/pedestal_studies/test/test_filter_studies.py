@@ -1,4 +1,4 @@
-"""Studies filters, manoeuvre and pareto in small: what physics says must come out, whatever the tuning."""
+"""Studies filters, manoeuvre and pareto in small: results that follow from physics for any tuning."""
 import dataclasses
 import json
 import math
@@ -70,7 +70,7 @@ def test_a_filter_that_expects_coloured_noise_knows_its_error_better(flyby):
 
 
 def test_a_model_of_the_flight_beats_models_of_the_angle(flyby):
-    """On a straight line an acceleration of the angle is geometry, which the range gives away."""
+    """On a straight line an acceleration of the angle is geometry, which the range shows."""
     assert flyby('imm_ukf', 'rate_rms_deg_s') < 0.6 * flyby('imm', 'rate_rms_deg_s')
 
 
@@ -85,7 +85,7 @@ def test_tuned_kalman_filters_know_their_errors(flyby):
 def test_rows_with_a_target_are_printed_and_doubts_are_said(filters_result):
     assert 0 < len(filters_result.shown) < len(filters_result.rows)
     assert all(row['target'] for row in filters_result.shown)
-    assert any('Not honest under coloured noise' in line for line in filters_result.remarks)
+    assert any('Inconsistent filters under coloured noise' in line for line in filters_result.remarks)
 
 
 def test_figures_of_filters(filters_result, tmp_path):

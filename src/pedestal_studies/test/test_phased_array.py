@@ -98,7 +98,7 @@ def test_a_beam_that_is_right_in_the_middle_is_off_at_the_ends_of_its_millisecon
 
 @pytest.mark.parametrize('hold, delay', [(1, 20), (10, 20), (5, 150)])
 def test_better_loop_meets_a_ramp_but_for_its_hold(hold, delay):
-    """Whatever the delay; a command that stands for `hold` is off by half of it at either end."""
+    """For any delay; a command that stands for `hold` is off by half of it at either end."""
     target = math.radians(30.0) * instants(10.0)
     beam, _ = FilterLoop(1e-2, 1e-3, hold=hold, delay=delay).run(target)
     error = np.degrees(target - beam)[-1000:]

@@ -57,7 +57,7 @@ def test_bias_takes_the_backlash_out_of_a_plant(pedestal, tmp_path):
 
 @pytest.mark.parametrize('arguments, expected', [
     (('pareto', '--scenario', 'leo_pass'),
-     "study pareto is of the papers' plant; any plant have backlash, bode, servo"),
+     'study pareto has the plant of the papers; must be one of backlash, bode, servo'),
     (('bode', '--scenario', 'phased_array_sway'), 'an electronic beam has no loops'),
     (('bode', '--scenario', 'leo_pass', '--runs', '3'), '--runs: does not go with --scenario'),
     (('servo', '--scenario', 'leo_pas'), "did you mean 'leo_pass'?")])

@@ -1,4 +1,4 @@
-"""The target motions: rate and acceleration are the derivatives of the angle, the peaks are what was asked for."""
+"""The target motions: rate and acceleration are the derivatives of the angle, the peaks have the requested size."""
 import math
 
 import numpy as np

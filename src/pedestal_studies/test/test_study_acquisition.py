@@ -14,7 +14,7 @@ from pedestal_studies.system import acquisition as study
 
 @dataclasses.dataclass
 class Told:
-    """What `tracked_after` reads of a run."""
+    """The data of a run that `tracked_after` reads."""
     steps: dict
     t: np.ndarray
 
@@ -22,7 +22,7 @@ class Told:
         return self.steps[topic]
 
 
-def told(mode, error):
+def run_with(mode, error):
     n = len(mode)
     errors = np.zeros(n, [('vector', 'f8', 3)])
     errors['vector'][:, 0] = error
@@ -31,12 +31,12 @@ def told(mode, error):
 
 def test_times():
     A, P, nan = Mode.AUTOTRACK, Mode.PROGRAM, math.nan
-    lost = told([P, P, A, A, A, P, A, A], [nan, 0, 0, 0, nan, 0, 0, 0])
+    lost = run_with([P, P, A, A, A, P, A, A], [nan, 0, 0, 0, nan, 0, 0, 0])
     assert study.tracked_after(lost, False) == 3.0
     assert study.tracked_after(lost, True) == 1.0
-    assert math.isnan(study.tracked_after(told([P, A, A], [0, 0, nan]), False))
-    assert math.isnan(study.tracked_after(told([P, A, A], [0, 0, 0]), True))
-    assert study.tracked_after(told([A, A], [0, 0]), False) == 0.0
+    assert math.isnan(study.tracked_after(run_with([P, A, A], [0, 0, nan]), False))
+    assert math.isnan(study.tracked_after(run_with([P, A, A], [0, 0, 0]), True))
+    assert study.tracked_after(run_with([A, A], [0, 0]), False) == 0.0
 
 
 @pytest.mark.parametrize('pattern', range(len(SEARCH_PATTERNS)))

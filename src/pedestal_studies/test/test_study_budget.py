@@ -1,4 +1,4 @@
-"""The error budget in a quick form: it adds up to the whole run, and what is known in closed form is that."""
+"""The error budget in a quick form: it adds up to the whole run, and terms known in closed form agree."""
 import math
 
 import numpy as np
@@ -47,8 +47,9 @@ def test_the_budget_is_the_whole_run_within_ten_percent(made, place, mode):
 
 
 def test_all_of_the_station_is_in_the_budget():
-    """Every parameter of a term differs from its default in the scenario, and with none on nothing is left of them."""
-    (whole, none) = (scenario.load(study.SCENARIO_NAME, study.overrides('autotrack', on)) for on in (study.ALL_TERMS, study.NO_TERMS))
+    """Every parameter of a term differs from its default in the scenario, and NO_TERMS restores all defaults."""
+    whole, none = (scenario.load(study.SCENARIO_NAME, study.overrides('autotrack', on))
+                   for on in (study.ALL_TERMS, study.NO_TERMS))
     off = build(type(none.header), {})
     for term in study.ERROR_TERMS:
         for key in study.parameters_of(term):

@@ -1,4 +1,4 @@
-"""The study target-filters: what its cases change, its rows, and one target of it."""
+"""The study target-filters: its cases, its rows, and one of its targets."""
 import numpy as np
 
 from pedestal_studies.system import target_filters as study

@@ -105,6 +105,22 @@ def test_signs_are_those_of_instruments_and_displacements_may_be_missing(tmp_pat
     assert now['mat_ed'][2, 1] > 0.0           # port is up
 
 
+def test_a_log_of_a_spreadsheet_is_read(path, tmp_path):
+    """Semicolons, decimal commas, units of its own, capitals, a mark."""
+    names, *rows = path.read_text().splitlines()
+    names = names.replace('time_s', 'Time [s]').replace('roll_deg', 'Roll [rad]').replace('heave_m', 'Heave [cm]')
+    made = ['sep=;', '# by a logger', names.replace(',', ';')]
+    for row in rows:
+        time, note, roll, *middle, heave = row.split(',')
+        cells = time, note, f'{math.radians(float(roll)):.15f}', *middle, f'{100.0 * float(heave):.12f}'
+        made.append(';'.join(cells).replace('.', ','))
+    other = tmp_path / 'ship.csv'
+    other.write_text('\n'.join(made), encoding='utf-8-sig')
+    for t in (5.0, 31.0):
+        now, was = truth(recorded(other), t), truth(recorded(path), t)
+        np.testing.assert_allclose(now['freedoms'], was['freedoms'], atol=1e-9)
+
+
 HEAD = 'time_s,roll_deg,pitch_deg,heading_deg\n'
 
 
@@ -113,6 +129,8 @@ HEAD = 'time_s,roll_deg,pitch_deg,heading_deg\n'
     (HEAD + '0,1,1,1\n1,1,1,1\n1,1,1,1\n', {}, 'line 4: time_s = 1: 0 s after the row before, must be above 0 and at '
                                                'most ship.recorded.max_gap = 2 s'),
     (HEAD + '0,1,1,1\n5,1,1,1\n', {}, 'line 3: time_s = 5: 5 s after the row before'),
+    (HEAD.replace('roll_deg', 'roll'), {}, "line 1: column 'roll': must end with a known unit to be taken as roll"),
+    (HEAD.replace(',pitch', ',heave,pitch'), {}, "line 1: column 'heave': must end with a known unit"),
     (HEAD + '0,nan,1,1\n', {}, 'line 2: roll_deg = nan: must be -80 to 80'),
     (HEAD + '0,1,,1\n', {}, "line 2: pitch_deg = '': must be a number"),
     (HEAD + '0,1,1,1\n1,1,1,1\n', {}, '2 rows, must be at least 4'),

@@ -170,6 +170,19 @@ def test_a_measured_spectrum_keeps_its_energy_where_it_was(tmp_path):
     assert np.sum(0.5 * amplitude[swell]**2) == pytest.approx(integrate.trapezoid(density[low], f[low]), rel=0.05)
 
 
+@pytest.mark.parametrize('names, frequency, density', [
+    ('Frequency [Hz];Density [m2/Hz]', 1.0, 1.0),
+    ('frequency (rad/s);density (m2 s/rad)', 2.0 * math.pi, 0.5 / math.pi)])
+def test_a_spectrum_of_a_spreadsheet_is_read(names, frequency, density, tmp_path):
+    path = tmp_path / 'buoy.csv'
+    f = np.arange(0.05, 0.4, 0.05)
+    rows = ''.join(f'{frequency * x:.12f};{density * 2.0:.12f}\n' for x in f)
+    path.write_text(f'{names}\n' + rows.replace('.', ','))
+    w, level = waves.density(measured(path))
+    assert (w[0], w[-1]) == pytest.approx((2.0 * math.pi * f[0], 2.0 * math.pi * f[-1]))
+    assert level == pytest.approx(np.full(len(w), 1.0 / math.pi))
+
+
 @pytest.mark.parametrize('content, message', [
     ('frequency_hz,density_m2_per_hz\n0.1,1\n0.05,2\n', 'line 3: frequency_hz = 0.05: -0.05 hz after the row before'),
     ('frequency_hz,density_m2_per_hz\n0.1,-1\n0.2,1\n', 'line 2: density_m2_per_hz = -1: must be 0 to 10000'),

@@ -106,4 +106,5 @@ def test_lockstep_refuses_what_everybody_would_wait_for():
     receiver.lockstep = True
     assert receiver.command(Command('nan')).granted
     refused = receiver.command(Command('drop'))
-    assert not refused.granted and 'in lockstep everybody would wait, it takes pacing realtime' in refused.text
+    assert not refused.granted
+    assert 'every lockstep node would wait, so this fault needs pacing realtime' in refused.text

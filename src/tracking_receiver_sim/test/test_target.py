@@ -183,7 +183,8 @@ GOOD = [(float(k), 47.4, 8.5, 600.0) for k in range(6)]
 
 
 @pytest.mark.parametrize('rows, message', [
-    (GOOD[:3] + [(2.0, 47.4, 8.5, 600.0)], r'line 5: time_s = 2: 0 s after the row before, must be above 0'),
+    (GOOD[:4] + [(3.0, 47.4, 8.6, 600.0)], r'line 6: time_s = 3: 0 s after the row before, must be above 0'),
+    (GOOD[:3] + [(2.0, 47.4, 8.5, 600.0)], r'3 fixes, .* passed over 1 x row that repeats time and place'),
     (GOOD[:3] + [(1.5, 47.4, 8.5, 600.0)], r'line 5: time_s = 1.5: -0.5 s after'),
     (GOOD[:3] + [(60.0, 47.4, 8.5, 600.0)], r'line 5: time_s = 60: 58 s after .* at most max_gap = 10 s'),
     (GOOD[:3] + ['3.0,47.4,east,600'], r"line 5: longitude_deg = 'east': must be a number"),
@@ -218,7 +219,7 @@ def test_broken_track_files(tmp_path):
     (tmp_path / 'empty.csv').write_text('')
     assert "column 'time_s' is missing" in message(tmp_path / 'empty.csv')
     (tmp_path / 'binary.csv').write_bytes(b'\x89\xff\x00\x01' * 100)
-    assert 'not a CSV text file' in message(tmp_path / 'binary.csv')
+    assert 'line 1: byte 0x00: must be text in UTF-8' in message(tmp_path / 'binary.csv')
     assert 'start = 5 s: must be before the end of the track at 5 s' in message(
         write_track(tmp_path / 'short.csv', GOOD), track_file__start=5.0)
 

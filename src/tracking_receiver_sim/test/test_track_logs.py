@@ -1,4 +1,6 @@
 """Logs of one flight in every form, what is passed over in them, and every way they can be wrong."""
+import gzip
+
 import numpy as np
 import pynmea2
 import pytest
@@ -65,6 +67,13 @@ def gga(k, time=None, altitude=None, quality='1', latitude=None):
     return str(pynmea2.GGA('GP', 'GGA', data))
 
 
+def incomplete(k, empty):
+    """Return a GGA of which the field `empty` is empty."""
+    data = list(pynmea2.parse(gga(k)).data)
+    data[empty] = ''
+    return str(pynmea2.GGA('GP', 'GGA', tuple(data)))
+
+
 def nmea(sentences=None):
     rmc = pynmea2.RMC('GP', 'RMC', ('100000.00', 'A', '4721.99', 'N', '00830.04', 'E', '0', '0', '230718', '', ''))
     return '\n'.join(['$GPGSV,1,1,00*79', *(sentences or [gga(k) for k in range(N)]), str(rmc), ''])
@@ -107,8 +116,9 @@ def test_lines_are_those_of_the_file(tmp_path):
 
 
 def test_rows_without_a_position_are_counted(tmp_path):
-    assert 'ADS-B of 4b1812 RGA3, passed over 1 x row without time, position or aircraft' in read(
-        tmp_path, traffic()).description
+    assert read(tmp_path, traffic()).description == (
+        'flight.log: ADS-B of 4b1812 RGA3, columns timestamp in UTC, latitude in deg, longitude in deg, '
+        'geoaltitude in ft, passed over 1 x row without time, position or aircraft')
 
 
 def test_barometric_altitude_is_said(tmp_path):
@@ -138,7 +148,7 @@ def test_a_point_without_geoidheight_or_ele(tmp_path):
     got = read(tmp_path, gpx(points=[trkpt(k, geoid='') for k in range(N)]))
     assert got.altitude == pytest.approx(np.array(ALTITUDE) - 47.5) and 'ele taken as height' in got.description
     got = read(tmp_path, gpx(points=[trkpt(k, ele='' if k == 3 else None) for k in range(N)]))
-    assert len(got.time) == N - 1 and 'passed over 1 x point without time or ele' in got.description
+    assert len(got.time) == N - 1 and 'passed over 1 x point without ele' in got.description
 
 
 def test_the_known_gga(tmp_path):
@@ -158,8 +168,67 @@ def test_a_log_of_nmea_as_it_comes(tmp_path):
     got = read(tmp_path, ('\n'.join(['$GPGGA', '$GPGGA,', '!AIVDM,1', damaged, gga(6, quality='0'), *good])
                           + '\r\n').encode() + b'\xff\xfe$GP\n')
     assert np.diff(got.time).tolist() == [0.5] * 4
-    assert 'passed over 2 x GGA without a fix' in got.description
-    assert 'passed over 1 x damaged sentence' in got.description
+    assert 'passed over 1 x GGA without a fix' in got.description
+    assert 'passed over 2 x damaged sentence' in got.description
+
+
+SENTENCES = [gga(k) for k in range(N)]
+AS_LOGGED = {
+    'cut': ([gga(0)[30:], *SENTENCES[1:]], 'passed over 1 x damaged sentence'),
+    'cut at the end': ([*SENTENCES[:-1], gga(N - 1)[:-20]], 'passed over 1 x damaged sentence'),
+    'cut and joined': ([SENTENCES[0], gga(1)[:40] + SENTENCES[2], *SENTENCES[3:]], 'passed over 1 x damaged sentence'),
+    'prefix': ([f'2018-07-23T10:00:00.123 {text}' for text in SENTENCES], 'flight.log: NMEA'),
+    'tag block': ([f'\\g:1-2-1234,s:r003669945,c:1120959341*57\\{text}' for text in SENTENCES], 'flight.log: NMEA'),
+    'comment': (['# log of u-center', *SENTENCES], 'flight.log: NMEA'),
+    'Android': (['# Version: v3', '#', 'Fix,GPS,47.3,8.5', *(f'NMEA,{text},1532340000000' for text in SENTENCES)],
+                'flight.log: NMEA'),
+    'time behind': ([f'{text},1532340000000' for text in SENTENCES], 'flight.log: NMEA'),
+    'two dimensions': ([SENTENCES[0], incomplete(1, 8), *SENTENCES[2:]], 'passed over 1 x GGA without altitude'),
+    'no time': ([SENTENCES[0], incomplete(1, 0), *SENTENCES[2:]], 'passed over 1 x GGA without time')}
+
+
+@pytest.mark.parametrize('name', AS_LOGGED)
+@pytest.mark.parametrize('encoding', ['ascii', 'utf-16'])
+def test_sentences_as_loggers_write_them(name, encoding, tmp_path):
+    sentences, described = AS_LOGGED[name]
+    got = read(tmp_path, '\r\n'.join(sentences).encode(encoding))
+    assert described in got.description
+    kept = [k for k in range(N) if SENTENCES[k] in '\n'.join(sentences)]
+    assert got.latitude == pytest.approx(np.array(LATITUDE)[kept], abs=1e-9)
+    assert got.altitude == pytest.approx(np.array(ALTITUDE)[kept], abs=1e-3)
+
+
+def test_a_log_without_gga_is_named(tmp_path):
+    assert '0 fixes, must be at least 4: no GGA in it (3 GLL, 1 GSA, 1 GSV, 1 RMC)' in refused(
+        tmp_path, '\n'.join(['$GPGLL,4721.99,N,00830.04,E,100000,A*20'] * 3) + nmea(['$GPGSA,A']))
+
+
+@pytest.mark.parametrize('declared, encoding', [
+    ('ISO-8859-1', 'latin-1'), ('windows-1252', 'cp1252'), ('UTF-8', 'utf-8'), ('UTF-8', 'utf-8-sig'),
+    ('UTF-16', 'utf-16'), ('UTF-8', 'utf-16')])
+def test_a_gpx_is_read_in_its_encoding(declared, encoding, tmp_path):
+    got = read(tmp_path, gpx(('Zürich',)).replace('UTF-8', declared).encode(encoding))
+    assert got.description.startswith('flight.log: GPX of Zürich') and got.latitude == pytest.approx(LATITUDE)
+
+
+def test_a_gpx_without_a_track_is_named(tmp_path):
+    assert 'no point has an ele, passed over 8 x point without ele' in refused(
+        tmp_path, gpx(points=[trkpt(k, ele='') for k in range(N)]))
+    assert 'no trkpt in it (9 wpt)' in refused(tmp_path, gpx().replace('trkpt', 'wpt'))
+    assert 'line 4: not well-formed XML (encoding UTF-8)' in refused(tmp_path, gpx(('Zürich',)).encode('latin-1'))
+    assert '(encoding Shift_JIS)' in refused(tmp_path, gpx().replace('UTF-8', 'Shift_JIS'))
+
+
+def test_a_point_that_is_repeated_is_counted(tmp_path):
+    got = read(tmp_path, gpx(points=[trkpt(k) for k in (0, 1, 1, 1, 2, 3, 4, 5, 6, 7)]))
+    assert len(got.time) == N and 'passed over 2 x row that repeats time and place' in got.description
+    assert 'time = 2018-07-23T10:00:01.000Z: 0 s after' in refused(
+        tmp_path, gpx(points=[trkpt(k).replace(clock(2), clock(1)) for k in range(N)]))
+
+
+def test_a_packed_log_is_named(tmp_path):
+    for name, log in LOGS.items():
+        assert 'compressed by gzip: unpack it with gunzip' in refused(tmp_path, gzip.compress(log().encode())), name
 
 
 @pytest.mark.parametrize('text, expected', [
@@ -193,7 +262,7 @@ BOMB = ('<?xml version="1.0"?>\n<!DOCTYPE gpx [<!ENTITY a "aaaaaaaaaa">' + ''.jo
     (traffic().replace(':03+00', ':61+00'), 'line 6: timestamp = '),
     (traffic().replace(':03+00', ':01+00'), 'line 6: timestamp = 2018-07-23T10:00:01.000Z: -1 s after the row before'),
     (traffic().replace(':07+00', ':59+00'), ': 53 s after the row before, must be above 0 and at most max_gap = 10 s'),
-    (traffic().replace('latitude', 'lat'), "line 1: column 'latitude' is missing"),
+    (traffic().replace('latitude', 'north'), "line 1: column 'latitude' is missing"),
     (opensky().replace('baroaltitude', 'a').replace('geoaltitude', 'b'), "line 1: column 'geoaltitude' is missing"),
     ('\n'.join(traffic().splitlines()[:3]), '2 fixes, must be at least 4'),
     ('timestamp,latitude,longitude,altitude\n', '0 fixes, must be at least 4'),
@@ -211,9 +280,8 @@ BOMB = ('<?xml version="1.0"?>\n<!DOCTYPE gpx [<!ENTITY a "aaaaaaaaaa">' + ''.jo
     (nmea([gga(k, time='100001' if k == 2 else None) for k in range(N)]), '4: time = 2018-07-23T10:00:01.000Z: 0 s'),
     (nmea([gga(k, quality='0') for k in range(N)]), '0 fixes, must be at least 4, passed over 8 x GGA without a fix'),
     ('$' + 'x' * 5000, 'line 1: longer than 1024 characters'),
-    (gpx().replace('UTF-8', 'UTF-9').replace('Rega', '\udce4').encode(errors='surrogateescape'), 'line 4: not well'),
-    (b'$\xff\xfe', '0 fixes'), (b'<gpx>\xff', 'line 1: not well-formed XML'),
-    (gpx().encode('utf-16'), 'not a CSV text file')])
+    (gpx().replace('UTF-8', 'UTF-9').replace('Rega', '\udce4').encode(errors='surrogateescape'), 'line 1: not well'),
+    (b'$\xff\xfe', '0 fixes'), (b'<gpx>\xff', 'line 1: not well-formed XML')])
 def test_bad_logs(tmp_path, content, message):
     assert message in refused(tmp_path, content)
 

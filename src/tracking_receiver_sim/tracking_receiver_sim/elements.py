@@ -14,7 +14,7 @@ from sgp4.exporter import export_tle
 
 from pedestal_common.geometry.orbit import TargetError
 from pedestal_common.parameters import did_you_mean
-from pedestal_common.text_files import csv_table
+from pedestal_common.text_files import content, csv_table
 from tracking_receiver_sim.ephemeris import lines
 
 FORMAT_PROBE_BYTES = 4096
@@ -66,7 +66,7 @@ def read(path, name=''):
     """
     try:
         with csv_table.stream(path) as stream:
-            beginning = stream.read(FORMAT_PROBE_BYTES).removeprefix(b'\xef\xbb\xbf').lstrip()
+            beginning = content.beginning(stream.read(FORMAT_PROBE_BYTES)).lstrip()
         names, found = [], []
         for satellite in _reader(beginning)(path):
             names.append(satellite.name)
@@ -93,20 +93,23 @@ def read(path, name=''):
 
 
 def _reader(beginning):
-    if beginning.startswith(b'<'):
+    if beginning.startswith('<'):
         return _xml
-    if beginning.startswith((b'{', b'[')):
+    if beginning.startswith(('{', '[')):
         return _json
-    if beginning.startswith(b'CCSDS_OMM_VERS'):
+    if beginning.startswith('CCSDS_OMM_VERS'):
         return _kvn
-    first = beginning.partition(b'\n')[0]
-    return _csv if b',' in first and b'EPOCH' in first else _tles
+    try:
+        names = csv_table.Table('', beginning).fieldnames
+    except csv_table.READ_ERRORS:
+        names = ()
+    return _csv if 'EPOCH' in names else _tles
 
 
 def _tles(path):
     """Yield the satellites of a file of TLEs, with or without a line of the name before each."""
     before, first = (0, ''), (0, '')
-    for number, text in lines.read(path, 'UTF-8'):
+    for number, text in lines.read(path):
         if first[1].startswith('1 ') and text.startswith('2 '):
             title = '' if before[1].startswith('2 ') else before[1].removeprefix('0 ').strip()
             yield Satellite(first[0], title or first[1][2:7].strip(), _number(first[1][2:7]), _designator(first[1]),
@@ -137,7 +140,7 @@ def _omm(line, fields):
 def _kvn(path):
     """Yield the satellites of OMMs in sequence; each begins with its CCSDS_OMM_VERS."""
     fields, begun = {}, 0
-    for number, text in lines.read(path, 'UTF-8'):
+    for number, text in lines.read(path):
         keyword, equals, value = text.partition('=')
         keyword = keyword.strip()
         if keyword == 'CCSDS_OMM_VERS':
@@ -154,7 +157,7 @@ def _kvn(path):
 
 def _csv(path):
     with csv_table.opened(path) as reader:
-        csv_table.require(path, reader, ('EPOCH', 'NORAD_CAT_ID'))
+        csv_table.require(reader, ('EPOCH', 'NORAD_CAT_ID'))
         for row in reader:
             yield _omm(reader.line_num, {keyword: row[keyword].strip()[:MAX_VALUE_CHARS] for keyword in OMM_KEYWORDS
                                          if isinstance(row.get(keyword), str)})
@@ -162,12 +165,7 @@ def _csv(path):
 
 def _json(path):
     """Yield the satellites of a JSON array of objects, or of one object, decoded one by one."""
-    with csv_table.stream(path) as stream:
-        content = stream.read(csv_table.MAX_CSV_BYTES)
-    try:
-        text = content.decode('utf-8-sig')
-    except UnicodeDecodeError as error:
-        raise csv_table.TableError(f'{path}: byte {error.start}: must be UTF-8') from None
+    text = csv_table.text(path)
     decoder, between = json.JSONDecoder(parse_int=str, parse_float=str), re.compile(r'[\s,\[\]]*')
     at, line, counted = between.match(text).end(), 1, 0
     while at < len(text):
@@ -189,8 +187,6 @@ def _json(path):
 def _xml(path):
     """Yield the satellites of the segments of an OMM or NDM as XML; expat keeps no parsed data in memory."""
     satellites, open_elements, texts = [], [], {}
-    parser = expat.ParserCreate('UTF-8')
-    parser.buffer_text = True
 
     def doctype(*_):
         raise lines.wrong(path, parser.CurrentLineNumber, parser.CurrentColumnNumber + 1,
@@ -215,10 +211,12 @@ def _xml(path):
             line = texts.pop('line', 1)
             satellites.append(_omm(line, {keyword: value.strip() for keyword, value in texts.items()}))
 
-    parser.StartDoctypeDeclHandler, parser.CharacterDataHandler = doctype, text
-    parser.StartElementHandler, parser.EndElementHandler = start, end
     try:
         with csv_table.stream(path) as stream:
+            parser = content.xml_parser(stream)
+            parser.buffer_text = True
+            parser.StartDoctypeDeclHandler, parser.CharacterDataHandler = doctype, text
+            parser.StartElementHandler, parser.EndElementHandler = start, end
             while piece := stream.read(PARSE_CHUNK_BYTES):
                 parser.Parse(piece)
                 yield from satellites
@@ -227,6 +225,10 @@ def _xml(path):
     except expat.ExpatError as error:
         raise lines.wrong(path, error.lineno, error.offset + 1, 'not well-formed XML: '
                           f'{expat.ErrorString(error.code)}') from None
+    except (LookupError, ValueError) as error:  # of an encoding that the file declares
+        if isinstance(error, csv_table.TableError):
+            raise
+        raise lines.wrong(path, 1, 1, f'not well-formed XML: {error}') from None
 
 
 def _tle(path, satellite):

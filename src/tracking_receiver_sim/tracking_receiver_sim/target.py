@@ -18,6 +18,7 @@ import functools
 import math
 import typing
 from collections import namedtuple
+from collections.abc import Callable
 
 import numpy as np
 
@@ -131,8 +132,8 @@ def look_angles(built, times):
 
 def build(params, duration) -> Target:
     """Return a Target of TargetParameters for a run of `duration` [s] from stamp 0; raises TargetError."""
-    builder = {'leo_pass': _leo_pass, 'track_file': _track_file, 'flyby': _flyby}.get(params.kind, _angles)
-    breaks, coefficients, *known = builder(params, duration)
+    builders: dict[str, Callable] = {'leo_pass': _leo_pass, 'track_file': _track_file, 'flyby': _flyby}
+    breaks, coefficients, *known = builders.get(params.kind, _angles)(params, duration)
     constants = np.zeros(1, TARGET_DTYPE)
     constants['kind'], constants['angle'] = TARGET_KINDS.index(params.kind), record(params.angle)
     return Target(constants, np.ascontiguousarray(breaks), np.ascontiguousarray(coefficients), *known)

@@ -4,11 +4,11 @@ The first row of FILE_FORMATS that matches the beginning of a file gives its rea
 """
 import typing
 
-from pedestal_common.text_files import csv_table
+from pedestal_common.text_files import content, csv_table
 from tracking_receiver_sim.ephemeris import course, directions, oem, stk
 from tracking_receiver_sim.track import fixes, flight, gpx, nmea, place, tables
 
-FORMAT_PROBE_BYTES = 4096
+FORMAT_PROBE_BYTES = 65536
 """Number of bytes at the beginning of a file that decide its format."""
 
 
@@ -26,7 +26,7 @@ DIRECTIONS_KIND = FileKind(course.of_directions, course.run_of_directions)
 
 
 class FileFormat(typing.NamedTuple):
-    """Format of a file. matches(beginning: bytes): True if a file has this format; read(TrackFileParameters): its
+    """Format of a file. matches(beginning: str): True if a file has this format; read(TrackFileParameters): its
     data."""
     name: str
     kind: FileKind
@@ -46,8 +46,8 @@ FILE_FORMATS = (
     FileFormat('CCSDS OEM', ORBIT_KIND, lambda beginning: beginning.startswith(oem.FILE_SIGNATURE),
                _read_object(oem.read)),
     FileFormat('STK ephemeris', ORBIT_KIND, stk.FILE_SIGNATURE_PATTERN.match, _read_object(stk.read)),
-    FileFormat('GPX', LOG_KIND, lambda beginning: beginning.startswith(b'<'), _read_log(gpx.rows)),
-    FileFormat('NMEA', LOG_KIND, lambda beginning: beginning.startswith((b'$', b'!')), _read_log(nmea.rows)),
+    FileFormat('GPX', LOG_KIND, lambda beginning: beginning.startswith('<'), _read_log(gpx.rows)),
+    FileFormat('NMEA', LOG_KIND, nmea.is_log, _read_log(nmea.rows)),
     FileFormat('sat-nms program', DIRECTIONS_KIND, directions.is_program, _read_object(directions.read_program)),
     FileFormat('table of azimuth and elevation', DIRECTIONS_KIND, directions.is_table,
                _read_object(directions.read_table)),
@@ -63,7 +63,7 @@ def read(track):
         raise csv_table.TableError('track_file.path is empty: must name a file of one of the formats '
                                    + ', '.join(form.name for form in FILE_FORMATS))
     with csv_table.stream(track.path) as stream:
-        beginning = stream.read(FORMAT_PROBE_BYTES).removeprefix(b'\xef\xbb\xbf').lstrip()
+        beginning = content.beginning(stream.read(FORMAT_PROBE_BYTES)).lstrip()
     form = next(form for form in FILE_FORMATS if form.matches(beginning))
     return form.kind, form.read(track)
 

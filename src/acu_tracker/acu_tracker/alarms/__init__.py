@@ -1,17 +1,18 @@
-"""Alarms: what is wrong, told once, with what it leads to under it and what the operator shall do.
+"""Alarms: each fault is reported once, with its consequences below it and the action for the operator.
 
-`detectors`    small laws with hysteresis on what the axes do
-`conditions`   which rows of the table are there in a step: bits in the order of the table
+`detectors`    small laws with hysteresis on the motion of the axes
+`conditions`   rows of the table whose condition holds in a step: bits in the order of the table
 `table`        one row for each alarm: priority, delays, latching, causes, meaning, action
-`machine`      the states of one alarm (ANSI/ISA-18.2-2016, section 6.2; IEC 62682), a pure function
-`annunciator`  the records of all alarms: delays, first-out, causes, shelving, reset
-`report`       the message on acu/alarms
-`desk`         what an operator does with them
+`machine`      states of one alarm (ANSI/ISA-18.2-2016, section 6.2; IEC 62682), a pure function
+`annunciator`  records of all alarms: delays, first-out, causes, shelving, reset
+`report`       message on acu/alarms
+
+`operating.alarm_desk` has the commands of the operator.
 
 Symbols
     y, dy           encoder angle, rate by the motors' encoders                         [rad], [rad/s]
     u               rate command in force                                               [rad/s]
     e               following error, reference less encoder                             [rad]
     T               torque of an axis on its load, as the drive measures it             [Nm]
-    t, dt           stamp of the step, time since the one before                        [s]
+    t, dt           stamp of the step, time since the previous step                     [s]
 """

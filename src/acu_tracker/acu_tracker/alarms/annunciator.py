@@ -1,7 +1,7 @@
-"""The records of all alarms: delays, causes, first-out, and what an operator asks of them.
+"""Records of all alarms: delays, causes, first-out, and the commands of an operator.
 
-A consequence stands under its cause while the cause is told: found when either is raised within CAUSE_WINDOW_S of the
-other, or while the cause is there. Only what stands under nothing is annunciated (see report).
+A consequence stands under its cause while the cause is listed: when either is raised within CAUSE_WINDOW_S of the
+other, or while the cause is there. Only an alarm that stands under no other is annunciated (see report).
 """
 import numpy as np
 
@@ -12,29 +12,39 @@ ALARM_COUNT = len(table.ALARMS)
 
 ALARM_DTYPE = np.dtype([('state', 'i8'), ('active', 'i8'), ('since', 'f8'), ('raised', 'f8'), ('first', 'i8'),
                         ('parent', 'i8'), ('until', 'f8')], align=True)
-"""state: of machine.STATES; active: whether its condition is there, delays over; since: stamp until which the
-condition was as `active` says [s]; raised: stamp at which it was raised last [s]; first: whether it was the first of
-its burst; parent: index of the alarm that it is a consequence of, NO_ALARM; until: stamp at which a shelved one comes
-back
-[s]."""
+"""State of an alarm.
+
+state   of machine.ALARM_STATES
+active  whether its condition is there, after the delays
+since   last stamp at which the condition was as `active` states [s]
+raised  stamp at which it was raised last [s]
+first   whether it was the first alarm of its burst
+parent  index of the alarm that it is a consequence of, or NO_ALARM
+until   stamp at which a shelved alarm returns [s]
+"""
 
 ALARM_LIST_DTYPE = np.dtype([('alarm', ALARM_DTYPE, (ALARM_COUNT,)), ('burst', 'f8'), ('revision', 'i8')], align=True)
-"""burst: stamp at which a burst of alarms began [s]; revision: counts the changes of what is told."""
+"""State of all alarms.
+
+burst     stamp at which a burst of alarms began [s]
+revision  count of the changes of the published list
+"""
 
 NO_ALARM = -1
+"""Index that stands for no alarm."""
 
 FIRST_OUT_WINDOW_S = 1.0
-"""Time [s] within which the alarms after the first one belong to its burst."""
+"""Time within which the alarms after the first one belong to its burst [s]."""
 
 CAUSE_WINDOW_S = 5.0
-"""Time [s] within which an alarm is taken for the consequence of another, whichever is raised first."""
+"""Time within which an alarm counts as the consequence of another, whichever is raised first [s]."""
 
 MAX_SHELVING_TIME_S = 86400.0
-"""Time for which an alarm may be shelved [s]: a day."""
+"""Longest time for which an alarm may be shelved [s]: a day."""
 
 
 def initialise(s):
-    """Nothing is wrong. s: view of ALARM_LIST_DTYPE, as everywhere here; nothing has been told."""
+    """Begin with every alarm normal and nothing published; s: view of ALARM_LIST_DTYPE, as in the whole module."""
     s['alarm']['state'] = machine.State.NORMAL
     s['alarm']['parent'] = NO_ALARM
     s['alarm']['since'] = s['alarm']['raised'] = s['burst'] = -np.inf
@@ -43,14 +53,17 @@ def initialise(s):
 
 @compiled
 def restart(s, t):
-    """After a gap between steps [s]: the delays begin anew."""
+    """Restart the delays at t [s], after a gap between steps."""
     for i in range(ALARM_COUNT):
         s.alarm[i].since = t
 
 
 @compiled
 def _parent(s, i, t):
-    """The first cause of alarm i that is told and is there, or was raised CAUSE_WINDOW_S ago at most; NO_ALARM."""
+    """Return the index of the first cause of alarm i that is there or was raised within CAUSE_WINDOW_S, or NO_ALARM.
+
+    The cause must be listed and not shelved.
+    """
     for j in range(i):
         cause = s.alarm[j]
         if table.CAUSE_BITS[i] >> j & 1 and machine.IS_ANNUNCIATED[cause.state] and (
@@ -61,7 +74,7 @@ def _parent(s, i, t):
 
 @compiled
 def _raised(s, i, t):
-    """Alarm i has been raised: whether it is the first, what it stands under, what stands under it."""
+    """Note that alarm i has been raised: whether it is the first, its parent, its consequences."""
     a = s.alarm[i]
     a.first = t - s.burst > FIRST_OUT_WINDOW_S
     if a.first:
@@ -76,7 +89,7 @@ def _raised(s, i, t):
 
 @compiled
 def _enter(s, i, state, t):
-    """Alarm i goes into another of machine.STATES."""
+    """Put alarm i into another state of machine.ALARM_STATES."""
     a = s.alarm[i]
     if machine.IS_LISTED[a.state] or machine.IS_LISTED[state]:
         s.revision += 1
@@ -87,7 +100,7 @@ def _enter(s, i, state, t):
 
 @compiled
 def apply_event(s, i, event, t):
-    """An event of machine.EVENTS for alarm i at t [s]; whether its state takes it."""
+    """Apply an event of machine.ALARM_EVENTS to alarm i at t [s]. Return True if its state accepts the event."""
     before = s.alarm[i].state
     after = machine.next_state(before, event, table.LATCHED_FLAGS[i])
     if after != before and after != machine.EVENT_REFUSED:
@@ -97,7 +110,7 @@ def apply_event(s, i, event, t):
 
 @compiled
 def _delayed(a, on, t, delay):
-    """Take whether the condition of a record is there at t [s]; it must be for a delay [s] before that counts."""
+    """Note whether the condition of an alarm's record is there at t [s]. It counts after a delay [s]."""
     if on == a.active:
         a.since = t
     elif t - a.since >= delay:
@@ -106,24 +119,25 @@ def _delayed(a, on, t, delay):
 
 @compiled
 def update(s, t, conditions, judged):
-    """One step at t [s]: the bits of the conditions that are there, and of the alarms that are judged now."""
+    """Run one step at t [s]; conditions: bits of the conditions that are there; judged: bits of the judged alarms."""
     for i in range(ALARM_COUNT):
         a = s.alarm[i]
-        on, means = conditions & judged & 1 << i != 0, judged & 1 << i != 0
-        usual = machine.State.NORMAL if means else machine.State.SUPPRESSED_BY_DESIGN
+        on, is_judged = conditions & judged & 1 << i != 0, judged & 1 << i != 0
+        usual = machine.State.NORMAL if is_judged else machine.State.SUPPRESSED_BY_DESIGN
         if not on and a.active == 0 and a.state == usual:
-            a.since = t     # nothing is wrong, as nearly always: what follows would change no more
+            # This avoids the work below in the usual case, in which nothing would change.
+            a.since = t
             continue
         _delayed(a, on, t, table.ON_DELAYS_S[i] if on else table.OFF_DELAYS_S[i])
         if a.state == machine.State.SHELVED and t >= a.until:
             apply_event(s, i, machine.Event.UNSHELVE, t)
-        apply_event(s, i, machine.Event.RELEASE if means else machine.Event.SUPPRESS, t)
+        apply_event(s, i, machine.Event.RELEASE if is_judged else machine.Event.SUPPRESS, t)
         apply_event(s, i, machine.Event.RAISE if a.active else machine.Event.CLEAR, t)
 
 
 @compiled
 def active_parent(s, i):
-    """Index of the alarm that alarm i stands under now, NO_ALARM."""
+    """Return the index of the alarm that alarm i stands under now, or NO_ALARM."""
     parent = s.alarm[i].parent
     if parent != NO_ALARM and machine.IS_ANNUNCIATED[s.alarm[parent].state]:
         return parent
@@ -132,7 +146,7 @@ def active_parent(s, i):
 
 @compiled
 def acknowledge(s, i, t):
-    """Acknowledge alarm i and all that stands under it; whether there was anything to acknowledge."""
+    """Acknowledge alarm i and all alarms under it. Return True if one waited for it."""
     done = apply_event(s, i, machine.Event.ACKNOWLEDGE, t)
     for k in range(i + 1, ALARM_COUNT):
         top = k
@@ -145,7 +159,7 @@ def acknowledge(s, i, t):
 
 @compiled
 def shelve(s, i, t, seconds):
-    """Put alarm i away until t + seconds, whatever its state."""
+    """Shelve alarm i until t + seconds, in any state."""
     s.alarm[i].until = t + seconds
     s.revision += 1
     apply_event(s, i, machine.Event.SHELVE, t)
@@ -153,24 +167,24 @@ def shelve(s, i, t, seconds):
 
 @compiled
 def persisting_alarm(s, without):
-    """Index of a latched alarm whose cause is still there, NO_ALARM; without: bits of those that are not asked
-    about."""
+    """Return the index of a latched alarm whose cause is still there, or NO_ALARM; without: bits of alarms to skip."""
     for i in range(ALARM_COUNT):
-        if table.LATCHED_FLAGS[i] and not without >> i & 1 and s.alarm[i].active and machine.IS_ANNUNCIATED[s.alarm[i].state]:
+        alarm = s.alarm[i]
+        if table.LATCHED_FLAGS[i] and not without >> i & 1 and alarm.active and machine.IS_ANNUNCIATED[alarm.state]:
             return i
     return NO_ALARM
 
 
 @compiled
 def set_condition(s, i, there, t):
-    """Whether the condition of alarm i is there is known at t [s] without its delays."""
+    """Set at t [s] whether the condition of alarm i is there, without its delays."""
     s.alarm[i].active = there
     apply_event(s, i, machine.Event.RAISE if there else machine.Event.CLEAR, t)
 
 
 @compiled
 def reset(s, t):
-    """End the latched states; whether there was one. To be called when nothing `persists`."""
+    """Reset the latched alarms. Return True if there was one. Call it only while no `persisting_alarm` is left."""
     done = False
     for i in range(ALARM_COUNT):
         if machine.IS_LATCHED[s.alarm[i].state]:

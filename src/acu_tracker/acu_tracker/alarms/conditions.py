@@ -1,4 +1,4 @@
-"""Which alarms have their condition in a step: detectors on both axes, and what the control unit knows otherwise."""
+"""Alarm conditions of a step: detectors on both axes, and the findings of the other parts of the control unit."""
 import math
 from collections import namedtuple
 
@@ -11,32 +11,44 @@ from acu_tracker.servo import position_loop
 from acu_tracker.signals import Flag
 from pedestal_common.compiled import compiled
 
-SUPERVISION_DTYPE = np.dtype([('axis', detectors.AXIS_DETECTORS_DTYPE, (2,)), ('said', 'f8', (3,)), ('least', 'f8'),
-                              ('ready', 'f8'),
-                              ('lost', 'i8'), ('alarms', annunciator.ALARM_LIST_DTYPE)], align=True)
-"""said: errors [rad] and C/N0 [dB-Hz] of the receiver in the step before; least: lowest C/N0 that it has told; ready:
-stamp at which the drive was ready last [s]; lost: bits of the axes that had one motor when it was."""
+SUPERVISION_DTYPE = np.dtype([
+    ('axis', detectors.AXIS_DETECTORS_DTYPE, (2,)), ('previous', 'f8', (3,)), ('least', 'f8'), ('ready', 'f8'),
+    ('lost', 'i8'), ('alarms', annunciator.ALARM_LIST_DTYPE)], align=True)
+"""State of the alarms and of their conditions.
+
+previous   errors [rad] and C/N0 [dB-Hz] of the receiver in the previous step
+least      lowest C/N0 received so far [dB-Hz]
+ready      last stamp at which the drive was ready [s]
+lost       bits of the axes that had only one motor at that stamp
+"""
 
 INVALID_INPUT_FLAGS = Flag.ENCODER | Flag.ERROR | Flag.ERROR_STAMP | Flag.PROGRAM | Flag.PRESET | Flag.ATTITUDE_ERROR
-"""Flags of inputs that were not believed, but of the attitude, which is lost when that goes on."""
+"""Flags of refused inputs, except the attitude, which has the alarm `INS lost`."""
 
 BRAKE_GRIP_DEADLINE_S = 2.5
-"""Time after the drive is ready no more until its brakes must hold [s]: longer than its longest stop."""
+"""Time after the drive ceases to be ready within which its brakes must hold [s]; longer than its longest stop."""
 
 JUDGED_ALWAYS, JUDGED_WITH_MOTORS, JUDGED_MOVING, JUDGED_FOLLOWING = table.JUDGED_ALARM_BITS
 
 Facts = namedtuple('Facts', 'dt gap lost latched attitude_lost attitude_jumped signal_lost unasked_rate beamwidth')
-"""Of a step: dt, time since the one before, and 0 after a gap, whose length is `gap` [s], infinite in the first step;
-whether steps between the two were lost; bits of the alarms that wait for a reset; whether the attitude of a ship is
-lost, or has jumped, and whether the signal of autotrack is lost. Beside that the rate at which an axis moves unasked
-[rad/s] and the beamwidth [rad]."""
+"""Facts of a step for the alarms.
+
+dt         time since the previous step [s], 0 after a gap
+gap        length of the gap [s], 0 for none, infinite in the first step
+lost       whether steps between the two were lost
+latched    bits of the alarms that wait for a reset
+attitude_lost, attitude_jumped  of the ship
+signal_lost  whether autotrack has lost its signal without an explanation
+unasked_rate  excess over the commanded rates that counts as uncommanded motion [rad/s]
+beamwidth  of the receiver [rad]
+"""
 
 DRIVE_SILENCE_GAP_S = 0.3
-"""Gap between two steps [s] beyond which the drive was silent."""
+"""Gap between two steps above which the drive was silent [s]."""
 
 
 def initialise(s):
-    """Nothing is wrong; s: view of SUPERVISION_DTYPE."""
+    """Begin without a condition; s: view of SUPERVISION_DTYPE."""
     s['least'], s['ready'] = np.inf, -np.inf
     s['axis']['y'] = np.nan
     annunciator.initialise(s['alarms'])
@@ -44,8 +56,10 @@ def initialise(s):
 
 @compiled
 def _of_motors(d, i, u, envelope, p, facts):
-    """Bits of the alarms of axis i that its encoder, motors and commands give away. d: its detectors; envelope:
-    servo.unasked.ENVELOPE; p: record of its AxisParameters."""
+    """Return the bits of the alarms of axis i that its encoder, motors and commands show.
+
+    d: its detectors; envelope: uncommanded_motion.ENVELOPE_DTYPE; p: record of its AxisParameters.
+    """
     y, dy, high, low = u.position[i], u.velocity[i], envelope.high[i], envelope.low[i]
     bits, surge = 0, detectors.MAX_ACCELERATION_RATIO * p.limits.acceleration if facts.lost else 0.0
     x = detectors.encoder_motor_mismatch(d, y, dy, facts.dt, surge)
@@ -66,8 +80,10 @@ def _of_motors(d, i, u, envelope, p, facts):
 
 @compiled
 def _of_loop(d, i, e, o, facts):
-    """Bits of the alarms of axis i that its following error e [rad] and its limits give away. Where its command is
-    limited it cannot follow."""
+    """Return the bits of the alarms of axis i that its following error e [rad] and its limits show.
+
+    The following error does not count while the command is limited.
+    """
     bits, limited = 0, o.rate_limited[i] or o.acceleration_limited[i]
     if o.angle_limited[i]:
         bits |= table.Bit.AZIMUTH_AT_LIMIT
@@ -80,7 +96,7 @@ def _of_loop(d, i, e, o, facts):
 
 @compiled
 def _of_axes(s, mode, u, o, c, envelope, facts):
-    """Bits of the alarms of both axes. c: records (2,) of their constants."""
+    """Return the bits of the alarms of both axes. c: records (2,) of their constants."""
     bits, off = 0, u.stamp - s.ready > BRAKE_GRIP_DEADLINE_S
     for i in range(2):
         p, d, y, dy = c[i].p, s.axis[i], u.position[i], u.velocity[i]
@@ -100,7 +116,7 @@ def _of_axes(s, mode, u, o, c, envelope, facts):
 
 @compiled
 def _of_drive(s, u):
-    """Bits of the alarms that the drive tells itself, by u.drive, a code of adu/state."""
+    """Return the bits of the alarms that the drive reports itself by u.drive, a code of adu/state."""
     if u.drive_ready:
         s.ready, s.lost = u.stamp, max(u.drive, 0)
     bits = s.lost * table.Bit.AZIMUTH_MOTOR_LOST
@@ -113,20 +129,23 @@ def _of_drive(s, u):
 
 @compiled
 def _repeated(s, u):
-    """Whether the receiver tells the numbers of the step before once more: it has noise. Unlocked it tells the level
-    alone, of which it may tell an empty sky's as the lowest that it has."""
-    said, z = s.said, u.cn0_dbhz
-    again = z == said[2] and (u.cross_elevation == said[0] and u.elevation == said[1] if u.error_valid else
-                              z > s.least)
-    said[0], said[1], said[2] = u.cross_elevation, u.elevation, z
+    """Return True if the receiver repeats the numbers of the previous step, which its noise makes impossible.
+
+    An unlocked receiver publishes only the level. The lowest level so far may repeat, because it may be the fixed
+    level of an empty sky.
+    """
+    previous, z = s.previous, u.cn0_dbhz
+    same = z == previous[2] and (u.cross_elevation == previous[0] and u.elevation == previous[1] if u.error_valid else
+                                 z > s.least)
+    previous[0], previous[1], previous[2] = u.cross_elevation, u.elevation, z
     if z < s.least:
         s.least = z
-    return again
+    return same
 
 
 @compiled
 def _of_unit(s, u, o, facts):
-    """Bits of the alarms of the inputs, and of what the control unit has found elsewhere."""
+    """Return the bits of the alarms of the inputs, and of the findings of other parts of the control unit."""
     bits = facts.latched
     if 0.0 < facts.gap < math.inf:
         bits |= table.Bit.TIME_JUMP | (table.Bit.DRIVE_SILENT if facts.gap > DRIVE_SILENCE_GAP_S else 0)
@@ -147,7 +166,7 @@ def _of_unit(s, u, o, facts):
 
 @compiled
 def _of_program(u, o):
-    """Bits of the alarms of the program track, by the reason that it is not followed."""
+    """Return the bits of the alarms of the program track, by the reason why it is not followed."""
     bits = table.Bit.PROGRAM_TURNAROUND if u.turnaround else 0
     if o.reason == Reason.BEFORE_PROGRAM:
         return bits | table.Bit.PROGRAM_TOO_EARLY
@@ -158,7 +177,7 @@ def _of_program(u, o):
 
 @compiled
 def _judged(mode, c):
-    """Bits of the alarms that mean something in a mode. c: records (2,) of the axes' constants."""
+    """Return the bits of the alarms that are judged in a mode. c: records (2,) of the constants of the axes."""
     motors = c[0].p.controller != position_loop.CONTROLLER_BEAM or c[1].p.controller != position_loop.CONTROLLER_BEAM
     return (JUDGED_ALWAYS | (JUDGED_WITH_MOTORS if motors else 0) | (JUDGED_MOVING if mode != Mode.STANDBY else 0)
             | (JUDGED_FOLLOWING if modes.FOLLOWS_TARGET[mode] else 0))
@@ -166,8 +185,11 @@ def _judged(mode, c):
 
 @compiled
 def take(s, mode, u, o, c, envelope, facts):
-    """Bring the alarms to a step with Facts. s: record of SUPERVISION_DTYPE; c: records (2,) of the axes' constants;
-    envelope: servo.unasked.ENVELOPE of their commands."""
+    """Bring the alarms to a step with its Facts.
+
+    s: record of SUPERVISION_DTYPE; c: records (2,) of the constants of the axes; envelope:
+    uncommanded_motion.ENVELOPE_DTYPE of their commands.
+    """
     bits = _of_drive(s, u) | _of_unit(s, u, o, facts) | _of_axes(s, mode, u, o, c, envelope, facts)
     if facts.gap > 0.0:
         annunciator.restart(s.alarms, u.stamp)

@@ -1,6 +1,6 @@
-"""Laws that tell what is wrong with an axis from its encoder, its motors and its command.
+"""Laws that detect a fault of an axis from its encoder, its motors and its command.
 
-Each is true from a first level on until it falls below a second one, half of the first where nothing else is said.
+Each condition begins above a first level and ends below a second level, half of the first unless stated otherwise.
 """
 import math
 
@@ -9,79 +9,83 @@ import numpy as np
 from pedestal_common.compiled import compiled
 
 AXIS_DETECTORS_DTYPE = np.dtype([
-    ('y', 'f8'), ('dy', 'f8'),                              # of the step before [rad], [rad/s]; NaN: it was none
-    ('apart', 'f8'), ('disagrees', 'i8'),                           # of `disagreement` [rad]
-    ('turned', 'f8'), ('moved', 'f8'), ('stuck', 'i8'),             # of motors and encoder in this look [rad]
-    ('immobile', 'i8'), ('push', 'f8'), ('pushes', 'i8'), ('late', 'i8'), ('moves', 'i8'),
-    ('e', 'f8'), ('area', 'f8'), ('loads', 'f8'), ('oscillates', 'i8'),         # of `oscillation` [rad], [rad s], [-]
+    ('y', 'f8'), ('dy', 'f8'),                              # of the previous step [rad], [rad/s]; NaN: no value
+    ('mismatch', 'f8'), ('disagrees', 'i8'),                        # of `disagreement` [rad]
+    ('turned', 'f8'), ('moved', 'f8'), ('stuck', 'i8'),             # of motors and encoder, in this test [rad]
+    ('immobile', 'i8'), ('mean_torque', 'f8'), ('overloaded', 'i8'), ('behind', 'i8'), ('moves', 'i8'),
+    ('e', 'f8'), ('area', 'f8'), ('half_waves', 'f8'), ('oscillates', 'i8'),    # of `oscillation` [rad], [rad s], [-]
 ], align=True)
 
 MAX_STEP_MISMATCH_RAD = 3e-3
 """Difference of encoder and motors over one step [rad]; wind-up and lash of a gear leave less than 1 mrad."""
 
 STUCK_TEST_TRAVEL_RAD = 3e-3
-"""Travel of the motors over which the encoder must move as well [rad]: more than the lash."""
+"""Travel of the motors over which the encoder must move as well [rad]; longer than the lash."""
 
 STUCK_TRAVEL_SHARE, FREE_TRAVEL_SHARE = 0.1, 0.5
-"""Shares of STUCK_TEST_TRAVEL_RAD: the encoder is stuck below the first, and moves from the second on."""
+"""Shares of STUCK_TEST_TRAVEL_RAD below which the encoder is stuck, and above which a stuck encoder moves again."""
 
 MIN_COMMANDED_RATE_RAD_S = 5e-3
-"""Rate command beyond which an axis must move [rad/s]."""
+"""Rate command above which an axis must move [rad/s]."""
 
 IMMOBILE_RATE_SHARE = 0.1
-"""Share of the command below which an axis does not obey it."""
+"""Share of the commanded rate below which an axis is immobile."""
 
 EXCESS_TORQUE_RATIO = 50.0
-"""Torque over the Coulomb friction that no free axis needs for long: half of what brakes hold, twice a strong wind."""
+"""Ratio of torque to Coulomb friction that no free axis needs for long.
+
+It is half of the torque that the brakes hold, and twice that of a strong wind.
+"""
 
 TORQUE_TIME_CONSTANT_S = 0.1
-"""Time constant of the mean of the torque's amount [s]: an axis whose brakes drag and that turns back pushes on."""
+"""Time constant of the mean of the absolute torque [s].
+
+The absolute value is used because an axis with dragging brakes that turns back keeps its large torque.
+"""
 
 MAX_ACCELERATION_RATIO = 2.0
-"""Acceleration that an axis may reach, in those that are commanded at the most."""
+"""Ratio of the largest acceleration of an axis to the largest commanded acceleration."""
 
 MAX_MISMATCH_RAD = 1e-2
-"""Difference of encoder and motors within MISMATCH_TIME_CONSTANT_S [rad]: five times what lash and wind-up of a gear
-leave."""
+"""Difference of encoder and motors within MISMATCH_TIME_CONSTANT_S [rad]: five times lash and wind-up of a gear."""
 
 MISMATCH_TIME_CONSTANT_S = 2.0
-"""Time in which a difference of encoder and motors is forgotten [s]."""
+"""Time constant with which a difference of encoder and motors decays [s]."""
 
 STANDSTILL_RATE_RAD_S = 2e-3
-"""Rate [rad/s] beyond which an axis moves."""
+"""Rate above which an axis moves [rad/s]."""
 
 FOLLOWING_ERROR_BEAMWIDTHS = 0.25
-"""Following error that is too large, in beamwidths."""
+"""Following error that is too large [beamwidths]."""
 
 MIN_HALF_WAVE_AREA = 1e-4
-"""Area of the following error between two of its zeros [rad s] from which a half wave counts: 2 a / w, 1 mrad at
-3 Hz."""
+"""Smallest area of a half wave of the following error that counts [rad s]: 2 a / w, 1 mrad at 3 Hz."""
 
 OSCILLATION_WINDOW_S = 5.0
-"""Time over which half waves are counted [s]."""
+"""Time constant with which the count of half waves decays [s]."""
 
 OSCILLATION_HALF_WAVES = 10.0
-"""Half waves within OSCILLATION_WINDOW_S that are an oscillation: faster than 1 Hz."""
+"""Count of half waves within OSCILLATION_WINDOW_S that is an oscillation: faster than 1 Hz."""
 
 
 @compiled
 def beyond(was, x, on, off):
-    """Whether x is beyond its level: `off` where it was, else `on`. NaN is not."""
+    """Return True if x is above its level: `off` if it was above before, else `on`. NaN is not above."""
     return x > (off if was else on)
 
 
 @compiled
 def initialise(d, y, dy):
-    """Begin at the encoder's angle [rad] and the motors' rate [rad/s]: after a gap, or an encoder that was invalid."""
-    d.y, d.dy, d.turned, d.moved, d.apart, d.e, d.area = y, dy, 0.0, 0.0, 0.0, 0.0, 0.0
+    """Begin at the encoder's angle [rad] and the motors' rate [rad/s], after a gap or an invalid encoder."""
+    d.y, d.dy, d.turned, d.moved, d.mismatch, d.e, d.area = y, dy, 0.0, 0.0, 0.0, 0.0, 0.0
 
 
 @compiled
 def encoder_motor_mismatch(d, y, dy, dt, acceleration):
-    """By how much [rad] encoder and motors moved otherwise in this step: x = y - y' - (dy + dy') dt / 2.
+    """Return the difference of the motions of encoder and motors in this step [rad]: x = y - y' - (dy + dy') dt / 2.
 
-    acceleration: that an axis may have reached between two steps of which those between were lost [rad/s2], else 0.
-    The motors may have gone acceleration dt^2 / 4 further than the trapezoid then: so much of x says nothing.
+    acceleration: acceleration of the axis that is possible between two steps where steps are lost [rad/s2], else 0. In
+    a gap the motors may have moved by acceleration dt^2 / 4 more than the trapezoid. That part of x is not counted.
     """
     x = y - d.y - 0.5 * (dy + d.dy) * dt
     return math.copysign(max(abs(x) - 0.25 * acceleration * dt * dt, 0.0), x)
@@ -89,14 +93,16 @@ def encoder_motor_mismatch(d, y, dy, dt, acceleration):
 
 @compiled
 def encoder_jump(x):
-    """Whether encoder and motors parted by more than MAX_STEP_MISMATCH_RAD in this step."""
+    """Return True if the motions of encoder and motors in this step differ by more than MAX_STEP_MISMATCH_RAD."""
     return abs(x) > MAX_STEP_MISMATCH_RAD
 
 
 @compiled
 def encoder_stuck(d, y, dy, dt):
-    """Whether the encoder stands while the motors turn. Looks end when the motors have turned by
-    STUCK_TEST_TRAVEL_RAD, one way."""
+    """Return True if the encoder stands still while the motors turn.
+
+    A test ends when the motors have turned by STUCK_TEST_TRAVEL_RAD in one direction.
+    """
     d.turned += 0.5 * (dy + d.dy) * dt
     d.moved += y - d.y
     if abs(d.turned) > STUCK_TEST_TRAVEL_RAD:
@@ -108,23 +114,27 @@ def encoder_stuck(d, y, dy, dt):
 
 @compiled
 def disagreement(d, x, dt):
-    """Whether encoder and motors have parted by x of late: X' = x / dt - X / MISMATCH_TIME_CONSTANT_S, |X| >
-    MAX_MISMATCH_RAD."""
-    d.apart += x - d.apart * dt / MISMATCH_TIME_CONSTANT_S
-    d.disagrees = beyond(d.disagrees, abs(d.apart), MAX_MISMATCH_RAD, 0.5 * MAX_MISMATCH_RAD)
+    """Return True if encoder and motors have recently moved apart.
+
+    The sum X of the differences x follows X' = x / dt - X / MISMATCH_TIME_CONSTANT_S. The limit of |X| is
+    MAX_MISMATCH_RAD, and half of it for the end of the condition.
+    """
+    d.mismatch += x - d.mismatch * dt / MISMATCH_TIME_CONSTANT_S
+    d.disagrees = beyond(d.disagrees, abs(d.mismatch), MAX_MISMATCH_RAD, 0.5 * MAX_MISMATCH_RAD)
     return d.disagrees != 0
 
 
 @compiled
 def immobile(d, dy, high, low):
-    """Whether the motors do not obey commands that were all beyond MIN_COMMANDED_RATE_RAD_S of late, and of one sign:
-    less than IMMOBILE_RATE_SHARE of
-    the smallest of them, until it is three times that, or they are within half of MIN_COMMANDED_RATE_RAD_S; motion
-    against them is none
-    of that. high, low: envelope of the commands (servo.unasked)."""
-    asked = 0.5 * MIN_COMMANDED_RATE_RAD_S if d.immobile else MIN_COMMANDED_RATE_RAD_S
-    u = low if low > asked else high
-    if low <= asked and high >= -asked:
+    """Return True if the motors do not follow recent commands of one sign, all above MIN_COMMANDED_RATE_RAD_S.
+
+    The axis is immobile below IMMOBILE_RATE_SHARE of the smallest of those commands, and stays so up to three times
+    that share. The state ends when the commands fall below half of MIN_COMMANDED_RATE_RAD_S. Motion against the
+    commands does not count as immobile. high, low: envelope of the commands (servo.uncommanded_motion).
+    """
+    threshold = 0.5 * MIN_COMMANDED_RATE_RAD_S if d.immobile else MIN_COMMANDED_RATE_RAD_S
+    u = low if low > threshold else high
+    if low <= threshold and high >= -threshold:
         d.immobile = 0
     else:
         d.immobile = abs(dy / u) < (3.0 * IMMOBILE_RATE_SHARE if d.immobile else IMMOBILE_RATE_SHARE)
@@ -133,50 +143,56 @@ def immobile(d, dy, high, low):
 
 @compiled
 def excess_torque(d, T, friction, dt):
-    """Whether a torque on the load is far more than the Coulomb friction, both [Nm], either way in the mean of
-    TORQUE_TIME_CONSTANT_S."""
+    """Return True if the mean of the absolute torque on the load is far above the Coulomb friction, both [Nm].
+
+    The time constant of the mean is TORQUE_TIME_CONSTANT_S.
+    """
     if math.isfinite(T):
-        d.push += (abs(T) - d.push) * min(dt / TORQUE_TIME_CONSTANT_S, 1.0)
-    d.pushes = beyond(d.pushes, d.push, EXCESS_TORQUE_RATIO * friction, 0.5 * EXCESS_TORQUE_RATIO * friction)
-    return d.pushes != 0
+        d.mean_torque += (abs(T) - d.mean_torque) * min(dt / TORQUE_TIME_CONSTANT_S, 1.0)
+    limit = EXCESS_TORQUE_RATIO * friction
+    d.overloaded = beyond(d.overloaded, d.mean_torque, limit, 0.5 * limit)
+    return d.overloaded != 0
 
 
 @compiled
 def moves(d, dy):
-    """Whether an axis moves."""
+    """Return True if an axis moves."""
     d.moves = beyond(d.moves, abs(dy), STANDSTILL_RATE_RAD_S, 0.5 * STANDSTILL_RATE_RAD_S)
     return d.moves != 0
 
 
 @compiled
 def opposes_command(dy, high, low, threshold):
-    """Whether a rate goes against its commands, which were of one sign of late.
+    """Return True if a rate opposes its recent commands, which were of one sign.
 
-    high, low: envelope of the commands (servo.unasked); threshold: rate that is expected of nobody [rad/s].
+    high, low: envelope of the commands (servo.uncommanded_motion); threshold: rate without an explanation [rad/s].
     """
-    return dy > threshold and high <= 0.0 and low < -STANDSTILL_RATE_RAD_S or dy < -threshold and low >= 0.0 and high > STANDSTILL_RATE_RAD_S
+    return (dy > threshold and high <= 0.0 and low < -STANDSTILL_RATE_RAD_S
+            or dy < -threshold and low >= 0.0 and high > STANDSTILL_RATE_RAD_S)
 
 
 @compiled
 def following_error(d, e, limit):
-    """Whether the following error is beyond FOLLOWING_ERROR_BEAMWIDTHS of a limit [rad], the beamwidth."""
-    d.late = beyond(d.late, abs(e), FOLLOWING_ERROR_BEAMWIDTHS * limit, 0.5 * FOLLOWING_ERROR_BEAMWIDTHS * limit)
-    return d.late != 0
+    """Return True if the following error is above FOLLOWING_ERROR_BEAMWIDTHS of a limit [rad], the beamwidth."""
+    d.behind = beyond(d.behind, abs(e), FOLLOWING_ERROR_BEAMWIDTHS * limit, 0.5 * FOLLOWING_ERROR_BEAMWIDTHS * limit)
+    return d.behind != 0
 
 
 @compiled
 def oscillation(d, e, dt):
-    """Whether the following error [rad] oscillates (T. Haegglund, A control-loop performance monitor, Control
-    Engineering Practice 3, 1995): half waves whose area is beyond MIN_HALF_WAVE_AREA are counted and forgotten within
-    OSCILLATION_WINDOW_S;
-    OSCILLATION_HALF_WAVES of them are an oscillation."""
-    d.loads *= math.exp(-dt / OSCILLATION_WINDOW_S)
+    """Return True if the following error [rad] oscillates.
+
+    Half waves whose area is above MIN_HALF_WAVE_AREA are counted; the count decays with OSCILLATION_WINDOW_S.
+    OSCILLATION_HALF_WAVES of them are an oscillation (T. Haegglund, A control-loop performance monitor, Control
+    Engineering Practice 3, 1995).
+    """
+    d.half_waves *= math.exp(-dt / OSCILLATION_WINDOW_S)
     if e * d.e < 0.0:
         if d.area > MIN_HALF_WAVE_AREA:
-            d.loads = min(d.loads + 1.0, 2.0 * OSCILLATION_HALF_WAVES)
+            d.half_waves = min(d.half_waves + 1.0, 2.0 * OSCILLATION_HALF_WAVES)
         d.area = 0.0
     if e != 0.0:
         d.e = e
     d.area += abs(e) * dt
-    d.oscillates = beyond(d.oscillates, d.loads, OSCILLATION_HALF_WAVES, 0.5 * OSCILLATION_HALF_WAVES)
+    d.oscillates = beyond(d.oscillates, d.half_waves, OSCILLATION_HALF_WAVES, 0.5 * OSCILLATION_HALF_WAVES)
     return d.oscillates != 0

@@ -1,6 +1,6 @@
-"""The states of one alarm and what leads from one to the other: ANSI/ISA-18.2-2016, section 6.2 (IEC 62682).
+"""States of one alarm and the events between them: ANSI/ISA-18.2-2016, section 6.2 (IEC 62682).
 
-An alarm that is not latched never is in a latched state: its row of `alarms.table` says whether it is.
+Only an alarm that is latched by its row of `alarms.table` enters a latched state.
 """
 import numpy as np
 
@@ -13,11 +13,14 @@ State = codes(ALARM_STATES)
 
 ALARM_EVENTS = ('raise', 'clear', 'acknowledge', 'reset', 'shelve', 'unshelve', 'suppress', 'release')
 Event = codes(ALARM_EVENTS)
-"""raise, clear: the condition is there, or gone, in this step; suppress, release: the alarm means nothing now, or does
-again; the others are asked for."""
+"""Events of an alarm.
+
+raise, clear: the condition is there, or gone, in this step; suppress, release: the alarm is not judged, or judged
+again. The other events are commands of the operator.
+"""
 
 EVENT_REFUSED = -1
-"""An event that a state does not take."""
+"""Next state for an event that a state does not accept."""
 
 _N, _U, _A, _R, _LU, _LA, _SH, _SU, _x = (*range(len(ALARM_STATES)), EVENT_REFUSED)
 
@@ -32,27 +35,27 @@ STATE_TRANSITIONS = np.array((
     (_SH, _SH, _x, _x, _SH, _N, _SH, _SH),     # shelved
     (_SU, _SU, _x, _x, _SH, _x, _SU, _N),      # suppressed by design
 ))
-"""STATE_TRANSITIONS[state, event] of an alarm that is not latched. An alarm that is there is never suppressed: its
-condition counts
-as gone, so that it returns, and is acknowledged, before."""
+"""STATE_TRANSITIONS[state, event] of an alarm that is not latched.
+
+An active alarm is not suppressed at once. Its condition counts as gone; the alarm returns and is acknowledged first.
+"""
 
 IS_ANNUNCIATED = (False, True, True, True, True, True, False, False)
-"""States in which an alarm is told."""
+"""States in which an alarm is in the published list and is not shelved."""
 
 IS_LISTED = (False, True, True, True, True, True, True, False)
-"""States in which it is in the list of alarms: told, or shelved."""
+"""States in which an alarm is in the published list."""
 
 AWAITS_ACKNOWLEDGEMENT = (False, True, False, True, True, False, False, False)
-"""States in which it waits for an acknowledgement."""
+"""States in which an alarm waits for an acknowledgement."""
 
 IS_LATCHED = (False, False, False, False, True, True, False, False)
-"""States that only a reset ends."""
+"""States that end only by a reset."""
 
 
 @compiled
 def next_state(state, event, latched):
-    """The state after an event, EVENT_REFUSED where the state does not take it; latched: 1 for an alarm that is
-    reset."""
+    """Return the state after an event, or EVENT_REFUSED if the state does not accept it; latched: of the alarm."""
     if latched and event == Event.CLEAR:
         if state == State.UNACKNOWLEDGED:
             return State.LATCHED_UNACKNOWLEDGED

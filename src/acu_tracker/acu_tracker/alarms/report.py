@@ -1,37 +1,41 @@
-"""The list of alarms as a message: diagnostic_msgs/DiagnosticArray on acu/alarms."""
+"""List of alarms as a message: diagnostic_msgs/DiagnosticArray on acu/alarms."""
 from acu_tracker.alarms import annunciator, machine, table
 from pedestal_common.node.unit import LEVEL_ERROR, LEVEL_OK, LEVEL_WARN
 from pedestal_common.wire import messages
 
 MAX_ANNUNCIATED_ALARMS = 10
-"""Alarms that are annunciated at once at the most: those of the highest priority, the first of them first."""
+"""Largest number of alarms annunciated at once: those of the highest priority, the earliest first."""
 
 DIAGNOSTIC_LEVELS = {'critical': LEVEL_ERROR, 'high': LEVEL_ERROR, 'medium': LEVEL_WARN, 'low': LEVEL_WARN}
 
 
 def order(s):
-    """Indices of the alarms that are told: by priority, then by the time at which they were raised. s: view of
-    annunciator.ALARMS, here and below."""
-    told = [i for i in range(annunciator.ALARM_COUNT) if machine.IS_ANNUNCIATED[s['alarm'][i]['state']]]
-    return sorted(told, key=lambda i: (table.ALARM_PRIORITIES.index(table.ALARMS[i].priority), s['alarm'][i]['raised'],
-                                       i))
+    """Return the indices of the alarms that are listed and not shelved, by priority, then by the time of raising.
+
+    s: view of annunciator.ALARM_LIST_DTYPE, as in the whole module.
+    """
+    chosen = [i for i in range(annunciator.ALARM_COUNT) if machine.IS_ANNUNCIATED[s['alarm'][i]['state']]]
+    return sorted(chosen, key=lambda i: (table.ALARM_PRIORITIES.index(table.ALARMS[i].priority),
+                                         s['alarm'][i]['raised'], i))
 
 
 def annunciated(s):
-    """Indices of the alarms that an operator's attention is asked for: MAX_ANNUNCIATED_ALARMS of those that stand
-    under no other."""
+    """Return the indices of the first MAX_ANNUNCIATED_ALARMS alarms that stand under no other.
+
+    These alarms call for the attention of an operator.
+    """
     return [i for i in order(s) if annunciator.active_parent(s, i) == annunciator.NO_ALARM][:MAX_ANNUNCIATED_ALARMS]
 
 
 def listed(s):
-    """Indices of all alarms that are not normal: the annunciated, their consequences, those that are shelved."""
+    """Return the indices of the published alarms: first the annunciated, then their consequences, then the shelved."""
     first = annunciated(s)
     shelved = [i for i in range(annunciator.ALARM_COUNT) if s['alarm'][i]['state'] == machine.State.SHELVED]
     return [*first, *(i for i in order(s) if i not in first), *shelved]
 
 
 def status(s, i, detail='', reason=''):
-    """The DiagnosticStatus of alarm i. detail: what else is known; reason: why it is shelved."""
+    """Return the DiagnosticStatus of alarm i. detail: more about the fault; reason: why the alarm is shelved."""
     alarm, row, above = s['alarm'][i], table.ALARMS[i], annunciator.active_parent(s, i)
     shelved = alarm['state'] == machine.State.SHELVED
     values = {'state': machine.ALARM_STATES[alarm['state']], 'priority': row.priority,
@@ -49,6 +53,6 @@ def status(s, i, detail='', reason=''):
 
 
 def message(s, details, reasons):
-    """The DiagnosticArray of the list; details, reasons: {index: text} of some alarms."""
+    """Return the DiagnosticArray of the list; details, reasons: {index: text} of some alarms."""
     return messages.DiagnosticArray(header=messages.header(''), status=[
         status(s, i, details.get(i, ''), reasons.get(i, '')) for i in listed(s)])

@@ -1,1 +1,1 @@
-"""Where the axes are sent in each mode, and what an operator steers by hand."""
+"""Guidance: the reference of the axes in each mode, and the manual rates of an operator."""

@@ -1,8 +1,7 @@
-"""Where the axes are sent: the target of the mode on the deck, on the azimuth wrap that fits, or a slew ahead of it.
+"""Reference of the axes: the target of the mode on the deck, on an azimuth wrap that fits, or a slew ahead of it.
 
-g: record of GUIDANCE_DTYPE; k: of tracking.TRACKING; c: of control_unit.CONSTANTS; way: the bridge.Way of the
-program; gap:
-the outage.Outage.
+g: record of GUIDANCE_DTYPE; k: record of tracking.TRACKING_DTYPE; c: record of control_unit.CONSTANTS_DTYPE; way: the
+bridge.Way of the program; gap: the outage.Outage.
 """
 from collections import namedtuple
 
@@ -28,16 +27,27 @@ GUIDANCE_DTYPE = np.dtype([
     ('bridge', bridge.BRIDGE_DTYPE), ('acquisition', acquisition.ACQUISITION_DTYPE),
     ('lookahead', planner.PLANNER_DTYPE),
     ('azimuth', 'f8'), ('target_angles', 'f8', (2,)), ('pointing_offset', 'f8'), ('overtravel', 'i8')], align=True)
-"""bridge: the program where the target was last tracked; azimuth: raw one of the last reference; target_angles: deck
-angles of its target; pointing_offset: intended angle between beam and target [rad]; overtravel: 1: no azimuth wrap
-held the whole program."""
+"""State of the guidance.
+
+bridge           rotation of the program to the place where the target was last tracked
+azimuth          raw azimuth of the last reference [rad]
+target_angles    deck angles of the target of that reference [rad]
+pointing_offset  intended angle between beam and target [rad]
+overtravel       1: no azimuth wrap holds the whole program
+"""
 
 Order = namedtuple('Order', 'mode begins azimuth stamp')
-"""The mode, whether it begins, the azimuth [rad] that the axis was sent to last, the stamp of the step [s]."""
+"""Mode of a step and where it starts.
+
+mode     the mode
+begins   whether the mode begins
+azimuth  last azimuth reference [rad]
+stamp    stamp of the step [s]
+"""
 
 
 def initialise(g, preset):
-    """No direction but the preset one (2,) [rad]; g: view of GUIDANCE_DTYPE."""
+    """Begin with no direction except the preset angles (2,) [rad]; g: view of GUIDANCE_DTYPE."""
     direction.initialise(g['preset'], preset)
     direction.initialise(g['slave'], 0.0)
     manual.initialise(g['manual'])
@@ -47,25 +57,27 @@ def initialise(g, preset):
 
 @compiled
 def start_from(g, azimuth):
-    """Choose the next wrap near an azimuth [rad]."""
+    """Choose the next azimuth wrap near an azimuth [rad]."""
     g.azimuth = azimuth
 
 
 @compiled
 def move_by_hand(g, c, order, ends, actual, dt):
-    """Move the point that is commanded by hand on by dt [s]. ends: of both axes; actual: Motion of the axes, where it
-    begins."""
-    heard = order.mode == Mode.RATE and manual.request_valid(g.manual, order.stamp)
+    """Move the manually commanded point on by dt [s].
+
+    ends: Ends of both axes; actual: Motion of the axes, where the point begins.
+    """
+    valid = order.mode == Mode.RATE and manual.request_valid(g.manual, order.stamp)
     for i in range(2):
         if order.begins:
             manual.begin(g.manual, i, actual[i])
         if order.mode == Mode.STOP or order.mode == Mode.RATE:
-            manual.step(g.manual, i, c.axis[i].p.shaper, ends[i], heard, dt)
+            manual.step(g.manual, i, c.axis[i].p.shaper, ends[i], valid, dt)
 
 
 @compiled
 def motion(g, k, c, order, way, gap, now):
-    """`_reference` of each axis at the instant that its controller needs; now: the Instants."""
+    """Return the `_reference` of each axis at the instant that its controller needs; now: the Instants."""
     t_azimuth, t_elevation = (position_loop.instant(c.axis[0].p, now.t_k, now.t_m),
                               position_loop.instant(c.axis[1].p, now.t_k, now.t_m))
     motion = _reference(g, k, c, order, way, gap, t_azimuth)
@@ -76,7 +88,7 @@ def motion(g, k, c, order, way, gap, now):
 
 @compiled
 def _reference(g, k, c, order, way, gap, t):
-    """Reference Motion on the deck at t [s] of the mode: its target, on the azimuth wrap that fits, or a slew."""
+    """Return the reference Motion on the deck at t [s]: the mode's target on a fitting azimuth wrap, or a slew."""
     mode = order.mode
     if not modes.FOLLOWS_TARGET[mode]:
         start_from(g, order.azimuth)
@@ -102,7 +114,7 @@ def _reference(g, k, c, order, way, gap, t):
 
 @compiled
 def _source(g, k, c, mode, way, gap, t):
-    """The target.Source of the mode at t [s]; the program bridges an outage that has a reason."""
+    """Return the target.Source of the mode at t [s]; the program bridges an explained outage."""
     if mode == Mode.SLAVE:
         return target.Source(0, direction.motion_at(g.slave, t))
     if modes.FOLLOWS_TABLE[mode]:
@@ -116,7 +128,10 @@ def _source(g, k, c, mode, way, gap, t):
 
 @compiled
 def _wrapped(g, limits, order, program, t, azimuth):
-    """AxisMotion of the azimuth at t [s] on the wrap that fits; when a program begins, on one that holds all of it."""
+    """Return the AxisMotion of the azimuth at t [s] on the wrap that fits.
+
+    When a program begins, the wrap must hold all of it.
+    """
     travel = Travel(0.0, 0.0)
     begins = order.begins and modes.FOLLOWS_TABLE[order.mode]
     if begins:
@@ -129,14 +144,16 @@ def _wrapped(g, limits, order, program, t, azimuth):
 
 @compiled
 def bridge_to(g, k, c, program, t):
-    """Put the program where the target is tracked at t [s]."""
+    """Rotate the program to the place where the target is tracked at t [s]."""
     bridge.begin(g.bridge, program, t, tracking.sight(k, c, t).u)
 
 
 @compiled
 def begin_by_level(g, k, c, before, mode, t):
-    """Enter a mode that goes by the level at t [s] from the one before. Its target is where the estimate says that
-    autotrack followed, or else where the antenna points."""
+    """Enter a mode that uses the signal level at t [s]; before: the previous mode.
+
+    The target is expected where autotrack tracked it, or else where the antenna points.
+    """
     tracked = before == Mode.AUTOTRACK
     if tracked:
         sight = tracking.sight(k, c, t)
@@ -150,7 +167,7 @@ def begin_by_level(g, k, c, before, mode, t):
 
 @compiled
 def check_slope(g, k, c, u, at, way):
-    """Judge an error of signals.INPUTS by the place where the target is expected; at: Pointing of the beam."""
+    """Judge an error of signals.INPUTS_DTYPE by the expected place of the target; at: Pointing of the beam."""
     t = u.error_stamp - c.p.tracker.receiver.age
     motion = attitude.on_deck(k.attitude, c.p, t, signal_level_modes.expected(g.acquisition, way, t))
     signal_level_modes.check_slope(g.acquisition, at, motion, (u.cross_elevation, u.elevation))
@@ -158,8 +175,10 @@ def check_slope(g, k, c, u, at, way):
 
 @compiled
 def look_ahead(g, k, c, mode, program, gap, t):
-    """Plan ahead once in planner.INTERVAL: keyholes and hidden sectors on the path of the target; whether the mode
-    begins anew, as there is another program."""
+    """Plan once in planner.LOOK_AHEAD_PERIOD_S for the keyholes and hidden sectors on the path of the target.
+
+    Return True if the mode must restart because the program has been replaced.
+    """
     h = g.lookahead
     if not modes.FOLLOWS_TARGET[mode] or mode == Mode.SLAVE:
         planner.clear_plan(h)
@@ -171,13 +190,13 @@ def look_ahead(g, k, c, mode, program, gap, t):
         planner.clear_plan(h)
         bridge.clear(g.bridge)
     if planner.due(h, t):
-        _look(g, k, c, mode, program, gap, t)
+        _plan(g, k, c, mode, program, gap, t)
     return another
 
 
 @compiled
-def _look(g, k, c, mode, program, gap, t):
-    """Look ahead from t [s] on along the program, or along the great circle of the target."""
+def _plan(g, k, c, mode, program, gap, t):
+    """Plan from t [s] on along the program, or along the great circle of the target."""
     if modes.FOLLOWS_TABLE[mode]:
         bridge.clear(g.bridge)
         planner.look_along_program(g.lookahead, c.lookahead, t, g.azimuth, bridge.way(g.bridge, program))

@@ -1,6 +1,6 @@
-"""Manual rates: the axes go at the rates that are asked for, ask after ask, and stand as soon as nobody asks.
+"""Manual rates: the axes move at the commanded rates, and stop when no new command arrives in time.
 
-    r       rate of the commanded point [rad/s], ramped with the acceleration a towards the rate asked for
+    r       rate of the commanded point [rad/s], ramped with the acceleration a towards the commanded rate
     A       commanded angle [rad], the integral of r
 """
 import math
@@ -11,44 +11,53 @@ from acu_tracker.geometry.motion import AxisMotion, Motion
 from pedestal_common.compiled import compiled
 
 RATE_REQUEST_TIMEOUT_S = 0.5
-"""Time [s] for which an ask for rates holds; whoever jogs asks again and again."""
+"""Time for which a command for rates is valid [s]; a client that jogs repeats it."""
 
 ACCELERATION_SHARE = 0.5
-"""Of the shaper's acceleration with which the rate is ramped, so that the shaped reference follows without lag."""
+"""Share of the shaper's acceleration for the ramp of the rate.
 
-MANUAL_DTYPE = np.dtype([('asked', 'f8', (2,)), ('until', 'f8'), ('angle', 'f8', (2,)), ('rate', 'f8', (2,)),
+The share lets the shaped reference follow without lag.
+"""
+
+MANUAL_DTYPE = np.dtype([('requested', 'f8', (2,)), ('until', 'f8'), ('angle', 'f8', (2,)), ('rate', 'f8', (2,)),
                          ('acceleration', 'f8', (2,))], align=True)
-"""asked: rates [rad/s] that hold until the stamp `until` [s]; angle, rate, acceleration of the commanded point."""
+"""State of the manual rates.
+
+requested  rates that are valid until the stamp `until` [s], in rad/s
+angle, rate, acceleration  of the commanded point
+"""
 
 
 def initialise(m):
-    """Nobody has asked; m: view of MANUAL_DTYPE."""
+    """Begin without a command; m: view of MANUAL_DTYPE."""
     m['until'] = -math.inf
 
 
 def request_rates(m, rates, stamp):
-    """Ask for rates (2,) [rad/s] at a stamp [s]; m: view of MANUAL_DTYPE."""
-    m['asked'], m['until'] = rates, stamp + RATE_REQUEST_TIMEOUT_S
+    """Set the commanded rates (2,) [rad/s] at a stamp [s]; m: view of MANUAL_DTYPE."""
+    m['requested'], m['until'] = rates, stamp + RATE_REQUEST_TIMEOUT_S
 
 
 @compiled
 def request_valid(m, t):
-    """Return whether the rates asked for hold at t [s]."""
+    """Return True if the commanded rates are valid at t [s]."""
     return t <= m.until
 
 
 @compiled
 def begin(m, i, motion):
-    """Begin on axis i where its AxisMotion is."""
+    """Begin on axis i at its AxisMotion."""
     m.angle[i], m.rate[i], m.acceleration[i] = motion.angle, motion.rate, 0.0
 
 
 @compiled
-def step(m, i, shaper, ends, heard, dt):
-    """Move the commanded point of axis i on by dt [s]; shaper: record of its ShaperParameters; heard: whether the
-    rates asked for hold. At one of the Ends, of its travel or in front of the floor, it stands, so that the way back
-    begins at once."""
-    wanted = min(max(m.asked[i], -shaper.rate), shaper.rate) if heard else 0.0
+def step(m, i, shaper, ends, valid, dt):
+    """Move the commanded point of axis i on by dt [s].
+
+    shaper: record of its ShaperParameters; valid: whether the commanded rates are valid. The point stops at the Ends
+    of the axis, which are those of its travel or of the floor. From there the way back begins at once.
+    """
+    wanted = min(max(m.requested[i], -shaper.rate), shaper.rate) if valid else 0.0
     step = ACCELERATION_SHARE * shaper.acceleration * dt
     rate = min(max(wanted, m.rate[i] - step), m.rate[i] + step)
     if dt > 0.0:
@@ -62,6 +71,6 @@ def step(m, i, shaper, ends, heard, dt):
 
 @compiled
 def motion(m, later):
-    """Motion of the commanded point, `later` [s] after the last step."""
+    """Return the Motion of the commanded point, `later` [s] after the last step."""
     return Motion(AxisMotion(m.angle[0] + m.rate[0] * later, m.rate[0], m.acceleration[0]),
                   AxisMotion(m.angle[1] + m.rate[1] * later, m.rate[1], m.acceleration[1]))

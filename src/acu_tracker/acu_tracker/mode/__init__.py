@@ -1,1 +1,1 @@
-"""The mode of a step: the facts that decide on it, what a change does, and the laws of single modes."""
+"""Mode of a step: the facts that decide on it, the effects of a change, and the laws of single modes."""

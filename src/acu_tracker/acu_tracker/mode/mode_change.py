@@ -1,4 +1,4 @@
-"""The mode of the control unit, its reason, and what waits: every change of them."""
+"""Every change of the mode of the control unit, its reason and the pending request."""
 import numpy as np
 
 from acu_tracker import modes
@@ -7,26 +7,32 @@ from pedestal_common.compiled import compiled
 
 MODE_DTYPE = np.dtype([('now', 'i8'), ('reason', 'i8'), ('pending', 'i8'), ('begins', 'i8'), ('table', 'i8'),
                        ('fallback', 'i8')], align=True)
-"""now: the mode; reason: of modes.REASONS; pending: the request that waits, NO_REQUEST; begins: 1 until the axes are
-sent where it wants them first; table: the mode whose table was followed last; fallback: the one chosen for the loss of
-the track."""
+"""State of the mode machine.
+
+now        the mode
+reason     of modes.REASONS
+pending    request that waits, or NO_REQUEST
+begins     1 until the mode sends its first command to the axes
+table      mode whose table was followed last
+fallback   mode chosen for the loss of the track
+"""
 
 
 def initialise(m, params):
-    """Standby, the initial mode of AcuParameters pending; m: view of MODE."""
+    """Begin in standby with the initial mode of AcuParameters pending; m: view of MODE_DTYPE."""
     m['pending'] = modes.MODES.index(params.initial_mode)
     m['table'] = Mode.PROGRAM
     choose(m, params.fallback)
 
 
 def choose(m, name):
-    """Choose what follows the loss of the track, by its name; m: view of MODE."""
+    """Choose the mode after the loss of the track, by its name in modes.FALLBACK_MODES; m: view of MODE_DTYPE."""
     m['fallback'] = modes.FALLBACK_MODES[name]
 
 
 @compiled
 def change(m, now, request):
-    """Run the mode machine in a Situation with a `request` or NO_REQUEST: its result."""
+    """Run the mode machine in a Situation with a `request` or NO_REQUEST. Return its result."""
     mode, reason, result = modes.next_mode(m.now, request, now)
     if result == modes.REQUEST_ACCEPTED:
         m.pending = modes.NO_REQUEST
@@ -41,38 +47,38 @@ def change(m, now, request):
 
 @compiled
 def restart(m):
-    """Begin the mode anew."""
+    """Restart the mode."""
     m.begins = 1
 
 
 @compiled
 def mark_started(m):
-    """Note that the axes were sent where the mode wants them."""
+    """Note that the mode has commanded the axes."""
     m.begins = 0
 
 
 @compiled
 def set_pending(m, request):
-    """Let a request wait, or NO_REQUEST."""
+    """Set the pending request, or NO_REQUEST."""
     m.pending = request
 
 
 @compiled
 def continue_in(m, mode):
-    """Go on in a mode after a silence: the one before, or STANDBY."""
+    """Continue in a mode after a silence: the mode before it, or STANDBY."""
     if mode != m.now:
         m.now, m.reason = mode, Reason.SILENCE
 
 
 @compiled
 def set_outage_reason(m, reason):
-    """Take the reason of an outage, NONE: there is none any more."""
+    """Set the reason of an outage; NONE: the outage is over."""
     if reason != Reason.NONE or m.reason == Reason.BLOCKED or m.reason == Reason.KEYHOLE:
         m.reason = reason
 
 
 @compiled
 def mark_stowed(m):
-    """Note that the pins are in, where that was requested."""
+    """Note that the pins are in, if stow was requested."""
     if m.reason == Reason.REQUESTED:
         m.reason = Reason.PINS_IN

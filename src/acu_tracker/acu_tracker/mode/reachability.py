@@ -1,6 +1,6 @@
-"""What the antenna can point at: angles inside the limits and above the floor, the tables that modes follow.
+"""Reachable directions: angles inside the limits and above the floor, and the tables that modes follow.
 
-c, u: records of control_unit.CONSTANTS and of signals.INPUTS.
+c, u: records of control_unit.CONSTANTS_DTYPE and of signals.INPUTS_DTYPE.
 """
 import math
 
@@ -15,7 +15,7 @@ from pedestal_common.compiled import compiled
 
 @compiled
 def outside(c, A, E):
-    """OUTSIDE_LIMITS if deck angles [rad] cannot be pointed at, else NONE; NaN is outside."""
+    """Return OUTSIDE_LIMITS if deck angles [rad] cannot be reached, else NONE; NaN is outside."""
     a, e = c.axis[0].p.limits, c.axis[1].p.limits
     inside = a.low <= A <= a.high and e.low <= E <= e.high
     return Reason.NONE if inside and not floor.above(c.floor, A, E) else Reason.OUTSIDE_LIMITS
@@ -23,8 +23,9 @@ def outside(c, A, E):
 
 @compiled
 def _followed(deck, c, track, t, azimuth):
-    """(NONE or why the program cannot be followed, by its times or its place when the next command is in force;
-    signals.Flag.PROGRAM if it is bad, else 0).
+    """Return (NONE or the reason why the program cannot be followed, signals.Flag.PROGRAM for a bad program, else 0).
+
+    Times and directions of the program are judged at the instant at which the next command is in force.
     """
     obstacle = program_track.status(track, t)
     if obstacle != Reason.NONE:
@@ -38,10 +39,12 @@ def _followed(deck, c, track, t, azimuth):
 
 
 @compiled
-def table(deck, c, u, mode, of_all, t, azimuth):
-    """(NONE or why the table of a mode cannot be followed at t [s], signals.Flag.PROGRAM if it is bad, else 0). deck:
-    ATTITUDE; azimuth: raw one of the last reference [rad]."""
-    track = tables.of_mode(of_all, mode)
+def table(deck, c, u, mode, all_tables, t, azimuth):
+    """Return (NONE or the reason why the table of a mode cannot be followed at t [s], signals.Flag.PROGRAM or 0).
+
+    The flag marks a bad program. deck: ATTITUDE_DTYPE; azimuth: raw azimuth of the last reference [rad].
+    """
+    track = tables.of_mode(all_tables, mode)
     if mode != Mode.PROGRAM:
         unpredicted = u.unpredicted[tables.TABLE_INDEX[mode]]
         if unpredicted != Reason.NONE:

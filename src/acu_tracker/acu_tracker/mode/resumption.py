@@ -1,4 +1,7 @@
-"""The mode that a silence interrupted: it is kept, and asked for again once a drive that was started anew is ready."""
+"""Resumption of the mode that a silence interrupted.
+
+The mode is kept, and requested again when a restarted drive is ready.
+"""
 import math
 
 import numpy as np
@@ -8,20 +11,20 @@ from acu_tracker.modes import Mode
 from pedestal_common.compiled import compiled
 
 RESUMPTION_DTYPE = np.dtype([('mode', 'i8'), ('until', 'f8')], align=True)
-"""mode: code of the one before the silence; until: stamp until which it is resumed [s], -inf: there is none."""
+"""mode: code of the mode before the silence; until: last stamp at which the mode is resumed [s], -inf for none."""
 
 DRIVE_RESTART_GAP_S = 0.3
-"""Silence [s] in which a drive may have been started again: a mode that it then ends for a while is resumed."""
+"""Silence after which the drive may have been restarted [s]; a mode that ends because of the restart is resumed."""
 
 
 def initialise(s):
-    """Nothing was interrupted; s: view of RESUMPTION_DTYPE."""
+    """Begin with no interrupted mode; s: view of RESUMPTION_DTYPE."""
     s['until'] = -math.inf
 
 
 @compiled
 def mode_after(s, mode, last, stamp, resume_time):
-    """The mode after a silence from the stamp `last` to `stamp` [s]: it goes on, or is STANDBY after resume_time."""
+    """Return the mode after a silence from `last` to `stamp` [s]: the same mode, or STANDBY after resume_time."""
     if stamp > last + resume_time:
         return Mode.STANDBY
     if stamp - last > DRIVE_RESTART_GAP_S:
@@ -31,14 +34,17 @@ def mode_after(s, mode, last, stamp, resume_time):
 
 @compiled
 def is_pending(s):
-    """Whether a mode is kept."""
+    """Return True if a mode is kept."""
     return math.isfinite(s.until)
 
 
 @compiled
 def pending(s, stamp, ended, locked, before):
-    """The request that is pending at `stamp` [s]. ended: the drive, not ready at first, has ended the mode; locked:
-    the receiver has the target; before: what was pending."""
+    """Return the request that is pending at `stamp` [s].
+
+    ended: the drive was not ready and has ended the mode; locked: the receiver has the target; before: the request
+    that was pending.
+    """
     if stamp > s.until:
         s.until = -math.inf
         return modes.NO_REQUEST
@@ -49,5 +55,5 @@ def pending(s, stamp, ended, locked, before):
 
 @compiled
 def cancel(s):
-    """Resume nothing."""
+    """Discard the mode that is kept."""
     s.until = -math.inf

@@ -1,6 +1,6 @@
-"""The modes that go by the level of the signal, between the control unit and the laws of `search`.
+"""Modes that use the signal level: the link between the control unit and the laws of `search`.
 
-a: record of acquisition.ACQUISITION; c: of control_unit.CONSTANTS; way: the bridge.Way of the program.
+a: record of acquisition.ACQUISITION_DTYPE; c: record of control_unit.CONSTANTS_DTYPE; way: bridge.Way of the program.
 """
 import math
 
@@ -14,14 +14,19 @@ from pedestal_common.compiled import compiled
 from pedestal_common.geometry import line_of_sight as pointing
 
 SIDE_LOBE_TIME_S = 0.3
-"""Time for which the level must be that of a side lobe [s], before autotrack or in it: on its slopes the filter
-diverges within 0.4 s."""
+"""Time for which the level must be that of a side lobe, before autotrack or in it [s].
+
+On the slopes of a side lobe the filter diverges within 0.4 s.
+"""
 
 
 @compiled
 def expected(a, way, t):
-    """Motion in earth angles of the expected place of the target at t [s]: by the program, rotated to where the target
-    was last tracked; without one, where it was last."""
+    """Return the Motion in earth angles of the expected place of the target at t [s].
+
+    The place follows the program, rotated to where the target was last tracked. Without a program it is the last
+    place, moved on with a rate that fades.
+    """
     if program_track.status(way.program, t) != Reason.NONE:
         return place.motion_at(a.place, t)
     return bridge.motion_at(way, t)
@@ -29,14 +34,14 @@ def expected(a, way, t):
 
 @compiled
 def source(a, mode, c, way, t):
-    """target.Source of the beam at t [s]."""
+    """Return the target.Source of the beam at t [s]."""
     motion = expected(a, way, t)
     return target.Source(0, place.displaced(motion, _offset(a, mode, c, t, motion)))
 
 
 @compiled
 def _offset(a, mode, c, t, motion):
-    """Point of the beam about the expected place in cross-elevation and elevation."""
+    """Return the Point of the beam about the expected place, in cross-elevation and elevation."""
     beamwidth = c.p.tracker.receiver.beamwidth
     if mode == Mode.SEARCH:
         p, _ = acquisition.searched(a, c.p.search, c.p.acquisition.time_constant, beamwidth, t)
@@ -48,12 +53,15 @@ def _offset(a, mode, c, t, motion):
 
 @compiled
 def advance(a, mode, c, u, way):
-    """Take the level of a step, learn from it what noise is, and bring the mode of the step before to this one; u:
-    record of signals.INPUTS. Whether acquire finds a slope wrong."""
+    """Take the level of a step and advance the mode of the previous step to this one. Return True if a slope is wrong.
+
+    While the beam is off the target, the level is noise alone, and its statistics are learnt. Only acquire finds a
+    wrong slope. u: record of signals.INPUTS_DTYPE.
+    """
     p, beamwidth = c.p.acquisition, c.p.tracker.receiver.beamwidth
     new = u.error_stamp > a.level.stamp and math.isfinite(u.cn0_dbhz)
-    off_target = (not modes.FOLLOWS_TARGET[mode] or (mode == Mode.SEARCH and acquisition.waiting(a, c.p.search,
-                                                                                                 u.stamp)))
+    off_target = (not modes.FOLLOWS_TARGET[mode]
+                  or (mode == Mode.SEARCH and acquisition.waiting(a, c.p.search, u.stamp)))
     if u.error_valid:
         level.restart_noise(a.level, p)
     elif off_target:
@@ -72,19 +80,20 @@ def advance(a, mode, c, u, way):
         acquisition.set_offset(a, x, e)
     axis = side_lobe.expected(p.expected_dbhz, p.reference_range, p.range_exponent, u.range)
     judged = mode == Mode.PROGRAM or mode == Mode.AUTOTRACK
-    acquisition.note_fair_level(a, u.stamp, not judged or not u.error_valid or not side_lobe.suspected(u.cn0_dbhz, axis))
+    fair = not judged or not u.error_valid or not side_lobe.suspected(u.cn0_dbhz, axis)
+    acquisition.note_fair_level(a, u.stamp, fair)
     return mode == Mode.ACQUIRE and a.phase == acquisition.Phase.WRONG_SLOPE
 
 
 @compiled
 def in_side_lobe(a, c, t):
-    """Whether autotrack follows a level that is that of a side lobe, at t [s]."""
+    """Return True if autotrack at t [s] follows a level that is that of a side lobe."""
     return c.p.acquisition.expected_dbhz > 0.0 and t - a.fair > SIDE_LOBE_TIME_S
 
 
 @compiled
 def found(a, mode, c):
-    """Whether search may hand over to acquire, or acquire to autotrack."""
+    """Return True if search may hand over to acquire, or acquire to autotrack."""
     if mode == Mode.SEARCH:
         return acquisition.peak_passed(a, c.p.acquisition)
     return a.phase == acquisition.Phase.CHECKED
@@ -92,7 +101,7 @@ def found(a, mode, c):
 
 @compiled
 def end(a, mode, c, t):
-    """NONE or the reason that the mode ends at t [s], for one that goes by the level."""
+    """Return the reason why a mode that uses the signal level ends at t [s], or NONE."""
     p = c.p.acquisition
     if mode == Mode.SEARCH:
         _, over = acquisition.searched(a, c.p.search, p.time_constant, c.p.tracker.receiver.beamwidth, t)
@@ -108,8 +117,10 @@ def end(a, mode, c, t):
 
 @compiled
 def begin(a, mode, c, t, spread):
-    """Enter a mode that goes by the level at t [s]; spread: standard deviation of the expected place [rad], NaN where
-    it is not known."""
+    """Enter a mode that uses the signal level at t [s].
+
+    spread: standard deviation of the expected place [rad], NaN where it is not known.
+    """
     level.restart_times(a.level)
     if mode == Mode.SEARCH:
         acquisition.begin_search(a, c.p.search, c.p.tracker.receiver.beamwidth, t, spread)
@@ -121,7 +132,7 @@ def begin(a, mode, c, t, spread):
 
 @compiled
 def remember(a, t, u, du):
-    """Keep where the target is at t [s]: an ENU unit Vector u and its rate du [1/s]."""
+    """Store the place of the target at t [s]: an ENU unit Vector u and its rate du [1/s]."""
     place.remember(a.place, t, u, du)
     acquisition.set_offset(a, 0.0, 0.0)
 
@@ -129,6 +140,8 @@ def remember(a, t, u, du):
 @compiled
 def check_slope(a, at, motion, error):
     """Judge an error (cross-elevation, elevation) [rad] by the offset of the target's expected place from the beam.
-    at: Pointing of the beam; motion: of that place, on the deck."""
+
+    at: Pointing of the beam; motion: of the expected place, on the deck.
+    """
     x, y, z = pointing.direction(motion.azimuth.angle, motion.elevation.angle)
     acquisition.take_error(a, pointing.offsets(at.A, at.E, x, y, z), error)

@@ -1,33 +1,38 @@
-"""The faults that the control unit latches itself until they are reset, and what they mean to its modes."""
+"""Latched faults of the control unit, which stay until a reset, and their effect on the modes."""
 from acu_tracker.alarms import annunciator, table
 from acu_tracker.modes import Reason
 from pedestal_common.compiled import compiled
 
-(UNCOMMANDED_MOTION_ALARM, FROZEN_DRIVE_ALARM,
- DIVERGENCE_ALARM) = (table.ALARM_INDEX[name] for name in ('moves unasked', 'drive frozen', 'diverged'))
-"""Alarms of these faults."""
+UNCOMMANDED_MOTION_ALARM, FROZEN_DRIVE_ALARM, DIVERGENCE_ALARM = (
+    table.ALARM_INDEX[name] for name in ('uncommanded motion', 'drive frozen', 'diverged'))
+"""Indices of the alarms of the latched faults."""
 
 LATCHED_FAULT_BITS = 1 << UNCOMMANDED_MOTION_ALARM | 1 << FROZEN_DRIVE_ALARM | 1 << DIVERGENCE_ALARM
 
 
 @compiled
-def latched(moves_unasked, frozen, diverged):
-    """Bits of the alarms whose fault waits for a reset; each of the faults: 1 while it does."""
-    return (moves_unasked << UNCOMMANDED_MOTION_ALARM) | (frozen << FROZEN_DRIVE_ALARM) | (diverged << DIVERGENCE_ALARM)
+def latched(uncommanded, frozen, diverged):
+    """Return the bits of the alarms whose fault waits for a reset; each argument: 1 while its fault does."""
+    return (uncommanded << UNCOMMANDED_MOTION_ALARM) | (frozen << FROZEN_DRIVE_ALARM) | (diverged << DIVERGENCE_ALARM)
 
 
 @compiled
-def axes_obey_commands(s):
-    """Whether both axes obey; while one does not, the target leaves the beam, and no filter is to blame. s: record of
-    conditions.SUPERVISION."""
+def axes_follow_commands(s):
+    """Return True if both axes follow their commands; s: record of conditions.SUPERVISION_DTYPE.
+
+    While an axis does not, the target leaves the beam, and the filter is not the cause.
+    """
     return not (s.axis[0].immobile or s.axis[1].immobile)
 
 
 @compiled
-def drive_refusal(ready, moves_unasked, frozen):
-    """NONE, or why a drive, ready or not, is not trusted with a mode."""
-    if moves_unasked:
-        return Reason.MOVES_UNASKED
+def drive_refusal(ready, uncommanded, frozen):
+    """Return the reason why the drive may not run a mode, or NONE.
+
+    ready: whether the drive is ready; uncommanded, frozen: whether the fault is latched.
+    """
+    if uncommanded:
+        return Reason.UNCOMMANDED_MOTION
     if frozen:
         return Reason.DRIVE_FROZEN
     return Reason.NONE if ready else Reason.DRIVE_NOT_READY
@@ -35,8 +40,7 @@ def drive_refusal(ready, moves_unasked, frozen):
 
 @compiled
 def reset(alarms, t):
-    """Reset the latched alarms at t [s], and know that the faults of LATCHED_FAULT_BITS are no more; whether there
-    was one."""
+    """Reset the latched alarms at t [s], with the conditions of LATCHED_FAULT_BITS. Return True if one was latched."""
     for i in (UNCOMMANDED_MOTION_ALARM, FROZEN_DRIVE_ALARM, DIVERGENCE_ALARM):
         annunciator.set_condition(alarms, i, False, t)
     return annunciator.reset(alarms, t)

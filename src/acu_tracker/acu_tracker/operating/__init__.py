@@ -1,1 +1,1 @@
-"""What an operator may command, who holds control, and what the control unit reports."""
+"""Operation of the antenna: the commands, the control over them, and the reports of the control unit."""

@@ -1,6 +1,6 @@
 """Texts of the look-ahead for the operator, and its numbers for the diagnostics.
 
-`h` is the record of lookahead.planner.PLANNER.
+`h` is a record of lookahead.planner.PLANNER_DTYPE.
 """
 import math
 
@@ -8,32 +8,32 @@ from acu_tracker.lookahead import planner
 
 
 def keyhole(h, beamwidth):
-    """The text of acu/keyhole: the planned slew, or that no azimuth wrap fits; beamwidth [rad]."""
+    """Return the text of acu/keyhole: the planned slew, or that no azimuth wrap fits; beamwidth [rad]."""
     if h['forecast'] == planner.FORECAST_NO_WRAP:
-        return 'keyhole ahead: no turn of the azimuth holds the pass, the axis will stop at the end of its travel'
+        return 'keyhole ahead: no azimuth wrap holds the pass; the axis will stop at the end of its travel'
     slew = h['slew']
     way = 'clockwise' if slew['peak'] > 0.0 else 'counter-clockwise'
     if slew['other_cost'] == math.inf:
-        other = 'the other way round is closed by the limits'
+        other = 'limits forbid the opposite direction'
     else:
-        other = f'the other way round would lose {slew["other_cost"] - slew["cost"]:.1f} s more'
+        other = f'the opposite direction would lose {slew["other_cost"] - slew["cost"]:.1f} s more'
     text = (f'keyhole at {slew["culmination"]:.1f} s, elevation {_deg(slew["highest"]):.1f} deg: azimuth leaves the '
-            f'target at {slew["t1"]:.1f} s, goes {abs(_deg(slew["azimuth2"] - slew["azimuth1"])):.0f} deg {way} and '
-            f'meets it at {slew["t2"]:.1f} s; expected loss {slew["loss"]:.1f} s, at most '
-            f'{_deg(slew["worst"]):.2f} deg off; {other}')
+            f'target at {slew["t1"]:.1f} s, slews {abs(_deg(slew["azimuth2"] - slew["azimuth1"])):.0f} deg {way} and '
+            f'meets the target at {slew["t2"]:.1f} s; expected loss {slew["loss"]:.1f} s, largest pointing '
+            f'offset {_deg(slew["worst"]):.2f} deg; {other}')
     if h['deck_motion'] > 0.25 * beamwidth:
-        text += f'; rough, as the deck moves by {_deg(h["deck_motion"]):.2f} deg rms'
+        text += f'; approximate, because the deck moves by {_deg(h["deck_motion"]):.2f} deg rms'
     return text
 
 
 def hidden(h):
-    """The text of acu/blockage: from when until when [s] the target will be hidden."""
+    """Return the text of acu/blockage: begin and end [s] of the time for which the target will be hidden."""
     begin, end = h['hidden']
     return f'target hidden from {begin:.1f} s to {end:.1f} s'
 
 
 def numbers(h):
-    """[(key, value text)] of the forecast; of a slew and of a hidden sector only where there is one."""
+    """Return [(key, value text)] of the forecast; a slew or a hidden sector appears only where there is one."""
     values = [('keyhole', planner.FORECAST_TEXTS[h['forecast']])]
     if h['forecast'] == planner.FORECAST_KEYHOLE:
         slew = h['slew']

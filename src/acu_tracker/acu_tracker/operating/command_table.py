@@ -1,4 +1,4 @@
-"""What can be asked of the control unit on acu/command: the modes with their arguments, and what is beside them."""
+"""Commands on acu/command: the modes with their arguments, and all other commands."""
 import math
 
 import numpy as np
@@ -15,48 +15,49 @@ from pedestal_common.wire.commands import Argument, CommandDefinition
 
 
 def _of_axes(doc, low, high, unit, default=None, suffix=''):
+    """Return an Argument for each axis."""
     return tuple(Argument(f'{axis}{suffix}', doc, low, high, unit, default=default) for axis in AXES)
 
 
-_MOTION_ARGUMENTS = (*_of_axes('its rate', -10.0, 10.0, 'rad/s', 0.0, '_rate'),
-                     Argument('moves', 'for so long it goes on at these rates', 0.0, 3600.0, 's', default=1.0))
+_MOTION_ARGUMENTS = (*_of_axes('rate of the angle', -10.0, 10.0, 'rad/s', 0.0, '_rate'),
+                     Argument('moves', 'duration of the motion at these rates', 0.0, 3600.0, 's', default=1.0))
 
 MODE_ARGUMENTS = {
-    'preset': (*_of_axes('deck angle; left out: as it was', -20.0, 20.0, 'rad', math.nan), *_MOTION_ARGUMENTS,
-               Argument('point', 'one of those that the parameter `points` names, instead of angles', default='')),
-    'rate': _of_axes(f'holds for {manual.RATE_REQUEST_TIMEOUT_S:g} s', -10.0, 10.0, 'rad/s', 0.0),
+    'preset': (*_of_axes('deck angle; default: unchanged', -20.0, 20.0, 'rad', math.nan), *_MOTION_ARGUMENTS,
+               Argument('point', 'name of a point of the parameter `points`, instead of angles', default='')),
+    'rate': _of_axes(f'rate of the axis, valid for {manual.RATE_REQUEST_TIMEOUT_S:g} s', -10.0, 10.0, 'rad/s', 0.0),
     'slave': (*_of_axes('earth angle', -20.0, 20.0, 'rad'), *_MOTION_ARGUMENTS,
-              Argument('holds', 'for so long it is good', 0.01, 86400.0, 's', default=1.0)),
-    'tle': tuple(Argument(f'line_{i}', f'line {i} of the elements, _ for blanks; left out: as they are', default='')
+              Argument('holds', 'time for which the direction is valid', 0.01, 86400.0, 's', default=1.0)),
+    'tle': tuple(Argument(f'line_{i}', f'line {i} of the elements, _ for blanks; default: unchanged', default='')
                  for i in (1, 2)),
 }
-"""{mode: its commands.Arguments}."""
+"""{mode: its Arguments}."""
 
-_ALARM_ARGUMENT = Argument('alarm', 'name of an alarm, with _ or blanks')
+_ALARM_ARGUMENT = Argument('alarm', 'name of the alarm, with _ or blanks')
 
 ALARM_COMMANDS = (
-    CommandDefinition('acknowledge', 'an alarm has been seen, with all that stands under it',
-                      (_ALARM_ARGUMENT._replace(doc='name of an alarm; left out: every alarm', default=''),)),
-    CommandDefinition('shelve', 'an alarm is put away for a time', (
-        _ALARM_ARGUMENT, Argument('seconds', 'until it comes back', 1.0, MAX_SHELVING_TIME_S, 's'),
-        Argument('reason', 'why'))),
-    CommandDefinition('unshelve', 'an alarm is taken back', (_ALARM_ARGUMENT,)),
-    CommandDefinition('reset',
-                      'what is latched ends, unless its cause is still there; nothing moves until a mode is asked for'))
-ALARM_COMMAND_NAMES = tuple(verb.name for verb in ALARM_COMMANDS)
+    CommandDefinition('acknowledge', 'acknowledge an alarm and all alarms under it',
+                      (_ALARM_ARGUMENT._replace(doc='name of the alarm; default: every alarm', default=''),)),
+    CommandDefinition('shelve', 'shelve an alarm for a time', (
+        _ALARM_ARGUMENT, Argument('seconds', 'time until the alarm returns', 1.0, MAX_SHELVING_TIME_S, 's'),
+        Argument('reason', 'reason for shelving'))),
+    CommandDefinition('unshelve', 'end the shelving of an alarm', (_ALARM_ARGUMENT,)),
+    CommandDefinition('reset', 'reset latched alarms and discard a waiting mode; refused while a cause remains'))
+ALARM_COMMAND_NAMES = tuple(command.name for command in ALARM_COMMANDS)
 
 ACU_COMMANDS = (
     *(CommandDefinition(mode, row.doc, MODE_ARGUMENTS.get(mode, ())) for mode, row in zip(MODES, MODE_ROWS)),
     CommandDefinition('elements', 'predict by these elements in mode `tle`', tuple(
         Argument(f'line_{i}', f'line {i} of the elements, _ for blanks') for i in (1, 2))),
-    CommandDefinition('fallback', 'choose what follows the loss of the track', (
-        Argument('mode', ', '.join(FALLBACK_MODES), options=tuple(FALLBACK_MODES)),)),
-    CommandDefinition('offset', 'shift what `program`, `tle` and `sun` follow, as they run', (
-        Argument('time', 'it comes later by this', -3600.0, 3600.0, 's', default=0.0),
-        *_of_axes('added to its angle', -1.0, 1.0, 'rad', 0.0))),
-    CommandDefinition('take', 'take control: nobody else is obeyed, but who stops', (
-        Argument('role', 'a supervisor takes it away from others', options=CONTROL_ROLES, default='operator'),)),
-    CommandDefinition('release', 'give control back'),
+    CommandDefinition('fallback', 'choose the mode after the loss of the track', (
+        Argument('mode', 'mode after the loss of the track', options=tuple(FALLBACK_MODES)),)),
+    CommandDefinition('offset', 'shift the table of `program`, `tle` and `sun`, also while it is followed', (
+        Argument('time', 'delay of the table', -3600.0, 3600.0, 's', default=0.0),
+        *_of_axes('offset of the angle', -1.0, 1.0, 'rad', 0.0))),
+    CommandDefinition('take', 'take control: commands of others are refused, except `standby` and `stop`', (
+        Argument('role', 'role of the client; a supervisor takes control from any holder', options=CONTROL_ROLES,
+                 default='operator'),)),
+    CommandDefinition('release', 'release control'),
     *ALARM_COMMANDS,
 )
 
@@ -64,7 +65,7 @@ POINTS_DOC = "named points for `preset`: 'NAME azimuth elevation; ...' [rad], de
 
 
 def points(text) -> dict:
-    """{name: (azimuth, elevation) [rad]} of a text as in POINTS_DOC. Raises ParameterError."""
+    """Return {name: (azimuth, elevation) [rad]} of a text as in POINTS_DOC. Raise ParameterError."""
     named = {}
     for part in filter(None, map(str.strip, text.split(';'))):
         name, *angles = part.split()
@@ -73,7 +74,7 @@ def points(text) -> dict:
         except ValueError:
             raise ParameterError(f'points = {part!r}: must be NAME azimuth elevation [rad]') from None
         if name in named or not (abs(azimuth) <= 20.0 and abs(elevation) <= 20.0):
-            raise ParameterError(f'points = {part!r}: each name once, angles -20 to 20 rad')
+            raise ParameterError(f'points = {part!r}: each name must be unique, each angle -20 to 20 rad')
         named[name] = azimuth, elevation
     return named
 
@@ -84,6 +85,7 @@ def _rates(arguments):
 
 
 def _take_preset(unit, arguments):
+    """Take the preset angles and their rates. Raise ValueError for an unknown point."""
     angles = [arguments[axis] for axis in AXES]
     if arguments['point']:
         named = points(unit.parameters.points)
@@ -97,20 +99,23 @@ def _take_preset(unit, arguments):
 
 
 def _take_rate(unit, arguments):
+    """Take the commanded rates."""
     state = unit.parts['state']
     manual.request_rates(state['guidance']['manual'], [arguments[axis] for axis in AXES], state['stamp'])
 
 
 def _take_slave(unit, arguments):
+    """Take the commanded direction."""
     state = unit.parts['state']
     direction.set_moving(state['guidance']['slave'], state['stamp'], [arguments[axis] for axis in AXES],
                          _rates(arguments), arguments['moves'], arguments['holds'])
 
 
 def _take_tle(unit, arguments):
+    """Take other elements, if there are any. Raise ValueError."""
     if any(arguments.values()):
         unit.take_elements(*arguments.values())
 
 
 ARGUMENT_SETTERS = {'preset': _take_preset, 'rate': _take_rate, 'slave': _take_slave, 'tle': _take_tle}
-"""{mode: function (unit.Acu, its arguments) that takes what it is asked for with}; each raises ValueError."""
+"""{mode: function (unit.Acu, arguments) that takes the arguments of its command}; each raises ValueError."""

@@ -1,4 +1,4 @@
-"""What the control unit says of itself on /diagnostics."""
+"""Diagnosis of the control unit for /diagnostics."""
 import math
 
 from acu_tracker import modes, signals
@@ -7,45 +7,46 @@ from pedestal_common.graph import topics
 from pedestal_common.node.unit import LEVEL_ERROR, LEVEL_OK, LEVEL_WARN, Diagnosis
 
 FAULT_TEXTS = {
-    'moves unasked': 'the antenna moves unasked: {unasked}; acu/reset_faults once it is known why',
-    'drive frozen': 'the drive repeats its numbers though it is told to move; acu/reset_faults once it is known why',
-    'diverged': "autotrack diverged: the receiver's errors led away from the target; acu/reset_faults once their "
-                'slope, phase and sign are right'}
-"""What is said of each fault of supervision.LATCHED, the gravest first."""
+    'uncommanded motion': 'uncommanded motion: {motion}; call acu/reset_faults once the cause is known',
+    'drive frozen': 'the drive repeats its numbers although motion is commanded; call acu/reset_faults once the cause '
+                    'is known',
+    'diverged': "autotrack diverged: the receiver's errors led away from the target; call acu/reset_faults once "
+                'slope, phase and sign of the errors are right'}
+"""Text of each latched fault of mode.supervision, the gravest first."""
 
-GATED_ERROR_TEXTS = {('error_gated',): 'an error of the receiver was too far off to be believed',
-                     ('error_noisy',): 'the errors of the receiver are noise, and not used',
-                     ('error_gated', 'error_noisy'): 'the errors of the receiver are noise, and not used'}
-"""What is said where nothing but these of signals.INVALID_INPUTS was refused."""
+GATED_ERROR_TEXTS = {('error_gated',): 'an error of the receiver was outside the gate and was not used',
+                     ('error_noisy',): 'the errors of the receiver are noise and are not used',
+                     ('error_gated', 'error_noisy'): 'the errors of the receiver are noise and are not used'}
+"""Texts of the diagnosis where only these bits of signals.INVALID_INPUTS are set."""
 
 
 def of(unit):
-    """The Diagnosis of an Acu."""
+    """Return the Diagnosis of an Acu."""
     state, outputs = unit.parts['state'], unit.parts['outputs']
     invalid = tuple(name for i, name in enumerate(signals.INVALID_INPUTS) if unit.parts['invalid'] >> i & 1)
     faults = unit.faults
     values = _values(unit, faults, invalid)
     if faults:
-        return Diagnosis(LEVEL_ERROR, FAULT_TEXTS[faults[0]].format(unasked=_uncommanded_motion(state['unasked'])),
-                         values)
+        text = FAULT_TEXTS[faults[0]].format(motion=_uncommanded_motion(state['unasked']))
+        return Diagnosis(LEVEL_ERROR, text, values)
     if invalid in GATED_ERROR_TEXTS:
         return Diagnosis(LEVEL_WARN, GATED_ERROR_TEXTS[invalid], values)
     if invalid:
         return Diagnosis(LEVEL_ERROR, f'invalid input: {" ".join(invalid)}', values)
     if state['guidance']['overtravel']:
-        return Diagnosis(LEVEL_WARN, 'no turn of the azimuth holds the whole program track: it will stop at a limit',
+        return Diagnosis(LEVEL_WARN, 'no azimuth wrap holds the whole program track: the axis will stop at a limit',
                          values)
     mode, reason = modes.MODES[outputs['mode']], modes.REASONS[outputs['reason']]
     return Diagnosis(LEVEL_WARN if outputs['coasting'] else LEVEL_OK, f'{mode} ({reason})', values)
 
 
 def _values(unit, faults, invalid):
-    """[(key, text)]."""
+    """Return [(key, text)] of the diagnosis."""
     state, outputs = unit.parts['state'], unit.parts['outputs']
     values = [('mode', modes.MODES[outputs['mode']]), ('reason', modes.REASONS[outputs['reason']]),
               ('fallback', modes.FALLBACK_NAMES[int(state['mode']['fallback'])]), ('control', unit.authority.holder),
               ('faults', ', '.join(faults)), ('locked', str(int(outputs['locked']))),
-              ('coasting', str(int(outputs['coasting']))), ('drive', unit.drive_told)]
+              ('coasting', str(int(outputs['coasting']))), ('drive', unit.drive_status)]
     if unit.parameters.stow_pins:
         values.append(('stow_pins', _pins(int(unit.parts['inputs']['pins']))))
     values += [('invalid_input', ' '.join(invalid)), ('errors gated', str(int(outputs['gated']))),
@@ -63,11 +64,11 @@ def _values(unit, faults, invalid):
 
 
 def _uncommanded_motion(movement):
-    """How the axes move. movement: view of servo.unasked's record."""
-    return ', '.join(f'{axis} {rate:.3g} rad/s where {low:.3g} to {high:.3g} was commanded'
+    """Return the text of the measured and commanded rates; movement: view of uncommanded_motion.ENVELOPE_DTYPE."""
+    return ', '.join(f'{axis} {rate:.3g} rad/s, commanded {low:.3g} to {high:.3g}'
                      for axis, (rate, low, high) in zip(topics.AXES, movement['measured']))
 
 
 def _pins(code):
-    """Where the stow pins are, as the drive says."""
+    """Return the text of the state of the stow pins, as the drive reports it."""
     return topics.TOPIC_BY_NAME['adu/stow_pins'].texts[code] if code != topics.NO_TEXT_CODE else 'unknown'

@@ -11,7 +11,7 @@ from pedestal_common.compiled import compiled
 TABLE_MODES = tuple(row for row in modes.MODE_ROWS if row.table)
 """Rows of modes.MODE_ROWS of the modes that follow a table."""
 
-Tables = collections.namedtuple('Tables', [row.name for row in TABLE_MODES])
+Tables = collections.namedtuple('Tables', [row.name for row in TABLE_MODES])  # type: ignore[misc]  # a field per row
 """One ProgramTrack for each mode that follows a table, the program first."""
 
 NO_TABLES = Tables(*(NO_TRACK for _ in TABLE_MODES))

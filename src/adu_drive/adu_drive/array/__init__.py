@@ -1,1 +1,1 @@
-"""In the drive's place: the beam of a phased array."""
+"""Beam of a phased array, in place of a drive with motors."""

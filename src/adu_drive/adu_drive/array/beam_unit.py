@@ -1,4 +1,4 @@
-"""The unit of one electronic beam: its command, the beam in force, enable and emergency stop."""
+"""Unit of one electronic beam: its command, the active beam, enable and emergency stop."""
 import math
 import typing
 
@@ -15,35 +15,38 @@ REFERENCE_TOPIC, JOINT_STATES_TOPIC, DRIVE_TRUTH_TOPIC = 'acu/reference', 'joint
 CLOCK_TOPIC, DRIVE_STATE_TOPIC = 'clock', 'adu/state'
 
 STATE_TEXTS = topics.TOPIC_BY_NAME[DRIVE_STATE_TOPIC].texts
-(STATE_CODE_ENABLED, STATE_CODE_DISABLED, STATE_CODE_EMERGENCY_STOP) = map(STATE_TEXTS.index,
-                                                                           ('enabled', 'disabled', 'emergency stop'))
-"""Codes of adu/state."""
+STATE_CODE_ENABLED, STATE_CODE_DISABLED, STATE_CODE_EMERGENCY_STOP = (
+    STATE_TEXTS.index(text) for text in ('enabled', 'disabled', 'emergency stop'))
+"""Codes of the texts of adu/state."""
 
 SWITCHES_DTYPE = np.dtype([('wanted', 'i8'), ('emergency', 'i8'), ('stamp', 'i8'), ('invalid', 'i8')])
-"""wanted: 0 when it was asked to be disabled; emergency: 1 while a stop is latched; stamp: of the last step [ns];
-invalid: 1 when a command held no angle since the last diagnosis."""
+"""Switches of a beam.
 
+wanted      0 after a request to disable
+emergency   1 while an emergency stop is latched
+stamp       stamp of the last step [ns]
+invalid     1 if a command since the last diagnosis was invalid
+"""
 
 RECORD_DTYPE = np.dtype([('state', electronic_beam.STATE_DTYPE), ('constants', electronic_beam.CONSTANTS_DTYPE),
                          ('inputs', electronic_beam.INPUTS_DTYPE), ('outputs', electronic_beam.OUTPUTS_DTYPE),
-                         ('switches', SWITCHES_DTYPE)],
-                        align=True)
+                         ('switches', SWITCHES_DTYPE)], align=True)
 
 
 class Memory(typing.NamedTuple):
-    """All a beam works on."""
+    """Memory of a beam."""
     record: np.ndarray
 
 
 @compiled
 def condition(m):
-    """Code of adu/state of SWITCHES_DTYPE."""
+    """Return the code of adu/state from a record SWITCHES_DTYPE."""
     return STATE_CODE_EMERGENCY_STOP if m.emergency else STATE_CODE_ENABLED if m.wanted else STATE_CODE_DISABLED
 
 
 @compiled
 def decode(u, m, command):
-    """Record of a command -> inputs of the beam, which is at the stamp of the last step."""
+    """Write the record of a command into the inputs of the beam, at the stamp of the last step."""
     u.stamp_ns = m.stamp
     u.due = 1 if command.stamp != NO_STAMP and condition(m) == STATE_CODE_ENABLED else 0
     if u.due == 1:
@@ -53,7 +56,9 @@ def decode(u, m, command):
 
 @compiled
 def encode(y, m, stamp, outputs):
-    """Outputs of the beam -> records of its messages. A beam has no rate and no torque, and it points where it says.
+    """Write the outputs of the beam into the records of its messages.
+
+    A beam has no rate and no torque, and its reported angles are the true ones.
     """
     joints, truth = outputs[JOINT_STATES_TOPIC], outputs[DRIVE_TRUTH_TOPIC]
     joints.stamp = truth.stamp = outputs[CLOCK_TOPIC].stamp = stamp
@@ -64,8 +69,10 @@ def encode(y, m, stamp, outputs):
 
 @compiled
 def law(memory, stamp, inputs, outputs):
-    """Step k: from t_k-1 to t_k by the command of step k - 1. While it is not enabled it hears nothing, and what is on
-    its way to it is lost."""
+    """Advance from t_k-1 to t_k with the command of step k - 1.
+
+    A beam that is not enabled ignores commands, and discards commands that are still delayed.
+    """
     m = memory.record[0]
     if m.switches.stamp != NO_STAMP:
         decode(m.inputs, m.switches, inputs[REFERENCE_TOPIC])
@@ -79,13 +86,13 @@ def law(memory, stamp, inputs, outputs):
 
 @compiled
 def laws(memory, stamps, inputs, outputs):
-    """`law` over arrays."""
+    """Apply `law` to each element of arrays."""
     for k in range(len(stamps)):
         law(memory, stamps[k], inputs[k], outputs[k])
 
 
 class Beam(Unit):
-    """One beam of a BeamParameters. It does not feel the ship."""
+    """One beam of a BeamParameters. The motion of the ship has no effect on a beam."""
     NODE, COMMAND, LAWS = nodes.ARRAY_DRIVE, REFERENCE_TOPIC, {Memory: (law, laws)}
     REQUESTS = ('adu/enable', 'adu/disable', 'adu/emergency_stop', 'adu/reset_faults')
 
@@ -100,23 +107,23 @@ class Beam(Unit):
         electronic_beam.read(self.parts['state'], self.parts['outputs'])
 
     def latency(self, topic):
-        """How old a command is that a step reads [s]: that of the step before."""
+        """Return the age [s] of the command in a step: one period."""
         return self.parameters.period
 
     rests = True
-    """An array has nothing that turns."""
+    """True always, because an array has no moving parts."""
 
     def encode(self, topic, code):
-        """The text of a code of adu/state."""
+        """Return the text of a code of adu/state."""
         return STATE_TEXTS[code]
 
     @property
     def condition(self):
-        """The text of adu/state as it is now, also between two steps."""
+        """Present text of adu/state, also between two steps."""
         return STATE_TEXTS[condition(self.parts['switches'])]
 
     def request(self, name):
-        """Enable, disable, stop or reset; the Reply names the state that follows, or why it is refused."""
+        """Execute one of REQUESTS. Return the Reply with the resulting state, or with the reason for a refusal."""
         m = self.parts['switches']
         if name == 'adu/enable' and m['emergency']:
             return Reply(False, 'refused: an emergency stop is latched (adu/reset_faults); '
@@ -128,14 +135,14 @@ class Beam(Unit):
         return Reply(True, f'drive is {self.condition}')
 
     def requests_for(self, topic, text):
-        """The services that lead to a text of adu/state."""
+        """Return the services that lead to a text of adu/state."""
         if text == STATE_TEXTS[STATE_CODE_EMERGENCY_STOP]:
             return ['adu/emergency_stop']
         latched = self.parts['switches']['emergency']
         return [*(['adu/reset_faults'] if latched else []), 'adu/enable' if text == 'enabled' else 'adu/disable']
 
     def diagnose(self):
-        """How it is: ERROR in an emergency stop or after a command that it did not obey, WARN while disabled."""
+        """Return the Diagnosis: ERROR in an emergency stop or after an invalid command, WARN while disabled."""
         outputs, switches = self.parts['outputs'], self.parts['switches']
         invalid, switches['invalid'] = switches['invalid'], 0
         values = [*((f'{axis}_deg', f'{math.degrees(angle):.4f}')
@@ -143,9 +150,9 @@ class Beam(Unit):
         if self.condition != 'enabled':
             return Diagnosis(LEVEL_ERROR if switches['emergency'] else LEVEL_WARN, self.condition, values)
         if invalid:
-            return Diagnosis(LEVEL_ERROR,
-                             f'{REFERENCE_TOPIC} holds NaN or infinity, goes beyond {electronic_beam.MAX_COMMAND_ANGLE_RAD:g} rad or '
-                             'is not newer than the one before: the beam stays', values)
+            limit = electronic_beam.MAX_COMMAND_ANGLE_RAD
+            return Diagnosis(LEVEL_ERROR, f'{REFERENCE_TOPIC} holds NaN or infinity, is not within +-{limit:g} rad, '
+                             'or is not newer than the previous command: the beam stays', values)
         if outputs['stale']:
             limit = self.parameters.command_timeout * self.parameters.period
             return Diagnosis(LEVEL_ERROR, f'no new {REFERENCE_TOPIC} for {limit:g} s: the beam stays', values)
@@ -153,6 +160,6 @@ class Beam(Unit):
 
     @staticmethod
     def idle(numbers):
-        """Why a recording did not exercise it: its command never changed."""
+        """Return the reason why a recording does not exercise a beam, '' if it does."""
         angles = numbers[REFERENCE_TOPIC][:, :2]
         return '' if len(angles) and np.ptp(angles, axis=0).any() else 'the beam was never steered'

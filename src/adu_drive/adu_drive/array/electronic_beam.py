@@ -1,7 +1,8 @@
-"""The electronically steered beam of a phased array: no motors, it goes where it is told after a pure delay and stays.
+"""Electronically steered beam of a phased array: no motors, a commanded angle is reached after a pure delay and held.
 
-A command stamped t_k is in force from the first step at or after t_k + transport delay on, until the next one is: the
-delays of paper 002's beam steering computer and array (section 2, figure 2) and the hold of its closed-loop period.
+A command stamped t_k is active from the first step at or after t_k + transport delay, until the next command becomes
+active. This models the delays of the beam steering computer and array of paper 002 (section 2, figure 2), and the hold
+of its closed-loop period.
 """
 import numpy as np
 
@@ -10,44 +11,51 @@ from pedestal_common.parameters import ParameterError
 from pedestal_common.wire.records import NO_STAMP
 
 BEAM_RING_SIZE = 512
-"""Commands that can be on their way at once."""
+"""Largest number of commands within the delay."""
 
 MAX_COMMAND_ANGLE_RAD = 1e3
-"""Angles beyond this [rad], infinite or NaN are not believed."""
+"""Largest valid angle of a command [rad]; a command beyond it, infinite or NaN is ignored."""
 
 CONSTANTS_DTYPE = np.dtype([('delay_ns', 'i8'), ('timeout_ns', 'i8')], align=True)
 
 STATE_DTYPE = np.dtype([('ring_stamp_ns', 'i8', (BEAM_RING_SIZE,)), ('ring_position', 'f8', (BEAM_RING_SIZE, 2)),
                         ('written', 'i8'),
                         ('released', 'i8'), ('command_stamp_ns', 'i8'), ('position', 'f8', (2,))], align=True)
-"""written, released: commands put into the ring and taken from it since the start; command_stamp_ns: of the newest
-that was believed; position: the beam in force (azimuth, elevation) [rad]."""
+"""State of a beam.
+
+written, released    numbers of commands put into and taken out of the ring since the start
+command_stamp_ns     stamp of the newest valid command [ns]
+position             active beam (azimuth, elevation) [rad]
+"""
 
 INPUTS_DTYPE = np.dtype([('stamp_ns', 'i8'), ('due', 'i8'), ('command_stamp_ns', 'i8'), ('position', 'f8', (2,))],
                         align=True)
-"""Stamp t_k of the step [ns]; due 1: a command came, with its stamp and its beam (azimuth, elevation) [rad]."""
+"""Stamp t_k of the step [ns]; due: 1 with a new command, its stamp [ns] and beam (azimuth, elevation) [rad]."""
 
 OUTPUTS_DTYPE = np.dtype([('position', 'f8', (2,)), ('stale', 'i8'), ('invalid_command', 'i8')], align=True)
-"""At t_k+1: the beam that was in force from t_k on (azimuth, elevation) [rad]; stale 1: the newest believed command
-was older than the timeout at t_k, or there was none; invalid_command 1: the command of this step was no angle or not
-newer than the one before. The beam stays then."""
+"""Outputs at t_k+1.
+
+position          active beam from t_k on (azimuth, elevation) [rad]
+stale             1 if the newest valid command was older than the timeout at t_k, or missing
+invalid_command   1 if the command of this step was invalid or not newer than the previous one; the beam stays
+"""
 
 
 def check_delay(period, transport_delay):
-    """Raises ParameterError where the commands on their way do not fit into the ring; both in s."""
+    """Raise ParameterError if the commands within the delay do not fit into the ring; both in s."""
     if transport_delay >= (BEAM_RING_SIZE - 1) * period:
         raise ParameterError(f'transport_delay = {transport_delay:g} s: must be below {BEAM_RING_SIZE - 1} periods of '
                              f'{period:g} s')
 
 
 def constants(period, transport_delay, timeout) -> np.ndarray:
-    """CONSTANTS_DTYPE (1,) of a step `period` [s], a delay [s] and the age [s] at which a command is stale."""
+    """Return CONSTANTS_DTYPE (1,) for a period, a delay and the age at which a command is stale, all in s."""
     check_delay(period, transport_delay)
     return np.array([(round(transport_delay * 1e9), round(timeout * 1e9))], CONSTANTS_DTYPE)
 
 
 def initial_state(azimuth, elevation) -> np.ndarray:
-    """STATE_DTYPE (1,): the beam at these angles [rad], no command yet."""
+    """Return STATE_DTYPE (1,): the beam at these angles [rad], without a command."""
     s = np.zeros(1, STATE_DTYPE)
     s['position'], s['command_stamp_ns'] = (azimuth, elevation), NO_STAMP
     return s
@@ -55,7 +63,7 @@ def initial_state(azimuth, elevation) -> np.ndarray:
 
 @compiled
 def receive(s, u):
-    """Put the command of a step into the ring; whether it was to be believed."""
+    """Put the command of a step into the ring. Return True if it is valid."""
     azimuth, elevation = u.position[0], u.position[1]
     if not (abs(azimuth) <= MAX_COMMAND_ANGLE_RAD and abs(elevation) <= MAX_COMMAND_ANGLE_RAD
             and u.command_stamp_ns > s.command_stamp_ns):
@@ -70,7 +78,7 @@ def receive(s, u):
 
 @compiled
 def release(s, c, stamp_ns):
-    """Bring every command into force whose delay is over at stamp_ns; the newest of them holds."""
+    """Release all commands whose delay has ended at stamp_ns; the newest of them is active."""
     while s.released < s.written and s.ring_stamp_ns[s.released % BEAM_RING_SIZE] <= stamp_ns - c.delay_ns:
         slot = s.released % BEAM_RING_SIZE
         s.position[0], s.position[1] = s.ring_position[slot, 0], s.ring_position[slot, 1]
@@ -79,14 +87,16 @@ def release(s, c, stamp_ns):
 
 @compiled
 def read(s, y):
-    """Outputs as they are now: at t_0, before the first step. Records STATE_DTYPE, OUTPUTS_DTYPE."""
+    """Write the present outputs, for t_0 before the first step. Records STATE_DTYPE, OUTPUTS_DTYPE."""
     y.position[0], y.position[1] = s.position[0], s.position[1]
 
 
 @compiled
 def step(s, c, u, y):
-    """One step from t_k to t_k+1. Records STATE_DTYPE, CONSTANTS_DTYPE, INPUTS_DTYPE, OUTPUTS_DTYPE; s and y are
-    written."""
+    """Advance one step from t_k to t_k+1. Records STATE_DTYPE, CONSTANTS_DTYPE, INPUTS_DTYPE, OUTPUTS_DTYPE.
+
+    s and y are written.
+    """
     y.invalid_command = 1 if u.due == 1 and not receive(s, u) else 0
     y.stale = 1 if s.command_stamp_ns == NO_STAMP or u.stamp_ns - s.command_stamp_ns > c.timeout_ns else 0
     release(s, c, u.stamp_ns)

@@ -1,1 +1,1 @@
-"""The laws of the drive's controller, on the motor shaft."""
+"""Laws of the controller of the drive, on the motor shaft."""

@@ -1,7 +1,8 @@
-"""Bias torque against backlash: opposite on the two motors, faded out where both must pull together.
+"""Bias torque against backlash: opposite on the two motors, zero at a high torque demand.
 
-Paper 000 section 1.3 leaves the schedule open; hold_fade is reference/servo.md section 3: full bias up to
-a torque demand `hold` (one pinion would let go without it), none from `out` on (peak torque for acceleration).
+Paper 000 section 1.3 leaves the schedule open. hold_fade is from reference/servo.md section 3. The bias is full up to
+a torque demand `hold`, because a pinion would lose contact without it. It is zero from `out` on, which leaves the peak
+torque for acceleration.
 """
 import math
 
@@ -9,7 +10,7 @@ from pedestal_common.compiled import inlined
 
 
 def line(p):
-    """T_b, out, per_fade of BiasParameters for `scheduled`."""
+    """Return T_b, out, per_fade of BiasParameters for `scheduled`."""
     if p.schedule == 'off':
         return 0.0, p.out, 1.0
     if p.schedule == 'constant':
@@ -20,5 +21,5 @@ def line(p):
 
 @inlined
 def scheduled(torque, T_b, out, per_fade):
-    """Bias [Nm] at a torque demand per motor [Nm]; per_fade = 1 / (out - hold)."""
+    """Return the bias [Nm] at a torque demand per motor [Nm]; per_fade = 1 / (out - hold)."""
     return T_b * min(max((out - abs(torque)) * per_fade, 0.0), 1.0)

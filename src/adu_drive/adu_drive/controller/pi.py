@@ -1,12 +1,12 @@
-"""The integral of a PI controller, held while its actuator cannot follow."""
+"""Integral of a PI controller, which is held while its actuator cannot follow."""
 from pedestal_common.compiled import inlined
 
 
 @inlined
 def integral(total, error, K_iT, excess):
-    """Integral part after one period T: total + K_i T e, held while e would push further into the limit.
+    """Return the integral part after one period T: total + K_i T e, held while e points further into the limit.
 
-    excess = output wanted - output realised; the realised value is the actuator's own, so any limit
-    further down the chain (torque, voltage circle) stops the integration in its direction only.
+    excess = demanded output - realised output. Because the realised output is that of the actuator, every limit down
+    the chain (torque, voltage circle) stops the integration, and only in the direction of the limit.
     """
     return total if excess * error > 0.0 else total + K_iT * error

@@ -1,18 +1,18 @@
-"""Ends of travel: a rate command that stops in time, and the buffer behind it."""
+"""Ends of travel: a limit of the rate command that stops in time, and the buffer beyond the end."""
 import math
 
 from pedestal_common.compiled import inlined
 
 MAX_RETURN_RATE_RAD_S = 0.1
-"""Rate [rad/s] at which an axis is led back from far behind an end of its travel."""
+"""Largest rate of the return from beyond an end of travel [rad/s]."""
 
 
 @inlined
 def approach_rate(distance, K, a):
-    """Largest rate [rad/s] towards an end of travel `distance` [rad] ahead; negative once it is passed, at most
-    MAX_RETURN_RATE_RAD_S.
+    """Return the largest rate [rad/s] towards an end of travel at a distance [rad].
 
-    Braking at a [rad/s2] far out, proportional with K [1/s] close in; value and slope meet at a / K^2.
+    Beyond the end the rate is negative, at most MAX_RETURN_RATE_RAD_S. Far from the end the rate allows braking at
+    a [rad/s2], close to the end it is proportional with K [1/s]; value and slope agree at a / K^2.
     """
     if distance * K < -MAX_RETURN_RATE_RAD_S:
         return -MAX_RETURN_RATE_RAD_S
@@ -23,7 +23,7 @@ def approach_rate(distance, K, a):
 
 @inlined
 def buffer_torque(theta, omega, lower, upper, k, c):
-    """Torque [Nm] of the mechanical end stops on the load: spring and damper that push, never pull."""
+    """Return the torque [Nm] of the mechanical end stops on the load: spring and damper that only push."""
     if theta > upper:
         return min(-k * (theta - upper) - c * omega, 0.0)
     if theta < lower:

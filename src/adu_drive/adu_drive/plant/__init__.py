@@ -1,1 +1,1 @@
-"""The laws of the plant: motors, gears, structure, wind, and the mount that they move."""
+"""Laws of the plant: motors, gears, structure, wind and mount."""

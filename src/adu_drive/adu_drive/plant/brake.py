@@ -1,4 +1,4 @@
-"""Spring-applied brake on a motor shaft: Coulomb friction, stepped exactly, so that it holds without creep."""
+"""Spring-applied brake on a motor shaft: Coulomb friction in exact steps, so that the brake holds without creep."""
 import math
 
 from pedestal_common.compiled import inlined
@@ -6,5 +6,5 @@ from pedestal_common.compiled import inlined
 
 @inlined
 def braked(omega, h_T_J):
-    """Shaft speed [rad/s] after a sub-step with the brake on: less by h T / J, at rest where it would turn round."""
+    """Return the shaft speed [rad/s] after a sub-step with the brake on: reduced by h T / J, but not reversed."""
     return math.copysign(max(abs(omega) - h_T_J, 0.0), omega)

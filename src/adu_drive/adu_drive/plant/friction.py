@@ -1,5 +1,8 @@
-"""Friction, and the two elementary functions it needs, written out so that they cost a few ns and give the
-same bits on every machine (reference/performance.md)."""
+"""LuGre friction with its two elementary functions.
+
+The functions are written out, so that they take a few ns and give the same bits on every machine
+(reference/performance.md).
+"""
 import math
 
 from pedestal_common.compiled import inlined
@@ -7,7 +10,7 @@ from pedestal_common.compiled import inlined
 
 @inlined
 def exp_minus(y):
-    """exp(-y) for y >= 0, absolute error < 6e-9: the Taylor series of degree 5 of exp(-y / 32), to the power 32."""
+    """Return exp(-y) for y >= 0, error below 6e-9: Taylor series of degree 5 of exp(-y / 32), to the power 32."""
     x = min(y, 32.0) * -0.03125
     x2 = x * x
     e = (1.0 + x) + x2 * ((0.5 + x * (1.0 / 6.0)) + x2 * (1.0 / 24.0 + x * (1.0 / 120.0)))
@@ -20,17 +23,19 @@ def exp_minus(y):
 
 @inlined
 def tanh(x):
-    """tanh(x), absolute error < 1.2e-8: (1 - e) / (1 + e) with e = exp(-2 |x|)."""
+    """Return tanh(x), absolute error below 1.2e-8: (1 - e) / (1 + e) with e = exp(-2 |x|)."""
     e = exp_minus(2.0 * abs(x))
     return math.copysign((1.0 - e) / (1.0 + e), x)
 
 
 @inlined
 def lugre(z, v, T_c, T_sc, per_v2, sigma_0, h_sigma_0, sigma_1_h, h):
-    """LuGre friction [Nm] at the rate v [rad/s] and the bristle deflection z one sub-step later.
+    """Return the LuGre friction [Nm] at the rate v [rad/s], and the bristle deflection z one sub-step later.
 
-    dz/dt = v - sigma_0 |v| z / g(v), g = T_c + (T_s - T_c) exp(-(v / v_s)^2), F = sigma_0 z + sigma_1 dz/dt;
-    implicit in z with one divide (explicit it is stiff: sigma_0 |v| / g). T_sc = T_s - T_c, per_v2 = 1 / v_s^2.
+        dz/dt = v - sigma_0 |v| z / g(v),  g = T_c + (T_s - T_c) exp(-(v / v_s)^2),  F = sigma_0 z + sigma_1 dz/dt
+
+    The step is implicit in z with one division, because the explicit form is stiff (sigma_0 |v| / g).
+    T_sc = T_s - T_c, per_v2 = 1 / v_s^2.
     Canudas de Wit, Olsson, Astrom, Lischinsky, IEEE Trans. Automatic Control 40 (1995) 419.
     """
     g = T_c + T_sc * exp_minus(v * v * per_v2)

@@ -1,4 +1,4 @@
-"""Pinion on bull gear: a mesh with lash, its torque on the load axis."""
+"""Pinion on bull gear: torque of a mesh with lash on the load axis."""
 import math
 
 from pedestal_common.compiled import inlined
@@ -6,9 +6,9 @@ from pedestal_common.compiled import inlined
 
 @inlined
 def mesh_torque(delta, rate, k, c, half_lash):
-    """Torque [Nm] of a pinion on the load; delta = theta_m / N - theta [rad], rate its derivative.
+    """Return the torque [Nm] of a pinion on the load; delta = theta_m / N - theta [rad], rate its derivative.
 
-    Dead zone of +-half_lash; a flank pushes, it never pulls.
+    The dead zone is +-half_lash; a flank pushes and never pulls.
     """
     if delta > half_lash:
         return max(k * (delta - half_lash) + c * rate, 0.0)
@@ -19,18 +19,21 @@ def mesh_torque(delta, rate, k, c, half_lash):
 
 @inlined
 def transmission_error(pinion, c):
-    """How much too far [rad on the load axis] a pinion at this angle [rad] drives the gear: by its runout once a turn,
-    by its teeth once each (total and tooth-to-tooth tangential composite deviation, ISO 1328-1)."""
+    """Return the transmission error [rad on the load axis] of a pinion at an angle [rad].
+
+    The runout acts once per turn, the tooth error once per tooth: total and tooth-to-tooth tangential composite
+    deviation, ISO 1328-1.
+    """
     return c.runout * math.sin(pinion) + c.tooth_error * math.sin(c.teeth * pinion)
 
 
 @inlined
 def gap(pinion, teeth, ratio):
-    """Additional half lash [rad] on the load axis of a pinion at an angle [rad] that has lost the tooth at 0 of its
-    `teeth`; 0 teeth: it is whole. ratio: bull gear : pinion.
+    """Return the additional half lash [rad on the load axis] of a pinion at an angle [rad] without its tooth at 0.
 
-    Where the tooth was, the flanks of its neighbours stop the pinion after half a pitch; they come nearer again as it
-    turns on, which makes the gap a cam: (cos phi - cos phi_0) / (1 - cos phi_0) within phi_0 = pi / teeth.
+    teeth: number of teeth, 0 for a whole pinion; ratio: bull gear to pinion. At the lost tooth, the flanks of its
+    neighbours stop the pinion after half a pitch. They come closer as the pinion turns, so the gap is a cam:
+    (cos phi - cos phi_0) / (1 - cos phi_0) within phi_0 = pi / teeth.
     """
     if teeth == 0.0:
         return 0.0

@@ -1,12 +1,11 @@
-"""Two axes on a moving deck: the inertia that azimuth feels at an elevation, and the torques of rigid bodies in turn.
+"""Two axes on a moving deck: inertia about azimuth at an elevation, and gyroscopic torques of rigid bodies.
 
     Q = M(E) (A'', E'') + h(A, E, A', E', w, w')       Q: torques on azimuth and elevation, w: rate of the deck
 
-from Newton and Euler: the elevating part turns with omega = C(E) (R(A) w + (0, -E', -A')) in its own frame (x along
-the beam, y to port, z up), and I omega' + omega x I omega must act on it; the rest of the load turns with the
-azimuth, about that axis alone. Bodies turn about the point where the axes cross: what gravity pulls at is the
-unbalance of an axis.
-Lagrange's equations of the same bodies are in the test.
+The equations are those of Newton and Euler. In its own frame (x along the beam, y to port, z up) the elevating part
+turns with omega = C(E) (R(A) w + (0, -E', -A')). The torque on it is I omega' + omega x I omega. The rest of the load
+turns about the azimuth axis only. Bodies turn about the intersection of the axes; gravity acts by the unbalance of an
+axis. The test has Lagrange's equations of the same bodies.
 """
 import math
 
@@ -17,7 +16,7 @@ from pedestal_common.geometry.line_of_sight import cross
 
 
 def constants(p):
-    """Constants of AduParameters: nested dictionary."""
+    """Return the constants of the bodies from AduParameters: nested dictionary."""
     e, I_y = p.elevating, p.elevation.load.inertia
     inertia = np.array([[e.about_beam, -e.product_xy, -e.product_xz], [-e.product_xy, I_y, -e.product_yz],
                         [-e.product_xz, -e.product_yz, e.about_lift]])
@@ -33,7 +32,7 @@ def _times(m, x, y, z):
 
 @compiled
 def inertia(c, E):
-    """(M_AA, M_AE) [kg m2] at an elevation; M_EE is the inertia of the elevation axis."""
+    """Return (M_AA, M_AE) [kg m2] at an elevation; M_EE is the inertia of the elevation axis."""
     s, k = math.sin(E), math.cos(E)
     x, y, z = _times(c.I, -s, 0.0, -k)
     return -s * x - k * z + c.J_yoke, -y
@@ -41,20 +40,20 @@ def inertia(c, E):
 
 @compiled
 def _on_elevating(A, E, x, y, z):
-    """A deck vector (FLU) in the frame of the elevating part."""
+    """Return a deck vector (FLU) in the frame of the elevating part."""
     forward, left = x * math.cos(A) - y * math.sin(A), x * math.sin(A) + y * math.cos(A)
     return forward * math.cos(E) + z * math.sin(E), left, z * math.cos(E) - forward * math.sin(E)
 
 
 @compiled
 def gyroscopic(c, angles, rates, w, w_dot):
-    """h [Nm] on azimuth and elevation; w, w_dot (3,): rate [rad/s] and acceleration [rad/s2] of the deck, FLU."""
+    """Return h [Nm] on azimuth and elevation; w, w_dot (3,): rate [rad/s], acceleration [rad/s2] of the deck, FLU."""
     (A, E), (A_dot, E_dot) = angles, rates
     wx, wy, wz = _on_elevating(A, E, w[0], w[1], w[2])
     ax, ay, az = -math.sin(E) * A_dot, 0.0, -math.cos(E) * A_dot
     x, y, z = wx + ax, wy - E_dot, wz + az
-    # A vector that stands on the deck turns against the elevating part with minus the rates of the axes, and the
-    # azimuth axis with minus that of the elevation.
+    # In the frame of the elevating part, a vector fixed to the deck turns with the negative rates of both axes, and
+    # the azimuth axis with the negative rate of elevation.
     ux, uy, uz = cross(wx, wy, wz, ax, ay - E_dot, az)
     vx, vy, vz = cross(ax, ay, az, 0.0, -E_dot, 0.0)
     bx, by, bz = _on_elevating(A, E, w_dot[0], w_dot[1], w_dot[2])

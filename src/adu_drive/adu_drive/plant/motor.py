@@ -3,6 +3,8 @@
     L di_d/dt = v_d - R i_d + omega_e L i_q
     L di_q/dt = v_q - R i_q - omega_e (L i_d + psi)
     J_m domega/dt = K_t i_q - T_c tanh(omega / v) - B omega - T_load
+
+omega_e = p omega is the electrical speed.
 """
 import math
 
@@ -12,7 +14,7 @@ from pedestal_common.compiled import inlined
 
 @inlined
 def currents(i_d, i_q, v_d, v_q, omega_e, L, psi, h_L, q_R):
-    """i_d, i_q [A] one sub-step h later, implicit in R: h_L = h / L, q_R = 1 / (1 + h R / L)."""
+    """Return i_d, i_q [A] one sub-step h later, implicit in R: h_L = h / L, q_R = 1 / (1 + h R / L)."""
     i_d = (i_d + h_L * (v_d + omega_e * L * i_q)) * q_R
     i_q = (i_q + h_L * (v_q - omega_e * (L * i_d + psi))) * q_R
     return i_d, i_q
@@ -20,7 +22,7 @@ def currents(i_d, i_q, v_d, v_q, omega_e, L, psi, h_L, q_R):
 
 @inlined
 def speed(omega, torque, T_c, per_v, h_J, q_B):
-    """Shaft speed [rad/s] one sub-step later under the net torque [Nm] but friction.
+    """Return the shaft speed [rad/s] one sub-step later under the net torque [Nm] without friction.
 
     Implicit in the viscous part: h_J = h / J_m, q_B = 1 / (1 + h B / J_m).
     """
@@ -29,6 +31,8 @@ def speed(omega, torque, T_c, per_v, h_J, q_B):
 
 @inlined
 def cogging(theta, T_cog, per_turn):
-    """Torque [Nm] of the magnets on the slots at a shaft angle [rad], per_turn = least common multiple of slots and
-    poles. Its mean over a turn is 0."""
+    """Return the torque [Nm] of the magnets on the slots at a shaft angle [rad]; its mean over a turn is 0.
+
+    per_turn: least common multiple of slots and poles.
+    """
     return T_cog * math.sin(per_turn * theta)

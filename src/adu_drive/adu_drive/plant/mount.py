@@ -1,14 +1,14 @@
-"""From the angles of the two axes to where the beam points: a pedestal that is not built as its drawing.
+"""Direction of the beam from the angles of the two axes, for a pedestal with alignment errors.
 
-Convention: every term is what must be ADDED to the wanted deck angles to get the angles to command (the VLBI Field
-System's, katpoint's). To first order, A the azimuth and E the elevation, with P of katpoint.PointingModel:
+Convention: each term is ADDED to the wanted deck angles to give the commanded angles, as in the VLBI Field System and
+katpoint. To first order, with azimuth A, elevation E and P of katpoint.PointingModel:
 
     dA = non_perpendicularity tan E - collimation / cos E + (tilt_forward sin A - tilt_starboard cos A) tan E
     dE = tilt_forward cos A + tilt_starboard sin A + sag cos E            P3, P4, P5, P6, P8; the zeros are P1, P7
 
-Here they are rotations, exact at any elevation. From the beam outwards: collimation sets it off the normal of the
-elevation axis, elevation turns it, less the sag, non_perpendicularity leans the elevation axis, azimuth turns that,
-and the pedestal's tilt leans the azimuth axis.
+Here the terms are rotations, exact at any elevation, in this order: collimation sets the beam off the normal of the
+elevation axis. The elevation angle, reduced by the sag, turns the beam. non_perpendicularity leans the elevation axis.
+The azimuth angle turns the elevation axis, and the tilt leans the azimuth axis.
 """
 import math
 
@@ -18,11 +18,11 @@ from pedestal_common.compiled import compiled
 from pedestal_common.geometry.line_of_sight import angles, wrap
 
 MIN_ZENITH_DISTANCE_RAD = 1e-9
-"""Closer to the zenith [rad] the azimuth of a beam turns no faster."""
+"""Distance from the zenith below which the rate of the azimuth of a beam is limited [rad]."""
 
 
 def _tilt(forward, starboard):
-    """Rotation (3, 3), FLU, that leans the vertical by `forward` and `starboard` [rad] about one horizontal axis."""
+    """Return the rotation (3, 3), FLU, that leans the vertical by `forward` and `starboard` [rad] about one axis."""
     tau = math.hypot(forward, starboard)
     if tau == 0.0:
         return np.eye(3)
@@ -31,7 +31,7 @@ def _tilt(forward, starboard):
 
 
 def constants(p):
-    """Constants of MountParameters: nested dictionary."""
+    """Return the constants of MountParameters: nested dictionary."""
     lean, off = p.non_perpendicularity, p.collimation
     return {'true': int(p.tilt_forward == p.tilt_starboard == lean == off == p.sag == 0.0),
             'tilt': _tilt(p.tilt_forward, p.tilt_starboard), 'sin_lean': math.sin(lean), 'cos_lean': math.cos(lean),
@@ -40,15 +40,16 @@ def constants(p):
 
 @compiled
 def _leaning(c, x, y, z):
-    """A vector of the elevating part in the yoke, whose elevation axis leans."""
+    """Return a vector of the elevating part in the frame of the yoke, whose elevation axis leans."""
     return x, c.cos_lean * y + c.sin_lean * z, c.cos_lean * z - c.sin_lean * y
 
 
 @compiled
 def beam(c, A, E, A_dot, E_dot):
-    """((azimuth, elevation) [rad], their rates [rad/s]) of the beam on the deck, from angles and rates of the axes.
+    """Return ((azimuth, elevation) [rad], their rates [rad/s]) of the beam on the deck, from those of the axes.
 
-    The azimuth is the one nearest to its axis. Past 90 deg the beam is told as its axes are, over the zenith.
+    Of the azimuths whole turns apart, the azimuth nearest to the axis is returned. If the elevation axis is beyond
+    90 deg, the elevation of the beam is too.
     """
     E_beam, E_beam_dot = E - c.sag * math.cos(E), (1.0 + c.sag * math.sin(E)) * E_dot
     cos_E, sin_E = c.cos_off * math.cos(E_beam), c.cos_off * math.sin(E_beam)

@@ -1,9 +1,9 @@
-"""Heating of a motor by its torque, as the I2t protection of a drive counts it, and the resistance it leads to.
+"""Heating of a motor by its torque, as in the I2t protection of a drive, and the resulting resistance.
 
-    tau dx/dt = (T / T_rated)^2 - x        x = 1: rated torque for ever; torque and current are proportional
+    tau dx/dt = (T / T_rated)^2 - x        x = 1: steady state at rated torque; torque and current are proportional
     R = R_20 (1 + alpha dT x)              copper: alpha = 0.00393 / K, dT the rise at rated torque
 
-x follows the torque the motor truly makes, so what trips on it stands for a sensor in the winding.
+Because x follows the true torque of the motor, a trip by x represents a sensor in the winding.
 """
 from pedestal_common.compiled import inlined
 
@@ -11,17 +11,17 @@ COPPER_COEFFICIENT_PER_K = 0.00393
 """Temperature coefficient of copper at 20 degrees C [1/K] (IEC 60028)."""
 
 WARNING_THERMAL_LOAD = 0.8
-"""Thermal load of a motor that is worth a warning."""
+"""Thermal load of a motor above which the drive reports a warning, and below which overtemperature ends."""
 
 
 @inlined
 def load(x, torque, per_rated, gain):
-    """Thermal load one period later under a torque [Nm]; gain = 1 - exp(-h / tau)."""
+    """Return the thermal load one period later under a torque [Nm]; gain = 1 - exp(-h / tau)."""
     relative = torque * per_rated
     return x + gain * (relative * relative - x)
 
 
 @inlined
 def damping(h_R_L, rise, x):
-    """Factor 1 / (1 + h R / L) of the current's implicit step with the winding at load x; rise = alpha dT."""
+    """Return the factor 1 / (1 + h R / L) of the implicit step of the current at thermal load x; rise = alpha dT."""
     return 1.0 / (1.0 + h_R_L * (1.0 + rise * x))

@@ -1,9 +1,8 @@
-"""Wind torque on both axes, a function of time alone: a mean, and a gust on top of it.
+"""Wind torque on both axes as a function of time only: a mean plus a gust.
 
-A spectral gust is the sum of SPECTRAL_LINE_COUNT cosines with random phases, one for each of SPECTRAL_LINE_COUNT
-equal steps of log f, so that
-v(t) has the spectrum asked for (Shinozuka and Deodatis, Applied Mechanics Reviews 44 (1991) 191) and the same t
-gives the same torque. Drag goes with the square of the wind's speed: torque = mean (1 + v / V)^2.
+A spectral gust is the sum of SPECTRAL_LINE_COUNT cosines with random phases, one for each of SPECTRAL_LINE_COUNT equal
+steps of log f. So v(t) has the given spectrum (Shinozuka and Deodatis, Applied Mechanics Reviews 44 (1991) 191), and
+equal times give equal torques. Drag grows with the square of the speed of the wind: torque = mean (1 + v / V)^2.
 """
 import math
 import types
@@ -14,8 +13,10 @@ from pedestal_common.compiled import compiled
 from pedestal_common.reproducible import geomspace, power
 
 SPECTRAL_LINE_COUNT = 128
+"""Number of cosines of a spectral gust."""
+
 MIN_GUST_FREQUENCY_HZ, MAX_GUST_FREQUENCY_HZ = 1e-4, 20.0
-"""Range of the spectra [Hz]; gusts quicker than 20 Hz are far smaller than an antenna."""
+"""Range of the spectra [Hz]; gusts above 20 Hz are far smaller than an antenna."""
 
 GUST_NONE, GUST_STEP, GUST_SINE, GUST_SPECTRUM = range(4)
 _GUST_KINDS = {'none': GUST_NONE, 'step': GUST_STEP, 'sine': GUST_SINE, 'davenport': GUST_SPECTRUM,
@@ -23,7 +24,9 @@ _GUST_KINDS = {'none': GUST_NONE, 'step': GUST_STEP, 'sine': GUST_SINE, 'davenpo
 
 
 def davenport(f, V):
-    """Density [s] of v^2 / sigma_v^2 at f [Hz], mean speed V [m/s]: 2/3 x^2 / (f (1 + x^2)^(4/3)), x = 1200 m f / V.
+    """Return the density [s] of v^2 / sigma_v^2 at f [Hz] for a mean speed V [m/s], by Davenport's spectrum.
+
+        2/3 x^2 / (f (1 + x^2)^(4/3)),  x = 1200 m f / V
 
     Davenport, Quarterly Journal of the Royal Meteorological Society 87 (1961) 194, scaled to a variance of 1.
     """
@@ -32,12 +35,12 @@ def davenport(f, V):
 
 
 def von_karman(f, V, L):
-    """The same of the longitudinal von Karman spectrum, L [m] its length."""
+    """Return the density [s] of v^2 / sigma_v^2 of the longitudinal von Karman spectrum with length scale L [m]."""
     return 4.0 * (L / V) / power(1.0 + 70.8 * (f * L / V) ** 2, 5.0 / 6.0)
 
 
 def _lines(gust):
-    """Amplitude of v / V, angular frequency [rad/s] and phase of every cosine."""
+    """Return amplitude of v / V, angular frequency [rad/s] and phase of every cosine."""
     if _GUST_KINDS[gust.kind] != GUST_SPECTRUM:
         return np.zeros((3, SPECTRAL_LINE_COUNT))
     edges = geomspace(MIN_GUST_FREQUENCY_HZ, MAX_GUST_FREQUENCY_HZ, SPECTRAL_LINE_COUNT + 1)
@@ -48,7 +51,7 @@ def _lines(gust):
 
 
 def constants(p):
-    """Constants of WindParameters: nested dictionary."""
+    """Return the constants of WindParameters: nested dictionary."""
     amplitude, omega, phase = _lines(p.gust)
     return {'azimuth': p.azimuth, 'elevation': p.elevation, 'kind': _GUST_KINDS[p.gust.kind],
             'gust_azimuth': p.gust.azimuth, 'gust_elevation': p.gust.elevation, 'start': p.gust.start,
@@ -57,7 +60,7 @@ def constants(p):
 
 @compiled
 def turbulence(t, amplitude, omega, phase):
-    """Longitudinal turbulence v / V at the time t [s]."""
+    """Return the longitudinal turbulence v / V at the time t [s]."""
     v = 0.0
     for i in range(SPECTRAL_LINE_COUNT):
         v += amplitude[i] * math.cos(omega[i] * t + phase[i])
@@ -66,10 +69,10 @@ def turbulence(t, amplitude, omega, phase):
 
 @compiled
 def torques(c, t):
-    """Torques [Nm] on the azimuth and elevation loads at the time t [s]."""
+    """Return the torques [Nm] on the azimuth and elevation loads at the time t [s]."""
     if c.kind == GUST_SPECTRUM:
         g = 1.0 + turbulence(t, c.amplitude, c.omega, c.phase)
-        return c.azimuth * g * abs(g), c.elevation * g * abs(g)      # a wind that turns round pushes back
+        return c.azimuth * g * abs(g), c.elevation * g * abs(g)      # A wind that reverses pushes back.
     gust = 0.0
     if t >= c.start:
         gust = 1.0 if c.kind == GUST_STEP else math.sin(c.omega_sine * (t - c.start)) if c.kind == GUST_SINE else 0.0
@@ -77,5 +80,5 @@ def torques(c, t):
 
 
 def initial_torques(p):
-    """Torques [Nm] of WindParameters on azimuth and elevation at t = 0."""
+    """Return the torques [Nm] of WindParameters on azimuth and elevation at t = 0."""
     return torques.py_func(types.SimpleNamespace(**constants(p)), 0.0)

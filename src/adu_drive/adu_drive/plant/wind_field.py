@@ -1,13 +1,14 @@
-"""One wind over both axes: speed, direction and turbulence in three components, and what it does to a dish.
+"""One wind over both axes: speed, direction and turbulence in three components, and its torques on a dish.
 
     W = V ((1 + u) along + v across + w up),    T = rho / 2 |W|^2 A D C,    C = c_1 sin alpha + c_2 sin 2 alpha
 
-alpha is the angle between the beam and where the wind comes from; a positive C turns the beam to the lee. The square
-law with a torque coefficient over A D is that of wind tunnels: Gawronski, Modeling and Control of Antennas and
-Telescopes (2008), section on wind disturbances; C there is a measured curve (JPL memo CP-6, 1964), of which c_1 and
-c_2 are the first harmonics. Defaults are of its size and shape: largest, 0.12, with the wind from behind at 130 deg.
-v and w have 0.78 and 0.55 of the intensity of u (ESDU 85020) and, for simplicity, its von Karman spectrum. Gusts
-smaller than the dish cancel over it: aerodynamic admittance 1 / (1 + (2 f sqrt(A) / V)^(4/3)) (Vickery 1965).
+alpha is the angle between the beam and the direction of the wind source; a positive C turns the beam to the lee. The
+square law with a torque coefficient for A D is that of wind tunnels: Gawronski, Modeling and Control of Antennas and
+Telescopes (2008), section on wind disturbances. C is a measured curve there (JPL memo CP-6, 1964), of which c_1 and
+c_2 are the first harmonics. The defaults have its size and shape: the largest value is 0.12, with the wind from behind
+at 130 deg. The components v and w have 0.78 and 0.55 of the intensity of u (ESDU 85020) and, for simplicity, the von
+Karman spectrum of u. Gusts smaller than the dish cancel over it: aerodynamic admittance
+1 / (1 + (2 f sqrt(A) / V)^(4/3)) (Vickery 1965).
 """
 import math
 import types
@@ -26,15 +27,15 @@ from pedestal_common.geometry.line_of_sight import cross, direction
 from pedestal_common.reproducible import geomspace, power
 
 TURBULENCE_SIGMA_RATIOS = (1.0, 0.78, 0.55)
-"""sigma of u, v, w over that of u."""
+"""Standard deviations of u, v, w divided by that of u."""
 
 
 def constants(p):
-    """Constants of WindFieldParameters: nested dictionary."""
-    (edges, random) = (geomspace(MIN_GUST_FREQUENCY_HZ, MAX_GUST_FREQUENCY_HZ, SPECTRAL_LINE_COUNT + 1),
-                       np.random.default_rng(p.seed))
+    """Return the constants of WindFieldParameters: nested dictionary."""
+    edges = geomspace(MIN_GUST_FREQUENCY_HZ, MAX_GUST_FREQUENCY_HZ, SPECTRAL_LINE_COUNT + 1)
+    random = np.random.default_rng(p.seed)
     phase = random.uniform(0.0, 2.0 * math.pi, (3, SPECTRAL_LINE_COUNT))
-    # Each component has its own frequencies, anywhere in the same bands: at equal ones they would stay correlated.
+    # Each component has its own random frequencies in the same bands, because equal frequencies would correlate them.
     f = edges[:-1] * power(edges[1] / edges[0], random.uniform(0.0, 1.0, (3, SPECTRAL_LINE_COUNT)))
     area, amplitude = 0.25 * math.pi * p.diameter ** 2, np.zeros((3, SPECTRAL_LINE_COUNT))
     if p.speed > 0.0:
@@ -42,20 +43,20 @@ def constants(p):
         amplitude = p.intensity * admittance * np.sqrt(2.0 * von_karman(f, p.speed, p.length) * np.diff(edges))
     to_x, to_y, _ = direction(p.from_azimuth + math.pi, 0.0)
     return {'blows': int(p.speed > 0.0), 'omega': 2.0 * math.pi * f,
-            'amplitude': np.array(TURBULENCE_SIGMA_RATIOS)[:, np.newaxis] * amplitude, 'phase': phase, 'to_x': to_x,
-            'to_y': to_y,
-            'torque': 0.5 * p.density * p.speed ** 2 * area * p.diameter, 'c_1': p.c_1, 'c_2': p.c_2}
+            'amplitude': np.array(TURBULENCE_SIGMA_RATIOS)[:, np.newaxis] * amplitude, 'phase': phase,
+            'to_x': to_x, 'to_y': to_y, 'torque': 0.5 * p.density * p.speed ** 2 * area * p.diameter,
+            'c_1': p.c_1, 'c_2': p.c_2}
 
 
 @compiled
 def torques(c, t, A, E):
-    """Torques [Nm] on the azimuth and elevation loads at the time t [s] with the axes at A, E [rad]."""
+    """Return the torques [Nm] on the azimuth and elevation loads at the time t [s] with the axes at A, E [rad]."""
     u, v, w = (turbulence(t, c.amplitude[0], c.omega[0], c.phase[0]),
                turbulence(t, c.amplitude[1], c.omega[1], c.phase[1]),
                turbulence(t, c.amplitude[2], c.omega[2], c.phase[2]))
     x, y, z = (1.0 + u) * c.to_x - v * c.to_y, (1.0 + u) * c.to_y + v * c.to_x, w
     bx, by, bz = direction(A, E)
-    nx, ny, nz = cross(bx, by, bz, x, y, z)     # |W| / V sin alpha, along the axis about which b turns to W
+    nx, ny, nz = cross(bx, by, bz, x, y, z)     # |W| / V sin alpha, along the axis of the turn from b to W
     speed = math.sqrt(x * x + y * y + z * z)
     cosine = -(bx * x + by * y + bz * z)        # |W| / V cos alpha
     T = c.torque * (c.c_1 * speed + 2.0 * c.c_2 * cosine)
@@ -63,5 +64,5 @@ def torques(c, t, A, E):
 
 
 def initial_torques(p, A, E):
-    """Torques [Nm] of WindFieldParameters on azimuth and elevation at t = 0."""
+    """Return the torques [Nm] of WindFieldParameters on azimuth and elevation at t = 0."""
     return torques.py_func(types.SimpleNamespace(**constants(p)), 0.0, A, E) if p.speed > 0.0 else (0.0, 0.0)

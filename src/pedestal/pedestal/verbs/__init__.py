@@ -1,1 +1,1 @@
-"""The verbs of `pedestal`, one per file: its arguments and its main."""
+"""Verbs of `pedestal`, a module each with `add_arguments` and `main`."""

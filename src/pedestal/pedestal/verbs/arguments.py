@@ -1,39 +1,55 @@
-"""Arguments that several verbs take."""
+"""Arguments that several verbs share."""
+import argparse
 import os
 import pathlib
+import typing
+
+if typing.TYPE_CHECKING:
+    from pedestal_operator.remote_node import RemoteSession
 
 
-def add_param(parser, example='acu.azimuth.feedforward.bandwidth=20'):
-    """--param NODE.KEY=VALUE, any number of times."""
+def add_scenario(parser: argparse.ArgumentParser) -> None:
+    """Add the scenario as first argument."""
+    parser.add_argument('scenario', help='name (see `pedestal scenarios`) or .yaml file of the scenario')
+
+
+def add_duration(parser: argparse.ArgumentParser, whole: str = 'a run') -> None:
+    """Add --duration S. whole: noun for the help, with its article."""
+    parser.add_argument('--duration', type=float, metavar='S', help=f'length of {whole} in the time of the drive [s]; '
+                        'default: value of the scenario')
+
+
+def add_param(parser: argparse.ArgumentParser, example: str = 'acu.azimuth.feedforward.bandwidth=20') -> None:
+    """Add --param NODE.KEY=VALUE, which may be repeated."""
     parser.add_argument('--param', action='append', default=[], metavar='NODE.KEY=VALUE',
-                        help=f'change a parameter, for example {example}; may be repeated')
+                        help=f'parameter and its new value, for example {example}; may be repeated')
 
 
-def add_beam(parser):
-    """--beam NAME of a recording of several beams."""
-    parser.add_argument('--beam', default='', metavar='NAME', help='of a recording of several, for example beam_2; '
-                        'default: the first')
+def add_beam(parser: argparse.ArgumentParser) -> None:
+    """Add --beam NAME for a recording of several beams."""
+    parser.add_argument('--beam', default='', metavar='NAME', help='beam to read from a recording of several beams, '
+                        'for example beam_2; default: the first')
 
 
-def add_vector(parser):
-    """--vector FORMAT of a verb that draws."""
-    parser.add_argument('--vector', choices=('pdf', 'svg'), help='write each figure in this format too, for print')
+def add_vector(parser: argparse.ArgumentParser) -> None:
+    """Add --vector FORMAT for a verb that draws figures."""
+    parser.add_argument('--vector', choices=('pdf', 'svg'), help='second format of each figure, for print')
 
 
-def add_new_bag(parser):
-    """--bag DIR, where a run is recorded."""
-    parser.add_argument('--bag', type=pathlib.Path, metavar='DIR', help='of the new run; default: '
-                        'bags/runs/SCENARIO-N')
+def add_new_bag(parser: argparse.ArgumentParser) -> None:
+    """Add --bag DIR for the recording of a run."""
+    parser.add_argument('--bag', type=pathlib.Path, metavar='DIR', help='output directory of the new recording; '
+                        'default: bags/runs/SCENARIO-N')
 
 
-def add_namespace(parser):
-    """--namespace NAME of a graph that was launched in one."""
-    parser.add_argument('--namespace', default='', metavar='NAME', help='in which the graph was launched, for example '
-                        'ship_1')
+def add_namespace(parser: argparse.ArgumentParser) -> None:
+    """Add --namespace NAME for a graph that was launched in a namespace."""
+    parser.add_argument('--namespace', default='', metavar='NAME', help='ROS namespace of the graph, for example '
+                        'ship_1; default: none')
 
 
-def ros_arguments(options):
-    """The arguments of ROS 2 for a node in the namespace of add_namespace. Raises ValueError."""
+def ros_arguments(options: argparse.Namespace) -> list[str]:
+    """Return the ROS 2 arguments for a node in the namespace of --namespace. Raises ValueError."""
     from rclpy.exceptions import InvalidNamespaceException
     from rclpy.validate_namespace import validate_namespace
     if not options.namespace:
@@ -42,21 +58,23 @@ def ros_arguments(options):
     try:
         validate_namespace(name)
     except InvalidNamespaceException:
-        raise ValueError(f'--namespace {options.namespace}: must be letters, digits and _, as ship_1') from None
+        raise ValueError(f'--namespace {options.namespace}: must be letters, digits and _, for example '
+                         'ship_1') from None
     return ['--ros-args', '-r', f'__ns:={name}']
 
 
-def add_remote(parser):
-    """Who asks a running graph, which beam, and how long to wait."""
+def add_remote(parser: argparse.ArgumentParser) -> None:
+    """Add namespace, name of the operator, beam and timeout for a client of a running graph."""
     add_namespace(parser)
-    parser.add_argument('--who', metavar='NAME', help='by which name to ask; default: login@host')
-    parser.add_argument('--beam', default='', metavar='NAME', help='of an array of several, for example beam_2')
-    parser.add_argument('--timeout', type=float, default=5.0, metavar='S', help='to wait for the graph and for its '
-                        'reply; default: 5')
+    parser.add_argument('--who', metavar='NAME', help='name of the operator in the commands; default: login@host')
+    parser.add_argument('--beam', default='', metavar='NAME', help='beam of an array with several beams, for example '
+                        'beam_2')
+    parser.add_argument('--timeout', type=float, default=5.0, metavar='S', help='longest wait for the graph and for '
+                        'its reply [s]; default: 5')
 
 
-def remote(options, node='acu'):
-    """A remote_node.Spun of the node `terminal`, by the options of add_remote."""
+def remote(options: argparse.Namespace, node: str = 'acu') -> 'RemoteSession':
+    """Return the session of a client node that sends commands to a node, by the options of add_remote."""
     from pedestal_common.graph import nodes
     from pedestal_operator.remote_node import Remote, RemoteSession, user
     if options.beam and options.beam + '/' not in nodes.prefixes(nodes.MAX_BEAMS):
@@ -65,17 +83,18 @@ def remote(options, node='acu'):
                          ros_arguments(options))
 
 
-def add_workers(parser):
-    """--workers N or --scheduler ADDRESS of many runs."""
+def add_workers(parser: argparse.ArgumentParser) -> None:
+    """Add --workers N and --scheduler ADDRESS for many runs."""
     workers = parser.add_mutually_exclusive_group()
-    workers.add_argument('--workers', type=int, metavar='N', help='processes for the runs; default: one per core')
-    workers.add_argument('--scheduler', metavar='ADDRESS', help="Dask cluster for the runs, for example "
-                         "tcp://host:8786; needs pip install 'pedestal_analysis[cluster]' here and the pedestal "
-                         "packages there")
+    workers.add_argument('--workers', type=int, metavar='N', help='number of processes for the runs; default: one per '
+                         'core')
+    workers.add_argument('--scheduler', metavar='ADDRESS', help="address of a Dask cluster for the runs, for example "
+                         "tcp://host:8786; needs pip install 'pedestal_analysis[cluster]' on this machine and the "
+                         "pedestal packages on the cluster")
 
 
-def add_params_file(parser):
-    """--params-file FILE."""
+def add_params_file(parser: argparse.ArgumentParser) -> None:
+    """Add --params-file FILE."""
     parser.add_argument('--params-file', type=pathlib.Path, metavar='FILE',
-                        help='ROS 2 parameter file whose values replace those of the scenario, for example one of '
-                        '`pedestal tune`')
+                        help='ROS 2 parameter file whose values replace the values of the scenario, for example an '
+                        'output of `pedestal tune`')

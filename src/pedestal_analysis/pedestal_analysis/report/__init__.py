@@ -1,1 +1,1 @@
-"""Figures, and the report of a recording as one HTML file."""
+"""Figures and HTML reports of recordings and trials."""

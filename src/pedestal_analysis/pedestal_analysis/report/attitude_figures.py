@@ -1,4 +1,4 @@
-"""The figures of a report about the INS: the error of its attitude beside the one it stated."""
+"""Figures of a report on the INS: attitude error and stated standard deviation."""
 import numpy as np
 
 from pedestal_analysis.report.figures import (
@@ -12,11 +12,11 @@ from pedestal_analysis.report.figures import (
 )
 
 MIN_DRAWN_ERROR_DEG = 1e-4
-"""Smallest error [deg] drawn on the logarithmic scale."""
+"""Smallest error drawn on the logarithmic scale [deg]."""
 
 
 def attitude(data):
-    """Heading and level error of the INS [deg] and their standard deviations as it states them."""
+    """Return the figure of the heading and level errors of the INS [deg] and their stated standard deviations."""
     known = data.attitude
     figure, panels = new_panels(2, y='error [deg]', sharex=True)
     for axes, name, error, sigma in zip(panels[:, 0], ('heading', 'level, both axes'),
@@ -25,7 +25,7 @@ def attitude(data):
         draw_line(axes, known.t, np.maximum(np.degrees(error), MIN_DRAWN_ERROR_DEG), color=TRUTH_COLOUR, linewidth=0.8,
                   label='error')
         draw_line(axes, known.t, np.maximum(np.degrees(sigma), MIN_DRAWN_ERROR_DEG), color=FILTERED_COLOUR,
-                  label='1 sigma, as the INS says')
+                  label='1 sigma, stated by the INS')
         if np.isfinite(known.aligned) and known.aligned > known.t[0]:
             axes.axvline(known.aligned, color=INK_COLOUR, linewidth=0.8, linestyle='--', label='aligned')
         axes.set_yscale('log')
@@ -34,6 +34,6 @@ def attitude(data):
 
 
 FIGURES = (
-    Spec('attitude', 'What the INS knew of the deck', 'Error of the attitude that the control unit was given (orange) '
-         'and its standard deviation as the INS states it (blue).', ('attitude',), attitude),
+    Spec('attitude', 'Attitude error of the INS', 'Error of the attitude that the control unit received (orange) and '
+         'the standard deviation that the INS states (blue).', ('attitude',), attitude),
 )

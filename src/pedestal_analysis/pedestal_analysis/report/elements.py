@@ -1,5 +1,4 @@
-"""Elements of the pages that are written: numbers, tables, figures, and the page around them, one HTML file that needs
-nothing else."""
+"""Elements of report pages: numbers, tables, figures, and the page as one self-contained HTML file."""
 import html
 import io
 import math
@@ -34,7 +33,7 @@ figure svg { display: block; width: 100%; height: auto; min-width: 26rem; }
 
 
 def page(title, parts):
-    """The text of a page of these parts, elements of HTML."""
+    """Return the text of a page of parts, elements of HTML."""
     return ('<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
             '<meta name="viewport" content="width=device-width, initial-scale=1">'
             f'<title>{html.escape(title)}</title><style>{PAGE_CSS}</style></head>\n<body>\n'
@@ -42,7 +41,7 @@ def page(title, parts):
 
 
 def figure(spec, data, reason=''):
-    """The figure of a figures.Spec with its title and caption; reason: why it cannot be drawn of these data, ''."""
+    """Return the figure of a figures.Spec with title and caption; reason: why it cannot be drawn, else ''."""
     caption = f'<h3>{html.escape(spec.title)}</h3>'
     if reason:
         return f'<figure id="{spec.key}">{caption}<p class="bad">Not drawn: {html.escape(reason)}.</p></figure>'
@@ -53,14 +52,13 @@ def figure(spec, data, reason=''):
 
 
 def number(value, unit=''):
-    """A value with its unit as text."""
+    """Return a value with its unit as text."""
     text = f'{value:#.4g}'.rstrip('.') if math.isfinite(value) else 'not measured'
     return f'{text}\N{NO-BREAK SPACE}{unit}'.rstrip() if math.isfinite(value) else text
 
 
 def table(head, rows, kind=''):
-    """An HTML table; the first cell of a row is its name, the others are right-aligned in one of numbers, kind 'n'.
-    """
+    """Return an HTML table; the first cell of a row is its name; kind 'n' right-aligns the other cells."""
     def line(cells, tag):
         rest = ''.join(f'<{tag} class="{kind}">{html.escape(cell)}</{tag}>' if kind != 'meta' and kind else
                        f'<{tag}>{html.escape(cell)}</{tag}>' for cell in cells[1:])

@@ -1,6 +1,6 @@
-"""How figures are drawn: colours, style, panels, lines, and one figure as a file or as part of a page.
+"""Drawing of figures: colours, style, panels, lines, and output as a file or as part of a page.
 
-Grey is what was measured, blue what was filtered or commanded, orange the truth.
+Grey marks measured, blue filtered or commanded, and orange true values.
 """
 import pathlib
 import re
@@ -15,7 +15,7 @@ INK_COLOUR = '#20242a'
 RAW_COLOUR, FILTERED_COLOUR, TRUTH_COLOUR = '#8d949e', '#1f6fd1', '#e57a00'
 MOTOR_1_COLOUR, MOTOR_2_COLOUR = '#0b8f8c', '#a04fc4'
 FIGURE_WIDTH_INCH = 7.4
-"""Of a figure [inch]."""
+"""Width of a figure [inch]."""
 
 MATPLOTLIB_STYLE = {
     'font.size': 9.0, 'axes.titlesize': 9.5, 'axes.titlelocation': 'left', 'legend.fontsize': 8.5,
@@ -30,8 +30,10 @@ MATPLOTLIB_STYLE = {
 
 
 class Spec(typing.NamedTuple):
-    """A figure: key, the name of its PNG; needs, what RunData must not lack; draw(RunData) -> Figure; dots per inch of
-    its PNG."""
+    """A figure.
+
+    key: name of its PNG; needs: keys of run_data._NEEDS; draw(RunData) -> Figure; dpi: dots per inch of its PNG.
+    """
     key: str
     title: str
     caption: str
@@ -41,8 +43,10 @@ class Spec(typing.NamedTuple):
 
 
 def thin(t, y, bins=1000):
-    """(t, y), both (n,), of the smallest and the largest value in each of `bins` stretches, in order, and of the first
-    NaN in each, so that gaps stay gaps."""
+    """Return (t, y), both (n,), of the smallest and the largest value in each of `bins` parts, in order.
+
+    Because gaps must stay visible, the first NaN of each part is kept.
+    """
     if t.size <= 2 * bins:
         return t, y
     edges = np.linspace(0, t.size, bins + 1).astype(int)
@@ -57,7 +61,7 @@ def thin(t, y, bins=1000):
 
 
 def spans(flags):
-    """[(first, last index)] of the stretches where flags (n,) bool are true."""
+    """Return [(first, last index)] of the intervals in which flags (n,) bool are true."""
     edges = np.flatnonzero(np.diff(np.concatenate(([0], flags.astype(int), [0]))))
     return list(zip(edges[::2].tolist(), (edges[1::2] - 1).tolist()))
 
@@ -65,8 +69,8 @@ def spans(flags):
 def new_panels(rows, columns=1, height=None, width=FIGURE_WIDTH_INCH, x='time [s]', y='', **options):
     """Return (Figure, axes (rows, columns)).
 
-    height, width: of the figure [inch], by default so high that a row has 1.75; x, y: labels below the last row and
-    left of the first column, one for all or one for each; options of Figure.subplots.
+    height, width: of the figure [inch], by default 1.75 for each row. x, y: labels below the last row and left of the
+    first column, one for all or one for each. options: of Figure.subplots.
     """
     figure = Figure(figsize=(width, height or 0.5 + 1.75 * rows), layout='constrained')
     axes = figure.subplots(rows, columns, squeeze=False, **options)
@@ -78,7 +82,7 @@ def new_panels(rows, columns=1, height=None, width=FIGURE_WIDTH_INCH, x='time [s
 
 
 def draw_line(axes, t, y, window=None, **options):
-    """Draw y (n,) over t (n,), thinned; window: (first, last t) that is drawn, options of Axes.plot."""
+    """Draw y (n,) over t (n,), thinned; window: (first, last t) to draw; options: of Axes.plot."""
     if window is not None:
         inside = (t >= window[0]) & (t <= window[1])
         t, y = t[inside], y[inside]
@@ -88,34 +92,36 @@ def draw_line(axes, t, y, window=None, **options):
 
 
 def outside_legend(figure, axes):
-    """Return the figure with the legend of some axes above it."""
+    """Return the figure with the legend of some axes above the panels."""
     figure.legend(*axes.get_legend_handles_labels(), loc='outside upper right', ncols=4)
     return figure
 
 
 FILE_METADATA = {'png': {'Software': None}, 'pdf': {'CreationDate': None, 'Creator': None, 'Producer': None},
                  'svg': {'Date': None, 'Creator': None, 'Format': None, 'Type': None}}
-"""What a file of each format does not say, so that equal data give equal bytes."""
+"""Metadata left out of a file of each format, so that equal data give equal bytes."""
 
 LINE_DASHES = {TRUTH_COLOUR: (0, (6.0, 1.5)), MOTOR_1_COLOUR: (0, (3.0, 1.0, 1.0, 1.0)),
                MOTOR_2_COLOUR: (0, (2.0, 1.2))}
-"""{colour: dashes} by which lines are told apart where colours are not; every other colour is solid."""
+"""{colour: dashes} that distinguish lines without colour; all other colours are solid."""
 
 
 MIN_WIDE_LINE_PT = 2.0
-"""Line width [pt] from which a line is told apart by that."""
+"""Line width from which a line needs no dashes [pt]."""
 
 
 def tidy(figure):
-    """Give the solid lines of a figure the dashes of their colours, where a panel has several, and logarithmic axes of
-    less than three decades plain numbers."""
+    """Dash the solid lines of panels with several lines; label short logarithmic axes with plain numbers.
+
+    The dashes are those of the colours; a short axis has less than three decades.
+    """
     for axes in figure.axes:
         lines = [line for line in axes.get_lines() if len(line.get_xdata()) > 2]
         _dash(lines if len(lines) > 1 else ())
         for axis in (axes.xaxis, axes.yaxis):
             low, high = sorted(axis.get_view_interval())
-            if axis.get_scale() == 'log' and 0.0 < high < 1e3 * low and not isinstance(axis.get_major_locator(),
-                                                                                        FixedLocator):
+            fixed = isinstance(axis.get_major_locator(), FixedLocator)
+            if axis.get_scale() == 'log' and 0.0 < high < 1e3 * low and not fixed:
                 axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
                 axis.set_major_formatter('{x:g}')
                 axis.set_minor_formatter(NullFormatter())
@@ -130,21 +136,23 @@ def _dash(lines):
 
 
 def store(figure, output, dpi=150):
-    """Write a figure into a path by its suffix (.png, .pdf on white), or into a stream as transparent SVG."""
+    """Write a figure to a path with its suffix as format (.png, .pdf on white), or to a stream as transparent SVG."""
     kind = str(output).rpartition('.')[2] if isinstance(output, pathlib.Path) else 'svg'
     colours = {'transparent': True} if kind == 'svg' else {'facecolor': 'white'}
     figure.savefig(output, format=kind, dpi=dpi, metadata=FILE_METADATA[kind], **colours)
 
 
 def render(spec, data, output):
-    """Draw the figure of a Spec into a path or stream, as `store` does. Equal data give equal bytes."""
+    """Draw the figure of a Spec and `store` it in a path or stream. Equal data give equal bytes."""
     with matplotlib.rc_context({**MATPLOTLIB_STYLE, 'svg.hashsalt': spec.key}):
         store(spec.draw(data), output, spec.dpi)
 
 
 def inline(svg):
-    """The text of an SVG file as an element of an HTML page: no prolog, no names, the ink of the page, coordinates to
-    0.01 pt."""
+    """Return the text of an SVG file as an element of an HTML page.
+
+    It has no prolog and no names, the text colour of the page, and coordinates to 0.01 pt.
+    """
     svg = svg[svg.index('<svg'):]
     svg = re.sub(r'<metadata>.*?</metadata>', '', svg, flags=re.DOTALL)
     svg = re.sub(r' xmlns(:xlink)?="[^"]*"', '', svg)

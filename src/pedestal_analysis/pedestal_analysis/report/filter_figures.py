@@ -1,4 +1,4 @@
-"""The figures of a report about the target filter: its errors beside what it states, innovations, probabilities."""
+"""Figures of a report on the target filter: errors and stated sigma, innovations, probabilities."""
 import numpy as np
 
 from pedestal_analysis.report.figures import (
@@ -16,11 +16,11 @@ from pedestal_common.graph import topics
 
 MODEL_COLOURS = {'cv': '#2f9e5b', 'ca': '#1f6fd1', 'singer': '#8364c8', 'current_statistical': '#e57a00'}
 NIS_SPAN_S = 1.0
-"""Seconds over which the NIS is averaged for its figure."""
+"""Span of the average of the NIS in its figure [s]."""
 
 
 def estimate(data):
-    """Estimate less truth and twice the sigma that the filter states, angle [deg] and rate [deg/s]."""
+    """Return the figure of estimate minus truth and twice the stated sigma, angle [deg] and rate [deg/s]."""
     known = data.filter
     figure, panels = new_panels(2, 2, sharex=True)
     for row, axis, i in zip(panels, topics.AXES, range(2)):
@@ -29,8 +29,8 @@ def estimate(data):
             error, sigma = np.degrees(error[:, i]), np.degrees(sigma[:, i])
             for sign in (-2.0, 2.0):
                 draw_line(axes, known.t, sign * sigma, color=FILTERED_COLOUR, linewidth=1.0,
-                          label='2 sigma, as the filter states' if sign > 0.0 else None)
-            draw_line(axes, known.t, error, color=TRUTH_COLOUR, linewidth=0.8, label='estimate less truth')
+                          label='2 sigma, stated by the filter' if sign > 0.0 else None)
+            draw_line(axes, known.t, error, color=TRUTH_COLOUR, linewidth=0.8, label='estimate minus truth')
             shown = np.abs(np.concatenate((error[known.tracking], 2.0 * sigma[known.tracking])))
             shown = shown[np.isfinite(shown)]
             if shown.size and shown.max() > 0.0:
@@ -42,7 +42,7 @@ def estimate(data):
 
 
 def innovations(data):
-    """Innovations [deg] and the mean NIS of NIS_SPAN_S seconds in its band."""
+    """Return the figure of the innovations [deg] and of the mean NIS over NIS_SPAN_S with its band."""
     known = data.filter
     figure, panels = new_panels(2, 2, y='innovation [deg]', sharex=True)
     for row, axis, i in zip(panels, topics.AXES, range(2)):
@@ -51,17 +51,19 @@ def innovations(data):
         row[0].set_title(f'{axis}: innovation')
         t, nis, expected, low, high = _averaged(known.t, known.nis[:, i], known.freedoms[:, i])
         row[1].fill_between(t, low, high, color=FILTERED_COLOUR, alpha=0.2, linewidth=0.0,
-                            label=f'{100.0 * BAND_PROBABILITY:g} % of an honest filter')
+                            label=f'{100.0 * BAND_PROBABILITY:g} % of a consistent filter')
         draw_line(row[1], t, expected, color=INK_COLOUR, linewidth=0.8, linestyle='--', label='expected')
-        draw_line(row[1], t, nis, color=FILTERED_COLOUR, label=f'mean NIS of {NIS_SPAN_S:g} s')
+        draw_line(row[1], t, nis, color=FILTERED_COLOUR, label=f'mean NIS over {NIS_SPAN_S:g} s')
         row[1].set_title(f'{axis}: NIS')
         row[1].set_ylim(0.0, None)
     return outside_legend(figure, panels[0, 1])
 
 
 def _averaged(t, nis, freedoms):
-    """(times, mean NIS, its expectation, its band) over stretches of NIS_SPAN_S; NaN where hardly anything was
-    measured."""
+    """Return (times, mean NIS, expectation, low, high) over spans of NIS_SPAN_S.
+
+    NaN in spans with less than half of the largest number of measurements.
+    """
     part = np.floor((t - t[0]) / NIS_SPAN_S).astype(int)
     known = np.isfinite(nis)
     count = np.bincount(part, known)
@@ -74,7 +76,7 @@ def _averaged(t, nis, freedoms):
 
 
 def probabilities(data):
-    """Probability of each motion model."""
+    """Return the figure of the probability of each motion model."""
     known = data.filter
     figure, panels = new_panels(2, y='probability', sharex=True)
     for axes, axis, i in zip(panels[:, 0], topics.AXES, range(2)):
@@ -88,12 +90,13 @@ def probabilities(data):
 
 
 FIGURES = (
-    Spec('estimate', 'What the filter states of its error', 'Estimate less truth (orange) and twice the standard '
-         'deviation the filter states (blue): about 95 % should lie between the lines. On a ship the attitude error '
-         'of the INS is in the error, and the filter does not know it.', ('truth', 'filter'), estimate),
-    Spec('innovations', 'Innovations', 'What each measurement was off its prediction, and the mean of its square in '
-         f'units of what the filter expected, over {NIS_SPAN_S:g} s; above the band the filter is too sure of itself or the '
-         'target does what no model knows, below it the filter is too careful.', ('filter',), innovations),
-    Spec('probabilities', 'Motion models', 'Probability of each model of the bank; one alone has probability 1.',
-         ('filter', 'bank'), probabilities),
+    Spec('estimate', 'Error and stated sigma of the filter', 'Estimate minus truth (orange) and twice the standard '
+         'deviation that the filter states (blue): about 95 % should lie between the lines. On a ship the error '
+         'includes the attitude error of the INS, which the filter does not model.', ('truth', 'filter'), estimate),
+    Spec('innovations', 'Innovations', 'Innovation: measurement minus prediction. Mean NIS: mean square of the '
+         f'innovations over their stated variance, over {NIS_SPAN_S:g} s. Above the band the stated variance is too '
+         'small, or the target moves as no model predicts. Below the band the stated variance is too large.',
+         ('filter',), innovations),
+    Spec('probabilities', 'Motion models', 'Probability of each motion model of the filter; a single model has '
+         'probability 1.', ('filter', 'bank'), probabilities),
 )

@@ -1,4 +1,4 @@
-"""The page that `pedestal report` writes: a recording as one HTML file that needs nothing else, its figures as PNG."""
+"""Page of `pedestal report`: a recording as one self-contained HTML file, its figures also as PNG."""
 import html
 import itertools
 import pathlib
@@ -23,14 +23,15 @@ from pedestal_recording import bag as bags
 from pedestal_recording.verify import verify
 
 MAX_DIAGNOSTICS_ROWS = 200
-"""Rows of the table of diagnostics at the most."""
+"""Largest number of rows of the table of diagnostics."""
+
 
 def write(bag_path, output=None, png_folder=None, beam='', vector=None) -> pathlib.Path:
-    """Write the report of a bag and return where: output, default report.html in the bag (beside a bare .mcap).
+    """Write the report of a bag and return its path: output, default report.html in the bag (beside a bare .mcap).
 
-    beam: of several, default the first. png_folder: also each figure, and the overview, as PNG there; vector: 'pdf'
-    or 'svg', as that too. The same bag gives the same bytes.
-    Raises bag.BagError when the bag cannot be read to its end, OSError when the report cannot be written.
+    beam: of several, default the first. png_folder: folder for the figures and the overview as PNG; vector: 'pdf' or
+    'svg' for a second file of each figure. The same bag gives the same bytes.
+    Raises bag.BagError if the bag cannot be read to its end, OSError if the report cannot be written.
     """
     whole = bags.read(bag_path)
     bag = whole.view(beam)
@@ -51,12 +52,12 @@ def write(bag_path, output=None, png_folder=None, beam='', vector=None) -> pathl
 
 
 def _of_axes(name, values, last=''):
-    """A row of numbers [(value, unit)] of azimuth and elevation."""
+    """Return a row of numbers [(value, unit)] of azimuth and elevation."""
     return [name, *(elements.number(*value) for value in values), last]
 
 
 def _pointing(bag, data, values):
-    """Rows of the table of pointing and torques, per axis."""
+    """Return the rows of the table of pointing and torques, per axis."""
     noise = values['single_sample_noise_deg'][0]
 
     def row(name, *keys, scale=1.0, unit='deg'):
@@ -65,7 +66,7 @@ def _pointing(bag, data, values):
     rms = ('cross_elevation_rms_deg', 'elevation_rms_deg', 'pointing_rms_deg')
     largest = ('cross_elevation_max_deg', 'elevation_max_deg', 'pointing_max_deg')
     joints = run_data.table(bag, 'joint_states')
-    by_encoders = [row(f'the same by the encoders, {name}', *(f'encoder_{key}' for key in keys))
+    by_encoders = [row(f'pointing error by the encoders, {name}', *(f'encoder_{key}' for key in keys))
                    for name, keys in (('rms', rms), ('largest', largest))] if data.run.has_encoders else []
     return [row('pointing error, rms', *rms), row('pointing error, largest', *largest), *by_encoders,
             row("rms / receiver's single-sample noise", *rms, scale=noise, unit=''),
@@ -84,19 +85,20 @@ def _torques(data):
 
 
 def _labelled(parts, *names):
-    """Rows [label, number] of the results of some parts: those named, else all that have a label."""
+    """Return rows [label, number] of results of some parts: the results in names, else all results with a label."""
     values = results.measured(parts)
     return [[results.RESULT_BY_NAME[name].label, elements.number(*values[name])] for name in names or values
             if results.RESULT_BY_NAME[name].label]
 
 
 def _loop(bag, check):
-    """Rows on the control loop: its rate in the drive's time, in realtime also in wall time, and what was lost."""
+    """Return rows on the control loop: rate in the time of the drive, in realtime also in wall time, and lost
+    steps."""
     rows = []
     joints = run_data.table(bag, 'joint_states')
     if joints is not None and joints['t'].size > 1 and joints['t'][-1] > joints['t'][0]:
         t = joints['t']
-        rows.append(["loop rate achieved (drive's time)", elements.number((t.size - 1) / (t[-1] - t[0]), 'Hz')])
+        rows.append(['loop rate achieved (time of the drive)', elements.number((t.size - 1) / (t[-1] - t[0]), 'Hz')])
         if bag.metadata.get('pacing') == 'realtime':
             wall = bag.rows('joint_states').publish
             jitter = (np.diff(wall) - check.period * 1e9) / 1e6
@@ -111,9 +113,9 @@ def _loop(bag, check):
                    and topics.TOPIC_BY_NAME[topic.name].rate == 'step'],
                   default=0)
     return [*rows, ['steps', f'{check.steps}'],
-            ['lost steps, made by the drive without the command for them', check.lost_steps or '0'],
+            ['lost steps (steps of the drive without a command)', check.lost_steps or '0'],
             ['steps missing in the recording', f'{max(missing, 0)}'],
-            ['recording', 'complete, every step once and in order' if check.complete else
+            ['recording', 'complete, each step once and in order' if check.complete else
              'NOT complete, see below']]
 
 
@@ -128,44 +130,45 @@ def _not_evaluated(run):
 
 
 def _results(bag, data, check):
-    """The section of the run against the truth, as far as it goes, and of its loop."""
+    """Return the section with the results of the run against the truth, if known, and of its control loop."""
     parts, rows = ['<h2 id="results">Results</h2>'], []
     if data.run is None:
-        parts.append(f'<p class="bad">Not compared with the truth: {html.escape(data.no_truth)}.</p>')
+        parts.append(f'<p class="bad">No comparison with the truth: {html.escape(data.no_truth)}.</p>')
         if data.motors:
             parts.append(elements.table(['', 'azimuth', 'elevation', ''], _torques(data), 'n'))
     else:
         known = results.of_tracking(data.run)
         if tracking.by_encoders(bag):
-            parts.append(f'<p class="bad">Pointing errors by the encoders: {html.escape(tracking.ENCODER_BEAM_NOTE)}.</p>')
+            parts.append('<p class="bad">Pointing errors are those of the encoders: '
+                         f'{html.escape(tracking.ENCODER_BEAM_NOTE)}.</p>')
         if not data.run.tracking.any():
             parts.append(f'<p class="bad">{_not_evaluated(data.run)}</p>')
         parts.append(elements.table(['', 'cross-elevation (azimuth)', 'elevation', 'both axes'],
                                     _pointing(bag, data, results.measured(known)), 'n'))
-        parts.append('<p class="soft">Pointing and noise over the evaluated part: autotrack, from '
-                     f'{tracking.HANDOVER_SETTLING_S:g} s after its start. Both axes: all samples of both, per axis.'
-                     '</p>')
+        parts.append('<p class="soft">Pointing and noise are computed over the evaluated part: autotrack, from '
+                     f'{tracking.HANDOVER_SETTLING_S:g} s after the first hand-over. "Both axes" pools the samples of '
+                     'both axes.</p>')
         rows = _labelled(known, 'single_sample_noise_deg', 'lock_time_s', 'autotrack_time_s', 'evaluated_time_s',
                          'loss_s')
     return [*parts, elements.table(None, rows + _loop(bag, check), 'n')]
 
 
 def _gaps(bag, check):
-    """What verify found, and the topics without a message."""
+    """Return the section on the problems that verify found and on topics without a message."""
     parts = []
     if not check.complete:
         problems = check.problems + [f'{topic.name}: {problem}' for topic in check.topics
                                      for problem in topic.problems]
-        parts.append('<h2 id="gaps">What the recording lacks</h2><ul>' + ''.join(
+        parts.append('<h2 id="gaps">Problems of the recording</h2><ul>' + ''.join(
             f'<li>{html.escape(problem)}</li>' for problem in problems) + '</ul>')
     absent = [topic for topic in bag.graph if topic not in bag.topics or not bag.rows(topic).size]
     if absent:
-        parts.append(f'<p class="soft">No message in this bag of: {", ".join(absent)}.</p>')
+        parts.append(f'<p class="soft">Topics without a message in this bag: {", ".join(absent)}.</p>')
     return parts
 
 
 def _warnings(check):
-    """What a reader must know before any number: that the run was aborted, and that steps were lost."""
+    """Return the warnings above all results: aborted run, lost steps, foreign messages."""
     return [line for line in (check.ending, check.loss, *check.foreign) if line]
 
 
@@ -174,7 +177,7 @@ def _figures(module, data):
 
 
 def _consistency_table(known):
-    """The table of a consistency.Consistency, and a sentence for each axis."""
+    """Return the table of a consistency.Consistency and a sentence for each axis."""
     judged = known.axes
 
     def row(name, field, marks=(), unit='', scale=1.0):
@@ -182,37 +185,37 @@ def _consistency_table(known):
 
     marks = [[f'{name}: {mark}' for name, mark in zip(AXES, of_axes) if mark]
              for of_axes in zip(*((axis.nis_mark, axis.nees_mark) for axis in judged))]
-    rows = [row('mean NIS', 'nis', marks[0]), row('expected of an honest filter', 'nis_expected'),
+    rows = [row('mean NIS', 'nis', marks[0]), row('expected mean NIS', 'nis_expected'),
             row(f'NIS inside their {100.0 * consistency.BAND_PROBABILITY:g} % band', 'nis_inside', unit='%',
                 scale=100.0),
             row('mean NEES (angle and rate)', 'nees', marks[1]),
-            [f'{100.0 * consistency.BAND_PROBABILITY:g} % band of the mean, 2 expected',
+            [f'{100.0 * consistency.BAND_PROBABILITY:g} % band of the mean NEES, 2 expected',
              *(' to '.join(map(elements.number, axis.nees_band)) for axis in judged), ''],
             row('independent errors', 'count'),
             row('angle error, rms', 'error', unit='deg', scale=DEG_PER_RAD),
-            row('sigma it states', 'sigma', unit='deg', scale=DEG_PER_RAD),
+            row('stated sigma of the angle', 'sigma', unit='deg', scale=DEG_PER_RAD),
             row('rate error, rms', 'rate_error', unit='deg/s', scale=DEG_PER_RAD),
-            row('rate sigma it states', 'rate_sigma', unit='deg/s', scale=DEG_PER_RAD)]
+            row('stated sigma of the rate', 'rate_sigma', unit='deg/s', scale=DEG_PER_RAD)]
     verdicts = ''.join(f'<p>{name.capitalize()}: {html.escape(axis.verdict)}.</p>' for name, axis in zip(AXES, judged))
     return elements.table(['', 'azimuth', 'elevation', ''], rows, 'n') + verdicts + (
-        '<p class="soft">Over the evaluated part. NIS: innovations in units of what the filter expects of them; NEES: '
-        'errors against the truth in units of what it states. On a ship the attitude error of the INS is among them, '
-        'which no filter of the target knows.</p>')
+        '<p class="soft">Computed over the evaluated part. NIS: squared innovations over their stated variance. NEES: '
+        'squared errors against the truth over the stated covariance. On a ship the errors include the attitude error '
+        'of the INS, which the target filter does not model.</p>')
 
 
 def _deck(bag, data):
-    """The section of what the INS knew and of what the ship's rotation left in the pointing error; none ashore."""
+    """Return the section on the attitude of the INS and the isolation from the ship; [] ashore."""
     if data.attitude is None:
         return []
     ship = isolation.read(bag, data.run) if data.run is not None else None
-    return ['<h2 id="attitude">The deck</h2>',
+    return ['<h2 id="attitude">Attitude of the ship</h2>',
             elements.table(None, _labelled({'attitude': data.attitude}) + _labelled({'isolation': ship}), 'n'),
             *_figures(attitude_figures, data)]
 
 
 def _diagnostics(statuses):
-    """The section of what was not OK: a status that a node repeats is one row."""
-    title = '<h2 id="diagnostics">Diagnostics that were not OK</h2>'
+    """Return the section on diagnostics other than OK; a status that a node repeats is one row."""
+    title = '<h2 id="diagnostics">Diagnostics other than OK</h2>'
     rows = {}
     for node in dict.fromkeys(node for _, node, _, _ in statuses):
         own = [(place, status) for place, status in enumerate(statuses) if status[1] == node]
@@ -223,13 +226,14 @@ def _diagnostics(statuses):
                 rows[places[0]] = [when, node, run_figures.LEVEL_COLOURS[min(level, 3)][0], message]
     if not rows:
         return [title, '<p>None.</p>' if statuses else '<p class="soft">No diagnostics in the bag.</p>']
-    more = [f'<p class="soft">and {len(rows) - MAX_DIAGNOSTICS_ROWS} more.</p>'] if len(rows) > MAX_DIAGNOSTICS_ROWS else []
     shown = [rows[place] for place in sorted(rows)][:MAX_DIAGNOSTICS_ROWS]
-    return [title, elements.table(['time [s]', 'node', 'level', 'message'], shown), *more]
+    hidden = len(rows) - len(shown)
+    return [title, elements.table(['time [s]', 'node', 'level', 'message'], shown),
+            *([f'<p class="soft">and {hidden} more.</p>'] if hidden else [])]
 
 
 def _provenance_table(bag, data):
-    """The table of what a bag is of, how it was made and what its file is."""
+    """Return the table of the subject, configuration, versions and file of a bag."""
     stamps = bag.index.log
     duration = (stamps.max() - stamps.min()) / 1e9 if stamps.size else 0.0
     versions = ', '.join(f'{key.removeprefix("version.")} {value}' for key, value in bag.metadata.items()
@@ -250,11 +254,11 @@ def _page(bag, data, check):
         *(f'<p class="bad">{html.escape(line.capitalize())}.</p>' for line in _warnings(check)),
         _provenance_table(bag, data),
         *_results(bag, data, check), *_gaps(bag, check),
-        '<h2 id="figures">Figures</h2><p class="soft">The paper: antenna tracking with a Kalman filter and a '
-        'dual-motor anti-backlash drive, its UAV experiment. Grey: measured, blue: filtered or achieved, '
-        'orange: truth.</p>',
+        '<h2 id="figures">Figures</h2><p class="soft">"The paper" is the one on antenna tracking with a Kalman filter '
+        'and a dual-motor anti-backlash drive; its figures are from a UAV experiment. Grey: measured, blue: filtered '
+        'or achieved, orange: truth.</p>',
         *_figures(run_figures, data),
-        '<h2 id="filter">Is the filter honest?</h2>', *([_consistency_table(data.filter)] if data.filter is not None
-                                                        else []),
+        '<h2 id="filter">Consistency of the filter</h2>',
+        *([_consistency_table(data.filter)] if data.filter is not None else []),
         *_figures(filter_figures, data), *_deck(bag, data), *_diagnostics(data.statuses)]
     return elements.page(f'Tracking run: {name}', parts)

@@ -1,4 +1,4 @@
-"""What a report draws: the run against the truth where there is one, and whatever else was recorded."""
+"""Data of a report: the run against the truth, if recorded, and the other topics of the recording."""
 import dataclasses
 import typing
 
@@ -11,13 +11,16 @@ from pedestal_recording import bag as bags
 
 @dataclasses.dataclass
 class RunData:
-    """A recording as the figures draw it.
+    """Data of a recording for the figures.
 
-    run: tracking.Tracking, None without truth; no_truth: why, else ''; raw_angles (n, 2): earth angles of the target
-    as measured [rad]; motors, receiver: tables of adu/motor_states and tracking_receiver/angle_error, None without a
-    message; modes: [(start, stop [s], mode)], one for each change; statuses: [(stamp [s], node, level, message)];
-    beamwidth [rad], NaN when the bag does not say; filter: consistency.Consistency, None without acu/filter; attitude:
-    known_attitude.KnownAttitude, None ashore.
+    run, no_truth     tracking.Tracking, or None and the reason why there is no truth
+    raw_angles        (n, 2) measured earth angles of the target [rad]
+    motors, receiver  tables of adu/motor_states and tracking_receiver/angle_error, None without a message
+    modes             [(start, stop [s], mode)], one for each change
+    statuses          [(stamp [s], node, level, message)]
+    beamwidth         [rad], NaN if the bag does not state it
+    filter            consistency.Consistency, None without acu/filter
+    attitude          known_attitude.KnownAttitude, None ashore
     """
     run: typing.Any
     no_truth: str
@@ -31,7 +34,7 @@ class RunData:
     attitude: typing.Any = None
 
     def lacks(self, needs):
-        """Why a figure with these needs (keys of _NEEDS) cannot be drawn; '' when it can."""
+        """Return the reasons why a figure with these needs (keys of _NEEDS) cannot be drawn, else ''."""
         reasons = [_NEEDS[need](self) for need in needs]
         return '; '.join(dict.fromkeys(filter(None, reasons)))
 
@@ -47,16 +50,16 @@ _NEEDS = {
     'filter': lambda data: '' if data.filter is not None else 'no message of acu/filter',
     'attitude': lambda data: '' if data.attitude is not None else 'no INS in the run',
     'bank': lambda data: '' if data.filter is None or np.isfinite(data.filter.probability).sum(axis=2).max() > 1 else
-    'one model of motion alone',
+    'the filter has only one motion model',
     'receiver': _no_receiver,
     'lock': lambda data: _no_receiver(data) or (
         '' if np.isfinite(data.receiver['x']).any() else 'the receiver never locked'),
 }
-"""{need of a figure: function of RunData -> why it is not met, ''}."""
+"""{need of a figure: function of RunData -> reason why the need is not met, else ''}."""
 
 
 def read(bag) -> RunData:
-    """The RunData of a bag.Bag. Raises bag.BagError when stamps of the steps go back."""
+    """Return the RunData of a bag.Bag. Raises bag.BagError if stamps of the steps go back."""
     run, no_truth = _tracking(bag)
     raw = _raw_angles(run, table(bag, 'ship/truth')) if run is not None else None
     motors = table(bag, 'adu/motor_states')
@@ -70,9 +73,9 @@ def read(bag) -> RunData:
 
 
 def table(bag, topic):
-    """The columns of a topic of a bag.Bag; None without a message or when its type is not the graph's.
+    """Return the columns of a topic of a bag.Bag; None without a message or if the type is not that of the graph.
 
-    Raises bag.BagError when the stamps of a topic of the steps go back: nothing drawn over them would be true.
+    Because a plot over stamps that go back would be wrong, raises bag.BagError for such a topic of the steps.
     """
     if bag.topics.get(topic) != topics.TOPIC_BY_NAME[topic].type or not bag.rows(topic).size:
         return None
@@ -81,12 +84,12 @@ def table(bag, topic):
     back = np.flatnonzero(np.diff(t) < 0.0) if topics.TOPIC_BY_NAME[topic].rate == 'step' else np.zeros(0, int)
     if back.size:
         raise bags.BagError(f'{bag.file}: the stamps of {topic} go back, the first from {t[back[0]]:.6f} to '
-                            f'{t[back[0] + 1]:.6f} s; `pedestal verify` says what else is wrong')
+                            f'{t[back[0] + 1]:.6f} s; `pedestal verify` lists all problems')
     return columns
 
 
 def _tracking(bag):
-    """(Tracking, '') or (None, why not)."""
+    """Return (Tracking, '') or (None, reason)."""
     absent = [name for name in ('joint_states', 'target/truth') if table(bag, name) is None]
     if absent:
         return None, f'no message of {" and ".join(absent)}'
@@ -95,11 +98,12 @@ def _tracking(bag):
     try:
         return tracking.read(bag), ''
     except KeyError as error:
-        return None, f'no number {error.args[0]} where the graph would have one'
+        return None, f'a topic has no number {error.args[0]}'
 
 
 def _raw_angles(run, ship):
-    """Earth angles (n, 2) [rad] of the target as measured, before any filter. ship: table of ship/truth or None."""
+    """Return the measured earth angles (n, 2) [rad] of the target, without filter; ship: table of ship/truth or
+    None."""
     quaternions = None
     if ship is not None:
         at = np.searchsorted(ship['t'], run.t - 1e-9).clip(0, ship['t'].size - 1)
@@ -108,7 +112,7 @@ def _raw_angles(run, ship):
 
 
 def _filter(bag, run):
-    """The consistency.Consistency, None without truth or without its numbers."""
+    """Return the consistency.Consistency, None without truth or without the numbers."""
     try:
         return consistency.read(bag, run) if run is not None and table(bag, 'acu/filter') is not None else None
     except KeyError:
@@ -116,7 +120,7 @@ def _filter(bag, run):
 
 
 def _attitude(bag):
-    """The known_attitude.KnownAttitude, None ashore or without its numbers."""
+    """Return the known_attitude.KnownAttitude, None ashore or without the numbers."""
     try:
         return known_attitude.read(bag) if table(bag, 'ship/imu/data') is not None else None
     except KeyError:
@@ -124,7 +128,7 @@ def _attitude(bag):
 
 
 def _modes(bag):
-    """[(start, stop [s], mode)], one for each change; the first begins with the recording."""
+    """Return [(start, stop [s], mode)], one for each change; the first begins with the recording."""
     stated = table(bag, 'acu/mode')
     changes = list(zip(stated['t'].tolist(), stated['data'])) if stated else []
     joints = table(bag, 'joint_states')

@@ -1,4 +1,4 @@
-"""The figures of a report about the run: pointing, errors, angles, torques, signal, sky, modes. Angles in degrees."""
+"""Figures of a report on the run: pointing, errors, angles, torques, signal, sky, modes. Angles in degrees."""
 import functools
 import itertools
 
@@ -25,15 +25,18 @@ from pedestal_analysis.report.figures import (
 MODE_COLOURS = dict(zip(modes.MODES, itertools.cycle((
     '#9aa0a6', '#a87b51', '#8364c8', '#b9a3e3', '#e0ac00', '#2f9e5b', '#3aa6b9', '#d1495b', '#e58a95', '#f2b84b',
     '#5b6abf', '#7a8b2a', '#c46aa8', '#4f4f4f'))))
-"""{mode: colour}."""
+"""{mode: colour} of the timeline."""
 LEVEL_COLOURS = (('OK', '#a5d8b5'), ('WARN', '#f2772b'), ('ERROR', '#c81e1e'), ('STALE', '#9aa0a6'))
 LOCKED_COLOUR = '#5f93c4'
 ZOOM_SPAN_S = 2.0
-"""Seconds of a zoomed figure."""
+"""Span of a zoomed figure [s]."""
 
 
 def _continuous(angle, beside=None):
-    """Degrees without the jump at +-180; beside: a continuous angle [deg] to stay within half a turn of."""
+    """Return an angle [rad] in degrees without the jump at +-180.
+
+    beside: a continuous angle [deg]; the result stays within half a turn of it.
+    """
     angle = np.degrees(angle)
     if beside is not None:
         return beside + (angle - beside + 180.0) % 360.0 - 180.0
@@ -44,14 +47,14 @@ def _continuous(angle, beside=None):
 
 
 def _middle(run):
-    """The ZOOM_SPAN_S seconds in the middle of what was evaluated, else of the run."""
+    """Return (first, last time) of the ZOOM_SPAN_S in the middle of the evaluated part, else of the run."""
     t = run.t[run.tracking] if run.tracking.any() else run.t
     middle = 0.5 * (t[0] + t[-1])
     return middle - 0.5 * ZOOM_SPAN_S, middle + 0.5 * ZOOM_SPAN_S
 
 
 def _slowest(run, angles):
-    """The ZOOM_SPAN_S seconds of what was evaluated in which the angles (n, 2) changed least."""
+    """Return (first, last time) of the ZOOM_SPAN_S of the evaluated part in which the angles (n, 2) changed least."""
     steps = round(ZOOM_SPAN_S / np.median(np.diff(run.t)))
     if run.tracking.sum() <= steps or not 0 < steps < run.t.size:
         return _middle(run)
@@ -62,7 +65,7 @@ def _slowest(run, angles):
 
 
 def _scale_to(axes, t, values, tracking):
-    """A frame for the evaluated part; a note where the approach before it leaves the frame."""
+    """Scale the axes to the evaluated part; add a note if values outside the part leave the frame."""
     shown = np.abs(values[tracking & np.isfinite(values)])
     whole = np.abs(values[np.isfinite(values)])
     if not shown.size or shown.max() == 0.0:
@@ -78,8 +81,10 @@ AXIS_TITLES = (('cross-elevation', 'azimuth'), ('elevation', 'elevation'))
 
 
 def draw_errors(axes, data, i, window=None):
-    """Draw what the receiver put out and what the filter made of it [deg], i: 0 cross-elevation, 1 elevation; with the
-    truth in a window (first, last time [s])."""
+    """Draw the receiver error and the filtered error [deg], i: 0 cross-elevation, 1 elevation.
+
+    In a window (first, last time [s]) the true error is drawn too.
+    """
     run = data.run
     raw, filtered = np.degrees(run.measured[:, i]), np.degrees(run.filtered[:, i])
     draw_line(axes, run.t, raw, window, color=RAW_COLOUR, linewidth=0.7, label='receiver, before the filter')
@@ -94,8 +99,7 @@ def draw_errors(axes, data, i, window=None):
 
 
 def error(data, window=None):
-    """What the receiver put out and what the filter made of it, cross-elevation and elevation [deg]; window as of
-    `draw_errors`."""
+    """Return the figure of receiver error and filtered error on both axes [deg]; window as in `draw_errors`."""
     figure, panels = new_panels(2, sharex=True)
     for i in range(2):
         draw_errors(panels[i, 0], data, i, window)
@@ -103,14 +107,15 @@ def error(data, window=None):
 
 
 def error_zoom(data):
-    """The middle ZOOM_SPAN_S seconds of `error`, with the truth."""
+    """Return `error` over the middle ZOOM_SPAN_S, with the truth."""
     return error(data, _middle(data.run))
 
 
 def angle(data, zoomed=False):
-    """Line of sight in earth angles [deg], as measured and as filtered; zoomed: the ZOOM_SPAN_S seconds in which the
-    target
-    moved least, with the truth."""
+    """Return the figure of the measured and the filtered line of sight in earth angles [deg].
+
+    zoomed: the ZOOM_SPAN_S in which the target moved least, with the truth.
+    """
     run = data.run
     figure, panels = new_panels(2, y=[f'{name} [deg]' for _, name in AXIS_TITLES], sharex=True)
     truth = np.column_stack([_continuous(run.target_earth[:, i]) for i in range(2)])
@@ -120,7 +125,7 @@ def angle(data, zoomed=False):
         scale = np.cos(run.beam_earth[:, 1] + run.filtered[:, 1]) if i == 0 else 1.0
         filtered = beam + np.degrees(run.filtered[:, i] / scale)
         draw_line(axes, run.t, _continuous(data.raw_angles[:, i], truth[:, i]), window, color=RAW_COLOUR,
-              linewidth=0.8 if zoomed else 2.5, label='measured, before the filter')
+                  linewidth=0.8 if zoomed else 2.5, label='measured, before the filter')
         if zoomed:
             draw_line(axes, run.t, truth[:, i], window, color=TRUTH_COLOUR, label='truth')
         draw_line(axes, run.t, filtered, window, color=FILTERED_COLOUR, linewidth=1.2, label='after the filter')
@@ -139,7 +144,7 @@ def draw_azimuth(axes, data):
 
 
 def azimuth(data):
-    """Azimuth of antenna and target in earth angles [deg]."""
+    """Return the figure of the azimuth of antenna and target in earth angles [deg]."""
     figure, panels = new_panels(1, height=2.9)
     draw_azimuth(panels[0, 0], data)
     return outside_legend(figure, panels[0, 0])
@@ -166,7 +171,8 @@ def draw_pointing(axes, data, i):
 
 
 def pointing(data):
-    """True pointing error on both axes and angle off the beam [deg], over the modes of the ACU."""
+    """Return the figure of the true pointing error on both axes and of the angle off the beam [deg], with ACU
+    modes."""
     run = data.run
     figure, panels = new_panels(3, sharex=True)
     distance = np.degrees(np.hypot(run.cross_elevation, run.elevation_error))
@@ -187,19 +193,18 @@ def _mode_legend(figure, data):
     names = dict.fromkeys(mode for _, _, mode in data.modes)
     if names:
         figure.legend([Patch(color=MODE_COLOURS.get(name, RAW_COLOUR), alpha=0.45, linewidth=0.0) for name in names],
-                      list(names),
-                      loc='outside upper right', ncols=len(names))
+                      list(names), loc='outside upper right', ncols=len(names))
 
 
 def draw_torques(axes, data, axis, window=None):
-    """Draw the torques of both motors of an axis, 'azimuth' or 'elevation', and their bias [Nm]."""
+    """Draw the torques of both motors of an axis, 'azimuth' or 'elevation', and their bias torque [Nm]."""
     motors = data.motors
     first, second = motors[f'{axis}_motor_1.effort'], motors[f'{axis}_motor_2.effort']
     width = 0.7 if window is None else 1.0
     draw_line(axes, motors['t'], first, window, color=MOTOR_1_COLOUR, linewidth=width, label='motor 1')
     draw_line(axes, motors['t'], second, window, color=MOTOR_2_COLOUR, linewidth=width, label='motor 2')
     draw_line(axes, motors['t'], 0.5 * (first - second), window, color=INK_COLOUR, linewidth=0.9, linestyle='--',
-          label='bias, half their difference')
+              label='bias, half the difference')
     axes.set_ylabel('torque [Nm]')
     axes.set_title(axis)
 
@@ -210,7 +215,7 @@ def _start(data):
 
 
 def torques(data):
-    """Torques of both motors of each axis [Nm], whole and the first ZOOM_SPAN_S seconds."""
+    """Return the figure of the torques of both motors of each axis [Nm]: whole run and first ZOOM_SPAN_S."""
     window = _start(data)
     figure, panels = new_panels(2, 2, height=4.5, sharex='col', sharey='row', width_ratios=(3, 2))
     for row, axis in zip(panels, ('azimuth', 'elevation')):
@@ -222,7 +227,7 @@ def torques(data):
 
 
 def draw_carrier(axes, data):
-    """Draw C/N0 [dB-Hz]; shaded where the receiver was locked."""
+    """Draw C/N0 [dB-Hz]; shade the times with a locked receiver."""
     table = data.receiver
     draw_line(axes, table['t'], table['z'], color=RAW_COLOUR, linewidth=0.8, label='C/N0')
     for first, last in spans(np.isfinite(table['x'])):
@@ -232,7 +237,7 @@ def draw_carrier(axes, data):
 
 
 def carrier(data):
-    """C/N0 [dB-Hz] and where the receiver was locked."""
+    """Return the figure of C/N0 [dB-Hz] and of the lock of the receiver."""
     figure, panels = new_panels(1, height=2.7)
     draw_carrier(panels[0, 0], data)
     handles, labels = panels[0, 0].get_legend_handles_labels()
@@ -262,7 +267,7 @@ def draw_sky(axes, data):
 
 
 def sky(data):
-    """Target and beam over the station, north up."""
+    """Return the sky plot of target and beam over the station, north up."""
     figure = Figure(figsize=(FIGURE_WIDTH_INCH, 4.2), layout='constrained')
     axes = figure.subplots(subplot_kw={'projection': 'polar'})
     draw_sky(axes, data)
@@ -271,10 +276,9 @@ def sky(data):
 
 
 def timeline(data):
-    """Mode of the ACU, lock of the receiver, level that each node reported."""
-    rows = ([('ACU mode', [(start, stop - start, MODE_COLOURS.get(mode, RAW_COLOUR)) for start, stop,
-                           mode in data.modes])]
-            if data.modes else [])
+    """Return the figure of the ACU mode, the lock of the receiver, and the reported level of each node."""
+    rows = [('ACU mode', [(start, stop - start, MODE_COLOURS.get(mode, RAW_COLOUR))
+                          for start, stop, mode in data.modes])] if data.modes else []
     if data.receiver:
         t = data.receiver['t']
         rows.append(('receiver locked', [(t[first], t[last] - t[first], LOCKED_COLOUR)
@@ -303,7 +307,7 @@ def timeline(data):
 
 
 def overview(data):
-    """One wide picture of a run: sky, error before and after the filter, pointing error, motor torques."""
+    """Return one wide figure of a run: sky plot, error before and after the filter, pointing error, motor torques."""
     figure = Figure(figsize=(13.0, 7.0), layout='constrained')
     grid = figure.add_gridspec(4, 3, width_ratios=(1.05, 1.0, 1.0))
     polar = figure.add_subplot(grid[:2, 0], projection='polar')
@@ -329,7 +333,7 @@ def overview(data):
         draw_errors(column[0], data, i)
         column[0].set_title(f'{AXIS_TITLES[i][0]}: measured error')
         draw_pointing(column[1], data, i)
-        column[1].set_title(f'{AXIS_TITLES[i][0]}: pointing error against truth')
+        column[1].set_title(f'{AXIS_TITLES[i][0]}: true pointing error')
         if i == 0:
             column[0].legend(loc='upper right')
         else:
@@ -340,33 +344,32 @@ def overview(data):
 
 
 FIGURES = (
-    Spec('pointing', 'Pointing error against truth', 'True angle from the beam axis to the target on both axes, and '
-         'its size over the whole run; background and dotted lines show the mode of the ACU.', ('truth',), pointing),
-    Spec('error', 'Error before and after the filter (figure 7 of the paper)', 'The error the receiver put out (grey) '
-         'jumps from sample to sample; the filtered line of sight seen from the beam (blue) is what the position '
-         "loop gets instead, but for the error of the encoders, and on a ship that of its INS's attitude.",
+    Spec('pointing', 'True pointing error', 'True angle from the beam axis to the target on both axes, and its size '
+         'over the whole run. Background and dotted lines show the mode of the ACU.', ('truth',), pointing),
+    Spec('error', 'Error before and after the filter (figure 7 of the paper)', 'The receiver error (grey) changes '
+         'from sample to sample. The position loop follows the filtered line of sight, here seen from the true beam '
+         '(blue). The loop itself uses the encoders and, on a ship, the attitude of the INS.',
          ('truth', 'lock'), error),
     Spec('error_zoom', 'Error, zoomed (figure 8 of the paper)',
-         f'The middle {ZOOM_SPAN_S:g} s of the evaluated part: the '
-         'position loop holds the filtered error (blue) near zero; the true one (orange) is what the filter leaves of '
-         'the noise (grey).', ('truth', 'lock'), error_zoom),
-    Spec('angle', 'Angle before and after the filter (figure 9 of the paper)', 'Line of sight in earth angles as '
-         'measured (grey: encoder plus receiver) and as filtered (blue): one curve at this scale.',
+         f'The middle {ZOOM_SPAN_S:g} s of the evaluated part. The position loop holds the filtered error (blue) near '
+         'zero. The true error (orange) is the rest of the noise (grey) after the filter.',
+         ('truth', 'lock'), error_zoom),
+    Spec('angle', 'Angle before and after the filter (figure 9 of the paper)', 'Line of sight in earth angles: '
+         'measured (grey: encoder plus receiver) and filtered (blue). At this scale both are one curve.',
          ('truth', 'lock'), angle),
     Spec('angle_zoom', 'Angle, zoomed (figure 10 of the paper)',
-         f'The {ZOOM_SPAN_S:g} s in which the target moved least, '
-         'where the noise stands out best: filtered (blue) against measured (grey) and true (orange).',
-         ('truth', 'lock'), functools.partial(angle, zoomed=True)),
-    Spec('azimuth', 'Azimuth trajectory (figure 11 of the paper)', "The antenna's azimuth (blue) comes to the "
-         "target's (orange) and stays on it.", ('truth',), azimuth),
-    Spec('torques', 'Motor torques', 'Both motors of an axis share the load and pull against each other by the bias '
-         '(dashed) that closes the backlash and fades where the load is large; right: the start of the run.',
+         f'The {ZOOM_SPAN_S:g} s in which the target moved least, so that the noise shows best: filtered (blue), '
+         'measured (grey) and true (orange).', ('truth', 'lock'), functools.partial(angle, zoomed=True)),
+    Spec('azimuth', 'Azimuth trajectory (figure 11 of the paper)', 'The azimuth of the antenna (blue) reaches the '
+         'azimuth of the target (orange) and stays on it.', ('truth',), azimuth),
+    Spec('torques', 'Motor torques', 'Both motors of an axis share the load. The bias torque (dashed) pulls them '
+         'against each other and closes the backlash; it fades at large load. Right: the start of the run.',
          ('motors',), torques),
-    Spec('carrier', 'Signal and lock', 'C/N0 at the receiver; shaded where it was locked and put out errors.',
+    Spec('carrier', 'Signal and lock', 'C/N0 at the receiver; shaded: receiver locked, with errors as output.',
          ('receiver',), carrier),
     Spec('sky', 'Sky plot', 'Target and beam over the station: north up, azimuth clockwise, zenith in the middle, '
          'horizon on the rim.', ('truth',), sky),
-    Spec('timeline', 'Modes and health', 'Mode of the ACU, lock of the receiver and the level each node reported.',
+    Spec('timeline', 'Modes and health', 'Mode of the ACU, lock of the receiver, and reported level of each node.',
          ('modes',), timeline),
 )
 OVERVIEW_FIGURE = Spec('overview', '', '', ('truth', 'lock', 'motors'), overview, dpi=100)

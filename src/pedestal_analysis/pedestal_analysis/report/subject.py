@@ -1,4 +1,4 @@
-"""What a recording is of, for people: when it was by the sky's clock, where the antenna stood, what it tracked."""
+"""Subject of a recording in words: date, station and target."""
 import datetime
 import math
 
@@ -9,27 +9,27 @@ from pedestal_common.geometry import orbit
 from tracking_receiver_sim.params import TargetParameters
 
 TARGET_DESCRIPTIONS = {
-    'leo_pass': lambda target: f'satellite {target.leo_pass.line_1[2:7]}, by its TLE',
-    'track_file': lambda target: f'the track in {target.track_file.path.rpartition("/")[2]}',
+    'leo_pass': lambda target: f'satellite {target.leo_pass.line_1[2:7]}, from its TLE',
+    'track_file': lambda target: f'track of the file {target.track_file.path.rpartition("/")[2]}',
     'flyby': lambda target: (f'straight flight at {target.flyby.speed:g} m/s, {target.flyby.height:g} m above the '
-                             f'station, {target.flyby.closest_distance:g} m over ground where it is closest'),
+                             f'station, closest distance over ground {target.flyby.closest_distance:g} m'),
     'sine': lambda target: f'sine of {target.angle.frequency:g} Hz in azimuth and elevation',
     'step': lambda target: f'step at {target.angle.start:g} s',
     'ramp': lambda target: f'constant rate from {target.angle.start:g} s on',
 }
-"""{kind of target: TargetParameters -> what it is}."""
+"""{kind of target: TargetParameters -> description}."""
 
 STATION_TARGET_KINDS = ('leo_pass', 'track_file')
-"""Kinds that depend on where the station is."""
+"""Kinds of target that depend on the position of the station."""
 
 
 def place(station):
-    """A StationParameters as text."""
+    """Return StationParameters as text."""
     return f'latitude {station.latitude_deg:g}, longitude {station.longitude_deg:g} deg, height {station.height:g} m'
 
 
 def rows(bag, data):
-    """[name, text] of a bag.Bag as one beam sees it and its run_data.RunData; without what the bag does not say."""
+    """Return rows [name, text] on a bag.Bag of one beam and its run_data.RunData, as far as the bag states them."""
     beamwidth = [['beamwidth', f'{math.degrees(data.beamwidth):.4g} deg']] if math.isfinite(data.beamwidth) else []
     values = bag.configuration['parameters'].get('tracking_receiver', {})
     try:
@@ -44,7 +44,7 @@ def rows(bag, data):
 
 
 def _sky(bag, data):
-    """Rows on the UTC at 0 s, and of the highest place, of a target that has a date."""
+    """Return rows on the UTC at 0 s and on the highest elevation, for a target with a date."""
     try:
         begin = orbit.instant('stamp_0_utc', _begin(bag))
     except orbit.TargetError:
@@ -60,7 +60,7 @@ def _sky(bag, data):
 
 
 def _begin(bag):
-    """UTC of 0 s as the receiver says it in its diagnostics, '' where it does not."""
+    """Return the UTC of 0 s in the diagnostics of the receiver, '' if there is none."""
     if 'diagnostics' not in bag.topics or not bag.rows('diagnostics').size:
         return ''
     for _, _, _, array in bag.messages('diagnostics'):

@@ -1,9 +1,9 @@
-"""`pedestal export --format tdm`: where the beam saw the target, as a CCSDS Tracking Data Message.
+"""`pedestal export --format tdm`: measured directions of the target as a CCSDS Tracking Data Message.
 
-CCSDS 503.0-B-2 in keyword = value notation, for orbit determination. A record holds azimuth and elevation, what the
-encoders said with the error of the receiver put on top; the range where it was measured; and the C/N0. Only steps in
-autotrack with the receiver locked are written. On a ship the angles are turned by the attitude that the INS knew.
-Nothing is corrected for refraction. Times are UTC.
+The format is CCSDS 503.0-B-2 in keyword = value notation, for orbit determination. A record contains azimuth and
+elevation (encoders plus receiver error), the range if measured, and C/N0. Only steps in autotrack with a locked
+receiver are written. On a ship the attitude of the INS rotates the angles. Nothing is corrected for refraction. Times
+are UTC.
 """
 import pathlib
 import re
@@ -16,42 +16,47 @@ from pedestal_common.graph import nodes
 from pedestal_recording import bag as bags
 from pedestal_recording import columns
 from pedestal_recording.export import whole
+from tracking_receiver_sim.track import instant
 
 RATE_LIMITS_HZ = 1e-3, 1000.0
-"""Records a second."""
+"""Smallest and largest rate of records [Hz]."""
 
 SEGMENT_STEPS = 10_000
-"""Steps of a segment, which are in memory at once."""
+"""Number of steps of a segment, all in memory at once."""
 
 DEFAULT_STATION_NAME = 'PEDESTAL'
-"""Name of the station where the user says none."""
+"""Default name of the station."""
 
 PARTICIPANT_PATTERN = re.compile(r'[ -~]{1,80}')
-"""What the name of a participant may be."""
+"""Pattern of the name of a participant."""
 
 TLE_DESIGNATOR_PATTERN = re.compile(r'(\d\d)(\d{3})([A-Z]{1,3}) *')
-"""The international designator of a TLE."""
+"""Pattern of the international designator of a TLE."""
 
 TOPIC_COLUMNS = {'joint_states': ('azimuth.position', 'elevation.position'),
                  'tracking_receiver/angle_error': ('x', 'y', 'z'),
                  'ship/imu/data': tuple(f'orientation.{axis}' for axis in 'xyzw'),
                  'tracking_receiver/range': ('range',)}
-"""{topic: its columns that are read}."""
+"""{topic: columns to read}."""
 
 
 def export(path, created, output=None, rate=10.0, participants=(), overwrite=False):
-    """Write the tracking data of a bag; iterator of (file, records), one for each beam.
+    """Write the tracking data of a bag and yield (file, records) for each beam.
 
-    created: datetime of the message, UTC. output: a file that ends in .tdm, or a folder, default `export` in the bag.
-    rate: records a second at the most. participants: names of the station and of the target, where they are not
-    DEFAULT_STATION_NAME and the international designator of the TLE. overwrite: replace files.
-    Raises bag.BagError and ValueError, or, before anything is written, FileExistsError.
+    created       datetime of the message, UTC
+    output        a file with the suffix .tdm, or a folder, default `export` in the bag
+    rate          largest number of records a second
+    participants  names of the station and the target, default DEFAULT_STATION_NAME and the international designator of
+                  the TLE
+    overwrite     True to replace files
+
+    Raises bag.BagError and ValueError, or FileExistsError before anything is written.
     """
     if not RATE_LIMITS_HZ[0] <= rate <= RATE_LIMITS_HZ[1]:
         raise ValueError(f'--rate {rate:g}: must be {RATE_LIMITS_HZ[0]:g} to {RATE_LIMITS_HZ[1]:g} records a second')
     for name in participants:
         if not PARTICIPANT_PATTERN.fullmatch(name):
-            raise ValueError(f'--participants {name!r:.60}: must be at most 80 ASCII characters')
+            raise ValueError(f'--participants {name!r:.60}: must be 1 to 80 ASCII characters')
     bag = bags.read(path)
     for file, view in _files(bag, output, overwrite).items():
         tracks = _Tracks(view, rate)
@@ -63,29 +68,32 @@ def export(path, created, output=None, rate=10.0, participants=(), overwrite=Fal
                 records += len(segment[0])
                 stream.write(_segment(segment, _participants(view, participants)))
             if not records:
-                raise bags.BagError(f'{path}: no step in autotrack with the receiver locked in it: nothing to export')
+                raise bags.BagError(f'{path}: nothing to export: no step is in autotrack with a locked receiver')
         yield file, records
 
 
 def _files(bag, output, overwrite):
-    """{file to write: bag.Bag of one beam}. Raises FileExistsError, and ValueError of one file for several beams."""
+    """Return {file to write: bag.Bag of one beam}.
+
+    Raises FileExistsError, and ValueError for one file with several beams.
+    """
     views = [bag.view(prefix[:-1]) for prefix in nodes.prefixes(bag.beams)]
     output = pathlib.Path(output) if output is not None else bag.file.parent / 'export'
     if output.suffix == '.tdm':
         if len(views) > 1:
-            raise ValueError(f'--output {output}: must be a folder: there are {len(views)} beams in {bag.path}')
+            raise ValueError(f'--output {output}: must be a folder, because {bag.path} has {len(views)} beams')
         files = {output: views[0]}
     else:
         name = bag.path.resolve().stem
         files = {output / f'{".".join(filter(None, (name, view.beam[:-1])))}.tdm': view for view in views}
     for file in files:
         if file.exists() and not overwrite:
-            raise FileExistsError(f'{file} exists already; --overwrite replaces')
+            raise FileExistsError(f'{file} exists already; --overwrite replaces the file')
     return files
 
 
 class _Tracks:
-    """The steps of a bag of one beam that are exported, `rate` a second at most."""
+    """The exported steps of a bag of one beam, at most `rate` a second."""
 
     def __init__(self, bag, rate):
         self.bag, self.begin = bag, _utc_of_zero(bag)
@@ -93,13 +101,13 @@ class _Tracks:
         self.rows = {topic: of for topic, of in rows.items() if of.size}
         missing = [name for name in ('joint_states', 'tracking_receiver/angle_error') if name not in self.rows]
         if missing:
-            raise bags.BagError(f'{bag.path}: no message of {missing[0]} in it')
+            raise bags.BagError(f'{bag.path}: no message of {missing[0]} in the bag')
         stamps = np.unique(self.rows['joint_states'].stamp)
         _, first = np.unique((stamps - stamps[:1]) * rate // 1e9, return_index=True)
         self.stamps = stamps[first]
 
     def segments(self):
-        """Iterator of (times, angles (n, 2) [deg], range (n,) [km] or NaN, C/N0 (n,) [dB-Hz]), none of them empty."""
+        """Yield (times, angles (n, 2) [deg], range (n,) [km] or NaN, C/N0 (n,) [dB-Hz]) of segments with n > 0."""
         for at in range(0, len(self.stamps), SEGMENT_STEPS):
             stamps = self.stamps[at:at + SEGMENT_STEPS]
             beam, error = self._at('joint_states', stamps), self._at('tracking_receiver/angle_error', stamps)
@@ -108,12 +116,12 @@ class _Tracks:
             mode = tracking.modes(self.bag, (stamps - self.bag.start) / 1e9)
             there = np.isfinite(angles).all(axis=1) & ((mode == 'autotrack') | ('acu/mode' not in self.bag.topics))
             if there.any():
-                times = self.begin + np.round((stamps[there] - self.bag.start) / 1e3).astype('m8[us]')
-                yield (np.datetime_as_string(times), angles[there],
+                passed = np.round((stamps[there] - self.bag.start) / 1e3).astype('m8[us]')
+                yield (instant.utc_texts(self.begin, passed), angles[there],
                        1e-3 * self._at('tracking_receiver/range', stamps)[there, 0], error[there, 2])
 
     def _at(self, topic, stamps):
-        """TOPIC_COLUMNS of a topic (n, k) at stamps (n,) [ns]; NaN where it has no message of that stamp."""
+        """Return the TOPIC_COLUMNS (n, k) of a topic at stamps (n,) [ns]; NaN where no message has the stamp."""
         out = np.full((len(stamps), len(TOPIC_COLUMNS[topic])), np.nan)
         rows = self.rows.get(topic, self.bag.index[:0])
         _, here, there = np.intersect1d(stamps, rows.stamp, return_indices=True)
@@ -129,15 +137,17 @@ class _Tracks:
 
 
 def _utc_of_zero(bag):
-    """UTC of the time 0 of a bag of one beam, datetime64[us]: of its target where that has a date, else of the clock
-    it was recorded by. Raises bag.BagError where there is neither."""
-    said = bag.last_values(f'{bag.beam}tracking_receiver').get('stamp_0_utc', '')
-    if said:
-        return np.datetime64(orbit.instant(f'{bag.path}: stamp_0_utc', said), 'us')
+    """Return the UTC of the time 0 of a bag of one beam, datetime64[us].
+
+    It is that of a target with a date, else that of the clock of the recording. Raises bag.BagError without both.
+    """
+    date = bag.last_values(f'{bag.beam}tracking_receiver').get('stamp_0_utc', '')
+    if date:
+        return np.datetime64(orbit.instant(f'{bag.path}: stamp_0_utc', date), 'us')
     if bag.start:
         return np.datetime64(bag.start // 1000, 'us')
-    raise bags.BagError(f'{bag.path}: it does not say when it was, as a tracking data message must: a run in lockstep '
-                        'has a date where its target is a satellite or a flight with a date')
+    raise bags.BagError(f'{bag.path}: the bag has no date, which a tracking data message needs; a lockstep run has a '
+                        'date only if its target is a satellite or a flight with a date')
 
 
 def _header(bag, created):
@@ -151,7 +161,7 @@ def _header(bag, created):
 
 
 def _participants(bag, names):
-    """(name of the station, name of the target)."""
+    """Return (name of the station, name of the target)."""
     receiver = bag.configuration['parameters'].get('tracking_receiver', {})
     target = str(receiver.get('target.kind', 'TARGET')).upper()[:80]
     launch = TLE_DESIGNATOR_PATTERN.fullmatch(str(receiver.get('target.leo_pass.line_1', ''))[9:17])
@@ -163,7 +173,7 @@ def _participants(bag, names):
 
 
 def _segment(segment, participants):
-    """The text of a segment; keywords are in the order that table 3-3 of the book demands."""
+    """Return the text of a segment, with the keywords in the order of table 3-3 of CCSDS 503.0-B-2."""
     times, angles, distance, cn0 = segment
     lines = ['META_START', 'COMMENT angles = encoders + error of the receiver, not corrected for refraction',
              'TIME_SYSTEM = UTC', f'START_TIME = {times[0]}', f'STOP_TIME = {times[-1]}',

@@ -1,4 +1,4 @@
-"""The page that `pedestal trials` writes: histograms, scatter plots, the worst trial beside the median one."""
+"""Page of `pedestal trials`: histograms, scatter plots, the worst and the median trial."""
 import dataclasses
 import html
 import math
@@ -21,36 +21,40 @@ from pedestal_bringup.loop import memory_recording
 from pedestal_common.graph import nodes
 
 HISTOGRAM_RESULTS = ('pointing_rms_deg', 'pointing_max_deg', 'azimuth_following_rms_deg',
-                     'elevation_following_rms_deg',
-                     'lock_time_s', 'loss_s', 'azimuth_nis_mean', 'azimuth_nees_mean', 'elevation_nis_mean',
-                     'elevation_nees_mean',
-                     'isolation_db', 'heading_error_rms_deg')
-"""Results whose histograms are drawn, where they vary."""
+                     'elevation_following_rms_deg', 'lock_time_s', 'loss_s', 'azimuth_nis_mean', 'azimuth_nees_mean',
+                     'elevation_nis_mean', 'elevation_nees_mean', 'isolation_db', 'heading_error_rms_deg')
+"""Names of results with a histogram, if their values vary."""
 
 
 @dataclasses.dataclass
 class Trials:
-    """Trials as the page shows them: plan.Plan and table.Table, by: the result that ranks them, worst: numbers of the
-    worst, the worst first; flown [(title, tracking.Tracking)] of the worst and of the median one; sides:
-    comparison.Sides or None; command: the command line."""
+    """Data of the page.
+
+    plan, table  plan.Plan and table.Table
+    by           name of the result that ranks the trials
+    worst        numbers of the worst trials, the worst first
+    runs         [(title, tracking.Tracking)] of the worst and the median trial
+    sides        comparison.Sides or None
+    command      command line
+    """
     plan: object
     table: object
     by: str
     worst: list
-    flown: list
+    runs: list
     sides: object
     command: str
 
 
 def read(plan, table, by, sides, command, count=10) -> Trials:
-    """The Trials of a plan and its table; the worst and the median trial are run once more."""
+    """Return the Trials of a plan and its table; run the worst and the median trial again for their signals."""
     places = statistics.ranking(by, table.column(by)).tolist()
     known = [i for i in places if math.isfinite(table.column(by)[i])] or places
     chosen = {'worst': places[0], 'median': known[len(known) // 2]}
     beam = nodes.beam_of(by)
-    flown = [(f'{name}: trial {i}', tracking.read(memory_recording.record(plan.scenario(i), beam)))
-             for name, i in chosen.items()]
-    return Trials(plan, table, by, places[:count], flown, sides, command)
+    runs = [(f'{name}: trial {i}', tracking.read(memory_recording.record(plan.scenario(i), beam)))
+            for name, i in chosen.items()]
+    return Trials(plan, table, by, places[:count], runs, sides, command)
 
 
 def _label(name):
@@ -59,14 +63,14 @@ def _label(name):
 
 
 def _varying(table, names):
-    """The columns of those named that vary: [(name, values)]."""
+    """Return [(name, values)] of the named columns whose values vary."""
     found = [(name, table.column(name)) for name in names]
     return [(name, values) for name, values in found
             if np.isfinite(values).any() and np.ptp(values[np.isfinite(values)]) > 0.0]
 
 
 def histograms(trials):
-    """How the results are spread over the trials, two a row; the median dashed."""
+    """Return the figure of the histograms of the results, two in a row; dashed: the median."""
     shown = _varying(trials.table, [name for name in trials.table.there if nodes.plain(name) in HISTOGRAM_RESULTS])
     rows = max(1, -(-len(shown) // 2))
     figure, panels = new_panels(rows, 2, height=0.5 + 1.7 * rows, x='')
@@ -82,7 +86,7 @@ def histograms(trials):
 
 
 def scatter(trials):
-    """The ranking result over every varied parameter; the worst trials orange."""
+    """Return the figure of the ranking result over each varied parameter; the worst trials are orange."""
     varied = _varying(trials.table, trials.table.varied)
     rows = max(1, -(-len(varied) // 2))
     figure, panels = new_panels(rows, 2, height=0.5 + 2.0 * rows, x='')
@@ -99,11 +103,11 @@ def scatter(trials):
 
 
 def worst_and_median(trials):
-    """Pointing error over time of the worst trial and of the median one, else the following error, on one scale."""
-    pointing = any(run.tracking.any() for _, run in trials.flown)
+    """Return the figure of the pointing error, else the following error, of the worst and the median trial."""
+    pointing = any(run.tracking.any() for _, run in trials.runs)
     figure, panels = new_panels(2, 2, y='pointing error [deg]' if pointing else 'following error [deg]', sharex=True,
                                 sharey='row')
-    for column, (title, run) in zip(panels.T, trials.flown):
+    for column, (title, run) in zip(panels.T, trials.runs):
         errors = (np.degrees(np.column_stack((run.cross_elevation, run.elevation_error))) if pointing
                   else run.following)
         if pointing:
@@ -115,7 +119,7 @@ def worst_and_median(trials):
 
 
 def pairs(trials):
-    """The ranking result of both sides pair by pair, and the histogram of the difference."""
+    """Return the figure of the ranking result of both sides, pair by pair, and of the histogram of the difference."""
     figure, panels = new_panels(1, 2, height=3.3, x=('', 'difference of a pair'))
     a, b = trials.sides.pairs(trials.by)
     left, right = panels[0]
@@ -131,23 +135,23 @@ def pairs(trials):
 
 
 def _figures(trials):
-    """[(Spec, why it cannot be drawn, '')]."""
+    """Return [(Spec, reason why the figure cannot be drawn, else '')]."""
     nothing_varied = '' if _varying(trials.table, trials.table.varied) else 'no parameter was varied'
-    found = [(Spec('histograms', 'Histograms', 'Every result over the trials in which it was measured; dashed: the '
-                   'median.', (), histograms), ''),
-             (Spec('scatter', 'Over the varied parameters', f'{trials.by} of each trial; orange: the worst ones.', (),
-                   scatter), nothing_varied),
-             (Spec('worst', 'The worst trial beside the median one', f'By {trials.by}, on one scale.', (),
+    found = [(Spec('histograms', 'Histograms', 'Distribution of each result over the trials in which it was measured; '
+                   'dashed: the median.', (), histograms), ''),
+             (Spec('scatter', 'Over the varied parameters', f'{trials.by} of each trial; orange: the worst trials.',
+                   (), scatter), nothing_varied),
+             (Spec('worst', 'Worst trial and median trial', f'Ranked by {trials.by}; both on one scale.', (),
                    worst_and_median), '')]
     if trials.sides is not None:
         few = '' if len(trials.sides.pairs(trials.by)[0]) else f'{trials.by} was measured in no pair'
-        found.insert(0, (Spec('pairs', 'Pair by pair', 'Each point is a seed; below the line the first side has the '
+        found.insert(0, (Spec('pairs', 'Pair by pair', 'Each point is a seed. Below the line the first side has the '
                               'smaller value.', (), pairs), few))
     return found
 
 
 def _estimates(rows, head):
-    """An HTML table of --json rows: value and interval."""
+    """Return an HTML table of --json rows with values and intervals."""
     lines = [[row['case'], row['metric'], elements.number(row['value'] if row['value'] is not None else math.nan,
                                                           row['unit']),
               '' if row['ci_low'] is None and row['ci_high'] is None else
@@ -160,7 +164,7 @@ def _bound(value):
 
 
 def page(trials, rows):
-    """The page of Trials and of their --json rows, as text."""
+    """Return the page of Trials and of their --json rows as text."""
     title = f'{trials.plan.runs} trials: {trials.plan.name}'
     values = trials.table.column(trials.by)
     worst = [[f'trial {i}', elements.number(values[i], statistics.unit(trials.by)), trials.plan.command(i)]
@@ -171,7 +175,7 @@ def page(trials, rows):
         parts.append(f'<p><b>{html.escape(comparison.sentence(trials.sides, trials.by))}</b></p>')
     parts += ['<h2 id="figures">Figures</h2>', *(elements.figure(spec, trials, reason)
                                                 for spec, reason in _figures(trials)),
-              f'<h2 id="worst-trials">The worst trials by {html.escape(trials.by)}</h2>',
-              elements.table(['trial', trials.by, 'the run in the graph with the same numbers'], worst),
+              f'<h2 id="worst-trials">Worst trials by {html.escape(trials.by)}</h2>',
+              elements.table(['trial', trials.by, 'command that runs the same trial in the graph'], worst),
               '<h2 id="numbers">Numbers</h2>', _estimates(rows, head)]
     return elements.page(title, parts)

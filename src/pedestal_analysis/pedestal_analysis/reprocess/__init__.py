@@ -1,1 +1,1 @@
-"""A recording used again: recomputed node by node, replayed into live nodes, the whole run made once more."""
+"""Reprocess a recording: recompute a node, replay the recording into live nodes, rerun the whole run."""

@@ -1,7 +1,7 @@
-"""Differences between the messages of a topic and those made again: count and order first, then the fields.
+"""Differences between recorded messages of a topic and new ones: count and order first, then the fields.
 
-`compare` pairs messages by their stamps and lets their numbers differ within a tolerance: a node recomputed.
-`compare_messages` pairs them by their place and lets nothing pass: a run made again.
+`compare` pairs messages by stamp and allows a tolerance of the numbers; it serves recomputed nodes.
+`compare_messages` pairs messages by position and allows no difference; it serves runs that were rerun.
 """
 import dataclasses
 import fnmatch
@@ -15,35 +15,40 @@ from pedestal_common.wire import messages
 from pedestal_recording import columns
 
 REST_FIELD = 'names, frames and the rest'
-"""The field that stands for everything in a message that is neither its stamp nor one of its numbers."""
+"""Name of the field that collects all content of a message except its stamp and its numbers."""
 
 RELATIVE_TOLERANCE = 1e-9
-"""Relative tolerance; the absolute one is of the column (layouts)."""
+"""Default relative tolerance [-]; the absolute tolerance is that of the column (layouts)."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Tolerance:
-    """How far numbers may differ: absolute and relative; None: that of the column and RELATIVE_TOLERANCE. ignored:
-    patterns of
-    topics or of topic.field that are not compared, for example 'acu/reference*'."""
+    """Allowed difference of numbers.
+
+    absolute: None for the tolerance of the column; relative: None for RELATIVE_TOLERANCE; ignored: patterns of topics
+    or of topic.field without comparison, for example 'acu/reference*'.
+    """
     absolute: float | None = None
     relative: float | None = None
     ignored: tuple = ()
 
     def of(self, column):
-        """(absolute, relative) of a layouts.Column."""
+        """Return (absolute, relative) for a layouts.Column."""
         return (column.tolerance if self.absolute is None else self.absolute,
                 RELATIVE_TOLERANCE if self.relative is None else self.relative)
 
     def ignores(self, name):
-        """Whether a topic or topic.field is not compared."""
+        """Return True if a topic or topic.field is not compared."""
         return any(fnmatch.fnmatchcase(name, pattern) for pattern in self.ignored)
 
 
 @dataclasses.dataclass
 class FieldDifference:
-    """One field of a topic: in how many messages it differs, in how many beyond its tolerance, the largest difference
-    (inf: a number against NaN, or no number), the stamp of the first [s]."""
+    """One field of a topic that differs.
+
+    different, beyond: numbers of messages that differ at all and beyond the tolerance; largest: largest difference
+    (inf: a number against NaN, or no number); first: stamp of the first difference [s].
+    """
     name: str
     different: int
     beyond: int
@@ -53,8 +58,10 @@ class FieldDifference:
 
 @dataclasses.dataclass
 class TopicDifference:
-    """A topic whose messages were paired by their stamps: how many were recorded and are there now, what is wrong with
-    their count and order (texts), the fields that differ, [FieldDifference]."""
+    """A topic with messages paired by stamp.
+
+    was, now: numbers of recorded and new messages; problems: texts on count and order; fields: [FieldDifference].
+    """
     name: str
     was: int
     now: int
@@ -63,16 +70,16 @@ class TopicDifference:
 
     @property
     def equal(self):
-        """Whether nothing differs beyond its tolerance."""
+        """True if nothing differs beyond its tolerance."""
         return not self.problems and not any(field.beyond for field in self.fields)
 
     @property
     def identical(self):
-        """Whether nothing differs at all."""
+        """True if nothing differs at all."""
         return not self.problems and not self.fields
 
     def lines(self):
-        """The topic as text, a line for each field that differs."""
+        """Return the topic as lines of text, a line for each field that differs."""
         lines = [f'{self.name:34} {self.now:9} {self.was:9}  {"identical" if self.identical else ""}'.rstrip()]
         lines += [f'  {problem}' for problem in self.problems]
         for field in self.fields:
@@ -82,7 +89,7 @@ class TopicDifference:
 
 
 def lines(differences) -> list:
-    """TopicDifferences as a table of text."""
+    """Return TopicDifferences as the lines of a table."""
     text = [f'{"topic":34} {"computed":>9} {"recorded":>9}']
     if any(topic.fields for topic in differences):
         text.append(f'  {"field":32} {"differ":>9} {"beyond":>9} {"largest":>11} {"first s":>14}')
@@ -91,14 +98,16 @@ def lines(differences) -> list:
 
 @dataclasses.dataclass
 class Output:
-    """Messages of one topic as numbers: stamps (n,) [ns], values (n, columns) in the units of the topic; texts (n,)
-    instead of values where the topic is a text."""
+    """Messages of one topic as numbers: stamps (n,) [ns], values (n, columns) in the units of the topic.
+
+    texts: (n,) instead of values for a text topic.
+    """
     stamps: np.ndarray
     values: np.ndarray
     texts: list | None = None
 
     def table(self, topic):
-        """{column: array (n,)} with the names of columns.table."""
+        """Return {column: array (n,)} with the names of columns.table."""
         if self.texts is not None:
             return {'t': self.stamps / 1e9, 'data': self.texts}
         return {'t': self.stamps / 1e9,
@@ -106,7 +115,8 @@ class Output:
 
 
 def recorded(data, log, topic) -> Output:
-    """The Output in CDR messages of a topic logged at `log` (n,) [ns]. Raises ValueError when they are none."""
+    """Return the Output of CDR messages of a topic logged at `log` (n,) [ns]. Raises ValueError for invalid
+    messages."""
     type_name = topics.TOPIC_BY_NAME[topic].type
     log = np.asarray(log, np.int64)
     if type_name == 'std_msgs/msg/String':
@@ -121,7 +131,7 @@ def recorded(data, log, topic) -> Output:
 def compare(topic, was: Output, now: Output, tolerance=Tolerance(), data=None, template=None) -> TopicDifference:
     """Compare the recorded messages of a topic with the recomputed ones.
 
-    data, template: the recorded CDR messages and a message as the node makes it, for what is no number in them.
+    data, template: recorded CDR messages and a message that the node makes, to compare the content without numbers.
     """
     difference = TopicDifference(topic, len(was.stamps), len(now.stamps), _order(was.stamps, now.stamps), [])
     _, here, there = np.intersect1d(was.stamps, now.stamps, return_indices=True)
@@ -132,7 +142,7 @@ def compare(topic, was: Output, now: Output, tolerance=Tolerance(), data=None, t
             difference.fields.append(FieldDifference(name, int(different.sum()), int(beyond.sum()), float(
                 size[different].max()), stamps[np.argmax(different)] / 1e9))
 
-    if was.texts is not None:
+    if was.texts is not None and now.texts is not None:
         different = np.array([was.texts[i] != now.texts[j] for i, j in zip(here, there)], bool)
         add('data', different, different, np.full(different.size, math.inf))
         return difference
@@ -153,7 +163,7 @@ def compare(topic, was: Output, now: Output, tolerance=Tolerance(), data=None, t
 
 
 def _order(was, now):
-    """What is wrong with the recorded stamps (n,) [ns] against those that are due."""
+    """Return texts on the problems of the recorded stamps (n,) [ns], compared with the expected stamps."""
     problems = []
     if len(was) != len(now):
         problems.append(f'{len(was)} messages recorded, {len(now)} recomputed')
@@ -172,8 +182,11 @@ def _order(was, now):
 
 @dataclasses.dataclass
 class MessageDifference:
-    """A topic whose messages were paired by their place: how many were recorded and are there now, how many pairs
-    differ, the log time of the first [ns] and what differs in it, texts."""
+    """A topic with messages paired by position.
+
+    was, now: numbers of recorded and new messages; different: number of pairs that differ; first: log time of the
+    first different pair [ns]; changes: texts on its differences.
+    """
     name: str
     was: int
     now: int
@@ -183,7 +196,8 @@ class MessageDifference:
 
 
 def compare_messages(name, was, now):
-    """The MessageDifference of a topic in two bags (bag.Bag); None when its messages are equal to the last byte."""
+    """Return the MessageDifference of a topic in two bags (bag.Bag); None if the messages are equal to the last
+    byte."""
     kinds = was.topics.get(name, 'none'), now.topics.get(name, 'none')
     old, new = ([(log, data) for _, log, _, data in bag.raw(name)] if name in bag.topics else []
                 for bag in (was, now))
@@ -197,18 +211,18 @@ def compare_messages(name, was, now):
 
 
 def compare_order(was, now):
-    """The MessageDifference at the first place where two bags differ whose topics are equal one by one, or None."""
+    """Return the MessageDifference at the first different position in two bags with equal topics, or None."""
     for old, new in zip(was.raw(), now.raw()):
         if old != new:
-            change = f'its place in the file, now {new[0]} at {new[1] / 1e9:.6f} s comes there'
+            change = f'position in the file; the new file has {new[0]} at {new[1] / 1e9:.6f} s there'
             return MessageDifference(old[0], was.rows(old[0]).size, now.rows(old[0]).size, 0, old[1], [change])
     return None
 
 
 def _changes(was, now, kinds):
-    """What differs between two messages (log time, bytes) of these types, None for one that is not there; texts."""
+    """Return texts on the differences of two messages (log time, bytes) of these types; None for a missing message."""
     if was is None or now is None:
-        return ['not recorded' if was is None else 'not there any more']
+        return ['not recorded' if was is None else 'no new message']
     if was[0] != now[0]:
         return [f'log time {was[0] / 1e9:.6f} -> {now[0] / 1e9:.6f}']
     try:
@@ -216,11 +230,11 @@ def _changes(was, now, kinds):
     except ValueError as error:
         return [str(error)]
     return [f'{key} {old.get(key)!r} -> {new.get(key)!r}' for key in dict.fromkeys((*old, *new))
-            if repr(old.get(key)) != repr(new.get(key))] or ['bytes that are in no field']
+            if repr(old.get(key)) != repr(new.get(key))] or ['bytes outside all fields']
 
 
 def _leaves(message, prefix=''):
-    """(dotted name, value) of every number and text in a message."""
+    """Yield (dotted name, value) of each number and text in a message."""
     for field in message.__dataclass_fields__:
         if field.isupper() or field == '__msgtype__':
             continue

@@ -1,4 +1,4 @@
-"""`pedestal recompute --live`: the recorded inputs of a node into its real process, in lockstep over DDS."""
+"""`pedestal recompute --live`: feed the recorded inputs of a node to its real process, in lockstep over DDS."""
 import collections
 import os
 import pathlib
@@ -24,16 +24,17 @@ from pedestal_common.node import middleware
 from pedestal_common.wire import commands, messages, records
 
 NODE_START_TIMEOUT_S = 300.0
-"""Seconds within which the node has started; it may be compiling its laws for the first time."""
+"""Time allowed for the start of the node, which may compile its laws for the first time [s]."""
 ANSWER_TIMEOUT_S = 20.0
-"""Seconds within which it answers a step."""
+"""Time allowed for the answer of the node to a step [s]."""
 STOP_TIMEOUT_S = 10.0
+"""Grace period between SIGINT and SIGKILL [s]."""
 
 
 class Feeder(Operator):
-    """Stands for everything around the node: writes what it reads, reads what it writes.
+    """The graph around the node: it publishes the inputs of the node and subscribes to its outputs.
 
-    inputs: topics that are fed; written: topics that are kept in `answers`.
+    inputs: topics to publish; written: output topics, whose messages are kept in `answers`.
     """
 
     def __init__(self, node, inputs, written):
@@ -50,7 +51,7 @@ class Feeder(Operator):
                                      self.replies.append, middleware.qos(self.links[row.replies].rate), raw=True)
 
     def stand_in(self, names):
-        """Make nodes of these names, those the process is told of, which read what it writes."""
+        """Make nodes of these names, which are in the node list of the process, as subscribers of its outputs."""
         for reader in names:
             if reader not in (self.node, self.name):
                 self.readers.append(rclpy.create_node(reader))
@@ -66,15 +67,15 @@ class Feeder(Operator):
         return self.create_publisher(middleware.message_class(link.type), link.name, middleware.qos(link.rate))
 
     def announce_now(self, name, data):
-        """Publish a message that no step waits for, and wait until it has arrived."""
+        """Publish a message that no step waits for, and wait for its acknowledgement."""
         publisher = self.publishers_of[name]
         publisher.publish(data)
         if not publisher.wait_for_all_acked(Duration(seconds=ANSWER_TIMEOUT_S)):
-            raise RunError(f'{self.node} did not take {name} within {ANSWER_TIMEOUT_S:g} s')
+            raise RunError(f'{self.node} did not acknowledge {name} within {ANSWER_TIMEOUT_S:g} s')
 
 
 class Live:
-    """The node's process and the feeder, spun until what is waited for has come."""
+    """The process of the node and the feeder, whose nodes are spun while waiting."""
 
     def __init__(self, feeder, process, log, services):
         self.feeder, self.process, self.log, self.services = feeder, process, log, services
@@ -82,19 +83,22 @@ class Live:
         for node in (feeder, *feeder.readers):
             self.executor.add_node(node)
 
-    def until(self, condition, limit, what):
-        """Spin until condition() holds. Raises RunError where the node dies, or lacks what() after `limit` [s]."""
+    def until(self, condition, limit, missing):
+        """Spin until condition() is true.
+
+        Raises RunError if the node dies, or after `limit` [s]; missing() -> name of the missing message.
+        """
         deadline = time.monotonic() + limit
         while not condition():
             if self.process.poll() not in (None, 0):
-                raise RunError(f'{self.feeder.node} ended with exit code {self.process.returncode}: '
+                raise RunError(f'{self.feeder.node} exited with code {self.process.returncode}: '
                                f'{" ".join(self.log.read_text(errors="replace").split())}')
             if time.monotonic() > deadline:
-                raise RunError(f'{self.feeder.node}: no {what()} within {limit:g} s')
+                raise RunError(f'{self.feeder.node}: no {missing()} within {limit:g} s')
             self.executor.spin_once(timeout_sec=0.1)
 
-    def ask(self, command):
-        """Ask for a Command, by the service of this name or by the topic, and wait for the answer."""
+    def send_command(self, command):
+        """Send a Command by its service or by the command topic, and wait for the reply."""
         if command.verb not in self.services:
             before = len(self.feeder.replies)
             self.feeder.asks.publish(messages.serialize(commands.message(command)))
@@ -104,16 +108,19 @@ class Live:
         client = self.feeder.create_client(Trigger, service)
         self.until(client.service_is_ready, ANSWER_TIMEOUT_S, lambda: f'service {service}')
         future = client.call_async(Trigger.Request())
-        self.until(future.done, ANSWER_TIMEOUT_S, lambda: f'answer of {service}')
+        self.until(future.done, ANSWER_TIMEOUT_S, lambda: f'reply of service {service}')
         self.feeder.destroy_client(client)
 
 
 def outputs(recording, done, params):
-    """{topic: Output} of the process of a node fed with the inputs of a Recomputed, whose answers say how many
-    messages are due at each step. Raises RunError when they do not come."""
+    """Return {topic: Output} of the process of a node fed with the inputs of a Recomputed.
+
+    The outputs of the Recomputed give the number of messages due at each step. Raises RunError if messages are
+    missing.
+    """
     if not recording.lockstep:
-        raise recompute.RecomputeError('--live feeds in lockstep: a realtime recording, whose steps may lack inputs, '
-                                       'is recomputed without it')
+        raise recompute.RecomputeError('--live feeds in lockstep, and steps of a realtime recording may lack inputs; '
+                                       'recompute it without --live')
     middleware.initialise([])
     try:
         with tempfile.TemporaryDirectory() as folder:
@@ -123,7 +130,7 @@ def outputs(recording, done, params):
 
 
 def _graph(recording, unit):
-    """Names of the nodes the process is told of: itself, who records it, and whoever changes what it reads."""
+    """Return the node list of the process: the node, the recorder, and nodes that determine its inputs."""
     optional = [node.name for node in nodes.NODES if (node.optional or node.name == 'operator')
                 and any(topic in unit.NODE.reads and recording.has(topic) for topic in node.writes)]
     return (unit.NODE.name, 'recorder', *optional)
@@ -138,7 +145,7 @@ def _run(recording, done, params, folder):
     inputs = [name for name in done.unit.reads if recording.feeds(name) and name not in done.unit.NODE.writes]
     feeder = Feeder(done.node, inputs, done.outputs)
     with sole_run(feeder.context.get_domain_id()), open(log, 'wb') as output:
-        feeder.refuse_company()
+        feeder.check_domain_free()
         feeder.stand_in(names)
         process = subprocess.Popen(command_line(done.node, done.unit.NODE.module, file),
                                    stdin=subprocess.DEVNULL, stdout=output, stderr=subprocess.STDOUT,
@@ -147,8 +154,8 @@ def _run(recording, done, params, folder):
             live = Live(feeder, process, log, done.unit.REQUESTS)
             live.until(lambda: all(publisher.get_subscription_count() for publisher in feeder.publishers_of.values())
                        and feeder.count_publishers('diagnostics'), NODE_START_TIMEOUT_S,
-                       lambda: 'reader of its inputs')
-            time.sleep(0.5)  # the other side of the discovery
+                       lambda: 'subscriber of its inputs')
+            time.sleep(0.5)  # time for the node to discover the feeder
             steps = _feed(recording, done, live)
         finally:
             process.send_signal(signal.SIGINT)
@@ -161,7 +168,7 @@ def _run(recording, done, params, folder):
 
 
 def _feed(recording, done, live):
-    """Feed every step; {topic: step at which each of its messages came}."""
+    """Feed all steps; return {topic: step at which each of its messages came}."""
     feed, feeder = done.feed, live.feeder
     events = collections.defaultdict(list)
     for step, name, row in feed.events:
@@ -182,7 +189,7 @@ def _feed(recording, done, live):
         for name, row in events[step]:
             feeder.announce_now(name, recording.data(name)[row])
         for command, _ in done.requests.get(step, ()):
-            live.ask(command)
+            live.send_command(command)
         for name, rows in feed.rows.items():
             if rows[step] >= 0 and name in feeder.publishers_of:
                 feeder.publishers_of[name].publish(recording.data(name)[rows[step]])
@@ -192,7 +199,7 @@ def _feed(recording, done, live):
 
 
 def _due(done, name):
-    """How many messages of a topic must have come by each step (n,)."""
+    """Return the number of messages of a topic that are due by each step (n,)."""
     if records.is_text(name):
         return np.searchsorted(done.outputs[name].stamps, done.feed.stamps, side='right')
     return np.cumsum(done.steps[name]['stamp'] != records.NO_STAMP)

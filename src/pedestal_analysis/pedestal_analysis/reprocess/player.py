@@ -1,4 +1,4 @@
-"""The node that publishes a recording: whom it waits for, when a message is due, what has arrived."""
+"""The node that publishes a recording: subscribers, due times and acknowledgements of its messages."""
 import contextlib
 import dataclasses
 import struct
@@ -17,63 +17,75 @@ from pedestal_recording import bag as bags
 
 ANSWER_TOPICS = {node.name: (None if node.reads[0] in node.writes else node.reads[0], node.answer)
                  for node in nodes.NODES if node.answer}
-"""{node: (topic, the topic on which the node answers it in every step, with the same stamp)}: what lockstep waits for.
-The drive begins the steps: it answers nothing (None). The INS answers late, by its latency, and is not waited for."""
+"""{node: (trigger topic, topic of the answer with the same stamp)} of the answers that lockstep waits for.
 
-KEY_HELP = 'space: pause, go on   n or right arrow: one step   q: quit'
+Because the drive begins the steps, it has no trigger (None). The INS is left out because its answers are late by its
+latency.
+"""
+
+KEY_HELP = 'space: pause, resume   n or right arrow: one step   q: quit'
 MAX_UNACKNOWLEDGED_MESSAGES = 1000
-"""Messages of a topic that may be unacknowledged: Fast DDS keeps 5000 and refuses more."""
+"""Largest number of unacknowledged messages of a topic; Fast DDS keeps 5000 and refuses more."""
 
 DISCOVERY_SETTLING_S = 0.5
-"""Seconds from the coming of the last reader to the first message, in which other nodes still find each other."""
+"""Time from the discovery of the last subscriber to the first message, for the discovery between other nodes [s]."""
 
 UNDISCOVERED_NODE_PATH = '_NODE_NAMESPACE_UNKNOWN_/_NODE_NAME_UNKNOWN_'
-"""What rmw calls the node of a writer it has found before it has found the node."""
+"""Name that rmw gives the node of a publisher that was discovered before its node."""
 
 POSITION_REFRESH_S, SUBSCRIBER_POLL_S, KEYBOARD_POLL_S = 0.1, 0.5, 0.05
-"""Seconds between two looks at the position shown, at who still reads, at the keyboard while waiting."""
+"""Periods of the shown position, of the check of subscribers, and of the keyboard poll while waiting [s]."""
 
 SUBSCRIBER_EXIT_TIMEOUT_S = 5.0
-"""Seconds that tell a reader that ended, which is known at once, from one that was killed: Fast DDS waits 20 s for it
-and then forgets what it did not take."""
+"""Time without acknowledgement after which a missing subscriber counts as killed [s].
+
+A subscriber that ends is known at once. Fast DDS waits 20 s for a killed one and then drops its messages.
+"""
 
 ANSWER_QUIET_S, STOPPED_ARRIVAL_TIMEOUT_S = 0.5, 1.0
-"""Seconds without another answer after which the node under test has answered all; seconds a stopped replay waits
-until what it sent has arrived."""
+"""Time without an answer that ends the wait for a node under test; time a stopped replay waits for acknowledgement
+[s]."""
 
 _stamp_of = struct.Struct('<iI').unpack_from
 
 
 def answer_of(node, graph):
-    """ANSWER_TOPICS of a node by its name in a graph {name: Link}; an array of several beams is asked by its first."""
+    """Return the ANSWER_TOPICS of a node by its name in a graph {name: Link}; an array uses the topics of its first
+    beam."""
     return tuple(name if name is None or name in graph else f'{nodes.beam_of(node) or "beam_1"}/{name}'
                  for name in ANSWER_TOPICS[nodes.plain(node)])
 
 
 @dataclasses.dataclass
 class NodeUnderTest:
-    """A node that answers every step: the topic that asks it (None: it asks), the one it answers on; stamps [ns] of
-    the last step it was asked and of its last answer; how many of both."""
+    """A node that answers every step.
+
+    trigger              topic that begins a step, None for a node that begins the steps
+    answer               topic of its answers
+    triggered, answered  stamps [ns] of the last trigger and the last answer
+    steps, answers       numbers of triggers and answers
+    """
     name: str
     trigger: str | None
     answer: str
-    asked: int = -1
+    triggered: int = -1
     answered: int = -1
     steps: int = 0
     answers: int = 0
 
     def owes(self, stamp=-1):
-        """Whether it must answer before the messages of this stamp may go out."""
-        return self.answered < (stamp if self.trigger is None else self.asked)
+        """Return True if the node must answer before the messages of this stamp may be published."""
+        return self.answered < (stamp if self.trigger is None else self.triggered)
 
     def silence(self, stamp, deadline):
-        """The GraphError when it did not answer within the deadline [s]."""
-        step = stamp if self.trigger is None else self.asked
-        return GraphError(f'no {self.answer} for step {step / NS_PER_SECOND:.6f} s after {deadline:g} s; silent: {self.name}')
+        """Return the GraphError for a missing answer after the deadline [s]."""
+        step = stamp if self.trigger is None else self.triggered
+        return GraphError(f'no {self.answer} for step {step / NS_PER_SECOND:.6f} s after {deadline:g} s; silent: '
+                          f'{self.name}')
 
 
 class Pace:
-    """When messages go out: `rate` times real time, None: at once. Keys pause it, let single steps through, quit."""
+    """Due times of messages: `rate` times real time, None for at once; keys pause, make single steps or quit."""
 
     def __init__(self, rate, paused):
         self.rate, self.paused, self.quit = rate, paused, False
@@ -81,7 +93,7 @@ class Pace:
         self._base = None
 
     def press(self, key):
-        """Do what a key says."""
+        """Apply a key."""
         if key == b' ':
             self.paused, self._steps = not self.paused, 0
         elif key == b'n' or key in RIGHT_ARROW_CODES:
@@ -91,7 +103,7 @@ class Pace:
             self.quit = True
 
     def wait(self, stamp, now):
-        """Seconds from now [s] until the messages of a stamp [ns] go out; 0 for a single step, which it uses up."""
+        """Return the time [s] from now [s] until the messages of a stamp [ns] are due; use up a single step."""
         if self.paused:
             self._base = None
             if self._steps:
@@ -110,17 +122,17 @@ class Pace:
 
 @dataclasses.dataclass
 class Channel:
-    """A topic that is published: its publisher, how many were sent, how many of them had arrived at the last look."""
+    """A published topic: publisher, number of sent messages, number known to be acknowledged."""
     publisher: object
     sent: int = 0
     arrived: int = 0
 
 
 class Player(Node):
-    """Publishes a Playlist as ReplayOptions say.
+    """Publisher of a Playlist according to ReplayOptions.
 
-    The nodes of the options must read every topic, or anyone when there are none. companion: a topic that goes along
-    where nobody else writes it, read or not. stopped() -> whether it shall end.
+    Each topic must have its subscribers among the nodes of the options or, without nodes, any subscriber. The topic
+    `companion` needs no subscriber; it is published only if it has no other publisher. stopped() -> True to end.
     """
 
     def __init__(self, playlist, companion, options, keyboard, stopped):
@@ -148,12 +160,12 @@ class Player(Node):
         try:
             kind = middleware.message_class(type_name)
         except (ImportError, AttributeError, ValueError):
-            raise bags.BagError(f'{self.playlist.bag.path}: {name} is of type {type_name}, which is not installed '
-                                'here; choose others with --topics') from None
+            raise bags.BagError(f'{self.playlist.bag.path}: {name} is of type {type_name}, which is not installed; '
+                                'choose other topics with --topics') from None
         return self.create_publisher(kind, name, middleware.qos(topic.rate if topic is not None else 'step'))
 
     def _listen(self, topic):
-        """Read what a node under test writes, in the place of the nodes that are not there."""
+        """Subscribe to an output of a node under test, in place of the missing nodes."""
         node = next((node for node in self.under_test if node.answer == topic.name), None)
 
         def take(data):
@@ -169,7 +181,7 @@ class Player(Node):
         self._spun = time.monotonic()
 
     def _other_writers(self, name):
-        """The others that write a topic; of one that every node writes, those whose messages would be doubled."""
+        """Return the other publishers of a topic; of a topic of all nodes, those with messages in the recording."""
         others = [shell.node_of(info) for info in self.get_publishers_info_by_topic(name)]
         if self.get_name() in others:
             others.remove(self.get_name())
@@ -177,7 +189,7 @@ class Player(Node):
         return [node for node in others if topic is None or len(topic.writers) == 1 or node in topic.writers]
 
     def _unread(self):
-        """(topic, who should read it) of the first that is not read; None when all are."""
+        """Return (topic, missing subscribers) of the first topic without its subscribers, else None."""
         for name, channel in self.channels.items():
             if name == self.companion:
                 continue
@@ -185,13 +197,13 @@ class Player(Node):
             wanted = [node for node in self.nodes if reads(self.graph, node, name)]
             lacking = [node for node in wanted if node not in readers]
             if lacking or channel.publisher.get_subscription_count() < max(1, len(wanted)):
-                return name, ', '.join(lacking or wanted) or 'anyone'
+                return name, ', '.join(lacking or wanted) or 'any node'
         return None
 
     def connect(self):
-        """Wait until every topic has its readers; True, or False when stopped meanwhile.
+        """Wait until each topic has its subscribers; return True, or False if stopped meanwhile.
 
-        Raises GraphError when a topic has a writer already, or is read by nobody after the deadline.
+        Raises GraphError if a topic already has a publisher, or has no subscriber after the deadline.
         """
         begun = settled = time.monotonic()
         while not self._ended():
@@ -201,16 +213,15 @@ class Player(Node):
                 if UNDISCOVERED_NODE_PATH in others and now - begun < self.deadline:
                     settled = now
                 elif others:
-                    raise GraphError(f'{name} already has a writer, {", ".join(others)}: its messages would come '
-                                     'twice')
+                    raise GraphError(f'{name} already has a publisher, {", ".join(others)}: messages would come twice')
             if unread:
                 settled = now
-                name, who = unread
-                self.status.show(f'waiting for {who} to read {name} ...')
+                name, missing = unread
+                self.status.show(f'waiting for {missing} to subscribe to {name} ...')
                 if now - begun > self.deadline:
                     present = sorted(set(self.get_node_names()) - {self.get_name()})
-                    raise GraphError(f'nobody reads {name} after {self.deadline:g} s; waited for {who}; present: '
-                                     f'{", ".join(present) or "no node"}')
+                    raise GraphError(f'no subscriber of {name} after {self.deadline:g} s; waited for {missing}; '
+                                     f'present: {", ".join(present) or "no node"}')
             elif now - settled > DISCOVERY_SETTLING_S:
                 if self.companion and self._other_writers(self.companion):
                     self.destroy_publisher(self.channels.pop(self.companion).publisher)
@@ -219,8 +230,11 @@ class Player(Node):
         return False
 
     def play(self):
-        """Publish to the end of the list, or until quit or stopped. Raises GraphError when a reader goes, or when an
-        answer of lockstep stays away for the deadline; shell.Stopped when stopped while a reader takes nothing."""
+        """Publish to the end of the list, or until quit or stopped.
+
+        Raises GraphError if a subscriber disappears or an answer of lockstep is missing after the deadline, and
+        shell.Stopped if stopped while a subscriber acknowledges nothing.
+        """
         for stamp, group in self.playlist.steps():
             if not self._await_turn(stamp):
                 return
@@ -246,7 +260,7 @@ class Player(Node):
         channel.sent += 1
         for node in self.under_test:
             if name == node.trigger:
-                node.asked, node.steps = stamp, node.steps + 1
+                node.triggered, node.steps = stamp, node.steps + 1
 
     def _await_arrival(self, name, limit):
         channel = self.channels[name]
@@ -256,14 +270,15 @@ class Player(Node):
             if waited > STOPPED_ARRIVAL_TIMEOUT_S and self.stopped():
                 raise shell.Stopped
             if waited > limit:
-                raise GraphError(f'a reader of {name} took nothing for {limit:g} s')
+                raise GraphError(f'a subscriber of {name} acknowledged nothing for {limit:g} s')
             self._spin(0.002)
-        if time.monotonic() > since + SUBSCRIBER_EXIT_TIMEOUT_S and channel.publisher.get_subscription_count() < readers:
-            raise GraphError(f'a reader of {name} died before it had taken all')
+        late = time.monotonic() > since + SUBSCRIBER_EXIT_TIMEOUT_S
+        if late and channel.publisher.get_subscription_count() < readers:
+            raise GraphError(f'a subscriber of {name} died before it had acknowledged all messages')
         channel.arrived = channel.sent
 
     def _await_turn(self, stamp):
-        """Wait until the messages of a stamp are due; False when it is the end instead."""
+        """Wait until the messages of a stamp are due; return False if the replay ends instead."""
         since = time.monotonic()
         while True:
             for key in self.keyboard.pressed():
@@ -283,7 +298,10 @@ class Player(Node):
         return self.pace.quit or self.stopped()
 
     def _wait(self, stamp, now, since):
-        """Seconds until the messages of a stamp go out, which are waited for since then; as far as one can tell."""
+        """Return the time to wait for the messages of a stamp [s]; since: start of the wait.
+
+        Raises GraphError if an answer is missing after the deadline.
+        """
         late = self._late(stamp) if self.pace.rate is None else None
         if late is None:
             return self.pace.wait(stamp, now)
@@ -298,18 +316,22 @@ class Player(Node):
         if now >= self._next_look:
             self._next_look = now + POSITION_REFRESH_S
             start, end = self.playlist.origin, self.playlist.end
-            self.status.show(f'{(self.position - start) / NS_PER_SECOND:.3f} / {(end - start) / NS_PER_SECOND:.3f} s  {self.pace}'
+            position, length = (self.position - start) / NS_PER_SECOND, (end - start) / NS_PER_SECOND
+            self.status.show(f'{position:.3f} / {length:.3f} s  {self.pace}'
                              + (f'   {KEY_HELP}' if self.keyboard.there else ''))
         if now >= self._next_readers:
             self._next_readers = now + SUBSCRIBER_POLL_S
             unread = self._unread()
             if unread:
-                name, who = unread
-                raise GraphError(f'{name} is no longer read by {who}, at {self.position / NS_PER_SECOND:.6f} s')
+                name, missing = unread
+                raise GraphError(f'{name} lost its subscriber at {self.position / NS_PER_SECOND:.6f} s: {missing}')
 
     def finish(self):
-        """Wait until everything sent has arrived and the nodes under test have answered. Raises GraphError after the
-        deadline; a stopped replay waits only for what it sent, and only a little."""
+        """Wait until all messages are acknowledged and the nodes under test have answered.
+
+        Raises GraphError after the deadline. A stopped replay waits STOPPED_ARRIVAL_TIMEOUT_S for acknowledgement
+        only.
+        """
         if self._ended():
             with contextlib.suppress(GraphError, shell.Stopped):
                 for name in self.channels:

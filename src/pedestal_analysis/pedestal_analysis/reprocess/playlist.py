@@ -1,8 +1,8 @@
-"""What a replay publishes, and in which order. No ROS here.
+"""Selection and order of the messages of a replay. No ROS here.
 
-The order is that of the stamps (`header.stamp`; the log time of a type that has none). Of equal stamps latched topics
-go first and have arrived everywhere before anything follows, for so do nodes send them (Shell.announce); then comes
-the order of the table of topics, topics that are not in it last; then the order of the file.
+The order is that of the stamps (`header.stamp`, else the log time). At equal stamps latched topics come first, and all
+subscribers acknowledge them before the next message, as with Shell.announce. Then comes the order of the table of
+topics, with topics outside the table last, and then the order of the file.
 """
 import itertools
 
@@ -15,25 +15,25 @@ from pedestal_recording import bag as bags
 
 
 def reads(graph, node, name):
-    """Whether a node of the graph {name: Link} reads a topic; the recorder reads every one."""
+    """Return True if a node of the graph {name: Link} subscribes to a topic; the recorder subscribes to all topics."""
     return node == 'recorder' or name in graph and node in graph[name].readers
 
 
 def writes(graph, node, name):
-    """Whether a node of the graph {name: Link} writes a topic."""
+    """Return True if a node of the graph {name: Link} publishes a topic."""
     return name in graph and node in graph[name].writers
 
 
 def latched(graph, name):
-    """Whether a topic of the graph {name: Link} holds until its next message."""
+    """Return True if a topic of the graph {name: Link} is latched."""
     return name in graph and topics.QOS_BY_RATE[graph[name].rate].latched
 
 
 def select(bag, of, names):
-    """The topics of a bag.Bag to publish: those named, else those that the nodes `of` read and none of
-    them writes, else all.
+    """Return the topics of a bag.Bag to publish.
 
-    Raises BagError for a topic that is not in the bag, an unknown node, and a node that reads nothing of the bag.
+    They are the topics in names, else the inputs of the nodes `of` that none of these nodes publishes, else all
+    topics. Raises BagError for a topic that is not in the bag, an unknown node, or a node without inputs in the bag.
     """
     if names:
         return bags.chosen_topics(bag, names)
@@ -42,12 +42,13 @@ def select(bag, of, names):
     chosen, graph, known = [], bag.graph, nodes.members(nodes.NODE_NAMES, bag.beams)
     for node in of:
         if node not in known:
-            raise bags.BagError(f'--node {node} is no node;{did_you_mean(node, known)} there are {", ".join(known)}')
+            raise bags.BagError(f'--node {node}: unknown node;{did_you_mean(node, known)} must be one of '
+                                f'{", ".join(known)}')
         of_node = [name for name in bag.topics
                    if reads(graph, node, name) and not any(writes(graph, other, name) for other in of)]
         if not of_node:
             wanted = ', '.join(name for name in graph if reads(graph, node, name))
-            raise bags.BagError(f'{bag.path}: nothing in it for node {node}, which reads {wanted}')
+            raise bags.BagError(f'{bag.path}: no input of node {node} in the bag; its inputs are {wanted}')
         chosen += of_node
     return list(dict.fromkeys(chosen))
 
@@ -55,10 +56,12 @@ def select(bag, of, names):
 class Playlist:
     """Messages of a bag.Bag in the order of this module.
 
-    names: topics. start, duration [s]: counted from the first message of a topic that is not latched, duration None to
-    the end; the last message before the start of each latched topic still holds there and goes first. origin, end:
-    stamps [ns] of the first message that counts and of the last one in the bag; first, last: of those published.
-    Raises BagError when there is none.
+    names: topics. start [s]: from the first message of a topic that is not latched. duration [s]: None to the end.
+    Because a latched message stays valid, the last message of each latched topic before the start is published first.
+    Raises BagError if there are no messages.
+
+    origin, end  stamps [ns] of the first message that is not latched and of the last message
+    first, last  stamps [ns] of the published messages
     """
 
     def __init__(self, bag, names, start, duration):
@@ -83,7 +86,7 @@ class Playlist:
         held = np.array([before[ranks[before] == topic][-1] for topic in np.unique(ranks[before])], int)
         inside = np.flatnonzero((stamps >= begin) & (stamps <= stop))
         if not inside.size:
-            raise bags.BagError(f'{bag.path}: no message from {start:g} s on; it is '
+            raise bags.BagError(f'{bag.path}: no message from {start:g} s on; the recording is '
                                 f'{(self.end - self.origin) / NS_PER_SECOND:g} s long')
         self.first, self.last = int(stamps[inside[0]]), int(stamps[inside[-1]])
         stamps[held] = self.first
@@ -91,7 +94,7 @@ class Playlist:
         self._where, self._stamps = where[chosen], stamps[chosen]
 
     def steps(self):
-        """Iterator of (stamp, iterator of (topic, CDR bytes)), one for each stamp."""
+        """Yield (stamp, iterator of (topic, CDR bytes)) for each stamp."""
         rows = zip(self._stamps.tolist(), self.bag.take(self.bag.index[self._where]))
         for stamp, group in itertools.groupby(rows, lambda row: row[0]):
             yield stamp, ((name, data) for _, (name, _, _, data) in group)

@@ -1,16 +1,16 @@
-"""`pedestal recompute`: recorded inputs of a node through its step function, its outputs against the recorded ones.
+"""`pedestal recompute`: feed the recorded inputs of a node to its unit and compare the outputs with the recorded ones.
 
-Inputs are matched to steps by the code the nodes use (pedestal_common.steps), turned into numbers and back by theirs
-(each package's unit module). What is exact, and what is not:
+The nodes' own code matches inputs to steps (pedestal_common.graph.steps) and decodes and encodes messages (the unit
+module of each package). Accuracy:
 
-lockstep   inputs belong to steps by their stamps, so the same version on the same machine gives the same bits
-realtime   a step gets what had been sent (in a foreign recording: recorded) when the next one began. That is what the
-           node had, but for messages that were on their way to it just then
-both       commands and services are asked for again before the step that the node's replies say. Of a node that tells
-           no replies, a change of adu/state that it would not make by itself is asked for at that step; a parameter
-           changed while running leaves no trace.
-           A recording that begins in the middle of a run starts from the initial state: it differs until the filter
-           has converged
+lockstep   Stamps assign inputs to steps, so the same version on the same machine gives the same bits.
+realtime   A step receives the messages published (in a foreign recording: recorded) before the next step began. These
+           are the inputs of the node, except for messages in transit at that moment.
+both       Commands and services are repeated before the step at which the node replied. For a node without recorded
+           replies, a change of adu/state that the unit does not make by itself is requested at that step. A parameter
+           changed during the run leaves no trace.
+           A recording that begins in the middle of a run starts from the initial state, so its outputs differ until
+           the filter has converged.
 """
 import dataclasses
 import time
@@ -27,32 +27,34 @@ from pedestal_common.wire import commands, messages, records
 from pedestal_recording import bag as bags
 
 SUBSTITUTE_TOPICS = {'adu/truth': 'joint_states'}
-"""{topic: topic that stands for it in an old recording}: receivers once looked where the encoders said."""
+"""{topic: topic that replaces it in an old recording}: old receivers used the direction of the encoders."""
 
 AFTER_LAST_STAMP = 2**63 - 1
-"""Stamp of the step of a message after which its writer answered none."""
+"""Stamp of the step of a message that is later than the last answer of its publisher [ns]."""
 
 RECOMPUTABLE_NODES = tuple(node.name for node in nodes.NODES if node.unit)
-"""Nodes that can be recomputed."""
+"""Names of the nodes that can be recomputed."""
 
 
 def row_of(recording, node) -> nodes.Node:
-    """The row of a node as a recording has it: its drive may be an array."""
+    """Return the row of a node for a recording; the drive of the recording may be an array."""
     return nodes.row(node, recording.bag.beams > 0)
 
 
 def publishing_node(topic) -> nodes.Node:
-    """The Node that writes a topic."""
+    """Return the Node that publishes a topic."""
     return next(node for node in nodes.NODES if topic in (*node.writes, node.replies))
 
 
 class RecomputeError(ValueError):
-    """A bag does not hold what a recomputation needs, or an option fits nothing in it; one line."""
+    """A bag lacks data for a recomputation, or an option does not fit the bag; one line."""
 
 
 class Recording:
-    """The messages of a bag by topic, read once; of several beams, those of one. lockstep: how they are matched; None:
-    as the bag says."""
+    """The messages of a bag by topic, read once; of several beams, the messages of one.
+
+    lockstep: True to match messages by stamp, False by arrival, None for the pacing that the bag states.
+    """
 
     def __init__(self, path, lockstep=None, beam=''):
         self.bag = bags.read(path, beam)
@@ -60,31 +62,33 @@ class Recording:
         self._rows, self._data, self._outputs = {}, {}, {}
 
     def has(self, topic):
-        """Whether the bag has a message of a topic."""
+        """Return True if the bag has a message of a topic."""
         return topic in self.bag.topics and len(self.rows(topic)) > 0
 
     def source(self, topic):
-        """The recorded topic whose messages a node gets that reads a topic: itself, or what SUBSTITUTE_TOPICS it."""
+        """Return the recorded topic for a subscriber of a topic: the topic or, if missing, its SUBSTITUTE_TOPICS."""
         return topic if topic in self.bag.topics else SUBSTITUTE_TOPICS.get(topic, topic)
 
     def feeds(self, topic):
-        """Whether there are messages for a node that reads a topic."""
+        """Return True if there are messages for a subscriber of a topic."""
         return self.has(self.source(topic))
 
     def rows(self, topic):
-        """The rows of a topic in the bag, or of what stands for it."""
+        """Return the rows of a topic, or of its substitute, in the bag."""
         if topic not in self._rows:
             self._rows[topic] = self.bag.rows(self.source(topic))
         return self._rows[topic]
 
     def arrival(self, topic):
-        """Numbers in whose order messages came: when they were sent, by the machine's clock, in our own recordings; in
-        others, where they are in the file."""
+        """Return numbers (n,) that increase in the order of arrival of the messages.
+
+        They are publish times by the clock of the machine; in a foreign recording, places in the file.
+        """
         rows = self.rows(topic)
         return rows.publish if 'pacing' in self.bag.metadata else (rows.chunk << 40) + rows.start
 
     def data(self, topic):
-        """The CDR bytes of its messages."""
+        """Return the CDR bytes of the messages of a topic."""
         if topic not in self._data:
             wanted, source = topics.TOPIC_BY_NAME[topic].type, self.source(topic)
             if self.bag.topics[source] != wanted:
@@ -93,7 +97,7 @@ class Recording:
         return self._data[topic]
 
     def output(self, topic) -> difference.Output:
-        """Its messages as numbers."""
+        """Return the messages of a topic as numbers or texts."""
         if topic not in self._outputs:
             try:
                 output = difference.recorded(self.data(topic), self.rows(topic).log, topic)
@@ -104,10 +108,11 @@ class Recording:
         return self._outputs[topic]
 
     def steps(self, topic):
-        """Stamps [ns] of the steps that messages without one belong to: in our lockstep recordings their log says, in
-        others they came before the answer to that step; AFTER_LAST_STAMP where none came any more, their log where no
-        answer
-        was recorded."""
+        """Return the stamps (n,) [ns] of the steps of messages without a stamp.
+
+        In a lockstep recording of this software the log time is the stamp. In others a message belongs to the step of
+        the publisher's next answer: AFTER_LAST_STAMP if no answer follows, the log time if no answers were recorded.
+        """
         log = self.rows(topic).log - self.bag.start
         answer = publishing_node(topic).writes[0]
         if self.bag.metadata.get('pacing') == 'lockstep' or not self.has(answer):
@@ -116,9 +121,11 @@ class Recording:
         return np.append(self.output(answer).stamps, AFTER_LAST_STAMP)[after]
 
     def commands(self, topic, stamps):
-        """{step: [Command]} of a topic of replies, but those of a schedule, which the parameters hold; steps are rows
-        of stamps (n,) [ns]. Raises RecomputeError."""
-        asked = {}
+        """Return {step: [Command]} of a topic of replies; a step is an index of stamps (n,) [ns].
+
+        Because the parameters contain the schedules, commands of schedules are left out. Raises RecomputeError.
+        """
+        found = {}
         rows = np.searchsorted(stamps, self.steps(topic)).tolist() if self.has(topic) else ()
         for step, data in zip(rows, self.data(topic) if self.has(topic) else ()):
             try:
@@ -126,11 +133,11 @@ class Recording:
             except ValueError as error:
                 raise RecomputeError(f'{self.bag.path}: {topic}: {error}') from None
             if command.who != commands.SCHEDULE_CLIENT:
-                asked.setdefault(step, []).append(command)
-        return asked
+                found.setdefault(step, []).append(command)
+        return found
 
     def states(self, topic, stamps):
-        """{step: text} of a recorded acu/mode or adu/state; steps are rows of stamps (n,) [ns]."""
+        """Return {step: text} of a recorded acu/mode or adu/state; a step is an index of stamps (n,) [ns]."""
         if not self.has(topic):
             return {}
         output = self.output(topic)
@@ -143,9 +150,12 @@ class Recording:
 class Feed:
     """The inputs of a unit by step.
 
-    inputs (n,) of its record; rows: {topic: row of its message at each step, -1 none}; stamps (n,) [ns]; events:
-    [(step before which it came, topic, row)] of what no step waits for, whose texts are in inputs as well; problem:
-    why it ends early, or ''; refused: messages that no step took.
+    inputs   (n,) records of the unit
+    rows     {topic: row of the message at each step, -1 for none}
+    stamps   (n,) [ns]
+    events   [(step that follows the message, topic, row)] of messages that no step waits for; texts are also in inputs
+    problem  reason of an early end, or ''
+    refused  number of messages that belong to no step
     """
     inputs: np.ndarray
     rows: dict
@@ -156,23 +166,26 @@ class Feed:
 
 
 def feed(recording, unit) -> Feed:
-    """Match the recorded inputs of a unit to its steps. A drive makes its own steps: where its clock was not recorded,
-    its joint states tell them."""
+    """Match the recorded inputs of a unit to its steps.
+
+    A drive makes its own steps. Without a recorded clock, the stamps of joint_states are the steps.
+    """
     paces = unit.trigger in unit.NODE.writes
     trigger = unit.NODE.writes[0] if paces and not recording.has(unit.trigger) else unit.trigger
     latencies = unit.latencies
     names = [trigger, *latencies]
     for name in names:
         if not recording.feeds(name):
-            raise RecomputeError(f'{recording.bag.path}: no {name} in it, which the node hears')
-    stamps = [recording.output(name).stamps for name in names]
-    sources = np.concatenate([np.full(len(part), number) for number, part in enumerate(stamps)])
-    rows = np.concatenate([np.arange(len(part)) for part in stamps])
-    stamps = np.concatenate(stamps)
+            raise RecomputeError(f'{recording.bag.path}: no {name} in the bag, an input of the node')
+    parts = [recording.output(name).stamps for name in names]
+    sources = np.concatenate([np.full(len(part), number) for number, part in enumerate(parts)])
+    rows = np.concatenate([np.arange(len(part)) for part in parts])
+    stamps = np.concatenate(parts)
     arrival = np.concatenate([recording.arrival(name) for name in names])
     order = np.lexsort((sources, stamps)) if recording.lockstep else np.argsort(arrival, kind='stable')
 
-    steps, taken = [], []
+    steps: list[tuple] = []
+    taken: list[int] = []
     matched = Steps(trigger, {name: round(latency * NS_PER_SECOND) for name, latency in latencies.items()},
                     recording.lockstep, lambda *step: steps.append(step), prompt=paces, held=nodes.held(latencies))
     problem = ''
@@ -193,8 +206,10 @@ def feed(recording, unit) -> Feed:
 
 
 def _events(recording, unit, stamps, taken):
-    """[(step before which it came, topic, row)] of the messages that no step waits for, in order; taken (n,): when the
-    last input of each step came. What a writer says along with a late message of its own comes as late."""
+    """Return the events of a Feed, in order; taken (n,): arrival of the last input of each step.
+
+    A publisher with a latency publishes its other messages with the same latency.
+    """
     events = []
     for name in unit.reads:
         if topics.TOPIC_BY_NAME[name].rate != 'step' and recording.has(name):
@@ -209,7 +224,7 @@ def _events(recording, unit, stamps, taken):
 
 
 def _gathered(recording, unit, trigger, steps):
-    """(inputs (n,), rows) of matched steps."""
+    """Return (inputs (n,), rows) of matched steps."""
     rows = {trigger: np.array([row for _, row, _ in steps], np.int64)}
     for name in unit.latencies:
         rows[name] = np.array([-1 if row[name] is None else row[name] for _, _, row in steps], np.int64)
@@ -223,16 +238,16 @@ def _gathered(recording, unit, trigger, steps):
 
 
 def state_of(unit) -> str:
-    """The text topic that tells the state of a unit which can be asked for one; '' where it cannot."""
+    """Return the text topic with the state of a unit that accepts requests for a state; '' for other units."""
     states = [name for name in unit.NODE.writes if records.is_text(name) and name not in unit.MOMENTARY]
     return states[0] if unit.REQUESTS else ''
 
 
 def compute(recording, unit, fed, states=None, requests=None):
-    """(outputs (n,), requests made {step: [(Command, granted)]}) of a unit on a Feed.
+    """Return (outputs (n,), requests made {step: [(Command, granted)]}) of a unit on a Feed.
 
-    states: {step: text} of the unit's state as recorded; where it does not come to it by itself, it is asked to.
-    requests: {step: [Command]} that are asked for whatever happens.
+    states: {step: text} of recorded states; a state that the unit does not reach by itself is requested.
+    requests: {step: [Command]} that are always made.
     """
     states, requests, made, events = states or {}, requests or {}, {}, {}
     state = state_of(unit)
@@ -244,9 +259,9 @@ def compute(recording, unit, fed, states=None, requests=None):
     def advance(first, last):
         unit.step(fed.stamps[first:last], fed.inputs[first:last], outputs[first:last])
 
-    def ask(asked, step):
+    def request(requested, step):
         unit.inputs[0] = fed.inputs[step]
-        return [(command, unit.command(command).granted) for command in asked]
+        return [(command, unit.command(command).granted) for command in requested]
 
     last = 0
     for step in sorted({*events, *states, *requests, len(outputs)}):
@@ -259,23 +274,23 @@ def compute(recording, unit, fed, states=None, requests=None):
                 message = messages.deserialize(recording.data(topic)[row], topics.TOPIC_BY_NAME[topic].type)
                 unit.decode(topic, messages.since(message, recording.bag.start))
             except ValueError:
-                pass  # refused, as the node does
+                pass  # the node also refuses the message
         if step in requests:
-            made[step] = ask(requests[step], step)
+            made[step] = request(requests[step], step)
         elif step in states:
             before = unit.memory.record.copy()
             advance(step, step + 1)
             last = step + 1
             if unit.encode(state, int(outputs[step][state])) != states[step]:
                 unit.memory.record[...] = before
-                made[step] = ask([commands.Command(service, commands.SERVICE_CLIENT)
-                                  for service in unit.requests_for(state, states[step])], step)
+                made[step] = request([commands.Command(service, commands.SERVICE_CLIENT)
+                                      for service in unit.requests_for(state, states[step])], step)
                 last = step
     return outputs, {step: done for step, done in made.items() if done}
 
 
 def outputs_of(unit, fed, outputs):
-    """{topic: Output} of what a unit wrote in outputs (n,)."""
+    """Return {topic: Output} of the outputs (n,) of a unit."""
     written = {}
     for name in unit.writes:
         if not records.is_text(name):
@@ -289,7 +304,8 @@ def outputs_of(unit, fed, outputs):
 
 @dataclasses.dataclass
 class Recomputed:
-    """One node on one recording: steps (n,), what it wrote in each step of its feed; outputs, the same by topic."""
+    """One node recomputed from one recording: steps (n,): outputs of each step of the feed; outputs: the same by
+    topic."""
     node: str
     unit: object
     feed: Feed
@@ -299,7 +315,7 @@ class Recomputed:
 
 
 def unit_of(recording, node, params):
-    """The unit of a node with parameters of its dataclass, in the graph that was recorded."""
+    """Return the unit of a node with parameters of its dataclass, in the recorded graph."""
     row = row_of(recording, node)
     names = [other.name for other in nodes.NODES if any(map(recording.has, other.writes))]
     flags = [flag for flag in topics.TOPIC_FLAGS if getattr(params, flag, False)]
@@ -309,8 +325,10 @@ def unit_of(recording, node, params):
 
 
 def recompute(recording, node, params, requests=None) -> Recomputed:
-    """Recompute a node with parameters of its dataclass. requests {step: [Command]}: what was asked of it; None: what
-    its recorded replies tell, or without these its states."""
+    """Recompute a node with parameters of its dataclass.
+
+    requests: {step: [Command]}; None: the commands in the recorded replies or, without replies, the recorded states.
+    """
     unit = unit_of(recording, node, params)
     fed = feed(recording, unit)
     states = None
@@ -323,7 +341,7 @@ def recompute(recording, node, params, requests=None) -> Recomputed:
 
 
 def idle(recording, done) -> str:
-    """Why the recording does not exercise a node; '' if it does. Recorded outputs are asked where there are any."""
+    """Return the reason why a recording does not exercise a node, else ''; recorded outputs take precedence."""
     numbers = {}
     for name, output in done.outputs.items():
         output = recording.output(name) if recording.has(name) else output
@@ -334,7 +352,7 @@ def idle(recording, done) -> str:
 
 
 def compare(recording, outputs, unit, tolerance) -> list:
-    """TopicDifference of every output that was recorded."""
+    """Return the TopicDifference of each recorded output."""
     compared = []
     for name, output in outputs.items():
         if recording.has(name) and not tolerance.ignores(name):
@@ -345,13 +363,16 @@ def compare(recording, outputs, unit, tolerance) -> list:
 
 
 def chosen(recording, names, file_values):
-    """The nodes to recompute: those named, else those whose parameters are known and whose inputs and outputs are
-    there, and the ACU also without outputs; of a recording that does not say how it was made, the ACU."""
+    """Return the nodes to recompute: the nodes in names, else all nodes that the recording allows.
+
+    It must contain parameters, inputs and outputs of a node; the ACU needs no outputs. A recording without parameters
+    allows the ACU.
+    """
     names = [name.removeprefix(recording.bag.beam) for name in names]
     for name in names:
         if nodes.beam_of(name):
-            raise RecomputeError(f'--node {name}: of one beam at a time; say --beam {nodes.beam_of(name)} --node '
-                                 f'{nodes.plain(name)}')
+            raise RecomputeError(f'--node {name}: only one beam can be recomputed at a time; use --beam '
+                                 f'{nodes.beam_of(name)} --node {nodes.plain(name)}')
         if name not in RECOMPUTABLE_NODES:
             raise RecomputeError(f'--node {name}: must be one of {", ".join(RECOMPUTABLE_NODES)}')
     known = file_values if file_values is not None else recording.bag.configuration['parameters']
@@ -362,13 +383,13 @@ def chosen(recording, names, file_values):
         return begun and name in (known or ('acu',)) and (name == 'acu' or any(map(recording.has, row.writes)))
     selected = [name for name in RECOMPUTABLE_NODES if (name in names if names else able(name))]
     if not selected:
-        raise RecomputeError(f'{recording.bag.path}: no node whose inputs are in it; there are '
+        raise RecomputeError(f'{recording.bag.path}: the bag has the inputs of no node; its topics are '
                              f'{", ".join(recording.bag.topics)}')
     return selected
 
 
 def file_parameters(path, beam=''):
-    """{node: {dotted name: value}} of a ROS 2 parameter file or a scenario, of several beams those of one ('beam_2/').
+    """Return {node: {dotted name: value}} of a ROS 2 parameter file or a scenario; beam: prefix such as 'beam_2/'.
 
     Raises ScenarioError or ParameterFileError.
     """
@@ -377,25 +398,25 @@ def file_parameters(path, beam=''):
         chosen = scenario.load(str(path))
         return {node: chosen.given(beam + node if nodes.row(node).of_beam else node) for node in chosen.values
                 if not nodes.beam_of(node)}
-    return {node: values for name,
-            values in sections.items() if (node := name.removeprefix(beam)) in RECOMPUTABLE_NODES}
+    return {node: values for name, values in sections.items()
+            if (node := name.removeprefix(beam)) in RECOMPUTABLE_NODES}
 
 
 def overrides(texts, names):
-    """{node: {key: value}} of texts [node.]key=value; the node may be left out where there is only one."""
+    """Return {node: {key: value}} of texts [node.]key=value; with one node its name may be left out."""
     parameters = {}
     for text in texts:
         if text.partition('=')[0].partition('.')[0] not in scenario.SECTION_NODES and len(names) == 1:
             text = f'{names[0]}.{text}'
         node, key, value = scenario.parse_override(text)
         if node not in names:
-            raise RecomputeError(f'--param {text}: {node} is not recomputed; that is {", ".join(names)}')
+            raise RecomputeError(f'--param {text}: {node} is not recomputed; must be one of {", ".join(names)}')
         parameters.setdefault(node, {})[key] = value
     return parameters
 
 
 def parameters_of(recording, node, file_values=None, changes=()):
-    """The parameter dataclass of a node: of the file, else as recorded, else the defaults; then changed."""
+    """Return the parameter dataclass of a node: of the file, else as recorded, else the defaults; with changes."""
     values = (file_values if file_values is not None else recording.bag.configuration['parameters']).get(node, {})
     values = {key: value for key, value in values.items() if not key.startswith('graph.')}
     try:
@@ -407,7 +428,10 @@ def parameters_of(recording, node, file_values=None, changes=()):
 
 
 def measure(path, node='acu'):
-    """Seconds recorded over seconds taken to read a bag, recompute a node and compare; the laws compiled before."""
+    """Return the ratio of recorded time to the wall time of reading a bag, recomputing a node and comparing.
+
+    A first run, which compiles the laws, is not counted.
+    """
     def run():
         recording = Recording(path)
         done = recompute(recording, node, parameters_of(recording, node))

@@ -1,4 +1,4 @@
-"""The verb `pedestal recompute`: what it prints, writes and answers."""
+"""The verb `pedestal recompute`: printed lines, --json rows, written bag and verdict."""
 import dataclasses
 import math
 
@@ -17,8 +17,11 @@ from pedestal_recording.writer import Writer
 
 @dataclasses.dataclass
 class NodeReport:
-    """One node: lines to print, rows of --json, the outputs {topic: Output} it has now, a message of each as the node
-    makes it {topic: message}, whether they are as they must be."""
+    """Report on one node.
+
+    lines: to print; rows: of --json; outputs: {topic: Output} recomputed; templates: {topic: message that the node
+    makes}; well: True if the outputs are as required.
+    """
     lines: list
     rows: list
     outputs: dict
@@ -27,9 +30,9 @@ class NodeReport:
 
 
 def main(options):
-    """(lines to print, rows of --json, whether all is well) of the verb's options.
+    """Return (lines to print, rows of --json, True if all is well) for the options of the verb.
 
-    Raises ValueError for an option that fits nothing, RunError when a live node does not answer.
+    Raises ValueError for an option that does not fit the bag, RunError if a live node does not answer.
     """
     recording = recompute.Recording(options.bag, {None: None, 'lockstep': True}.get(options.pacing, False),
                                     options.beam)
@@ -39,7 +42,7 @@ def main(options):
     if changes:
         nodes = list(changes)
     if changes and options.live:
-        raise recompute.RecomputeError('--live compares with what was recorded; --param does not go with it')
+        raise recompute.RecomputeError('--live compares with the recorded outputs; it cannot be combined with --param')
     if options.output and options.output.exists():
         raise recompute.RecomputeError(f'--output {options.output} exists already; a recording is never overwritten')
     reports = [_node_report(recording, node, given, changes.get(node), options) for node in nodes]
@@ -55,8 +58,10 @@ def main(options):
 
 
 def _node_report(recording, node, given, changes, options):
-    """The NodeReport of a node with the parameters given; changes: {key: value} of parameters, None to compare with
-    what was recorded."""
+    """Return the NodeReport of a node with the given parameters.
+
+    changes: {key: value} of parameters, None to compare with the recorded outputs.
+    """
     params = recompute.parameters_of(recording, node, given)
     done = recompute.recompute(recording, node, params)
     tolerance = difference.Tolerance(options.absolute, options.relative, tuple(options.ignore))
@@ -67,10 +72,10 @@ def _node_report(recording, node, given, changes, options):
     elif options.live:
         from pedestal_analysis.reprocess import live
         report = _against_recorded(recording, live.outputs(recording, done, params), done, tolerance)
-        report.lines.insert(0, f'compared is what the process of {node} published, fed in lockstep')
+        report.lines.insert(0, f'compared: messages that the process of {node} published, fed in lockstep')
     else:
         report = _against_recorded(recording, done.outputs, done, tolerance)
-    report.lines[:0] = [_title(recording, done, options.params_file), *_stand_ins(recording, done),
+    report.lines[:0] = [_title(recording, done, options.params_file), *_substitutes(recording, done),
                          *_input_problems(done), *_requests(done)]
     part = steps_before(recording.bag) > 0
     if part:
@@ -78,7 +83,7 @@ def _node_report(recording, node, given, changes, options):
                             'state, so it may differ until its filter has converged')
     idle = '' if options.allow_idle or part else recompute.idle(recording, done)
     if idle:
-        report.lines.append(f'{node}: NOT exercised: {idle} (--allow-idle lets it pass)')
+        report.lines.append(f'{node}: NOT exercised: {idle} (allowed with --allow-idle)')
         report.well = False
     return report
 
@@ -92,13 +97,13 @@ def _title(recording, done, params_file):
     elif recording.bag.configuration['parameters']:
         origin = 'parameters as recorded'
     else:
-        origin = 'DEFAULT parameters, for the recording does not say how it was made (--params-file)'
+        origin = 'DEFAULT parameters, because the recording contains none (set --params-file)'
     return f'{recording.bag.path}: {recording.bag.beam}{done.node}: {len(stamps)} steps, {span}, {pacing}; {origin}'
 
 
-def _stand_ins(recording, done):
-    """Lines on the inputs that were not recorded, and what stands for them."""
-    return [f'no {topic} in it: {source} stands for it' for topic in done.feed.rows
+def _substitutes(recording, done):
+    """Return lines on inputs that were not recorded and their substitutes."""
+    return [f'no {topic} in the recording: {source} replaces it' for topic in done.feed.rows
             if (source := recording.source(topic)) != topic]
 
 
@@ -112,18 +117,18 @@ def _input_problems(done):
 
 
 def _requests(done):
-    """Lines on what was asked for."""
+    """Return lines on the commands and services that were repeated."""
     lines = [line for step, made in done.requests.items() for line in _requests_of_step(done, step, made)]
-    return lines + ([f'{len(lines)} requests fed'] if lines else [])
+    return lines + ([f'{len(lines)} requests repeated'] if lines else [])
 
 
 def _requests_of_step(done, step, made):
-    return [f'{command} asked for at {done.feed.stamps[step] / NS_PER_SECOND:.6f} s{"" if granted else ", and refused"}'
+    return [f'{command} requested at {done.feed.stamps[step] / NS_PER_SECOND:.6f} s{"" if granted else ", refused"}'
             for command, granted in made]
 
 
 def _against_recorded(recording, outputs, done, tolerance):
-    """The NodeReport of outputs {topic: Output} against those that were recorded."""
+    """Return the NodeReport of outputs {topic: Output} against the recorded outputs."""
     compared = recompute.compare(recording, outputs, done.unit, tolerance)
     if not compared:
         return _new_numbers(recording, outputs, done)
@@ -147,32 +152,32 @@ def _against_recorded(recording, outputs, done, tolerance):
 
 
 def _new_numbers(recording, outputs, done):
-    """The NodeReport where no output was recorded."""
-    lines = [f'{done.node}: none of its outputs is in the recording: nothing to compare']
+    """Return the NodeReport of a node without recorded outputs."""
+    lines = [f'{done.node}: the recording has no output of the node, so there is no comparison']
     lines += [f'{name:34} {len(output.stamps):9} messages' for name, output in done.outputs.items()]
     rows = [row(done.node, f'{name} recomputed', len(output.stamps)) for name, output in done.outputs.items()]
     if done.node == 'acu' and len(done.feed.stamps):
         numbers = what_if.numbers(recording.bag, [done.outputs])
-        lines += _by_encoders(recording)
+        lines += _encoder_note(recording)
         lines += [f'{name:42} {console.measured(value):>12} {unit}' for name, ((value,), unit) in numbers.items()]
         rows += [row(done.node, name, value, unit) for name, ((value,), unit) in numbers.items()]
     return NodeReport(lines, rows, outputs, done.unit.messages, not done.feed.problem)
 
 
-def _by_encoders(recording):
-    """A line on errors that are not those of the dish, in a list; none where its true direction was recorded."""
+def _encoder_note(recording):
+    """Return [note that errors are those of the encoders], or [] if the true direction of the dish was recorded."""
     return [f'note: {tracking.ENCODER_BEAM_NOTE}'] if tracking.by_encoders(recording.bag) else []
 
 
 def _old_against_new(recording, old, new, tolerance, changes):
-    """The NodeReport of a node recomputed with changed parameters: numbers of both, and how far its messages moved."""
+    """Return the NodeReport of a node recomputed with changed parameters: results of both and message differences."""
     before = {name: recording.output(name) if recording.has(name) else output for name, output in old.outputs.items()}
-    whose = 'recorded' if any(map(recording.has, old.outputs)) else 'recomputed with the parameters unchanged'
-    lines = [f'changed: {", ".join(f"{key} = {value}" for key, value in changes.items())}; old is {whose}']
+    origin = 'recorded' if any(map(recording.has, old.outputs)) else 'recomputed with unchanged parameters'
+    lines = [f'changed: {", ".join(f"{key} = {value}" for key, value in changes.items())}; old: {origin}']
     lines += [line for step, made in new.requests.items() for line in _requests_of_step(new, step, made)]
     rows = []
     if new.node == 'acu' and len(new.feed.stamps):
-        lines += [f'note: {what_if.COMPARISON_NOTE}', *_by_encoders(recording),
+        lines += [f'note: {what_if.COMPARISON_NOTE}', *_encoder_note(recording),
                   f'{"metric":42} {"old":>12} {"new":>12} {"new/old":>9}']
         for name, ((a, b), unit) in what_if.numbers(recording.bag, [before, new.outputs]).items():
             ratio = f'{b / a:9.4g}' if a and math.isfinite(b / a) else f'{"":9}'
@@ -184,8 +189,11 @@ def _old_against_new(recording, old, new, tolerance, changes):
 
 
 def write(path, recording, outputs, templates, changes):
-    """Write a bag: the recording with some topics replaced. A message is logged at its stamp in lockstep; else a new
-    one is logged with the newest recorded message whose stamp is not after its own."""
+    """Write a bag: the recording with some topics replaced.
+
+    In lockstep the log time of a message is its stamp. In realtime a replaced message gets the log time of the newest
+    recorded joint state whose stamp is not later.
+    """
     named = [topic for topic in topics.TOPICS if topic.name in outputs or topic.name in recording.bag.topics]
     rows = []
     for index, topic in enumerate(named):
@@ -205,13 +213,13 @@ def write(path, recording, outputs, templates, changes):
 
 
 def _logged(recording, stamps):
-    """When messages of these stamps would have been logged: with the recorded joint states."""
+    """Return the log times of messages with these stamps: those of the recorded joint states."""
     rows, output = recording.rows('joint_states'), recording.output('joint_states')
     return rows.log[np.clip(np.searchsorted(output.stamps, stamps, side='right') - 1, 0, None)]
 
 
 def _bytes(topic, output, templates):
-    """The CDR messages of an Output."""
+    """Return the CDR messages of an Output."""
     if output.texts is not None:
         return [messages.serialize(messages.String(data=text)) for text in output.texts]
     encoder = records.Encoder(topic, templates[topic])

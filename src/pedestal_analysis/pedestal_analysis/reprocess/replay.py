@@ -1,4 +1,4 @@
-"""`pedestal replay`: a recording published into a live graph in the order of its Playlist, bytes as recorded."""
+"""`pedestal replay`: publish a recording into a live graph in the order of its Playlist, bytes as recorded."""
 import contextlib
 import dataclasses
 import math
@@ -18,11 +18,12 @@ from pedestal_recording import bag as bags
 
 @dataclasses.dataclass(frozen=True)
 class ReplayOptions:
-    """What is published, and when.
+    """Selection and pace of a replay.
 
-    nodes: what these nodes read, or names: these topics, or neither: all. rate: times real time; None: lockstep with
-    the nodes. start, duration [s]: from the first message on, None to the end. paused: begin with a pause. deadline:
-    wall-clock time [s] a reader or an answer is waited for. Raises ValueError for a number out of range.
+    nodes: publish the inputs of these nodes; names: publish these topics; without both, publish all topics.
+    rate: times real time; None for lockstep with the nodes. start, duration [s]: from the first message on, None to
+    the end. paused: True to begin with a pause. deadline: longest wait for a subscriber or an answer [s].
+    Raises ValueError for a number out of range.
     """
     nodes: list = dataclasses.field(default_factory=list)
     names: list = dataclasses.field(default_factory=list)
@@ -43,8 +44,11 @@ class ReplayOptions:
 
 @dataclasses.dataclass
 class ReplayResult:
-    """What was sent {topic: count}, from the first to the last stamp [s], in which wall time [s]; {node: (its answers,
-    the steps it was asked)}. ended: 'whole', 'quit' (by key) or 'stopped' (by a signal)."""
+    """Counts of a replay.
+
+    sent: {topic: count}; first, last: stamps [s]; wall: wall time [s]; answers: {node: (answers, triggered steps)};
+    ended: 'whole', 'quit' (by key) or 'stopped' (by a signal).
+    """
     bag: str
     sent: dict
     first: float
@@ -54,7 +58,7 @@ class ReplayResult:
     ended: str
 
     def lines(self):
-        """The result as text."""
+        """Return the result as lines of text."""
         width = max(map(len, self.sent))
         lines = [f'{name:{width}} {count:9}' for name, count in self.sent.items()]
         lines += [f'{node} answered {count} of {steps} steps' for node, (count, steps) in self.answers.items()]
@@ -67,7 +71,7 @@ class ReplayResult:
 
 @contextlib.contextmanager
 def stop_by_signal():
-    """stopped() -> whether a signal to end has come: rclpy must not be left in the middle of a call."""
+    """Yield stopped() -> True after a signal to end. This avoids leaving rclpy in the middle of a call."""
     signals = []
     before = {number: signal.signal(number, lambda *_: signals.append(True))
               for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
@@ -80,10 +84,10 @@ def stop_by_signal():
 
 
 def replay(path, options, ready=lambda: None) -> ReplayResult:
-    """Publish a bag into the live graph of this ROS domain, as ReplayOptions say. ready() is called before the first
-    message.
+    """Publish a bag into the live graph of this ROS domain according to ReplayOptions.
 
-    Raises BagError, ValueError for options that do not fit the bag, GraphError for what the graph is not.
+    ready() is called before the first message. Raises BagError, ValueError for options that do not fit the bag,
+    GraphError for a graph that does not fit.
     """
     bag = bags.read(path)
     chosen = select(bag, options.nodes, options.names)
@@ -94,7 +98,7 @@ def replay(path, options, ready=lambda: None) -> ReplayResult:
     playlist = Playlist(bag, [*chosen, *filter(None, [companion])], options.start, options.duration)
     keyboard = Keyboard()
     if options.paused and not keyboard.there:
-        raise ValueError('--paused: standard input is no terminal, no key could end the pause')
+        raise ValueError('--paused: standard input must be a terminal, because a key ends the pause')
     middleware.initialise([])
     try:
         with stop_by_signal() as stopped, keyboard:
@@ -122,9 +126,9 @@ def replay(path, options, ready=lambda: None) -> ReplayResult:
 def _check_lockstep(under_test, chosen, graph):
     answering = [node for node in under_test if nodes.plain(node) in ANSWER_TOPICS]
     if not answering:
-        why = (f'{", ".join(under_test)} answers no step at its stamp' if under_test else
-               'say with --node who answers the steps')
-        raise ValueError(f'--lockstep: {why}; there are {", ".join(ANSWER_TOPICS)}')
+        problem = (f'{", ".join(under_test)} does not answer steps at their stamps' if under_test else
+                   'set --node to a node that answers the steps')
+        raise ValueError(f'--lockstep: {problem}; must be one of {", ".join(ANSWER_TOPICS)}')
     for node in answering:
         trigger, _ = answer_of(node, graph)
         if trigger not in (None, *chosen):

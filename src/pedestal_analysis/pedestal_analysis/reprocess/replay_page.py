@@ -1,4 +1,4 @@
-"""`pedestal replay --page`: a recording on the operator's page, with a slider. There is no graph: it reads the bag."""
+"""`pedestal replay --page`: show a recording on the operator's page with a slider, from the bag without a graph."""
 import itertools
 import math
 import queue
@@ -19,26 +19,29 @@ from pedestal_operator.page.page_server import PageServer
 from pedestal_recording import bag as bags
 
 PAGE_FRAME_PERIOD_S, SLOW_FRAME_PERIOD_S = 0.1, 1.0
-"""Time [s] between two states that pages are sent, and two of what changes slowly."""
+"""Period of the states sent to pages, and of their slow sections [s]."""
 
 MIN_REPLAY_RATE, MAX_REPLAY_RATE = 0.05, 50.0
-"""Times real time."""
+"""Limits of the replay rate [times real time]."""
 
 MAX_EVENT_MESSAGES = 5000
-"""Messages of a topic that are looked through for the event log, the first ones."""
+"""Largest number of messages of a topic for the event log, from the beginning."""
 
 DIAGNOSTICS_LOOKBACK = 60
-"""Diagnostics before a moment in which the last one of each node is looked for."""
+"""Number of diagnostics messages that are searched for the last status of each node."""
 
 NUMBER_TOPICS = (*remote_node.NUMBER_TOPICS, *page_state.EXTRA_NUMBER_TOPICS)
+"""Topics whose numbers the page shows."""
 TEXT_TOPICS = (*remote_node.TEXT_TOPICS, 'ins/state', 'acu/blockage')
+"""Topics whose texts the page shows."""
 LIST_TOPICS = ('acu/alarms', 'acu/program_track', 'diagnostics', 'acu/command_result')
+"""Topics of other kinds that the page shows."""
 
 
 class Recording(Antenna):
-    """A bag.Bag of one beam as page_state wants an antenna: what had been told last when it was `position` [s] old.
+    """A bag.Bag of one beam with the interface of an Antenna: the newest messages at `position` [s].
 
-    length: of the recording [s]. Raises BagError where there are no joint_states in it.
+    length: of the recording [s]. Raises BagError if the bag has no joint_states.
     """
 
     def __init__(self, bag):
@@ -46,7 +49,7 @@ class Recording(Antenna):
         self._rows = {name: bag.rows(name) for name in (*NUMBER_TOPICS, *TEXT_TOPICS, *LIST_TOPICS)
                       if name in bag.topics and len(bag.rows(name))}
         if 'joint_states' not in self._rows:
-            raise bags.BagError(f'{bag.path}: no joint_states in it, which the page shows')
+            raise bags.BagError(f'{bag.path}: no joint_states in the bag, which the page needs')
         self._times = {name: np.maximum.accumulate(rows.stamp if name in NUMBER_TOPICS else rows.log)
                        for name, rows in self._rows.items()}
         joints = self._times['joint_states']
@@ -56,21 +59,21 @@ class Recording(Antenna):
                               for name, value in bag.configuration['parameters'].get(node, {}).items()}
         self.configuration['graph.start'] = bag.start
         self.alarms, self.path, self.log = [], None, Log(most=MAX_EVENT_MESSAGES)
-        self.numbers, self.texts, self.status, self._heard = {}, {}, {}, {}
+        self.numbers, self.texts, self.status, self._received = {}, {}, {}, {}
         self._read_log()
         self.move(0.0)
 
     @property
     def now(self):
-        """The time of the recording [s], UTC in realtime."""
+        """Time in the recording [s]; UTC in realtime."""
         return (self._begin + round(self.position * NS_PER_SECOND)) / NS_PER_SECOND
 
     def present(self, name):
-        """Whether a topic or node had been heard lately."""
-        return name in self._heard and self.now - self._heard[name] < remote_node.MAX_MESSAGE_AGE_S
+        """Return True if the newest message of a topic or node is not stale."""
+        return name in self._received and self.now - self._received[name] < remote_node.MAX_MESSAGE_AGE_S
 
     def lines(self):
-        """What had happened so far, for the event log."""
+        """Return the events up to now, for the event log."""
         return [line for line in self.log.lines if line['t'] <= self.now][-page_log.MAX_LOG_LINES:]
 
     def move(self, position):
@@ -86,23 +89,24 @@ class Recording(Antenna):
         for time_of, array in zip(self._times.get('diagnostics', ())[max(last - DIAGNOSTICS_LOOKBACK, 0):last],
                                   self._messages('diagnostics', DIAGNOSTICS_LOOKBACK)):
             for status in array.status:
-                self.status[status.name], self._heard[status.name] = status, time_of / NS_PER_SECOND
+                self.status[status.name], self._received[status.name] = status, time_of / NS_PER_SECOND
 
     def move_numbers(self, position):
-        """The same for the numbers only."""
+        """Go to a position [s] with the numbers only."""
         self.position = min(max(position, 0.0), self.length)
-        self.numbers, self.texts, self.status, self._heard = {}, {}, {}, {}
+        self.numbers, self.texts, self.status, self._received = {}, {}, {}, {}
         for name in NUMBER_TOPICS:
             for time_of, data in self._last(name, 1):
-                self.numbers[name], self._heard[name] = self._decoders[name].decoded(data)[1], time_of / NS_PER_SECOND
+                self.numbers[name] = self._decoders[name].decoded(data)[1]
+                self._received[name] = time_of / NS_PER_SECOND
 
     def _count(self, name):
-        """How many messages of a topic there had been."""
+        """Return the number of messages of a topic up to now."""
         moment = self._begin + round(self.position * NS_PER_SECOND)
         return int(np.searchsorted(self._times[name], moment, 'right')) if name in self._rows else 0
 
     def _last(self, name, most):
-        """[(time [ns], CDR bytes)] of the last messages of a topic."""
+        """Return [(time [ns], CDR bytes)] of the last messages of a topic, at most `most`."""
         last = self._count(name)
         first = max(last - most, 0)
         if last == 0:
@@ -114,13 +118,13 @@ class Recording(Antenna):
         return [messages.deserialize(data, self._bag.topics[name]) for _, data in self._last(name, most)]
 
     def _read_log(self):
-        """All that happened, in its order."""
-        told = []
+        """Fill the event log, in the order of the log times."""
+        events = []
         for name in ('acu/mode', 'adu/state', 'acu/command_result', 'acu/alarms'):
             rows = self._rows.get(name, ())[:MAX_EVENT_MESSAGES]
-            told += [(row_log, name, messages.deserialize(data, self._bag.topics[name]))
-                     for row_log, (*_, data) in zip(rows.log.tolist() if len(rows) else (), self._bag.take(rows))]
-        for log, name, message in sorted(told, key=lambda row: row[0]):
+            events += [(row_log, name, messages.deserialize(data, self._bag.topics[name]))
+                       for row_log, (*_, data) in zip(rows.log.tolist() if len(rows) else (), self._bag.take(rows))]
+        for log, name, message in sorted(events, key=lambda row: row[0]):
             if name == 'acu/command_result':
                 self.log.replied(log / NS_PER_SECOND, *commands.of_reply(message))
             elif name == 'acu/alarms':
@@ -131,8 +135,10 @@ class Recording(Antenna):
 
 
 class Player:
-    """Shows a Recording on a page at a port: plays, pauses, goes where the slider is. options: a replay.ReplayOptions,
-    of which it takes start, rate, paused."""
+    """Player of a Recording on a page at a port: play, pause, go to a position.
+
+    options: start, rate and paused of a replay.ReplayOptions.
+    """
 
     def __init__(self, recording, port, options):
         self._recording, self._lock = recording, threading.Lock()
@@ -143,12 +149,12 @@ class Player:
         self.url = self._server.access.url(PAGE_ROLES[0])
 
     def play(self, stopped):
-        """Serve until stopped() is true."""
+        """Serve the page until stopped() is true."""
         before, slow = time.monotonic(), -math.inf
         while not stopped():
             now = time.monotonic()
             with self._lock:
-                moved = self._hear()
+                moved = self._receive()
                 if self._playing:
                     self._go(self._recording.position + self._rate * (now - before))
                 self._show(moved or now - slow >= SLOW_FRAME_PERIOD_S)
@@ -162,8 +168,8 @@ class Player:
         self._recording.move(position)
         self._playing = self._playing and position < self._recording.length
 
-    def _hear(self):
-        """Do what the pages ask; whether the recording is elsewhere now."""
+    def _receive(self):
+        """Execute the requests of the pages; return True if the position jumped."""
         moved = False
         while True:
             try:
@@ -173,7 +179,7 @@ class Player:
             wanted = (message or {}).get('replay')
             if not isinstance(wanted, dict):
                 if message is not None:
-                    self._server.reply(client, {'error': 'this is a recording: nothing can be asked of it'})
+                    self._server.reply(client, {'error': 'this is a recording: commands are not possible'})
                 continue
             if _number(wanted.get('position')):
                 self._go(float(wanted['position']))
@@ -204,7 +210,7 @@ class Player:
             return [page_state.history_row(frame) for frame in self._frames(page_state.CHART_PERIOD_S)]
 
     def _frames(self, period):
-        """[page_state.now] of the time of the strip charts before this moment."""
+        """Return [page_state.now] at intervals of `period` [s] over the span of the strip charts before now."""
         recording, position = self._recording, self._recording.position
         frames = []
         for count in itertools.count(-round(page_state.CHART_SPAN_S / period)):

@@ -1,4 +1,4 @@
-"""Makes a run again from the configuration in its recording, and compares: bytes, then messages, then metadata."""
+"""Rerun a run from the configuration in its recording, and compare bytes, then messages, then metadata."""
 import dataclasses
 import pathlib
 
@@ -9,14 +9,19 @@ from pedestal_common.text_files import files
 from pedestal_recording import bag as bags
 
 MAX_SHOWN_FIELDS = 4
-"""Fields shown of the first message that differs on a topic."""
+"""Number of shown fields of the first message that differs on a topic."""
 
 
 @dataclasses.dataclass
 class RerunResult:
-    """A recording against the one made again, which is at path. topics: [difference.MessageDifference], the earliest
-    first; metadata: {record: {key: (was, now)}} of what differs; end: last log time of the recording [ns]; sha256: of
-    the new file; same: whether the files are equal to the last byte."""
+    """Comparison of a recording with the recording of its rerun, at path.
+
+    topics    [difference.MessageDifference], the earliest first
+    metadata  {record: {key: (was, now)}} of different values
+    end       last log time of the old recording [ns]
+    sha256    of the new file
+    same      True if the files are equal to the last byte
+    """
     path: pathlib.Path
     topics: list
     metadata: dict
@@ -26,33 +31,33 @@ class RerunResult:
 
     @property
     def equal(self):
-        """Whether every message is there again, with the same bytes in the same order."""
+        """True if both recordings have the same messages, with the same bytes in the same order."""
         return not self.topics
 
     @property
     def cut(self):
-        """Whether the recording ends before the run did and is equal up to there."""
+        """True if the old recording ends before the run did and is equal up to its end."""
         return all(topic.was < topic.now == topic.was + topic.different for topic in self.topics)
 
     @property
     def other_version(self):
-        """Whether another version of this software made the recording."""
+        """True if another version of this software made the old recording."""
         return any(key == 'git' or key.startswith('version.') for key in self.metadata.get('pedestal', ()))
 
     def lines(self):
-        """The comparison as text, the verdict last."""
+        """Return the comparison as lines of text, the verdict last."""
         lines = [] if self.cut else list(map(_line, self.topics))
         lines += [f'{record}.{key}: {_short(was)} -> {_short(now)}'
                   for record, changes in self.metadata.items() for key, (was, now) in changes.items()]
         if self.same:
             verdict = f'equal to the last byte, sha256 {self.sha256}'
         elif not self.equal:
-            part = f', but equal up to {self.end / 1e9:.6f} s, where the recording ends' if self.cut else ''
+            part = f', but equal up to {self.end / 1e9:.6f} s, the end of the recording' if self.cut else ''
             verdict = f'NOT equal{part}'
         elif self.other_version:
             verdict = 'messages equal, made by another version'
         else:
-            verdict = f'messages equal, {"metadata not" if self.metadata else "packed in another way"}'
+            verdict = f'messages equal, {"metadata differ" if self.metadata else "layout of the file differs"}'
         return [*lines, f'{self.path}: {verdict}']
 
 
@@ -64,44 +69,44 @@ def _line(topic):
 
 
 def _short(text):
-    """A value of the metadata on one line; of a long one (the scenario) only its length."""
+    """Return a value of the metadata on one line; for a long text (the scenario) only its length."""
     if not text:
         return 'none'
     return text if len(text) < 60 and '\n' not in text else f'a text of {len(text)} characters'
 
 
 def configured(bag):
-    """The Scenario a recording was made from, parameters whose default has changed since set as they were.
+    """Return the Scenario of a recording; parameters with a changed default are set to their recorded values.
 
-    Raises bag.BagError for a recording that cannot be made again.
+    Raises bag.BagError for a recording that cannot be rerun.
     """
     recorded = bag.configuration['parameters']
     if not bag.configuration['scenario']:
-        raise bags.BagError(f'{bag.file}: holds no configuration, so that it cannot be made again')
+        raise bags.BagError(f'{bag.file}: contains no configuration, so it cannot be rerun')
     if bag.metadata.get('pacing') != 'lockstep':
-        raise bags.BagError(f'{bag.file}: recorded in {bag.metadata.get("pacing")}, which is never the same twice; '
-                            'only a lockstep run can be made again')
+        raise bags.BagError(f'{bag.file}: pacing is {bag.metadata.get("pacing")}; must be lockstep to rerun, because '
+                            'other runs are never the same twice')
     chosen = scenario.parse(bag.metadata.get('scenario', ''), bag.configuration['scenario'])
     values = {node: dict(values) for node, values in chosen.values.items()}
     for node, then in recorded.items():
         if node not in chosen.nodes:
-            raise bags.BagError(f'{bag.file}: holds parameters of {node}, which is no node of its scenario')
+            raise bags.BagError(f'{bag.file}: contains parameters of {node}, which is no node of its scenario')
         now = parameters.as_dict(chosen.node_parameters(node))
         values[node].update({key: value for key, value in then.items() if key not in now or now[key] != value})
-        # A topic that the version of the recording did not have is not there.
-        values[node].update({key: False for owner, told, flag in scenario.MEASUREMENT_FLAGS for key in (told, flag)
+        # Because the version of the recording did not have a topic without a recorded flag, its flags are false.
+        values[node].update({key: False for _, *flags in scenario.MEASUREMENT_FLAGS for key in flags
                              if key in now and key not in then})
     changed = dataclasses.replace(chosen, values=values)
     for node in recorded:
         try:
             changed.node_parameters(node)
         except parameters.ParameterError as error:
-            raise bags.BagError(f'{bag.file}: made by a version with other parameters: {node}: {error}') from None
+            raise bags.BagError(f'{bag.file}: recorded by a version with other parameters: {node}: {error}') from None
     return changed
 
 
 def result(was, now) -> RerunResult:
-    """Compare a recording with the one made again; both bag.Bag."""
+    """Compare a recording with that of its rerun; both bag.Bag."""
     metadata = {}
     for record in dict.fromkeys((*was.metadata_records, *now.metadata_records)):
         old, new = (bag.metadata_records.get(record, {}) for bag in (was, now))

@@ -1,7 +1,10 @@
-"""Keys pressed on a terminal, and one line on it that shows a position.
+"""Keys of a terminal without waiting, and a status line.
 
-No library does it in fewer lines: readchar waits for a key; blessed (with wcwidth 22,000 lines) reads keys only where
-standard output is a terminal too; rich has no keys, and its status line takes a thread and wraps.
+No library needs fewer lines:
+
+readchar  waits for a key
+blessed   has 22,000 lines with wcwidth and reads keys only if standard output is a terminal too
+rich      has no keys, and its status line needs a thread and wraps
 """
 import os
 import re
@@ -12,21 +15,22 @@ import tty
 
 _KEY = re.compile(rb'\x1b[\[O][A-D]|.', re.DOTALL)
 RIGHT_ARROW_CODES = (b'\x1b[C', b'\x1bOC')
-"""What the right arrow sends."""
+"""Bytes of the right arrow key."""
 
 
 def _in_foreground():
-    """Whether this process may read the terminal: in the background it would be stopped (SIGTTIN, SIGTTOU)."""
+    """Return True if this process may read the terminal; signals stop a process in the background (SIGTTIN,
+    SIGTTOU)."""
     try:
         return os.tcgetpgrp(sys.stdin.fileno()) == os.getpgrp()
     except OSError:
-        return True  # not the terminal that controls this process
+        return True  # standard input is not the controlling terminal
 
 
 class Keyboard:
-    """The keys pressed since the last look, without waiting for Enter; Ctrl-C stays a signal. Use as a context.
+    """Keyboard without waiting for Enter; Ctrl-C remains a signal. Use as a context.
 
-    `there` is False, and no key ever comes, where standard input is no terminal or belongs to another process.
+    `there` is False, and there are no keys, if standard input is no terminal or belongs to another process.
     """
 
     def __init__(self):
@@ -43,26 +47,26 @@ class Keyboard:
             termios.tcsetattr(sys.stdin, termios.TCSADRAIN, self._before)
 
     def pressed(self):
-        """[bytes of a key]."""
+        """Return [bytes of a key] of the keys pressed since the last call."""
         if not self.there or not select.select([sys.stdin], [], [], 0)[0]:
             return []
         return _KEY.findall(os.read(sys.stdin.fileno(), 1024))
 
 
 class StatusLine:
-    """A line on standard error that is written over; nothing where that is no terminal."""
+    """A line on standard error that each text overwrites; without effect if standard error is no terminal."""
 
     def __init__(self):
         self._on = sys.stderr.isatty()
         self._last = ''
 
     def show(self, text):
-        """Write the line anew."""
+        """Replace the text of the line."""
         if self._on and text != self._last:
             self._last = text
             sys.stderr.write(f'\r\x1b[K{text}')
             sys.stderr.flush()
 
     def clear(self):
-        """Leave the line empty."""
+        """Empty the line."""
         self.show('')

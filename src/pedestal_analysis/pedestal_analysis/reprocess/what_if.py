@@ -1,8 +1,8 @@
-"""What a node's outputs are worth: old against new, for a recording recomputed with other parameters.
+"""Comparison of the recorded outputs of an ACU with outputs recomputed from the recording with other parameters.
 
-The recorded antenna does not move with the recomputed command, so the pointing that other parameters would give is not
-in a recording. Three things are: the error of the estimate against the recorded truth, its noise and lag, and how
-rough the command is.
+The recorded antenna does not move with the recomputed command, so a recording cannot show the pointing that other
+parameters would give. It can show the error of the estimate against the recorded truth, the noise and lag of the
+estimate, and the noise of the command.
 """
 import dataclasses
 import functools
@@ -16,14 +16,16 @@ from pedestal_analysis.results.tracking import DEG_PER_RAD, known_rms, largest
 from pedestal_common.graph.topics import AXES
 
 RIPPLE_WINDOW_S = 0.25
-"""What is faster than a moving mean of this length [s] counts as noise of a command."""
+"""Length of the moving mean; the difference from the mean counts as noise of a rate [s]."""
 
-COMPARISON_NOTE = ('the recorded antenna does not move with the recomputed command: compared are the estimate against the '
-                   'recorded truth and the noise of estimate and command; for the pointing, run the scenario anew')
+COMPARISON_NOTE = ('the recorded antenna does not move with the recomputed command, so the table compares the '
+                   'estimate with the recorded truth, and the noise of estimate and command; for the pointing, run '
+                   'the scenario again')
+"""Note above the table of old and new results."""
 
 
 class Overlay:
-    """A recording whose outputs of one node are replaced: what analysis/ reads of a bag.Bag."""
+    """A recording with replaced outputs of one node, with the part of the interface of bag.Bag that results need."""
 
     def __init__(self, bag, outputs):
         self.path, self.beam, self.beams, self.metadata = bag.path, bag.beam, bag.beams, bag.metadata
@@ -32,7 +34,7 @@ class Overlay:
         self.topics = {**bag.topics, **dict.fromkeys(outputs, '')}
 
     def table(self, topic):
-        """{column: array (n,)} of a topic."""
+        """Return {column: array (n,)} of a topic."""
         return self._outputs[topic].table(topic) if topic in self._outputs else self._bag.table(topic)
 
     @property
@@ -46,9 +48,11 @@ class Overlay:
 
 
 class RecomputedAcu:
-    """What an ACU answered in an Overlay. estimate, command: tables of acu/estimate and acu/rate_command; autotrack:
-    stamps [s] of its estimates in autotrack; known: number of its
-    estimates with a known mode; common: stamps [s] at which it is judged."""
+    """Outputs of an ACU in an Overlay.
+
+    estimate, command: tables of acu/estimate and acu/rate_command; autotrack: stamps [s] of the estimates in
+    autotrack; known: number of the estimates with a known mode; common: stamps [s] at which the ACU is evaluated.
+    """
 
     def __init__(self, overlay):
         self.estimate, self.command = overlay.table('acu/estimate'), overlay.table('acu/rate_command')
@@ -58,7 +62,7 @@ class RecomputedAcu:
         self.common = t[:0]
 
     def ripple(self, table):
-        """Rms [rad/s] of what is faster than RIPPLE_WINDOW_S in the velocities of a table."""
+        """Return the rms [rad/s] of the velocities of a table minus their moving mean over RIPPLE_WINDOW_S."""
         return known_rms(np.concatenate([_ripple(table['t'], table[f'{axis}.velocity'], self.common)
                                          for axis in AXES]))
 
@@ -74,39 +78,39 @@ def _ripple(t, values, common):
 
 @dataclasses.dataclass
 class TruthComparison:
-    """The estimate of Answers and the recorded antenna in a tracking.Tracking, against the recorded truth."""
-    answers: RecomputedAcu
+    """The estimate of an ACU and the recorded antenna in a tracking.Tracking, against the recorded truth."""
+    acu: RecomputedAcu
     run: tracking.Tracking
 
     @functools.cached_property
-    def judged(self):
-        """Which steps (n,) bool of the run are judged."""
-        return np.isin(self.run.t, self.answers.common)
+    def evaluated(self):
+        """Mask (n,) bool of the evaluated steps of the run."""
+        return np.isin(self.run.t, self.acu.common)
 
     @functools.cached_property
     def true(self):
         """True pointing error (k, 2) [rad] of the recorded antenna."""
-        return np.column_stack((self.run.cross_elevation, self.run.elevation_error))[self.judged]
+        return np.column_stack((self.run.cross_elevation, self.run.elevation_error))[self.evaluated]
 
     @functools.cached_property
     def error(self):
-        """Estimate less truth (k, 2) [rad]: cross-elevation, elevation."""
-        return self.run.filtered[self.judged] - self.true
+        """Estimate minus truth (k, 2) [rad]: cross-elevation, elevation."""
+        return self.run.filtered[self.evaluated] - self.true
 
     @property
     def noise(self):
-        """Rms [rad] of the receiver's error less the true one."""
-        return known_rms(self.run.measured[self.judged] - self.true)
+        """Rms difference between receiver error and true pointing error [rad]."""
+        return known_rms(self.run.measured[self.evaluated] - self.true)
 
     @functools.cached_property
     def motion(self):
-        """(lag [s], rms of the rate error [rad/s]) of the estimate behind the true direction, in earth angles.
+        """(lag [s] behind the true direction, rms of the rate error [rad/s]) of the estimate, in earth angles.
 
-        The lag is the one that explains most of the error e by the true rate w: - sum(e w) / sum(w w).
+        The lag is the least-squares fit of the error e to the true rate w: - sum(e w) / sum(w w).
         """
-        if self.judged.sum() < 3:
+        if self.evaluated.sum() < 3:
             return math.nan, math.nan
-        t, estimate = self.run.t, self.answers.estimate
+        t, estimate = self.run.t, self.acu.estimate
         _, here, there = np.intersect1d(np.round(t * 1e9), np.round(estimate['t'] * 1e9), return_indices=True)
         angle, rate = np.full((2, t.size, 2), math.nan)
         angle[here] = np.column_stack([estimate[f'{axis}.position'] for axis in AXES])[there]
@@ -115,7 +119,7 @@ class TruthComparison:
         scale = np.column_stack((np.cos(truth[:, 1]), np.ones(t.size)))
         true_rate = np.gradient(truth, t, axis=0) * scale
         error = ((angle - truth + math.pi) % (2.0 * math.pi) - math.pi) * scale
-        known = self.judged & np.isfinite(error).all(axis=1) & np.isfinite(true_rate).all(axis=1)
+        known = self.evaluated & np.isfinite(error).all(axis=1) & np.isfinite(true_rate).all(axis=1)
         e, w = error[known], true_rate[known]
         moving = np.sum(w * w)
         return (-float(np.sum(e * w) / moving) if moving > 0.0 else math.nan,
@@ -123,55 +127,54 @@ class TruthComparison:
 
 
 COMPARISON_RESULTS = (
-    Result('autotrack_from_s', 's', 'answers', lambda acu: acu.autotrack[0] if acu.autotrack.size else math.nan,
-           'When the ACU came to autotrack.'),
-    Result('tracked_percent', '%', 'answers',
+    Result('autotrack_from_s', 's', 'acu', lambda acu: acu.autotrack[0] if acu.autotrack.size else math.nan,
+           'Time of the first step in autotrack.'),
+    Result('tracked_percent', '%', 'acu',
            lambda acu: 100.0 * acu.autotrack.size / acu.known if acu.known else math.nan,
            'Share of the steps in autotrack.'),
     Result('recorded_pointing_rms_deg', 'deg', 'truth', lambda acu: known_rms(acu.true) * DEG_PER_RAD,
            'Rms of the true pointing error of the recorded antenna, both axes together.'),
     Result('estimate_error_rms_deg', 'deg', 'truth', lambda acu: known_rms(acu.error) * DEG_PER_RAD,
-           'Rms of estimate less truth, both axes together.'),
-    Result('estimate_error_cross_elevation_rms_deg', 'deg', 'truth', lambda acu: known_rms(acu.error[:, 0])
-           * DEG_PER_RAD,
-           'Rms of estimate less truth in cross-elevation.'),
+           'Rms of estimate minus truth, both axes together.'),
+    Result('estimate_error_cross_elevation_rms_deg', 'deg', 'truth',
+           lambda acu: known_rms(acu.error[:, 0]) * DEG_PER_RAD, 'Rms of estimate minus truth in cross-elevation.'),
     Result('estimate_error_elevation_rms_deg', 'deg', 'truth', lambda acu: known_rms(acu.error[:, 1]) * DEG_PER_RAD,
-           'Rms of estimate less truth in elevation.'),
+           'Rms of estimate minus truth in elevation.'),
     Result('estimate_error_max_deg', 'deg', 'truth', lambda acu: largest(acu.error) * DEG_PER_RAD,
-           'Largest of estimate less truth on either axis.'),
+           'Largest absolute value of estimate minus truth on either axis.'),
     Result('single_sample_noise_deg', 'deg', 'truth', lambda acu: acu.noise * DEG_PER_RAD,
-           "Rms of the receiver's error less the true one."),
+           'Rms of the difference between receiver error and true pointing error, both axes together.'),
     Result('noise_reduction', '-', 'truth', lambda acu: acu.noise / known_rms(acu.error),
-           "The receiver's noise over the error of the estimate."),
-    Result('estimate_lag_s', 's', 'truth', lambda acu: acu.motion[0], 'How late the estimate is.'),
+           'Ratio of the receiver noise to the error of the estimate.'),
+    Result('estimate_lag_s', 's', 'truth', lambda acu: acu.motion[0],
+           'Lag of the estimate behind the true direction.'),
     Result('estimate_rate_error_rms_deg_s', 'deg/s', 'truth', lambda acu: acu.motion[1] * DEG_PER_RAD,
-           "Rms of the estimate's rate less the true one."),
-    Result('estimate_rate_noise_deg_s', 'deg/s', 'answers', lambda acu: acu.ripple(acu.estimate) * DEG_PER_RAD,
-           f"Rms of what is faster than {RIPPLE_WINDOW_S:g} s in the estimate's rate."),
-    Result('command_noise_deg_s', 'deg/s', 'answers', lambda acu: acu.ripple(acu.command) * DEG_PER_RAD,
-           f'Rms of what is faster than {RIPPLE_WINDOW_S:g} s in the rate command.'),
-    Result('evaluated_time_s', 's', 'answers',
+           'Rms of estimated rate minus true rate, both axes together.'),
+    Result('estimate_rate_noise_deg_s', 'deg/s', 'acu', lambda acu: acu.ripple(acu.estimate) * DEG_PER_RAD,
+           f'Rms of the estimated rate minus its moving mean over {RIPPLE_WINDOW_S:g} s.'),
+    Result('command_noise_deg_s', 'deg/s', 'acu', lambda acu: acu.ripple(acu.command) * DEG_PER_RAD,
+           f'Rms of the rate command minus its moving mean over {RIPPLE_WINDOW_S:g} s.'),
+    Result('evaluated_time_s', 's', 'acu',
            lambda acu: acu.common.size * float(np.median(np.diff(acu.estimate['t']))),
-           'How long all versions were in autotrack and settled.'),
+           'Total time with all versions in settled autotrack.'),
 )
 
 
 def numbers(bag, versions) -> dict:
-    """{metric: ([value of each version], unit)} of an ACU's outputs; versions: [{topic: Output}].
+    """Return {metric: ([value of each version], unit)} of the outputs of an ACU; versions: [{topic: Output}].
 
-    Over the time in which all of them are in autotrack and settled, so that they are judged on the same samples.
+    All versions are evaluated on the same samples: the time in which all are in settled autotrack.
     """
     overlays = [Overlay(bag, outputs) for outputs in versions]
-    answers = [RecomputedAcu(overlay) for overlay in overlays]
+    acus = [RecomputedAcu(overlay) for overlay in overlays]
     try:
-        truths = [TruthComparison(acu, tracking.read(overlay)) for acu, overlay in zip(answers, overlays)]
+        truths: list[TruthComparison | None] = [
+            TruthComparison(acu, tracking.read(overlay)) for acu, overlay in zip(acus, overlays)]
     except ValueError:
         truths = [None] * len(versions)
-    common = functools.reduce(np.intersect1d, [acu.autotrack for acu in answers])
-    start = (max((acu.autotrack[0] for acu in answers if acu.autotrack.size), default=math.inf)
-             + tracking.HANDOVER_SETTLING_S)
-    for acu in answers:
-        acu.common = common[common >= start]
-    columns = [results.measured({'answers': acu, 'truth': truth}, COMPARISON_RESULTS) for acu,
-               truth in zip(answers, truths)]
+    common = functools.reduce(np.intersect1d, [acu.autotrack for acu in acus])
+    first = max((acu.autotrack[0] for acu in acus if acu.autotrack.size), default=math.inf)
+    for acu in acus:
+        acu.common = common[common >= first + tracking.HANDOVER_SETTLING_S]
+    columns = [results.measured({'acu': acu, 'truth': truth}, COMPARISON_RESULTS) for acu, truth in zip(acus, truths)]
     return {name: ([column[name][0] for column in columns], unit) for name, (_, unit) in columns[0].items()}

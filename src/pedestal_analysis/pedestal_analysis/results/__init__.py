@@ -1,1 +1,1 @@
-"""What a recorded run achieved: pointing, honesty of the filter, isolation from the ship, attitude."""
+"""Results of a recorded run: pointing, consistency of the filter, isolation from the ship, attitude."""

@@ -1,8 +1,9 @@
-"""Whether the target filter of a recorded run is honest: NIS of its innovations, NEES of its errors against truth.
+"""Consistency of the target filter of a recorded run: NIS of its innovations, NEES of its errors against truth.
 
-Both are squared errors in units of the covariance the filter states (Bar-Shalom, Li, Kirubarajan 2001, section 5.4):
-NIS against the measurements, chi-square with as many degrees of freedom as were measured; NEES of angle and rate
-against the truth, two degrees of freedom. A filter that is too sure of itself has more, one that is too careful less.
+Both are squared errors in units of the covariance that the filter states (Bar-Shalom, Li, Kirubarajan 2001, section
+5.4). NIS compares with the measurements: chi-square with one degree of freedom for each measured number. NEES compares
+angle and rate with the truth: two degrees of freedom. Larger values mean that the stated covariance is too small (the
+filter is too sure), smaller values that it is too large (the filter is too careful).
 """
 import dataclasses
 import functools
@@ -19,24 +20,28 @@ from pedestal_common.geometry import line_of_sight
 from pedestal_common.graph import topics
 
 NEES_FREEDOMS = 2
-"""Of the NEES: angle and rate."""
+"""Degrees of freedom of the NEES: angle and rate."""
 BAND_PROBABILITY = 0.95
-"""Share of honest filters inside a band."""
+"""Share of consistent filters inside a band."""
 
 NOTABLE_DEVIATION = 0.1
-"""Share of its expectation by which a mean is off, beside lying outside of its band, where a table marks it: over
-minutes the band is narrower than any model is true."""
+"""Smallest relative deviation of a mean from its expectation that a table marks, outside the band.
+
+Because over minutes the band becomes narrower than the accuracy of any model, the band alone would mark every filter.
+"""
 
 FILTER_NUMBERS = ('innovation', 'rate_innovation', 'nis', 'sigma', 'rate_sigma', 'correlation')
 
 
 @dataclasses.dataclass
 class Consistency:
-    """The numbers of acu/filter on the steps of a Tracking: arrays (n, 2) of azimuth and elevation, NaN where none.
+    """Numbers of acu/filter on the steps of a Tracking: arrays (n, 2) of azimuth and elevation, NaN where missing.
 
-    innovation [rad], rate_innovation [rad/s], nis; sigma [rad], rate_sigma [rad/s] and correlation that the filter
-    states of its estimate; probability (n, 2, 4) of topics.MOTION_MODELS; error, rate_error: estimate less truth [rad,
-    rad/s]; nees of the two; tracking (n,) bool: the evaluated part.
+    innovation [rad], rate_innovation [rad/s], nis       of the measurements
+    sigma [rad], rate_sigma [rad/s], correlation         stated covariance of the estimate
+    probability                                          (n, 2, 4) of topics.MOTION_MODELS
+    error [rad], rate_error [rad/s], nees                estimate minus truth
+    tracking                                             (n,) bool: the evaluated part
     """
     t: np.ndarray
     innovation: np.ndarray
@@ -58,14 +63,16 @@ class Consistency:
 
     @functools.cached_property
     def axes(self):
-        """The Axis of azimuth and that of elevation."""
+        """The Axis objects of azimuth and elevation."""
         return Axis(self, 0), Axis(self, 1)
 
 
 @compiled
 def _rates(relative, velocity, attitude, ship_velocity, rates):
-    """Fill the rates (n, 2) of earth azimuth and elevation of a target at `relative` [m], moving with `velocity`
-    [m/s], from a ship that moves with `ship_velocity` in its own frame."""
+    """Fill the rates (n, 2) of earth azimuth and elevation of a target seen from a ship.
+
+    relative [m] and velocity [m/s]: of the target, ENU; ship_velocity [m/s]: in the frame of the ship.
+    """
     for k in range(len(relative)):
         q = attitude[k]
         v = minus(vector(velocity[k]), rotated(turn(q[0], q[1], q[2], q[3]), vector(ship_velocity[k])))
@@ -74,7 +81,7 @@ def _rates(relative, velocity, attitude, ship_velocity, rates):
 
 
 def read(bag, run):
-    """The Consistency of a bag.Bag whose tracking.Tracking is `run`; None when it has no acu/filter."""
+    """Return the Consistency of a bag.Bag whose tracking.Tracking is `run`; None if the bag has no acu/filter."""
     if 'acu/filter' not in bag.topics or not bag.rows('acu/filter').size:
         return None
     t = run.t
@@ -96,16 +103,19 @@ def read(bag, run):
     _rates(relative, velocity, attitude, ship_velocity, true_rate)
     error = (estimate[:, :2] - run.target_earth + math.pi) % (2.0 * math.pi) - math.pi
     rate_error = estimate[:, 2:] - true_rate
-    with np.errstate(all='ignore'):  # a filter that states nothing it could be held to has no NEES
+    with np.errstate(all='ignore'):  # a filter without a stated covariance has no NEES
         a, b, correlation = error / numbers['sigma'], rate_error / numbers['rate_sigma'], numbers['correlation']
         nees = (a * a - 2.0 * correlation * a * b + b * b) / (1.0 - correlation * correlation)
     return Consistency(t, **numbers, probability=probability, error=error, rate_error=rate_error, nees=nees,
                        tracking=run.tracking)
 
 
-def independent(values):
-    """How many independent samples a correlated series (n,) is worth for its mean: n / (1 + 2 sum of its
-    autocorrelations), summed while two neighbours together are positive (Geyer 1992, initial positive sequence)."""
+def effective_count(values):
+    """Return the number of independent samples that is equivalent to a correlated series (n,), for its mean.
+
+    It is n / (1 + 2 sum of the autocorrelations). The sum ends at the first pair of neighbours whose sum is not
+    positive (Geyer 1992, initial positive sequence).
+    """
     n = values.size
     deviation = values - values.mean()
     if n < 4 or not deviation.any():
@@ -118,33 +128,34 @@ def independent(values):
 
 
 def bounds(freedoms):
-    """(low, high) that hold a chi-square value with this many degrees of freedom, a number or an array, with
-    BAND_PROBABILITY."""
-    # A long run has few different numbers, and each is found by iteration.
+    """Return (low, high) that contain a chi-square value with BAND_PROBABILITY.
+
+    freedoms: degrees of freedom, a number or an array.
+    """
+    # Because chdtri iterates for each value and a long run has few different ones, each is computed once.
     different, places = np.unique(freedoms, return_inverse=True)
     places = places.reshape(np.shape(freedoms))
-    return tuple(special.chdtri(different, tail)[places] for tail in (0.5 + 0.5 * BAND_PROBABILITY, 0.5 - 0.5
-                                                                      * BAND_PROBABILITY))
+    tails = 0.5 + 0.5 * BAND_PROBABILITY, 0.5 - 0.5 * BAND_PROBABILITY
+    return tuple(special.chdtri(different, tail)[places] for tail in tails)
 
 
 def band(freedoms, count):
-    """The two bounds that hold the mean of `count` chi-square values with this many degrees of freedom with
-    BAND_PROBABILITY."""
+    """Return (low, high) that contain the mean of `count` chi-square values with BAND_PROBABILITY."""
     return tuple(float(bound / count) for bound in bounds(freedoms * count))
 
 
 class Axis:
     """One axis, 0 azimuth or 1 elevation, of a Consistency over the evaluated part; NaN where nothing was measured.
 
-    nis: mean, nis_expected: degrees of freedom; nees: mean; error, rate_error: rms [rad, rad/s]; sigma, rate_sigma:
-    rms of what the filter states.
+    nis: mean; nis_expected: mean degrees of freedom; nees: mean; error [rad], rate_error [rad/s]: rms; sigma,
+    rate_sigma: rms of the stated values.
     """
 
     def __init__(self, known, i):
         on = known.tracking
         nis, freedoms, nees = known.nis[on, i], known.freedoms[on, i], known.nees[on, i]
-        self._freedoms, self._nis, self._nees = freedoms[np.isfinite(nis)], nis[np.isfinite(nis)], nees[
-            np.isfinite(nees)]
+        self._freedoms, self._nis = freedoms[np.isfinite(nis)], nis[np.isfinite(nis)]
+        self._nees = nees[np.isfinite(nees)]
         self.nis, self.nis_expected, self.nees = _mean(self._nis), _mean(self._freedoms), _mean(self._nees)
         self.error, self.rate_error, self.sigma, self.rate_sigma = (
             tracking.known_rms(values[on, i])
@@ -152,7 +163,7 @@ class Axis:
 
     @functools.cached_property
     def nis_inside(self):
-        """Share of single values of the NIS inside their band."""
+        """Share of the values of the NIS inside their bands."""
         if not self._nis.size:
             return math.nan
         low, high = bounds(self._freedoms)
@@ -160,48 +171,45 @@ class Axis:
 
     @functools.cached_property
     def nis_band(self):
-        """Of the mean of the NIS."""
-        return band(self.nis_expected, independent(self._nis)) if self._nis.size else (math.nan, math.nan)
+        """Band (low, high) of the mean NIS."""
+        return band(self.nis_expected, effective_count(self._nis)) if self._nis.size else (math.nan, math.nan)
 
     @functools.cached_property
     def count(self):
-        """Independent errors that the NEES is over."""
-        return independent(self._nees) if self._nees.size else math.nan
+        """Number of independent errors in the mean NEES."""
+        return effective_count(self._nees) if self._nees.size else math.nan
 
     @functools.cached_property
     def nees_band(self):
-        """Of the mean of the NEES."""
+        """Band (low, high) of the mean NEES."""
         return band(NEES_FREEDOMS, self.count) if self._nees.size else (math.nan, math.nan)
 
     @property
     def nis_mark(self):
-        """The `mark` of its NIS."""
+        """The `mark` of the mean NIS."""
         return mark(self.nis, self.nis_expected, self.nis_band)
 
     @property
     def nees_mark(self):
-        """The `mark` of its NEES."""
+        """The `mark` of the mean NEES."""
         return mark(self.nees, NEES_FREEDOMS, self.nees_band)
 
     @property
     def verdict(self):
-        """A plain sentence."""
+        """The result of the test as a sentence."""
         if not math.isfinite(self.nees):
             return 'nothing was evaluated'
         low, high = self.nees_band
-        times = math.sqrt(self.nees / NEES_FREEDOMS)
-        where = f'mean NEES {self.nees:.3g}, {100.0 * BAND_PROBABILITY:g} % of honest filters have {low:.3g} to {high:.3g}'
-        if self.nees > high:
-            return f'too sure of itself: its errors are {times:.2g} times what it states ({where})'
-        if self.nees < low:
-            return f'too careful: its errors are only {times:.2g} times what it states ({where})'
-        return f'honest: its errors are what it states ({where})'
+        kind = 'too sure' if self.nees > high else 'too careful' if self.nees < low else 'consistent'
+        return (f'{kind}: the errors are {math.sqrt(self.nees / NEES_FREEDOMS):.2g} times the stated sigma (mean NEES '
+                f'{self.nees:.3g}, {100.0 * BAND_PROBABILITY:g} % of consistent filters have {low:.3g} to {high:.3g})')
 
 
 def mark(mean, expected, band):
-    """'too sure' or 'too careful' where a mean of squared errors is off its expectation by more than
-    NOTABLE_DEVIATION and
-    outside of its band, else ''."""
+    """Return 'too sure' or 'too careful' for a mean that is outside its band and off by more than NOTABLE_DEVIATION.
+
+    mean: of squared errors; expected: its expectation; band: (low, high). Return '' otherwise.
+    """
     if mean > max(band[1], (1.0 + NOTABLE_DEVIATION) * expected):
         return 'too sure'
     return 'too careful' if mean < min(band[0], (1.0 - NOTABLE_DEVIATION) * expected) else ''

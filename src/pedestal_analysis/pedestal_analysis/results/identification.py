@@ -1,9 +1,12 @@
-"""The rate loop of an axis identified on the drive core, and the gains of the feed-forward that follow from it.
+"""Identification of the rate loop of an axis on the drive core, and the feed-forward gains that follow from the loop.
 
-Small sines of a few low frequencies are added to a constant rate, where friction is a constant and the bias keeps the
-teeth closed; W(jw) is what the antenna's rate makes of them, without the known delay (transport and half a period of
-the hold, which the ACU's prediction covers). By least squares 1 / W(jw) = f_1 + f_2 jw + f_3 (jw)^2 + f_4 (jw)^3, and
-the rate command k_v v + k_a a needs k_v = f_1, k_a = f_2 (paper 003, eq. 14 to 18, as corrected in
+Small sines of a few low frequencies are added to a constant rate. At that rate friction is constant and the bias
+torque keeps the teeth closed. W(jw) is the response of the antenna's rate without the known delay: transport plus half
+a period of the hold, which the ACU's prediction covers. Least squares fit the series
+
+    1 / W(jw) = f_1 + f_2 jw + f_3 (jw)^2 + f_4 (jw)^3.
+
+The rate command k_v v + k_a a needs k_v = f_1, k_a = f_2 (paper 003, eq. 14 to 18, as corrected in
 acu_tracker.servo.feedforward).
 """
 import dataclasses
@@ -19,41 +22,43 @@ from pedestal_common.graph import topics
 from pedestal_common.parameters import record
 
 SINE_FREQUENCIES_HZ = np.array([0.25, 0.5, 1.0, 1.5, 2.0, 2.5])
-"""Hz; whole periods in COMMON_PERIOD_S."""
+"""Frequencies of the excitation, each with whole periods in COMMON_PERIOD_S [Hz]."""
 COMMON_PERIOD_S = 4.0
+"""Period of the sum of the sines [s]."""
 SETTLING_PERIODS, MEASURED_PERIODS = 1, 2
-"""Periods to settle and to measure."""
+"""Numbers of common periods to settle and to measure."""
 SERIES_TERMS = 4
+"""Number of terms of the series of 1 / W."""
 IDENTIFICATION_RATES_RAD_S = (0.1, 0.06)
-"""Rates of the axes [rad/s]: above the excitation, and inside the travel for a whole record."""
+"""Constant rates of azimuth and elevation, above the excitation and inside the travel for a whole record [rad/s]."""
 SINE_PEAK_RAD_S = 0.004
-"""Of each sine [rad/s]."""
+"""Peak of each sine [rad/s]."""
 
 
 @dataclasses.dataclass(frozen=True)
 class RateLoop:
-    """One axis: W (n,) complex at w (n,) [rad/s]; f (SERIES_TERMS,): the series of 1 / W."""
+    """Identified rate loop of one axis: W (n,) complex at w (n,) [rad/s]; f (SERIES_TERMS,): series of 1 / W."""
     w: np.ndarray
     W: np.ndarray
     f: np.ndarray
 
     @property
     def k_v(self):
-        """Gain of the rate of the reference [-]."""
+        """Feed-forward gain of the reference's rate [-]."""
         return float(self.f[0])
 
     @property
     def k_a(self):
-        """Gain of the acceleration of the reference [s]."""
+        """Feed-forward gain of the reference's acceleration [s]."""
         return float(self.f[1])
 
     def error(self, k_v, k_a):
-        """|1 - (k_v + k_a jw) W| (n,): what a feed-forward leaves of the angle, relative."""
+        """Return |1 - (k_v + k_a jw) W| (n,), the relative angle error that a feed-forward leaves."""
         return np.abs(1.0 - (k_v + 1j * k_a * self.w) * self.W)
 
 
 def series(w, W, terms=SERIES_TERMS):
-    """f (terms,) of the least-squares fit 1 / W(jw) = f_1 + f_2 jw + f_3 (jw)^2 + ..."""
+    """Return f (terms,) of the least-squares fit 1 / W(jw) = f_1 + f_2 jw + f_3 (jw)^2 + ..."""
     basis = (1j * w[:, np.newaxis]) ** np.arange(terms)
     wanted = 1.0 / W
     return np.linalg.lstsq(np.concatenate((basis.real, basis.imag)), np.concatenate((wanted.real, wanted.imag)),
@@ -61,10 +66,10 @@ def series(w, W, terms=SERIES_TERMS):
 
 
 def response(commanded, position, T, delay, w):
-    """W (n,) at w (n,) [rad/s] of a rate loop, less its delay and the hold.
+    """Return W (n,) at w (n,) [rad/s] of a rate loop, without its delay and its hold.
 
-    commanded (m,): rates [rad/s], each held for T [s] from t_k + delay [s] on; position (m,): the angle [rad] at t_k.
-    The record holds whole periods of every w; what is linear in time is left out.
+    commanded (m,): rates [rad/s], each held for T [s] from t_k + delay [s] on; position (m,): angle [rad] at t_k.
+    The record contains whole periods of each w. A linear trend is removed.
     """
     t = T * (np.arange(len(commanded)) - 0.5 * (len(commanded) - 1))
     waves = np.cos(w * t[:, np.newaxis]), np.sin(w * t[:, np.newaxis])
@@ -76,7 +81,7 @@ def response(commanded, position, T, delay, w):
 
 @compiled
 def _drive(state, constants, inputs, outputs, rate, torque, position):
-    """Fill position (n, 2) [rad]: the encoders before each step with the commands rate and torque (n, 2)."""
+    """Fill position (n, 2) [rad] with the encoders before each step with the commands rate and torque (n, 2)."""
     u, y = inputs[0], outputs[0]
     for k in range(len(rate)):
         position[k, 0], position[k, 1] = y.azimuth.position, y.elevation.position
@@ -86,9 +91,10 @@ def _drive(state, constants, inputs, outputs, rate, torque, position):
 
 
 def identify(scenario, torque=True) -> dict:
-    """{axis: RateLoop} of a scenario's drive in still air; torque: with the ACU's torque feed-forward, or without.
+    """Return {axis: RateLoop} of a scenario's drive in still air.
 
-    Raises ValueError for a period that does not divide COMMON_PERIOD_S, and for travel that is too short.
+    torque: True to include the ACU's torque feed-forward. Raises ValueError if the period of the drive does not divide
+    COMMON_PERIOD_S or if the travel is too short.
     """
     acu, drive = scenario.node_parameters('acu'), scenario.node_parameters('adu')
     axes = [getattr(drive, name) for name in topics.AXES]
@@ -99,17 +105,18 @@ def identify(scenario, torque=True) -> dict:
     w = 2.0 * math.pi * SINE_FREQUENCIES_HZ
     steps = round(COMMON_PERIOD_S / drive.period)
     if abs(steps * drive.period - COMMON_PERIOD_S) > 1e-9:
-        raise ValueError(f'adu.period = {drive.period:g} s: must divide the {COMMON_PERIOD_S:g} s it is identified over')
-    for name, axis, rate in zip(topics.AXES, axes, IDENTIFICATION_RATES_RAD_S):
-        if axis.limits.upper - axis.limits.lower < 1.1 * rate * duration:
+        raise ValueError(f'adu.period = {drive.period:g} s: must divide {COMMON_PERIOD_S:g} s, the period of the '
+                         'identification')
+    for name, axis, turn in zip(topics.AXES, axes, IDENTIFICATION_RATES_RAD_S):
+        if axis.limits.upper - axis.limits.lower < 1.1 * turn * duration:
             raise ValueError(f'adu.{name}.limits: travel must be at least '
-                             f'{1.1 * rate * duration:g} rad to identify the drive')
-    # Schroeder's phases keep the peak of the sum low.
+                             f'{1.1 * turn * duration:g} rad to identify the drive')
+    # Because Schroeder's phases keep the peak of the sum low, the sines have these phases.
     k = np.arange(len(w))
     angle = w * drive.period * np.arange(steps)[:, np.newaxis] - math.pi * k * (k + 1) / len(k)
     v, a = SINE_PEAK_RAD_S * np.cos(angle).sum(axis=1), -SINE_PEAK_RAD_S * (w * np.sin(angle)).sum(axis=1)
-    (rate, acceleration) = (np.tile(v, SETTLING_PERIODS + MEASURED_PERIODS)[:, np.newaxis]
-                            + IDENTIFICATION_RATES_RAD_S, np.tile(a, SETTLING_PERIODS + MEASURED_PERIODS))
+    v, acceleration = (np.tile(motion, SETTLING_PERIODS + MEASURED_PERIODS) for motion in (v, a))
+    rate = v[:, np.newaxis] + IDENTIFICATION_RATES_RAD_S
     torques = np.zeros_like(rate)
     for i, name in enumerate(topics.AXES if torque else ()):
         known = record(getattr(acu, name).feedforward)[0]

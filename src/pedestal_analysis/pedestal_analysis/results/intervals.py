@@ -1,20 +1,19 @@
-"""Rows of results, their intervals over independent runs, and the targets they meet or miss."""
+"""Rows of results, intervals of results over independent runs, and targets of results."""
 import math
 
 import numpy as np
 from scipy.special import stdtrit
 
 CONFIDENCE_LEVEL = 0.95
-"""Of the interval of a mean."""
+"""Confidence level of the interval of a mean [-]."""
 
 
 def interval(values):
-    """(mean, low, high) of the values (n,) of n independent runs: mean and its CONFIDENCE_LEVEL interval by Student's
-    t,
+    """Return (mean, low, high) of the values (n,) of n independent runs: mean and interval by Student's t,
 
         mean -+ t_(n-1) s / sqrt(n),        s: standard deviation of the values.
 
-    NaN where a value is not finite; of one run low and high are NaN.
+    The interval has the confidence CONFIDENCE_LEVEL. NaN if a value is not finite; low and high of one run are NaN.
     """
     values = np.asarray(values, float)
     n, mean = len(values), float(np.mean(values))
@@ -25,10 +24,10 @@ def interval(values):
 
 
 def pseudo_values(parts, statistic):
-    """Values (n,) whose mean and `interval` are those of a statistic of all runs together, such as an rms over them.
+    """Return values (n,) with the mean and the `interval` of a statistic over all runs together, such as an rms.
 
     parts: n about equal parts of the runs; statistic(parts) -> number. Tukey's jackknife (Efron and Stein, Annals of
-    Statistics 9 (1981) 586): theta_i = n theta - (n - 1) theta_-i, the latter of all parts but i.
+    Statistics 9 (1981) 586): theta_i = n theta - (n - 1) theta_-i, with theta_-i from all parts except i.
     """
     n, whole = len(parts), statistic(parts)
     return np.array([n * whole - (n - 1) * statistic(parts[:i] + parts[i + 1:]) if n > 1 else whole
@@ -36,16 +35,18 @@ def pseudo_values(parts, statistic):
 
 
 def row(case, metric, value, unit='', paper=None, target=None, runs=None):
-    """One row of a --json file. value: a number, or the values (n,) of the runs of what is random: the row then has
-    their mean, its interval and their number, or `runs` where the values are those of parts of the runs. paper: the
-    printed number or None; target: a text that `meets` reads, or None."""
+    """Return one row of a --json file.
+
+    value: a number, or the values (n,) of n random runs. For values the row has the mean, its interval and n; `runs`
+    replaces n if each value belongs to several runs. paper: printed number or None; target: text for `meets`, or None.
+    """
     if np.ndim(value):
         return estimated(case, metric, interval(value), unit, runs or len(value), paper, target)
     return {'case': case, 'metric': metric, 'value': _finite(value), 'unit': unit, 'paper': paper, 'target': target}
 
 
 def estimated(case, metric, estimate, unit, runs, paper=None, target=None):
-    """Return the `row` of an estimate (value, low, high) of so many runs."""
+    """Return the `row` of an estimate (value, low, high) from a number of runs."""
     value, low, high = estimate
     return {**row(case, metric, value, unit, paper, target), 'ci_low': _finite(low), 'ci_high': _finite(high),
             'runs': runs}
@@ -56,7 +57,10 @@ def _finite(value):
 
 
 def meets(value, target):
-    """Whether a value meets a target: '<= 1', '>= 1', '< 1', '> 1', '1 +- 0.1' or '1 to 2'; None meets no target."""
+    """Return True if a value meets a target: '<= 1', '>= 1', '< 1', '> 1', '1 +- 0.1' or '1 to 2'.
+
+    The value None meets no target.
+    """
     if value is None:
         return False
     first, word, last = ('', *target.split()) if len(target.split()) == 2 else target.split()
@@ -67,6 +71,6 @@ def meets(value, target):
 
 
 def missed(row):
-    """Whether a row has a target and does not meet it; a random one meets it when its whole interval does."""
+    """Return True if a row misses its target; the whole interval of a random value must meet the target."""
     judged = ('ci_low', 'ci_high') if 'runs' in row else ('value',)
     return row['target'] is not None and not all(meets(row[key], row['target']) for key in judged)

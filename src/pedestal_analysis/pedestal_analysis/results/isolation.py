@@ -1,23 +1,24 @@
-"""How much of the ship's rotation is left in the pointing error of a recorded run.
+"""Isolation of the pointing error of a recorded run from the rotation of the ship.
 
-isolation = 20 log10(motion / coherent), over the evaluated part of the run (Tracking.tracking) as far as the
-target was within half a beamwidth and no slew through a keyhole under way, from the recorded truth; each rms is per
-axis and sample, cross-elevation and elevation together.
+isolation = 20 log10(motion / coherent), from the recorded truth. It is computed over the evaluated part of the run
+(Tracking.tracking) with the target within half a beamwidth, without slews through a keyhole. Each rms is per axis and
+sample, cross-elevation and elevation together.
 
-motion    how far the direction to the target moves on the deck because the ship turns about its mean attitude: the
-          angle between that direction and the one the deck would see in its mean attitude.
-coherent  the part of the true pointing error that a linear law of the ship's rotation explains: least squares of each
-          axis on nine series, the deck's turn from its mean attitude, its angular velocity and its angular
-          acceleration, their means taken out, each in the axes of the beam (cross-elevation, elevation, along). The
-          velocity stands between turn and acceleration, so leads and lags are in it; and in the axes of the beam,
-          because there a wrong attitude, a delay or friction acts while the target moves across the deck.
+motion    Motion of the direction to the target on the deck because the ship rotates about its mean attitude: the angle
+          between the direction and the direction on a deck in the mean attitude.
+coherent  Part of the true pointing error that a linear law of the ship's rotation explains. It is the least-squares
+fit
+          of each axis to nine series: rotation of the deck from its mean attitude, angular velocity and angular
+          acceleration, without their means, each in the axes of the beam (cross-elevation, elevation, along). The
+          velocity is a quarter period from both rotation and acceleration, so leads and lags are included. The axes
+          are those of the beam because a wrong attitude, a delay or friction acts there while the target crosses the
+          deck.
 
-Noise that is independent of the ship fits nine series a little as well, by chance. `floor` is the rms of that fit
-which is expected of noise with the power spectrum of what the regression leaves over, smoothed over
-SMOOTHING_HALF_WIDTH_HZ, in
-random phases. `limit`, 20 log10(motion / floor), is therefore the isolation that a run of this length and noise can
-show: where the isolation is near the limit (or above, by chance), the ship cannot be told from noise in the error, and
-a run with less noise shows more (tracking_receiver.receiver.cn0_dbhz, the noises of the ins).
+Noise that is independent of the ship also fits nine series a little, by chance. `floor` is the expected rms of that
+fit for noise of random phase. The power spectrum of the noise is that of the remainder of the regression, smoothed
+over SMOOTHING_HALF_WIDTH_HZ. `limit`, 20 log10(motion / floor), is therefore the highest isolation that a run of this
+length and noise can show. Near the limit (or above, by chance), the effect of the ship cannot be separated from noise.
+A run with less noise shows more isolation (tracking_receiver.receiver.cn0_dbhz, the noises of the ins).
 """
 import dataclasses
 import math
@@ -27,9 +28,9 @@ import numpy as np
 from pedestal_analysis.results import tracking
 
 SMOOTHING_HALF_WIDTH_HZ = 0.02
-"""Half the width [Hz] over which the power spectrum of the remainder is averaged."""
+"""Half the width of the average over the power spectrum of the remainder [Hz]."""
 MIN_TRACKED_TIME_S = 20.0
-"""Shortest evaluated time [s] that can tell: a few periods of the ship."""
+"""Shortest evaluated time for an isolation: a few periods of the ship [s]."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -41,12 +42,12 @@ class Isolation:
 
     @property
     def isolation(self):
-        """[dB]; NaN where nothing moved."""
+        """Isolation [dB]; NaN without motion."""
         return _decibels(self.motion, self.coherent)
 
     @property
     def limit(self):
-        """[dB]"""
+        """Highest isolation that the run can show [dB]."""
         return _decibels(self.motion, self.floor)
 
 
@@ -55,7 +56,8 @@ def _decibels(large, small):
 
 
 def _beam_axes(direction):
-    """(n, 3, 3): the unit vectors cross-elevation, elevation and along the beam as rows, of directions (n, 3) FLU."""
+    """Return unit vectors cross-elevation, elevation and along the beam as rows (n, 3, 3), for directions (n, 3)
+    FLU."""
     x, y, z = direction.T
     flat = np.hypot(x, y)
     sa, ca = -y / flat, x / flat
@@ -65,12 +67,12 @@ def _beam_axes(direction):
 
 
 def measure(dt, error, target, attitude, deck_rate) -> Isolation:
-    """The Isolation of n samples dt [s] apart.
+    """Return the Isolation of n samples at intervals of dt [s].
 
-    error (n, 2) [rad] cross-elevation, elevation; target (n, 3) ENU from the ship, of any length; attitude (n, 4)
-    true quaternions x, y, z, w deck -> earth; deck_rate (n, 3) [rad/s] FLU.
+    error (n, 2) [rad]: cross-elevation, elevation; target (n, 3): ENU from the ship, of any length; attitude (n, 4):
+    true quaternions x, y, z, w deck -> earth; deck_rate (n, 3): [rad/s] FLU.
     """
-    # Slow to import, and most runs are ashore.
+    # Because the import is slow and most runs are ashore, it is made here.
     from scipy import ndimage
     from scipy.spatial.transform import Rotation
     turns = Rotation.from_quat(attitude)
@@ -89,7 +91,7 @@ def measure(dt, error, target, attitude, deck_rate) -> Isolation:
     error = error - error.mean(axis=0)
     explained = basis.T @ error
     n = len(error)
-    # The regression takes the share `weight` of the noise out of each frequency; its neighbours tell what was there.
+    # The regression removes the share `weight` of the noise at each frequency; the neighbours restore the level.
     weight = np.sum(np.abs(np.fft.fft(basis, axis=0))**2, axis=1) / n
     power = np.sum(np.abs(np.fft.fft(error - basis @ explained, axis=0))**2, axis=1) / n
     width = 2 * round(SMOOTHING_HALF_WIDTH_HZ * n * dt) + 1
@@ -100,8 +102,10 @@ def measure(dt, error, target, attitude, deck_rate) -> Isolation:
 
 
 def read(bag, run):
-    """The Isolation of a bag.Bag whose tracking.Tracking is `run`; None ashore or when less than MIN_TRACKED_TIME_S
-    was tracked."""
+    """Return the Isolation of a bag.Bag whose tracking.Tracking is `run`.
+
+    None ashore, and for less than MIN_TRACKED_TIME_S of evaluated time.
+    """
     if 'ship/truth' not in bag.topics or run.t.size < 2:
         return None
     ship = tracking.on_grid(bag, run.t, 'ship/truth', [*(f'orientation.{letter}' for letter in 'xyzw'),

@@ -1,4 +1,4 @@
-"""What the INS of a recorded run knew of the deck's attitude, against the truth and against the error it stated."""
+"""Attitude that the INS of a recorded run reported, against the truth and against the stated standard deviations."""
 import dataclasses
 import math
 
@@ -11,12 +11,13 @@ ATTITUDE_TOPIC, INS_STATE_TOPIC = 'ship/imu/data', 'ins/state'
 
 @dataclasses.dataclass
 class KnownAttitude:
-    """The INS at its stamps t (n,) [s].
+    """Errors of the INS at its stamps t (n,) [s].
 
-    error (n, 3) [rad]: the rotation from the true attitude to the known one about east and north (level) and,
-    clockwise, about up (heading); any size up to half a turn. sigma (n, 2) [rad]: standard deviations of level and
-    heading that the INS stated. aligned: stamp [s] at which ins/state became `aligned`; NaN when it never did, the
-    first stamp in a bag without ins/state.
+    error    (n, 3) [rad] rotation from the true to the reported attitude about east and north (level) and, clockwise,
+             about up (heading), up to half a turn
+    sigma    (n, 2) [rad] stated standard deviations of level and heading
+    aligned  stamp [s] at which ins/state became `aligned`; NaN if it never did, the first stamp of a bag without
+             ins/state
     """
     t: np.ndarray
     error: np.ndarray
@@ -35,18 +36,18 @@ class KnownAttitude:
 
     @property
     def after(self):
-        """Which rows (n,) bool are from alignment on."""
+        """Mask (n,) bool of the rows from alignment on."""
         return self.t >= self.aligned
 
     @property
     def at_alignment(self):
-        """(heading error, its stated standard deviation) [rad] when it was aligned; NaN when it never was."""
+        """(heading error, stated standard deviation of heading) [rad] at alignment; NaN without alignment."""
         first = np.argmax(self.after)
         return (float(self.heading[first]), float(self.sigma[first, 1])) if self.after.any() else (math.nan, math.nan)
 
 
 def read(bag):
-    """The KnownAttitude of a bag.Bag; None ashore."""
+    """Return the KnownAttitude of a bag.Bag; None ashore."""
     if any(topic not in bag.topics or not bag.rows(topic).size for topic in ('ship/truth', ATTITUDE_TOPIC)):
         return None
     table = bag.table(ATTITUDE_TOPIC)

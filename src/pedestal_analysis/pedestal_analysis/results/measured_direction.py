@@ -1,4 +1,4 @@
-"""Where a receiver saw the target: from encoders, angle errors and attitude to earth angles."""
+"""Measured direction of the target: from encoders, receiver errors and attitude to earth angles."""
 import numpy as np
 
 from pedestal_common.compiled import compiled
@@ -7,7 +7,7 @@ from pedestal_common.geometry import line_of_sight
 
 @compiled
 def _displaced(azimuth, elevation, errors, quaternions, earth):
-    """Fill the earth angles (n, 2) of the directions that a receiver at deck angles (n,) measures at errors (n, 2)."""
+    """Fill the earth angles (n, 2) of a target at the errors (n, 2) from a beam at deck angles (n,)."""
     mat_ed = np.empty((3, 3))
     for k in range(azimuth.size):
         line_of_sight.rotation(quaternions[k, 0], quaternions[k, 1], quaternions[k, 2], quaternions[k, 3], mat_ed)
@@ -18,10 +18,10 @@ def _displaced(azimuth, elevation, errors, quaternions, earth):
 
 
 def earth_angles(beam, errors, quaternions=None):
-    """Earth azimuth in (-pi, pi] and elevation (n, 2) [rad] of a target that the receiver sees off its beam.
+    """Return earth azimuth in (-pi, pi] and elevation (n, 2) [rad] of the target, from beam and receiver errors.
 
     beam (n, 2): deck azimuth and elevation [rad]; errors (n, 2): cross-elevation and elevation [rad]; quaternions
-    (n, 4): attitude deck -> earth, None ashore. NaN where one of them is NaN.
+    (n, 4): attitude deck -> earth, None ashore. NaN where an input is NaN.
     """
     if quaternions is None:
         quaternions = np.tile(np.array(line_of_sight.ASHORE_ATTITUDE), (len(beam), 1))

@@ -1,4 +1,4 @@
-"""A recorded run on the drive's steps: beam, encoders, estimate and receiver against the recorded truth."""
+"""A recorded run on the steps of the drive: beam, encoders, estimate and receiver against the recorded truth."""
 import contextlib
 import dataclasses
 import functools
@@ -14,18 +14,18 @@ from tracking_receiver_sim.path import arrival
 from tracking_receiver_sim.path.params import PathParameters
 
 HANDOVER_SETTLING_S = 2.0
-"""Seconds after the first hand-over to autotrack that are left out of every statistic."""
+"""Time after the first hand-over to autotrack that every statistic leaves out [s]."""
 DEG_PER_RAD = math.degrees(1.0)
-ENCODER_BEAM_NOTE = ('there is no adu/truth in it, so the beam is taken to be where joint_states say: what moves the dish '
-                     'off its encoders does not show')
-"""What is said of the numbers of a recording from before the drive told where its dish truly points."""
+ENCODER_BEAM_NOTE = ('the recording has no adu/truth, so the direction of the beam is taken from joint_states: errors '
+                     'between encoders and dish do not show')
+"""Note on the results of an old recording, whose drive did not publish the true direction of its dish."""
 
 
 @compiled
 def _true_error(direction, relative, attitude, error):
     """Fill the error (n, 2) (cross-elevation, elevation) [rad] of deck angles (n, 2) against the target.
 
-    relative (n, 3): ENU [m] from the antenna to the target; attitude (n, 4): the true one.
+    relative (n, 3): ENU [m] from the antenna to the target; attitude (n, 4): true attitude.
     """
     mat_ed = np.empty((3, 3))
     for k in range(len(direction)):
@@ -36,9 +36,9 @@ def _true_error(direction, relative, attitude, error):
 
 @compiled
 def _view_from_beam(beam, attitude, known_attitude, estimate, filtered, beam_earth):
-    """Fill, per row: the filtered error (cross-elevation, elevation) seen from the beam, the beam's earth angles.
+    """Fill per row: filtered error (cross-elevation, elevation) seen from the beam, earth angles of the beam.
 
-    attitude is the true one, known_attitude the INS's, in whose earth angles the estimate is given.
+    attitude: true attitude; known_attitude: attitude of the INS; the estimate is in the earth angles of the INS.
     """
     mat_ed, known = np.empty((3, 3)), np.empty((3, 3))
     for k in range(len(beam)):
@@ -63,8 +63,11 @@ def _interval_start_error(beam, error, out):
 
 
 def interval_start_error(beam, error):
-    """Pointing error (n, 2) at the beginning of the intervals in which a beam (n, 2) [rad] that jumps at the steps
-    stood, from the one (n, 2) at their ends, the stamps: beam k against the target of k - 1; NaN in the first."""
+    """Return the pointing error (n, 2) of an electronic beam (n, 2) [rad] at the beginning of each interval.
+
+    The beam jumps at each step and then stands. error (n, 2): pointing error at the ends of the intervals, which are
+    the stamps. The beginning compares beam k with the target of k - 1; NaN in the first row.
+    """
     out = np.full(beam.shape, np.nan)
     _interval_start_error(np.ascontiguousarray(beam), np.ascontiguousarray(error), out)
     return out
@@ -72,17 +75,25 @@ def interval_start_error(beam, error):
 
 @dataclasses.dataclass
 class Tracking:
-    """A run as arrays on the drive's steps; angles in rad, NaN where nothing was measured. Two columns are azimuth (or
-    cross-elevation) and elevation.
+    """A run as arrays on the steps of the drive; angles in rad, NaN where nothing was measured.
 
-    t (n,) s; azimuth, elevation (n,): encoders; reference (n, 2): deck angles that the ACU follows, NaN in standby and
-    of an electronic beam, which obeys them later; cross_elevation, elevation_error (n,): true error at the stamps, the
-    target off where the dish points; encoder_error (n, 2): the target off where the encoders say, NaN of an electronic
-    beam and where the bag does not tell the two apart; measured (n, 2): errors of the receiver; cn0 (n,) dB-Hz;
-    filtered (n, 2): the estimate seen from the beam; beam_earth, target_earth (n, 2): earth angles; range (n,) m; mode
-    (n,): text; tracking (n,) bool: in autotrack and settled, the evaluated part; since (n,) bool: that or later;
-    beamwidth, NaN when the bag does not say; begun (n, 2): true error of an electronic beam at the beginning of the
-    interval that ends at the stamp, else NaN.
+    Two columns are azimuth (or cross-elevation) and elevation. An electronic beam follows the reference later.
+
+    t                               (n,) [s]
+    azimuth, elevation              (n,) encoders
+    reference                       (n, 2) deck angles of the ACU's reference; NaN in standby and of an electronic beam
+    cross_elevation,
+    elevation_error                 (n,) true pointing error at the stamps: target minus direction of the dish
+    encoder_error                   (n, 2) target minus direction of the encoders; NaN of an electronic beam and of a
+                                    bag without adu/truth
+    measured, cn0                   (n, 2) receiver error; (n,) [dB-Hz]
+    filtered                        (n, 2) estimate seen from the beam
+    beam_earth, target_earth, range (n, 2) earth angles of both; (n,) distance to the target [m]
+    mode                            (n,) texts
+    tracking, since                 (n,) bool: settled autotrack, which is the evaluated part; from its first step on
+    beamwidth                       NaN if the bag does not state it
+    begun                           (n, 2) true error of an electronic beam at the beginning of the interval that ends
+                                    at the stamp, else NaN
     """
     t: np.ndarray
     azimuth: np.ndarray
@@ -105,49 +116,53 @@ class Tracking:
 
     @property
     def period(self):
-        """Of the drive's steps [s]."""
+        """Period of the drive [s]."""
         return np.median(np.diff(self.t))
 
     @property
     def electronic(self):
-        """Whether the beam is an electronic one, which stands from step to step."""
+        """True if the beam is electronic: it stands from step to step."""
         return np.isfinite(self.begun).any()
 
     @property
     def following(self):
-        """Reference less encoder (n, 2) [deg]."""
+        """Following error: reference minus encoder (n, 2) [deg]."""
         return (self.reference - np.column_stack((self.azimuth, self.elevation))) * DEG_PER_RAD
 
     @functools.cached_property
     def true(self):
-        """True error (k, 2) [rad] over the evaluated part."""
+        """True pointing error (k, 2) [rad] over the evaluated part."""
         return np.column_stack((self.cross_elevation, self.elevation_error))[self.tracking]
 
     @property
     def has_encoders(self):
-        """Whether what the encoders say is known beside where the beam points."""
+        """True if the bag holds both the encoders and the true direction of the beam."""
         return np.isfinite(self.encoder_error).any()
 
     @functools.cached_property
     def by_encoders(self):
-        """Error by the encoders (k, 2) [deg] over the evaluated part."""
+        """Pointing error computed from the encoders (k, 2) [deg] over the evaluated part."""
         return self.encoder_error[self.tracking] * DEG_PER_RAD
 
     @functools.cached_property
     def noise(self):
-        """Measured less true error (k, 2) [deg] over the evaluated part; of an electronic beam less the true error in
-        the middle of the interval, which the receiver measures."""
+        """Measured minus true error (k, 2) [deg] over the evaluated part.
+
+        The receiver of an electronic beam measures the error in the middle of the interval, so that is its true error.
+        """
         true = 0.5 * (self.true + self.begun[self.tracking]) if self.electronic else self.true
         return (self.measured[self.tracking] - true) * DEG_PER_RAD
 
     @functools.cached_property
     def filter_error(self):
-        """Filtered less true error (k, 2) [deg] over the evaluated part."""
+        """Filtered minus true error (k, 2) [deg] over the evaluated part."""
         return (self.filtered[self.tracking] - self.true) * DEG_PER_RAD
 
     def pointing(self, measure, axis=slice(None)):
-        """measure(true error) [deg] over the evaluated part; of an electronic beam at the end or at the beginning of
-        its intervals, whichever is larger."""
+        """Return measure(true error) [deg] over the evaluated part.
+
+        For an electronic beam, return the larger value of the beginnings and the ends of the intervals.
+        """
         errors = (self.true, self.begun[self.tracking]) if self.electronic else (self.true,)
         return max(measure(error[:, axis]) for error in errors) * DEG_PER_RAD
 
@@ -181,8 +196,10 @@ class Tracking:
 
     @property
     def loss(self):
-        """How long [s] the target was further than half a beamwidth off the beam, in whatever mode, from the first
-        evaluated step on; NaN without such a step or a beamwidth."""
+        """Time [s], in any mode from the first evaluated step on, with the target further than half a beamwidth off.
+
+        NaN without an evaluated step or without a beamwidth.
+        """
         if not (self.since.any() and math.isfinite(self.beamwidth)):
             return math.nan
         distance = np.hypot(self.cross_elevation, self.elevation_error)[self.since]
@@ -190,7 +207,7 @@ class Tracking:
 
 
 def beamwidth(bag):
-    """The beamwidth [rad] a bag was recorded with, NaN when it does not say."""
+    """Return the beamwidth [rad] that a bag states, NaN if it states none."""
     try:
         return float(bag.metadata.get('beamwidth', 'nan'))
     except ValueError:
@@ -198,7 +215,7 @@ def beamwidth(bag):
 
 
 def on_grid(bag, t, topic, columns):
-    """Columns of a topic at the stamps t; NaN where it has no message of that stamp."""
+    """Return columns of a topic at the stamps t; NaN where the topic has no message of that stamp."""
     table = bag.table(topic) if topic in bag.topics else {'t': ()}
     if np.array_equal(table['t'], t) and (np.diff(t) > 1e-9).all():     # a message in every step
         return np.column_stack([table[column] for column in columns])
@@ -211,7 +228,7 @@ def on_grid(bag, t, topic, columns):
 
 
 def _lever_arm(bag, attitude):
-    """(n, 3) ENU [m] from base_link to the antenna, at attitudes (n, 4) of the deck; 0 when the bag does not say."""
+    """Return (n, 3) ENU [m] from base_link to the antenna at attitudes (n, 4) of the deck; 0 if the bag has no arm."""
     parameters = bag.configuration['parameters'].get('tracking_receiver', {})
     arm = np.array([parameters.get(f'lever_arm.{axis}', 0.0) for axis in 'xyz'], float)
     enu, mat_ed = np.zeros((len(attitude), 3)), np.empty((3, 3))
@@ -223,8 +240,10 @@ def _lever_arm(bag, attitude):
 
 
 def _arriving(bag, relative, velocity):
-    """(n, 3) ENU [m] from the antenna to where the target is seen, which is at `relative` with the velocity (n, 3):
-    refracted and late as the bag says."""
+    """Return (n, 3) ENU [m] from the antenna to the apparent position of a target at `relative` with velocity (n, 3).
+
+    Refraction and light time are those of the parameters in the bag.
+    """
     of_receiver = bag.configuration['parameters'].get('tracking_receiver', {})
     given = {key: of_receiver[key] for key in ('path.refractivity', 'path.light_time') if key in of_receiver}
     path = build(PathParameters, given, 'path.')
@@ -232,16 +251,19 @@ def _arriving(bag, relative, velocity):
 
 
 def by_encoders(bag):
-    """Whether the beam of a bag is taken to be where its encoders say (ENCODER_BEAM_NOTE); an array's steering is the
-    truth."""
+    """Return True if the direction of the beam is taken from the encoders of a bag (ENCODER_BEAM_NOTE).
+
+    The steering of an array is its true direction.
+    """
     return not bag.beams and 'adu/truth' not in bag.topics
 
 
 def read(bag) -> Tracking:
-    """The Tracking of a bag (bag.Bag). Raises ValueError when it has no joint_states or target/truth."""
+    """Return the Tracking of a bag.Bag. Raises ValueError if the bag has no joint_states or no target/truth."""
     missing = [name for name in ('joint_states', 'target/truth') if name not in bag.topics]
     if missing:
-        raise ValueError(f'{bag.path}: no {" and no ".join(missing)} in it, so nothing can be compared with the truth')
+        raise ValueError(f'{bag.path}: no {" and no ".join(missing)} in the bag, so no comparison with the truth is '
+                         'possible')
 
     joints = bag.table('joint_states')
     t = joints['t']
@@ -273,9 +295,9 @@ def read(bag) -> Tracking:
     start = t[automatic][0] + HANDOVER_SETTLING_S if automatic.any() else math.inf
     reference = at_steps('acu/reference', ('azimuth.position', 'elevation.position'))
     reference[(mode == 'standby') | (mode == '') | (bag.beams > 0)] = np.nan
-    return Tracking(t, *encoders.T, reference, *error.T, encoder_error, measured[:, :2], measured[:, 2],
-                    filtered, beam_earth, target_earth, np.linalg.norm(relative, axis=1), mode,
-                    automatic & (t >= start), t >= start, beamwidth(bag),
+    return Tracking(t, encoders[:, 0], encoders[:, 1], reference, error[:, 0], error[:, 1], encoder_error,
+                    measured[:, :2], measured[:, 2], filtered, beam_earth, target_earth,
+                    np.linalg.norm(relative, axis=1), mode, automatic & (t >= start), t >= start, beamwidth(bag),
                     interval_start_error(beam, error) if bag.beams else np.full_like(error, np.nan))
 
 
@@ -303,29 +325,29 @@ def _first_mode(bag, change):
 
 
 def keyholes(bag):
-    """[(begin, end, loss)] [s] of the slews through a keyhole that the ACU announced in its diagnostics, each once."""
+    """Return [(begin, end, loss)] [s] of the keyhole slews that the ACU predicted in its diagnostics, each once."""
     slews = {}
     for _, _, _, array in bag.messages('diagnostics') if 'diagnostics' in bag.topics else ():
         for status in array.status:
             values = {value.key: value.value for value in status.values}
-            with contextlib.suppress(KeyError, ValueError):  # announces none, or is of another node
+            with contextlib.suppress(KeyError, ValueError):  # the status is of another node or predicts no slew
                 begin, end, loss = (float(values[f'keyhole_{name}_s']) for name in ('begins', 'ends', 'loss'))
                 slews[begin] = begin, end, loss
     return list(slews.values())
 
 
 def rms(values, axis=None):
-    """Return the root mean square of values, of all or along an axis; NaN where one of them is NaN."""
+    """Return the root mean square of all values, or along an axis; NaN where a value is NaN."""
     return np.sqrt(np.mean(np.square(values), axis=axis))
 
 
 def known_rms(values):
-    """Return the root mean square of the finite values; NaN when there are none."""
+    """Return the root mean square of the finite values; NaN if there are none."""
     values = values[np.isfinite(values)]
     return float(rms(values)) if values.size else math.nan
 
 
 def largest(values):
-    """Largest size of the finite values; NaN when there are none."""
+    """Return the largest absolute value of the finite values; NaN if there are none."""
     values = values[np.isfinite(values)]
     return float(np.max(np.abs(values))) if values.size else math.nan

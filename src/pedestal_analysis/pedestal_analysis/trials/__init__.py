@@ -1,1 +1,1 @@
-"""Many runs at once, and the search for parameters that they serve."""
+"""Trials: many runs of a scenario with varied parameters, their table and their statistics."""

@@ -1,4 +1,4 @@
-"""Cases: scenarios with parameters changed, run through the composed units."""
+"""Cases: scenarios with changed parameters, run in the closed loop without ROS."""
 import dataclasses
 import math
 import shlex
@@ -9,8 +9,7 @@ from pedestal_bringup.scenario import scenario
 
 @dataclasses.dataclass(frozen=True)
 class Case:
-    """A scenario with some parameters changed: parameters is {'node.key': value}, duration [s] and seed None for its
-    own."""
+    """A scenario with changed parameters {'node.key': value}; duration [s] and seed None for those of the scenario."""
     name: str
     scenario: str
     parameters: dict = dataclasses.field(default_factory=dict)
@@ -18,23 +17,23 @@ class Case:
     seed: int | None = None
 
     def with_seed(self, seed):
-        """This Case with another seed."""
+        """Return this Case with another seed."""
         return dataclasses.replace(self, seed=seed)
 
     def loaded(self):
-        """The scenario.Scenario of this case."""
+        """Return the scenario.Scenario of this case."""
         return scenario.load(self.scenario, self.overrides(), duration=self.duration, seed=self.seed)
 
     def run(self):
-        """The closed loop of this case, a closed_loop.Run."""
+        """Run the closed loop of this case and return its closed_loop.Run."""
         return closed_loop.Loop(self.loaded()).run()
 
     def overrides(self):
-        """The parameters as texts node.key=value."""
+        """Return the parameters as texts node.key=value."""
         return [f'{key}={value}' for key, value in self.parameters.items()]
 
     def command(self):
-        """The command that runs this case through the nodes."""
+        """Return the command that runs this case in the graph."""
         duration = [] if self.duration is None else ['--duration', f'{self.duration:g}']
         parameters = [part for override in self.overrides() for part in ('--param', override)]
         seed = [] if self.seed is None else ['--seed', str(self.seed)]
@@ -42,7 +41,8 @@ class Case:
 
 
 def sine_case(case, w, periods):
-    """The Case with a sine of w [rad/s], for `periods` and up to 12 ms more, so that the last period is whole."""
+    """Return the Case with a sine of w [rad/s] for `periods` and up to 12 ms more, so that the last period is
+    complete."""
     step = 0.002
     duration = math.ceil((2.0 * math.pi * periods / w + 0.01) / step) * step
     parameters = {**case.parameters, 'tracking_receiver.target.angle.frequency': w / (2.0 * math.pi)}

@@ -1,11 +1,11 @@
-"""Two scenarios, or two settings of one, compared trial by trial: pairs have the same seed and the same draws.
+"""Comparison of two scenarios, or of two settings of one, trial by trial; a pair has the same seed and draws.
 
-gain   how much better A is than B in the mean, [%] of B:
+gain   improvement of the mean of A over that of B, [%] of B:
 
-           100 (1 - mean a / mean b),       of a result of which more is better 100 (mean a / mean b - 1),
+           100 (1 - mean a / mean b),       for a result with larger values preferred 100 (mean a / mean b - 1),
 
        with the interval of its jackknife (Efron and Stein, Annals of Statistics 9 (1981) 586)
-wins   in how many pairs A is the better one, by Clopper and Pearson; a draw is no win
+wins   share of the pairs in which A is better, by Clopper and Pearson; equal values are no win
 """
 import typing
 
@@ -16,7 +16,7 @@ from pedestal_analysis.trials import statistics
 
 
 class Sides(typing.NamedTuple):
-    """Names of the two that are compared, and their table.Tables."""
+    """Names and table.Tables of the two compared sides."""
     name_a: str
     name_b: str
     a: object
@@ -24,29 +24,29 @@ class Sides(typing.NamedTuple):
 
     @property
     def case(self):
-        """The case of its rows."""
+        """Case of the rows."""
         return f'{self.name_a} against {self.name_b}'
 
     @property
     def results(self):
-        """The results that both have."""
+        """Names of the results that both sides have."""
         return [name for name in self.a.there if name in self.b.there]
 
     def pairs(self, result):
-        """The values a, b (n,) of a result in the trials in which both have it."""
+        """Return the values a, b (n,) of a result in the trials in which both sides have the result."""
         both = self.a.column(result), self.b.column(result)
         known = np.isfinite(both).all(axis=0)
         return both[0][known], both[1][known]
 
 
 def names(plan_a, plan_b):
-    """What the sides of two plan.Plans are called: the scenario, and the changes that the other one does not have."""
+    """Return the names of the sides of two plan.Plans: the scenario, and the overrides that only this side has."""
     return tuple(' '.join((own.name, *(change for change in own.overrides if change not in other.overrides)))
                  for own, other in ((plan_a, plan_b), (plan_b, plan_a)))
 
 
 def gain(a, b, larger):
-    """(gain, low, high) [%] of a over b (n,), both above 0; larger: whether more is better."""
+    """Return (gain, low, high) [%] of a over b (n,), both above 0; larger: True if larger values are better."""
     def of(sum_a, sum_b):
         return 100.0 * (sum_a / sum_b - 1.0 if larger else 1.0 - sum_a / sum_b)
 
@@ -56,17 +56,20 @@ def gain(a, b, larger):
 
 
 def wins(a, b, larger):
-    """(share, low, high) [%] of the pairs in which a is better than b (n,)."""
+    """Return (share, low, high) [%] of the pairs in which a is better than b (n,)."""
     return statistics.rate(int(np.sum(a > b if larger else a < b)), len(a))
 
 
 def has_gain(result, a, b):
-    """Whether a share of b says something: of a ratio scale, measured in two pairs at least and never in all zero."""
+    """Return True if a gain in percent of b is meaningful.
+
+    It needs a ratio scale, at least two pairs, and at least two values of b above 0.
+    """
     return len(a) > 1 and statistics.unit(result) != 'dB' and min(a.min(), b.min()) >= 0.0 and np.sum(b > 0.0) > 1
 
 
 def rows(sides):
-    """The rows of difference a - b, gain and wins of every result that both Sides have."""
+    """Return the rows of difference a - b, gain and wins of each result that both Sides have."""
     found = []
     for name in sides.results:
         a, b = sides.pairs(name)
@@ -82,10 +85,10 @@ def rows(sides):
 
 
 def sentence(sides, by):
-    """One sentence on who is better by a result."""
+    """Return one sentence on which side is better by a result."""
     a, b = sides.pairs(by)
     if len(a) < 2:
-        return f'{sides.case}: {by} was measured in {len(a)} pairs, which decides nothing.'
+        return f'{sides.case}: {by} was measured in {len(a)} pairs, which are too few for a comparison.'
     larger, unit = statistics.larger_is_better(by), '%'
     value, low, high = gain(a, b, larger) if has_gain(by, a, b) else interval(a - b if larger else b - a)
     if not has_gain(by, a, b):
@@ -95,7 +98,7 @@ def sentence(sides, by):
     pairs = f'{by}, {len(a)} pairs, 95 % interval'
     if low <= 0.0 <= high:
         return (f'{sides.name_a} is neither better nor worse than {sides.name_b}: by {value:.2g} +- {half:.2g} {unit} '
-                f'({pairs}); it wins in {share:.0f} % ({least:.0f} to {most:.0f} %).')
+                f'({pairs}); it wins in {share:.0f} % ({least:.0f} to {most:.0f} %) of the pairs.')
     word = 'better' if value > 0.0 else 'worse'
     return (f'{sides.name_a} is {word} than {sides.name_b} by {abs(value):.2g} +- {half:.2g} {unit} ({pairs}), and '
-            f'wins in {share:.0f} % ({least:.0f} to {most:.0f} %).')
+            f'wins in {share:.0f} % ({least:.0f} to {most:.0f} %) of the pairs.')

@@ -1,8 +1,8 @@
-"""The distributions a varied parameter is drawn from: one row each, by its quantile function.
+"""Distributions of varied parameters, each a row with its quantile function.
 
-A parameter is varied by a text NODE.KEY=KIND(numbers), the value itself, or NODE.KEY=KIND(numbers)x, a factor of what
-the scenario says. Every draw is the quantile of a number u between 0 and 1, so that independent draws and the points
-of a Sobol sequence go the same way.
+The text NODE.KEY=KIND(numbers) varies the value of a parameter; NODE.KEY=KIND(numbers)x varies a factor of its value
+in the scenario. Each draw is the quantile of a number u between 0 and 1. Independent draws and the points of a Sobol
+sequence therefore use the same functions.
 """
 import re
 import typing
@@ -16,8 +16,13 @@ from pedestal_common.text_files import plain_yaml
 
 
 class Kind(typing.NamedTuple):
-    """usage: how it is written; arguments: how many, None for one or more; quantile(u (n,), arguments) -> (n,);
-    extremes(arguments) -> the values that decide whether it stays in a range, None where it has no ends."""
+    """A kind of distribution.
+
+    usage      its text
+    arguments  number of arguments, None for one or more
+    quantile   quantile(u (n,), arguments) -> values (n,)
+    extremes   extremes(arguments) -> values to check against the range of a parameter, None without bounds
+    """
     usage: str
     arguments: int | None
     quantile: typing.Callable
@@ -32,26 +37,29 @@ DISTRIBUTION_KINDS = {
                    lambda u, options: np.array(options, object)[(u * len(options)).astype(int)],
                    lambda options: options),
 }
+"""{name of a distribution: Kind}."""
 
 _WRITTEN = re.compile(r'(\w+)\((.*)\)(x?)')
 
 
 class VaryError(ValueError):
-    """A --vary that says nothing that can be drawn; one line naming it."""
+    """Invalid text of --vary; one line that names the text."""
 
 
 class Distribution(typing.NamedTuple):
-    """text: as it was written; kind: of DISTRIBUTION_KINDS; arguments: numbers, of a choice any values; factor:
-    whether it is a
-    factor of what the scenario says."""
+    """The distribution of a parameter.
+
+    text: as given; kind: key of DISTRIBUTION_KINDS; arguments: numbers, or any values of a choice; factor: True for a
+    factor of the value in the scenario.
+    """
     text: str
     kind: str
     arguments: tuple
     factor: bool
 
     def draw(self, u, whole=False):
-        """Values (n,) at u (n,) between 0 and 1; whole: of a parameter that is a whole number, low and high among
-        them."""
+        """Return values (n,) at u (n,) between 0 and 1; whole: True for an integer parameter, low and high
+        included."""
         if whole and self.kind == 'uniform':
             low, high = self.arguments
             return np.floor(low + u * (high - low + 1.0))
@@ -59,19 +67,19 @@ class Distribution(typing.NamedTuple):
 
     @property
     def extremes(self):
-        """The values that decide whether it stays in a range; None where it has no ends."""
+        """Values to check against the range of the parameter, None without bounds."""
         return DISTRIBUTION_KINDS[self.kind].extremes(self.arguments)
 
 
 def parse(text) -> Distribution:
-    """The Distribution that a text such as 'normal(1, 0.1)x' says. Raises VaryError."""
+    """Return the Distribution of a text such as 'normal(1, 0.1)x'. Raises VaryError."""
     match = _WRITTEN.fullmatch(text.strip())
     usage = ', '.join(kind.usage for kind in DISTRIBUTION_KINDS.values())
     if not match:
-        raise VaryError(f'{text!r}: must be one of {usage}, for a factor with an x behind it')
+        raise VaryError(f'{text!r}: must be one of {usage}; a factor has an x at the end')
     name, inside, factor = match[1], match[2], bool(match[3])
     if name not in DISTRIBUTION_KINDS:
-        raise VaryError(f'{text!r}:{did_you_mean(name, DISTRIBUTION_KINDS)} there are {usage}')
+        raise VaryError(f'{text!r}:{did_you_mean(name, DISTRIBUTION_KINDS)} must be one of {usage}')
     try:
         arguments = tuple(plain_yaml.parse(part) for part in inside.split(','))
     except yaml.YAMLError as error:

@@ -1,7 +1,8 @@
-"""Makes the trials of plans and writes their rows: the same numbers whoever works, and however often it was stopped.
+"""Make the trials of plans and write their rows, with the same numbers for any workers and after any interruption.
 
-The row of a trial holds the results of `pedestal run` for each beam, measured on the closed loop without ROS, which
-holds what the lockstep recording of the trial's command does. Trials ashore run side by side (run/side_by_side).
+The row of a trial contains the results of `pedestal run` for each beam. They are measured on the closed loop without
+ROS, which has the same data as the lockstep recording of the trial's command. Trials ashore run side by side
+(pedestal_bringup.loop.side_by_side).
 """
 import contextlib
 import functools
@@ -15,23 +16,25 @@ from pedestal_bringup.loop import closed_loop, memory_recording, side_by_side
 from pedestal_common.wire import records
 
 MIN_BATCH_TRIALS = 4
-"""Trials that one worker makes at a time, unless they run side by side: so many at most are lost for each worker when
-it is killed."""
+"""Smallest number of trials in a batch of a worker.
+
+Without side-by-side trials it is the number in a batch, so a killed worker loses at most this many trials.
+"""
 
 TRIAL_RESULTS = tuple(result.name for result in results.RESULTS if result.part not in ('run', 'supervised'))
-"""Results of a trial: those of `pedestal run` but for what it says of the processes."""
+"""Names of the results of a trial: those of `pedestal run` except the results on its processes."""
 
 MEASURED_TOPICS = ('joint_states', 'adu/truth', 'tracking_receiver/angle_error', 'target/truth', 'acu/rate_command',
                    'acu/estimate', 'acu/reference', 'acu/filter', 'acu/mode')
-"""What they are measured on ashore; the stamps of acu/mode are those of acu/rate_command."""
+"""Topics that the results ashore need; the stamps of acu/mode are those of acu/rate_command."""
 
 
 class TrialError(ValueError):
-    """A trial cannot be run; one line naming it."""
+    """A trial cannot be run; one line that names the trial."""
 
 
 def table(plan, folder, name='trials') -> Table:
-    """The table.Table of the trials of a plan.Plan in a folder."""
+    """Return the table.Table of the trials of a plan.Plan in a folder."""
     prefixes = plan.scenario(0).prefixes
     heads = [f'{prefix}{result}' for prefix in prefixes for result in TRIAL_RESULTS]
     return Table(folder, name, {**plan.identity, 'sources': monte_carlo.sources()}, plan.varied, heads)
@@ -39,7 +42,7 @@ def table(plan, folder, name='trials') -> Table:
 
 @contextlib.contextmanager
 def _trial(plan, i):
-    """A ValueError becomes a TrialError that names trial i."""
+    """Convert a ValueError to a TrialError that names trial i."""
     try:
         yield
     except ValueError as error:
@@ -48,14 +51,18 @@ def _trial(plan, i):
 
 @functools.lru_cache(maxsize=1)
 def _memory(trials, steps):
-    """What trials side by side keep, batch after batch: new memory costs up to a tenth of their time."""
+    """Return the memory of trials side by side, kept for all batches.
+
+    Because new memory costs up to a tenth of the time of the trials, the memory is reused.
+    """
     return np.empty((trials, steps), records.of(*MEASURED_TOPICS))
 
 
 def _batch(plan):
-    """The results of every trial of a short Plan, each in the order of TRIAL_RESULTS for each beam, None for what it
-    does
-    not have; what workers do."""
+    """Return the results of each trial of a short Plan: the work of a worker.
+
+    The order is that of TRIAL_RESULTS for each beam; None for a missing result.
+    """
     scenarios, found = [], [[] for _ in range(plan.runs)]
     for i in range(plan.runs):
         with _trial(plan, i):
@@ -75,14 +82,14 @@ def _batch(plan):
 
 
 def _batch_size(plan):
-    """How many trials of a plan a worker makes at a time."""
+    """Return the number of trials of a plan in a batch."""
     return max(MIN_BATCH_TRIALS, side_by_side.max_parallel_trials(plan.scenario(0), MEASURED_TOPICS))
 
 
 def make(plans, tables, pool, progress=lambda done, total: None):
-    """Make the trials that tables lack of their plans, those of several side by side, and append their rows.
+    """Make the trials of plans that their tables lack, and append the rows; several plans advance together.
 
-    pool: monte_carlo.Pool. progress(trials done, trials in all) is called as they come. Raises TrialError.
+    pool: monte_carlo.Pool. progress(trials done, all trials) is called after each batch. Raises TrialError.
     """
     pieces, size = [], min(map(_batch_size, plans))
     for first in range(0, max(plan.runs for plan in plans), size):

@@ -1,8 +1,8 @@
-"""Many runs at once: on the cores of this machine, or on the Dask cluster behind a scheduler.
+"""Parallel runs on the cores of this machine or on a Dask cluster.
 
-A study splits its runs into batches whose size and seeds do not depend on the workers, and adds their results in
-order, so that its numbers are equal to the last bit on any pool. A batch returns sums and a few numbers of every run
-instead of records, so that memory suffices for many --runs.
+A study splits its runs into batches and adds their results in order. Because size and seeds of the batches do not
+depend on the workers, the numbers are equal to the last bit on any pool. To save memory, a batch returns sums and a
+few numbers of each run instead of records.
 """
 import contextlib
 import logging
@@ -19,19 +19,19 @@ from joblib.externals import loky
 from pedestal_common.law_cache import COLUMN_PACKAGES, UPPER_PACKAGES, digest
 
 SCHEDULER_TIMEOUT_S = 10.0
-"""Longest time to wait for a scheduler, or for its first worker [s]."""
+"""Longest wait for a scheduler, and for its first worker [s]."""
 
 
 def batches(runs, size):
-    """The (first, count) of every batch of at most `size` runs."""
+    """Return the (first, count) of each batch of at most `size` runs."""
     return [(first, min(size, runs - first)) for first in range(0, runs, size)]
 
 
 class Pool:
-    """Workers for `map`: local processes (None: one per core), or a Dask scheduler's, 'tcp://host:port'.
+    """Workers for `map`: local processes (None: one per core), or those of a Dask scheduler, 'tcp://host:port'.
 
-    Use as a context; one local worker is this process and needs none. Raises ValueError for no worker at all,
-    RuntimeError where Dask is missing or nobody answers.
+    Use as a context; a single local worker is this process and needs no context. Raises ValueError for less than one
+    worker, RuntimeError if Dask is missing or no scheduler answers.
     """
 
     def __init__(self, workers=None, scheduler=None):
@@ -44,7 +44,7 @@ class Pool:
         self._stack = contextlib.ExitStack()
 
     def __enter__(self):
-        # joblib warns of wasted work when a study is stopped, at any time after that
+        # After a study is stopped, joblib warns of wasted work at any later time.
         warnings.filterwarnings('ignore', '.*tasks (which were|have been)', UserWarning, r'joblib\.parallel')
         if self.scheduler is None:
             if self.workers > 1:
@@ -59,9 +59,9 @@ class Pool:
         return self._stack.__exit__(*raised)
 
     def map(self, function, items, progress=lambda share, text: None):
-        """Yield function(item) of every item, in their order. function: of a module, so that it can be sent.
+        """Yield function(item) of each item, in their order.
 
-        progress(share done, text) is called after each.
+        function: of a module, so that it can be sent to workers. progress(share done, text) is called after each item.
         """
         items = list(items)
         options = {'n_jobs': -1} if self.scheduler else {'n_jobs': min(self.workers, len(items) or 1),
@@ -74,8 +74,10 @@ class Pool:
             yield result
 
     def of_cases(self, function, cases, runs, size, progress=lambda share, text: None):
-        """{case: the values of its runs, arrays (runs, ...)}: function((case, first, count)) gives those of a batch
-        of at most `size` runs."""
+        """Return {case: values of its runs, arrays (runs, ...)}.
+
+        function((case, first, count)) returns the values of a batch of at most `size` runs.
+        """
         pieces = batches(runs, size)
         done = self.map(function, [(case, *piece) for case in cases for piece in pieces], progress)
         return {case: np.concatenate([next(done) for _ in pieces]) for case in cases}
@@ -83,10 +85,11 @@ class Pool:
 
 @contextlib.contextmanager
 def _deferred_interrupt():
-    """Keep Ctrl-C, which reaches every process of a terminal, from workers started now; this process ends them.
+    """Protect workers that start now from Ctrl-C, which reaches all processes of a terminal; this process ends them.
 
-    The resource trackers that start with the first worker unblock the signal, so they are started before. Here it must
-    not interrupt the start of the workers either, but a thread of numpy may receive it: it is raised afterwards.
+    Because the resource trackers that start with the first worker unblock the signal, they are started first. In this
+    process the signal must not interrupt the start of the workers. A thread of numpy may still receive the signal, so
+    KeyboardInterrupt is raised afterwards.
     """
     multiprocessing.resource_tracker.ensure_running()
     loky.backend.resource_tracker.ensure_running()
@@ -104,7 +107,7 @@ def _deferred_interrupt():
 
 @contextlib.contextmanager
 def _manager_in_silence():
-    """The thread of loky that hands out the work may still do so while its workers are ended, and print a KeyError."""
+    """Suppress the KeyError that the dispatch thread of loky prints if it runs while its workers are ended."""
     before = threading.excepthook
     threading.excepthook = lambda failure: (
         None if failure.thread and failure.thread.name == 'ExecutorManagerThread' else before(failure))
@@ -125,19 +128,19 @@ def _client(address):
         raise RuntimeError(f"--scheduler {address}: Dask is not installed: pip install 'pedestal_analysis[cluster]'"
                            ) from None
     for name in ('distributed', 'tornado'):
-        logging.getLogger(name).setLevel(logging.CRITICAL)  # what went wrong is raised as well
+        logging.getLogger(name).setLevel(logging.CRITICAL)  # the errors are raised as well
     try:
         client = distributed.Client(address, timeout=SCHEDULER_TIMEOUT_S, set_as_default=False)
     except (OSError, ValueError) as error:
-        raise RuntimeError(f'--scheduler {address}: nobody answers as a Dask scheduler: {error}') from None
+        raise RuntimeError(f'--scheduler {address}: no Dask scheduler answers: {error}') from None
     try:
         client.wait_for_workers(1, timeout=SCHEDULER_TIMEOUT_S)
         others = [worker for worker, theirs in client.run(sources).items() if theirs != sources()]
         problem = others and f'other versions of the pedestal packages or of numba on {", ".join(others)}'
     except TimeoutError:
-        problem = f'no worker came within {SCHEDULER_TIMEOUT_S:g} s'
-    except Exception as error:  # Dask raises here what a worker could not import
-        problem = f'a worker cannot work: {error}'
+        problem = f'no worker connected within {SCHEDULER_TIMEOUT_S:g} s'
+    except Exception as error:  # Dask raises the import errors of a worker here
+        problem = f'a worker failed: {error}'
     if problem:
         client.close()
         raise RuntimeError(f'--scheduler {address}: {problem}')
@@ -145,5 +148,5 @@ def _client(address):
 
 
 def sources():
-    """Digest of all that determines the numbers: the packages' sources and the version of numba."""
+    """Return a digest of the sources of the packages and the version of numba, which determine the numbers."""
     return digest(('pedestal_common', *COLUMN_PACKAGES, *UPPER_PACKAGES))

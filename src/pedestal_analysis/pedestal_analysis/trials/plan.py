@@ -1,8 +1,8 @@
-"""What trials are to be made of a scenario: the seed and the changed parameters of each, all known before the first.
+"""Plan of the trials of a scenario: seed and changed parameters of each trial, all known before the first.
 
-Trial i has the seed first + i. The numbers its parameters are drawn from follow from that seed alone, or are point i
-of a scrambled Sobol sequence (scipy.stats.qmc; Owen, Journal of Complexity 14 (1998) 466), so that a plan of more
-trials begins with the same ones.
+Trial i has the seed first + i. Its random numbers depend on that seed alone, or are point i of a scrambled Sobol
+sequence (scipy.stats.qmc; Owen, Journal of Complexity 14 (1998) 466). A plan of more trials therefore begins with the
+same trials.
 """
 import dataclasses
 import hashlib
@@ -20,14 +20,22 @@ from pedestal_common.graph import nodes
 from pedestal_common.text_files import csv_table, plain_yaml
 
 PLAN_HEADER_KEYS = ('seed', 'duration', 'pacing', 'beam', 'beams')
-"""Keys of the header that all trials share, or have from their number."""
+"""Keys of the header that are equal for all trials or follow from the number of the trial; they cannot vary."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Plan:
-    """Trials of a scenario: source as the command names it; name and content of its file; overrides 'node.key=value'
-    of all trials; duration [s], None for the scenario's; seed of the first trial; varied {node.key: values of the
-    trials}; texts: of --vary, by which it is told from others."""
+    """Trials of a scenario.
+
+    source         scenario in the command
+    name, content  of the scenario file
+    overrides      texts 'node.key=value' for all trials
+    duration       [s], None for that of the scenario
+    seed           of the first trial
+    runs           number of trials
+    varied         {node.key: values of the trials}
+    texts          of --vary, part of the identity
+    """
     source: str
     name: str
     content: str
@@ -39,39 +47,42 @@ class Plan:
     texts: tuple
 
     def changes(self, i):
-        """The overrides of trial i."""
+        """Return the overrides of trial i."""
         return (*self.overrides, *(scenario.override(name, values[i]) for name, values in self.varied.items()))
 
     def scenario(self, i):
-        """The scenario.Scenario of trial i. Raises ScenarioError."""
+        """Return the scenario.Scenario of trial i. Raises ScenarioError."""
         return scenario.parse(self.name, self.content, self.changes(i), self.seed + i, self.duration)
 
     def command(self, i):
-        """The command that runs trial i through the nodes."""
+        """Return the command that runs trial i in the graph."""
         duration = [] if self.duration is None else ['--duration', repr(self.duration)]
         changes = [part for change in self.changes(i) for part in ('--param', change)]
         return shlex.join(['pedestal', 'run', self.source, '--seed', str(self.seed + i), *duration, *changes])
 
     def part(self, numbers):
-        """The Plan of some trials in a row, a range, numbered from 0 again."""
+        """Return the Plan of consecutive trials, a range, numbered from 0."""
         varied = {name: values[numbers.start:numbers.stop] for name, values in self.varied.items()}
         return dataclasses.replace(self, seed=self.seed + numbers.start, runs=len(numbers), varied=varied)
 
     @property
     def identity(self):
-        """{what: text} by which trials of this plan, whatever their number, are told from those of another."""
+        """{name: text} that identifies the trials of this plan, for any number of trials."""
         return {'scenario': self.name, 'content': hashlib.sha256(self.content.encode()).hexdigest(),
                 '--param': ' '.join(self.overrides), '--vary': ' '.join(self.texts), '--seed': str(self.seed),
                 '--duration': str(self.duration)}
 
 
 def plan(source, runs=None, vary=(), overrides=(), seed=None, duration=None, sobol=False) -> Plan:
-    """The Plan of trials of a scenario, a name or a path.
+    """Return the Plan of trials of a scenario, a name or a path.
 
-    runs: how many, None for the rows of a table, else 100. vary: texts 'node.key=distribution', or a path of a .csv
-    whose columns are parameters and whose rows are trials. overrides: texts 'node.key=value'. seed: of the first, None
-    for the scenario's. sobol: the points of a Sobol sequence in the place of independent draws.
-    Raises ScenarioError, VaryError, TableError for what cannot be run in every trial.
+    runs       number of trials, None for the rows of a table, else 100
+    vary       texts 'node.key=distribution', or paths of .csv tables with parameters as columns and trials as rows
+    overrides  texts 'node.key=value'
+    seed       of the first trial, None for that of the scenario
+    sobol      True for the points of a Sobol sequence instead of independent draws
+
+    Raises ScenarioError, VaryError, TableError if a trial could not be run.
     """
     name, content = scenario.text(source)
     nominal = scenario.parse(name, content, overrides, seed, duration)
@@ -82,16 +93,16 @@ def plan(source, runs=None, vary=(), overrides=(), seed=None, duration=None, sob
     names = [*drawn, *(column for table in rows for column in table)]
     for column in names:
         if names.count(column) > 1 or sum(text.startswith(f'{column}=') for text in vary) > 1:
-            raise VaryError(f'--vary {column}: is varied twice')
+            raise VaryError(f'--vary {column}: the parameter is varied twice')
     if runs is None:
         runs = min((len(values) for table in rows for values in table.values()), default=100)
     if runs < 1:
         raise VaryError(f'--runs {runs}: must be at least 1')
     if sobol and not drawn:
-        raise VaryError('--sobol: nothing is drawn; a --vary NODE.KEY=DISTRIBUTION is missing')
+        raise VaryError('--sobol: needs at least one --vary NODE.KEY=DISTRIBUTION')
     first = nominal.header.seed
     if first + runs > 2**31:
-        raise VaryError(f'--runs {runs}: from seed {first} on there are {2**31 - first} seeds')
+        raise VaryError(f'--runs {runs}: must be at most {2**31 - first}, the number of seeds from {first} on')
     u = _points(first, runs, len(drawn), sobol)
     varied = {column: _values(nominal, column, distribution, u[:, k])
               for k, (column, distribution) in enumerate(drawn.items())}
@@ -99,7 +110,7 @@ def plan(source, runs=None, vary=(), overrides=(), seed=None, duration=None, sob
         for column, values in table.items():
             _field(nominal, column)
             if len(values) < runs:
-                raise VaryError(f'--runs {runs}: the table has {len(values)} rows')
+                raise VaryError(f'--runs {runs}: must be at most {len(values)}, the rows of the table')
             varied[column] = values[:runs]
     texts = (*(f'{column}={distribution.text}' for column, distribution in drawn.items()), *['--sobol'] * sobol,
              *(hashlib.sha256(repr(table).encode()).hexdigest() for table in rows))
@@ -110,10 +121,10 @@ def plan(source, runs=None, vary=(), overrides=(), seed=None, duration=None, sob
 
 
 def _drawn(text):
-    """(node.key, Distribution) of a --vary."""
+    """Return (node.key, Distribution) of a --vary."""
     column, equals, distribution = text.partition('=')
     if not equals:
-        raise VaryError(f'--vary {text!r}: must be NODE.KEY=DISTRIBUTION or a table .csv')
+        raise VaryError(f'--vary {text!r}: must be NODE.KEY=DISTRIBUTION or the path of a .csv table')
     try:
         return column, distributions.parse(distribution)
     except VaryError as error:
@@ -121,7 +132,7 @@ def _drawn(text):
 
 
 def _table(path):
-    """{node.key: values of the trials} of a CSV file with a header."""
+    """Return {node.key: values of the trials} of a CSV file with a header."""
     with csv_table.opened(path) as reader:
         columns = {column: [] for column in reader.fieldnames or ()}
         for row in reader:
@@ -130,29 +141,29 @@ def _table(path):
             for column, cell in row.items():
                 columns[column].append(plain_yaml.parse(cell))
     if not columns or not all(columns.values()):
-        raise csv_table.TableError(f'{path}: must have a header of NODE.KEY and a row for each trial')
+        raise csv_table.TableError(f'{path}: must have a header of NODE.KEY names and a row for each trial')
     return columns
 
 
 def _points(first, runs, count, sobol):
-    """Numbers between 0 and 1 (runs, count)."""
+    """Return numbers between 0 and 1 (runs, count)."""
     if sobol:
         return qmc.Sobol(count, seed=first).random_base2(math.ceil(math.log2(runs)))[:runs]
-    # A spawn key of its own keeps the draws of a seed apart from the noise of the same seed.
+    # A separate spawn key makes the draws independent of the noise of the same seed.
     return np.array([np.random.default_rng(np.random.SeedSequence(first + i, spawn_key=(0,))).random(count)
                      for i in range(runs)])
 
 
 def _field(nominal, column):
-    """The dataclass field of a parameter node.key that trials can vary. Raises VaryError, ScenarioError."""
+    """Return the dataclass field of a parameter node.key that trials can vary. Raises VaryError, ScenarioError."""
     node, _, key = column.partition('.')
     scenario.parameters_of(node)
     if node == 'scenario' and key in PLAN_HEADER_KEYS:
-        raise VaryError(f'--vary {column}: is the same for every trial, or follows from its number')
-    there = dict.fromkeys((*map(nodes.plain, nominal.nodes), *nominal.nodes, 'scenario'))
-    there.pop('operator', None)  # it has no parameters but those of the header
-    if node not in there:
-        raise VaryError(f'--vary {column}: {node} takes no part in {nominal.name}; there are {", ".join(there)}')
+        raise VaryError(f'--vary {column}: cannot vary, because trials share it or derive it from their number')
+    present = dict.fromkeys((*map(nodes.plain, nominal.nodes), *nominal.nodes, 'scenario'))
+    present.pop('operator', None)  # the operator has only the parameters of the header
+    if node not in present:
+        raise VaryError(f'--vary {column}: {node} is not in {nominal.name}; must be one of {", ".join(present)}')
     fields = dict(parameters.flatten(type(_parameters(nominal, node))))
     if key not in fields:
         raise VaryError(f'--vary {column}: unknown parameter {key!r};{parameters.did_you_mean(key, fields)}')
@@ -160,36 +171,36 @@ def _field(nominal, column):
 
 
 def _parameters(nominal, node):
-    """The parameter dataclass of a node, or of the header, as the scenario sets it."""
+    """Return the parameter dataclass of a node, or of the header, of a scenario."""
     return nominal.header if node == 'scenario' else nominal.node_parameters(node)
 
 
 def _nominal_value(nominal, column):
-    """What the scenario says of node.key."""
+    """Return the value of node.key in the scenario."""
     node, _, key = column.partition('.')
     return parameters.as_dict(_parameters(nominal, node))[key]
 
 
 def _values(nominal, column, distribution, u):
-    """The values of a drawn parameter in the trials, at u (runs,)."""
+    """Return the values of a drawn parameter in the trials, at u (runs,)."""
     whole = _field(nominal, column).type is int
     if distribution.factor:
-        said = _nominal_value(nominal, column)
-        if isinstance(said, bool | str) or said == 0:
-            raise VaryError(f'--vary {column}={distribution.text}: a factor of {said!r} varies nothing')
-        values = said * distribution.draw(u)
+        value = _nominal_value(nominal, column)
+        if isinstance(value, bool | str) or value == 0:
+            raise VaryError(f'--vary {column}={distribution.text}: a factor of {value!r} varies nothing')
+        values = value * distribution.draw(u)
     else:
         values = distribution.draw(u, whole)
     return _rounded(values.tolist(), whole)
 
 
 def _rounded(values, whole):
-    """Values as they are, or whole numbers for a parameter that is one; texts stay for the parameter to refuse."""
+    """Return values, rounded for an integer parameter; texts stay, because the check of the parameter refuses them."""
     return [round(value) if whole and isinstance(value, float) else value for value in values]
 
 
 def _check(nominal, made, column, distribution):
-    """Raise VaryError unless every value of a varied parameter is allowed where the others are as in the scenario."""
+    """Raise VaryError unless each value of a varied parameter is allowed with the other parameters of the scenario."""
     values = made.varied[column]
     numbers = all(isinstance(value, int | float) and not isinstance(value, bool) for value in values)
     extremes = [min(values), max(values)] if numbers else list(dict.fromkeys(values))

@@ -1,12 +1,12 @@
-"""What trials say: percentiles, rates and sensitivities of their results, each with its 95 % interval.
+"""Statistics of trials: percentiles, rates and sensitivities of the results, each with its 95 % interval.
 
-percentile   by the order statistics (scipy.stats.quantile_test), whatever the distribution of the result
+percentile   from order statistics (scipy.stats.quantile_test), for any distribution of the result
 rate         of a yes or no, by Clopper and Pearson (Biometrika 26 (1934) 404)
 sensitivity  of a result to a varied parameter: Spearman's rank correlation r, -1 to 1, with the interval
 
                  tanh(artanh r -+ 1.96 sqrt((1 + r^2 / 2) / (n - 3)))
 
-             of Bonett and Wright (Psychometrika 65 (2000) 23); texts rank in the order in which they first appear
+             of Bonett and Wright (Psychometrika 65 (2000) 23); texts rank in the order of their first appearance
 """
 import math
 import typing
@@ -19,11 +19,13 @@ from pedestal_common.graph import nodes
 from pedestal_common.parameters import did_you_mean
 
 PERCENTILES = (1, 5, 25, 50, 75, 95, 99)
+"""Reported percentiles [%]."""
 Z = float(stats.norm.ppf(0.5 + 0.5 * intervals.CONFIDENCE_LEVEL))
+"""Standard normal quantile of the confidence level [-]."""
 
 
 class Question(typing.NamedTuple):
-    """A yes or no about a trial: name; the result it is asked of; holds(values (n,)) -> (n,) bool; a sentence."""
+    """A yes or no about a trial: name; the result that decides; holds(values (n,)) -> (n,) bool; a sentence."""
     name: str
     result: str
     holds: typing.Callable
@@ -34,8 +36,8 @@ TRIAL_QUESTIONS = (
     Question('locked', 'lock_time_s', np.isfinite, 'The receiver locked.'),
     Question('tracked', 'evaluated_time_s', lambda time: time > 0.0, 'The run reached settled autotrack.'),
     Question('never_lost', 'loss_s', lambda loss: loss == 0.0,
-             'The target was never further than half a beamwidth off, once tracked.'),
-    Question('aligned', 'aligned_s', np.isfinite, 'The INS reported that it was aligned.'),
+             'After the first evaluated step the target was never further than half a beamwidth off.'),
+    Question('aligned', 'aligned_s', np.isfinite, 'The INS reported `aligned`.'),
     *(Question(f'{result.name}_met', result.name,
                lambda values, target=result.target: np.array([intervals.meets(value, target) for value in values]),
                f'{result.name} is {result.target}.')
@@ -44,20 +46,22 @@ TRIAL_QUESTIONS = (
 
 
 def percentile(values, share):
-    """(value, low, high) of a percentile, 0 to 100, of values (n,); NaN where n is too small for a bound."""
+    """Return (value, low, high) of a percentile, 0 to 100, of values (n,); NaN for a bound that n is too small for."""
     interval = stats.quantile_test(values, p=share / 100.0).confidence_interval(intervals.CONFIDENCE_LEVEL)
     return np.percentile(values, share), interval.low, interval.high
 
 
 def rate(count, n):
-    """(share, low, high) [%] of `count` times yes out of n."""
+    """Return (share, low, high) [%] of `count` times yes out of n."""
     interval = stats.binomtest(count, n).proportion_ci(intervals.CONFIDENCE_LEVEL, method='exact')
     return 100.0 * count / n, 100.0 * interval.low, 100.0 * interval.high
 
 
 def rank_correlation(x, y):
-    """(r, low, high) of Spearman's correlation of x and y (n,); NaN where one of them does not vary, and low and high
-    of fewer than four."""
+    """Return (r, low, high) of Spearman's correlation of x and y (n,).
+
+    All are NaN if x or y does not vary; low and high are NaN for n below four.
+    """
     n = len(x)
     if n < 2 or not (np.ptp(x) > 0.0 and np.ptp(y) > 0.0):
         return math.nan, math.nan, math.nan
@@ -69,18 +73,18 @@ def rank_correlation(x, y):
 
 
 def unit(name):
-    """The unit of a column of a table, such as beam_2/loss_s."""
+    """Return the unit of a column of a table, such as beam_2/loss_s."""
     return results.RESULT_BY_NAME[nodes.plain(name)].unit
 
 
 def case_of(case, name):
-    """(case, metric) of a column: that of its beam, as `pedestal run` writes it."""
+    """Return (case, metric) of a column; the case contains the beam, as in `pedestal run`."""
     beam, plain = nodes.beam_of(name), nodes.plain(name)
     return f'{case}/{beam}'.rstrip('/'), plain
 
 
 def of_results(case, table):
-    """The rows of mean, least, percentiles and largest of every result of a table.Table."""
+    """Return the rows of mean, smallest value, percentiles and largest value of each result of a table.Table."""
     found = []
     for name in table.there:
         values = table.column(name)
@@ -97,7 +101,7 @@ def of_results(case, table):
 
 
 def of_questions(case, table):
-    """The rows of the rates of TRIAL_QUESTIONS over a table.Table."""
+    """Return the rows of the rates of TRIAL_QUESTIONS over a table.Table."""
     found = []
     for name in table.there:
         own, metric = case_of(case, name)
@@ -110,8 +114,10 @@ def of_questions(case, table):
 
 
 def of_sensitivity(case, table):
-    """The rows of the rank correlation of every result with every varied parameter of a table.Table; none for a
-    result that does not vary."""
+    """Return the rows of the rank correlation of each result with each varied parameter of a table.Table.
+
+    A result that does not vary has no row.
+    """
     found = []
     varied = {name: table.column(name) for name in table.varied}
     for name in table.there:
@@ -127,23 +133,25 @@ def of_sensitivity(case, table):
 
 
 def larger_is_better(name):
-    """Whether more of a result is better, by its target."""
+    """Return True if the target of a result prefers larger values."""
     return (results.RESULT_BY_NAME[nodes.plain(name)].target or '').startswith('>')
 
 
 def ranking(name, values):
-    """Places (n,) of the values (n,) of a result from the worst to the best; one that was not measured is the
+    """Return the indices (n,) of the values (n,) of a result from the worst to the best; a missing value is the
     worst."""
     badness = -values if larger_is_better(name) else values
     return np.argsort(-np.where(np.isfinite(badness), badness, math.inf), kind='stable')
 
 
-def ranked_by(table, asked=None):
-    """The result of a table.Table by which its trials are ranked: the one asked for, else pointing, else what the axes
-    follow. Raises ValueError where no trial has it."""
-    for name in (asked,) if asked else ('pointing_rms_deg', 'azimuth_following_rms_deg'):
+def ranked_by(table, result=None):
+    """Return the result that ranks the trials of a table.Table: result, else pointing, else following error.
+
+    Raises ValueError if no trial has the result.
+    """
+    for name in (result,) if result else ('pointing_rms_deg', 'azimuth_following_rms_deg'):
         for column in table.there:
-            if name in (column, nodes.plain(column)) and (asked or np.isfinite(table.column(column)).any()):
+            if name in (column, nodes.plain(column)) and (result or np.isfinite(table.column(column)).any()):
                 return column
-    raise ValueError(f'--by {asked}: no trial has it;{did_you_mean(asked or "", table.there)} there are '
-                     f'{", ".join(table.there)}')
+    raise ValueError(f'--by {result}: no trial has this result;{did_you_mean(result or "", table.there)} must be one '
+                     f'of {", ".join(table.there)}')

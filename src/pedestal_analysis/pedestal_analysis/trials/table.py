@@ -1,7 +1,7 @@
-"""The table of trials: a CSV file, one row a trial, written as they come, beside a file that says what they are of.
+"""Table of trials: a CSV file with one row for each trial, and a JSON file that describes the trials.
 
-A row is written whole, so a process that is killed loses the rows it had not written, and at most the last line is
-cut short; the same trials go on behind the last whole one.
+Rows are written as their batches end. A killed process loses the rows of unfinished batches and leaves at most one
+incomplete line; the same trials later continue after the last complete row.
 """
 import csv
 import fcntl
@@ -14,18 +14,18 @@ import pathlib
 import numpy as np
 
 LEADING_COLUMNS = ('trial', 'seed')
-"""Before the varied parameters and the results."""
+"""Columns before the varied parameters and the results."""
 
 
 class TableError(ValueError):
-    """The file of a table is of other trials, or is written by somebody else; one line."""
+    """The file of a table belongs to other trials, or another process writes the file; one line."""
 
 
 class Table:
-    """The rows of the trials of a plan.Plan in a file FOLDER/NAME.csv, FOLDER/NAME.json says what they are of.
+    """Rows of the trials of a plan.Plan in the file FOLDER/NAME.csv; FOLDER/NAME.json describes the trials.
 
-    varied, results: heads of the columns. Use as a context: while it is open no other process writes the file.
-    Raises TableError where it is there and of other trials.
+    varied, results: heads of the columns. Use as a context; the open file is locked against other processes.
+    Raises TableError if the file exists and belongs to other trials.
     """
 
     def __init__(self, folder, name, identity, varied, results):
@@ -37,7 +37,7 @@ class Table:
 
     @property
     def head(self):
-        """The heads of all columns."""
+        """Heads of all columns."""
         return [*LEADING_COLUMNS, *self.varied, *self.results]
 
     def __enter__(self):
@@ -49,7 +49,7 @@ class Table:
         except BaseException as error:
             self._stream.close()
             if isinstance(error, BlockingIOError):
-                raise TableError(f'{self.file}: another process writes it') from None
+                raise TableError(f'{self.file}: another process writes the file') from None
             raise
         return self
 
@@ -57,7 +57,7 @@ class Table:
         self._stream.close()
 
     def _begin(self):
-        """Take over the whole rows of the file, or begin it."""
+        """Read the complete rows of the file, or begin a new file."""
         self._stream.seek(0)
         content = self._stream.read()
         whole = content[:content.rfind(b'\n') + 1]
@@ -73,20 +73,21 @@ class Table:
         self._write([self.head])
 
     def _compare(self):
-        """Raise TableError where the file is of other trials."""
+        """Raise TableError if the file belongs to other trials."""
         try:
             there = json.loads(self._described.read_text())
         except (OSError, ValueError):
             there = {}
         for key, value in self._identity.items():
             if there.get(key) != value:
-                told = {'columns': 'other columns', 'content': 'another scenario file of that name',
-                        'sources': 'another version of the pedestal packages'}
-                what = told.get(key, f'{key} {there.get(key)}, not {value}')
-                raise TableError(f'{self.file} holds other trials ({what}): give another --output, or delete it')
+                names = {'columns': 'other columns', 'content': 'another scenario file of that name',
+                         'sources': 'another version of the pedestal packages'}
+                difference = names.get(key, f'{key} {there.get(key)}, not {value}')
+                raise TableError(f'{self.file} contains other trials ({difference}): use another --output, or delete '
+                                 'the file')
 
     def append(self, rows):
-        """Write rows, lists of values in the order of `head`; None for what a trial does not have."""
+        """Write rows, lists of values in the order of `head`; None for a missing value."""
         rows = [[_written(value) for value in row] for row in rows]
         self._write(rows)
         self.rows += rows
@@ -98,8 +99,10 @@ class Table:
         self._stream.flush()
 
     def column(self, name):
-        """The numbers (n,) of a column, NaN where there is none, as of a result that was not measured; a column of
-        texts as the place of each among them in their order of appearance."""
+        """Return the numbers (n,) of a column, NaN for a result that was not measured.
+
+        For a column of texts, return the index of each text in the order of first appearance.
+        """
         i = self.head.index(name)
         cells = [row[i] for row in self.rows]
         try:
@@ -110,13 +113,13 @@ class Table:
 
     @property
     def there(self):
-        """The results that any trial has."""
+        """Names of the results that at least one trial has."""
         first = len(LEADING_COLUMNS) + len(self.varied)
         return [name for i, name in enumerate(self.results, first) if any(row[i] for row in self.rows)]
 
 
 def _written(value):
-    """A cell: a number as the shortest text that reads back as the same, NaN where it was not measured."""
+    """Return the text of a cell: '' for None, a number as the shortest text that reads back as the same number."""
     if value is None:
         return ''
     return repr(float(value)) if isinstance(value, float) else str(value)

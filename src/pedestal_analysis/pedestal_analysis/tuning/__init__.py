@@ -1,1 +1,1 @@
-"""Gains and filters for an antenna: from its data sheet, from its loops, from a recording."""
+"""Gains and filters of an antenna from its data sheet, from measured loops, or from a recording."""

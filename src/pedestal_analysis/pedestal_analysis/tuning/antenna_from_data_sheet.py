@@ -1,13 +1,13 @@
-"""`pedestal new`: a scenario of your own antenna from the numbers of its data sheet.
+"""`pedestal new`: make a scenario of your own antenna from the numbers of its data sheet.
 
-What a data sheet does not say is scaled from the antenna that comes with the product (paper 000's motors on a load of
-210 kg m2), which keeps the frequencies of gears and motors where they are there:
+Values that are missing in a data sheet are scaled from the antenna of the product (the motors of paper 000 with a load
+of 210 kg m2). The scaling keeps the resonance frequencies of gears and motors:
 
-    motor       flux from the voltage at rated speed; resistance and inductance from the share of the voltage they take
-                at rated torque; inertia with the torque to the power 5/3, friction and brake with the torque
-    gear, load  stiffness, damping and viscous friction with the load's inertia; its other friction and unbalance with
+    motor       flux from the voltage at rated speed; resistance and inductance from their shares of the voltage at
+                rated torque; inertia with the torque to the power 5/3; friction and brake with the torque
+    gear, load  stiffness, damping and viscous friction with the load's inertia; other friction and unbalance with
                 the inertia to the power 2/3
-    loops       the rigid design of trials/loops.py, which `pedestal tune --loops` then measures
+    loops       the rigid design of tuning/loops.py; `pedestal tune --loops` then measures the loops
 """
 import math
 
@@ -19,24 +19,24 @@ from pedestal_common.parameters import ParameterError, as_dict, build, flatten
 from pedestal_common.text_files import plain_yaml
 
 BACK_EMF_SHARE, RESISTANCE_VOLTAGE_SHARE, INDUCTANCE_VOLTAGE_SHARE = 0.85, 0.033, 0.24
-"""Shares of the phase voltage: back-EMF at rated speed; drops at rated torque over resistance and inductance."""
+"""Shares of the phase voltage: back-EMF at rated speed, drops over resistance and inductance at rated torque [-]."""
 
 
 def motor(sheet, known):
-    """{key: value} of a motor, from a known motor's values {key: value} and the DataSheet."""
+    """Return {key: value} of a motor from the values {key: value} of a known motor and the DataSheet."""
     share, pairs, voltage = sheet.motor_torque / 30.0, known['pole_pairs'], known['voltage']
     electrical = pairs * sheet.motor_speed * math.pi / 30.0
     flux = BACK_EMF_SHARE * voltage / electrical
     current = sheet.motor_torque / (1.5 * pairs * flux)
     return {'flux_linkage': flux, 'resistance': RESISTANCE_VOLTAGE_SHARE * voltage / current,
-            'inductance': INDUCTANCE_VOLTAGE_SHARE * voltage / (electrical * current), 'torque_limit': 3.0
-            * sheet.motor_torque,
-            'inertia': known['inertia'] * share**(5.0 / 3.0), 'friction': known['friction'] * share,
+            'inductance': INDUCTANCE_VOLTAGE_SHARE * voltage / (electrical * current),
+            'torque_limit': 3.0 * sheet.motor_torque, 'inertia': known['inertia'] * share**(5.0 / 3.0),
+            'friction': known['friction'] * share,
             'viscous': known['viscous'] * share, 'brake': known['brake'] * share}
 
 
 def axis(sheet, name):
-    """{key: value} of an axis of the drive, its loops left out."""
+    """Return {key: value} of an axis of the drive, without its loops."""
     known = as_dict(getattr(AduParameters(), name))
     inertia, ratio, rate = (getattr(sheet, f'{what}_{name}') for what in ('inertia', 'ratio', 'rate'))
     share = inertia / known['load.inertia']
@@ -57,14 +57,13 @@ def axis(sheet, name):
 
 
 def sections(sheet, title):
-    """{node: {key: value}} of the scenario of a DataSheet. Raises ScenarioError, ParameterError,
-    LoopError."""
+    """Return {node: {key: value}} of the scenario of a DataSheet. Raises ScenarioError, ParameterError, LoopError."""
     from pedestal_analysis.tuning import loops
     _, content = scenario.text(sheet.like)
     found = {parameter_file.node_of(node): parameter_file.dotted(body['ros__parameters'])
              for node, body in plain_yaml.parse(content).items()}
     found['scenario']['title'] = title
-    if 'program.time_offset' in found['scenario']:  # as far off in beamwidths as there
+    if 'program.time_offset' in found['scenario']:  # keeps the offset in beamwidths
         found['scenario']['program.time_offset'] *= min(1.0, sheet.theta / 0.0175)
     found['tracking_receiver']['antenna.beamwidth'] = sheet.theta
     w_s = 2.0 * math.pi * loops.DEFAULT_SPEED_CROSSOVER_HZ
@@ -87,13 +86,13 @@ def sections(sheet, title):
 
 
 def _at_the_target(sheet, found):
-    """Initial angles three beamwidths beside where the target is predicted, so that a slow antenna is there soon."""
+    """Return initial angles three beamwidths from the predicted target, so that a slow antenna reaches it soon."""
     _, angles = Plan(scenario.parse(sheet.like, parameter_file.text(found))).tables['']
     return {f'initial_{name}': float(f'{angle + 3.0 * sheet.theta:.4g}') for name, angle in zip(AXES, angles[0])}
 
 
 def text(found, head):
-    """The scenario file of sections {node: {key: value}}: a comment behind each value says what it is. head: lines."""
+    """Return the scenario file of sections {node: {key: value}}, with a comment after each value; head: lines."""
     lines = [f'# {line}'.rstrip() for line in head]
     for node, values in found.items():
         fields = dict(flatten(scenario.parameters_of(node)))
@@ -107,11 +106,12 @@ def text(found, head):
 
 
 def new(sheet, name, command):
-    """The text of the scenario file of a DataSheet. Raises ScenarioError where the sheet contradicts itself."""
+    """Return the text of the scenario file of a DataSheet. Raises ScenarioError for values that contradict each
+    other."""
     title = f'{sheet.mirror:g} m antenna, beam {math.degrees(sheet.theta):.3g} deg, on the mission of {sheet.like}'
     found = sections(sheet, title)
-    content = text(found, (f'made by: {command}', 'What is no number of the data sheet is scaled from the antenna of '
-                           'the product: replace it by what you know.',
+    content = text(found, (f'made by: {command}', 'Values that are not in the data sheet are scaled from the antenna '
+                           'of the product: replace them by known values.',
                            f'Next: pedestal tune {name}.yaml --loops, then pedestal run {name}.yaml --params-file '
                            f'{name}-loops.yaml'))
     scenario.parse(name, content)

@@ -1,12 +1,13 @@
 """Open-loop and closed-loop response of the current, speed and position loops to a multisine, on the simulated plant.
 
-A signal is added inside a loop at its break point while the axis moves at a constant rate, where friction is a
-constant and the bias keeps the teeth closed. The signal sent on from there is E, the returned one -Y; at the excited
-frequencies the open loop is L = Y / E, the closed loop T = L / (1 + L). It uses no model of a controller:
+A signal is added inside a loop at its break point while the axis moves at a constant rate. At that rate friction is
+constant and the bias torque keeps the teeth closed. E is the signal after the break point, -Y the signal that returns
+to it. At the excited frequencies the open loop is L = Y / E and the closed loop T = L / (1 + L). The method needs no
+model of a controller:
 
     current     added to i_ref, every 100 us        E = i_ref - i_q            Y = i_q
     speed       added to the rate command, 0.5 ms   E = rate - mean speed / N  Y = mean speed / N from the encoders
-    position    added between ACU and drive, T      E = rate the drive gets    Y = -(rate the ACU commands)
+    position    added between ACU and drive, T      E = rate to the drive      Y = -(rate commanded by the ACU)
 """
 import dataclasses
 import math
@@ -20,17 +21,21 @@ from pedestal_common.compiled import compiled
 from pedestal_common.graph.topics import AXES
 
 MOTOR_FIELDS = ('motor_1', 'motor_2')
+"""Fields of the motors in the state of an axis."""
 SWEEP_START_ANGLES_RAD = (-2.0, 0.15)
-"""Where the axes start [rad]."""
+"""Initial angles of azimuth and elevation [rad]."""
 
 SWEEP_RATES_RAD_S = (0.1, 0.03)
-"""Rates of the axes [rad/s]: far above the excitation and the Stribeck rate, inside the travel for a whole record."""
+"""Constant rates of the axes, far above the excitation and the Stribeck rate, with room for a whole record [rad/s]."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Sweep:
-    """A multisine: `points` frequencies, evenly spaced in log from `lowest` to `highest` [Hz], on whole periods of
-    `period` [s]; `dropped` periods to settle, `kept` to measure; largest value `peak`."""
+    """A multisine with the largest value `peak`.
+
+    It has `points` frequencies, logarithmically spaced from `lowest` to `highest` [Hz], each with whole periods in
+    `period` [s]. `dropped` periods settle and `kept` periods are measured.
+    """
     period: float
     lowest: float
     highest: float
@@ -40,16 +45,19 @@ class Sweep:
     peak: float
 
     def bins(self):
-        """Frequencies as whole multiples of 1 / period."""
+        """Return the frequencies as integer multiples of 1 / period."""
         return np.unique(np.round(np.geomspace(self.lowest, self.highest, self.points) * self.period).astype(int))
 
     def frequencies(self):
-        """Excited frequencies (points,) [Hz], or fewer where two fall on one."""
+        """Return the excited frequencies (points,) [Hz]; less if several round to the same frequency."""
         return self.bins() / self.period
 
     def signal(self, step):
-        """The whole record (n,) at one value per `step` [s]: equal amplitudes, Schroeder's phases (IEEE Trans.
-        Information Theory 16 (1970) 85), which keep the peak low."""
+        """Return the whole record (n,) with one value per `step` [s].
+
+        The amplitudes are equal. The phases of Schroeder (IEEE Trans. Information Theory 16 (1970) 85) keep the peak
+        low.
+        """
         n = round(self.period / step)
         k = np.arange(len(self.bins()))
         spectrum = np.zeros(n // 2 + 1, complex)
@@ -59,43 +67,48 @@ class Sweep:
 
 
 CURRENT_SWEEP = Sweep(0.1, 10.0, 4000.0, 60, 5, 5, 1.5)
-"""Peak in A."""
+"""Sweep of the current loop; peak in A."""
 
 SPEED_SWEEP = Sweep(1.0, 1.0, 900.0, 120, 2, 4, 0.015)
-"""Peak in rad/s of the load: 6 Nm of a motor, less than the bias."""
+"""Sweep of the speed loop; peak in rad/s of the load: 6 Nm of a motor, less than the bias torque."""
 
 POSITION_SWEEP = Sweep(8.0, 0.25, 95.0, 300, 2, 3, 0.012)
-"""Peak in rad/s: half of what would open the teeth at the paper's 5 Nm of bias. Up to nearly half of 1 / 5 ms."""
+"""Sweep of the position loop, up to nearly half of 1 / 5 ms; peak in rad/s.
+
+The peak is half of the value that opens the teeth at the 5 Nm of bias torque of the paper.
+"""
 
 
 @dataclasses.dataclass(frozen=True)
 class Response:
-    """Open loop (n,) complex at the frequencies (n,) [Hz]; deviation (n,): its relative standard deviation [-]."""
+    """Open loop (n,) complex at the frequencies (n,) [Hz]; deviation (n,): relative standard deviation [-]."""
     frequency: np.ndarray
     open_loop: np.ndarray
     deviation: np.ndarray
 
     @property
     def closed_loop(self):
-        """T = L / (1 + L) (n,)."""
+        """Closed loop T = L / (1 + L) (n,)."""
         return self.open_loop / (1.0 + self.open_loop)
 
 
 def response(sweep, sent, returned):
-    """Response of a loop from the signals sent on from its break point and returned to it, two records (n,)."""
+    """Return the Response of a loop from the records (n,) of the signals after its break point and returned to it."""
     E, Y = (np.fft.rfft(x.reshape(sweep.dropped + sweep.kept, -1)[sweep.dropped:], axis=1)[:, sweep.bins()]
             for x in (sent, returned))
-    with np.errstate(invalid='ignore'):  # nothing comes back of a drive that has tripped
+    with np.errstate(invalid='ignore'):  # a tripped drive returns no signal
         L = Y.mean(axis=0) / E.mean(axis=0)
         return Response(sweep.frequencies(), L, np.std(Y / E / L, axis=0) / math.sqrt(sweep.kept - 1))
 
 
 @compiled
 def _inner_loops(s, c, substeps, rate, current, speed, wanted, made):
-    """One axis from rest: rate (n,) [rad/s] commanded each speed period, current (5 n,) [A] added to both i_ref each
-    current period, to the speed (n,) [rad/s] of the axis and i_ref, i_q of both motors (5 n, 2) [A]."""
+    """Run one axis from rest; fill speed (n,) [rad/s] of the axis and wanted (i_ref), made (i_q) (5 n, 2) [A].
+
+    rate (n,) [rad/s]: command of each speed period; current (5 n,) [A]: added to both i_ref in each current period.
+    """
     m1, m2, k1, k2 = s.motor_1, s.motor_2, c.motor_1, c.motor_2
-    axis.begin_period(s, c, False)        # brakes off, windings cold throughout
+    axis.begin_period(s, c, False)        # brakes off; the windings stay cold
     for n in range(len(rate)):
         axis.speed_control(s, c, rate[n], 0.0, 1, True, True)
         speed[n] = c.per_2N * (m1.measured + m2.measured)
@@ -110,8 +123,10 @@ def _inner_loops(s, c, substeps, rate, current, speed, wanted, made):
 
 
 def _run_inner(drive, index, rate, current):
-    """(speed (n,) [rad/s], i_ref, i_q (5 n, 2) [A]) of axis `index` of a drive (AduParameters), with signals added to
-    its rate command (n,) [rad/s] and current references (5 n,) [A]."""
+    """Return (speed (n,) [rad/s], i_ref, i_q (5 n, 2) [A]) of axis `index` of a drive (AduParameters).
+
+    rate (n,) [rad/s], current (5 n,) [A]: signals added to the rate command and to the current references.
+    """
     drive = dataclasses.replace(drive, initial_azimuth=SWEEP_START_ANGLES_RAD[0],
                                 initial_elevation=SWEEP_START_ANGLES_RAD[1])
     speed, wanted, made = np.zeros(len(rate)), np.zeros((len(current), 2)), np.zeros((len(current), 2))
@@ -122,7 +137,7 @@ def _run_inner(drive, index, rate, current):
 
 
 def current(drive, sweep=CURRENT_SWEEP):
-    """Responses of the current loops of the azimuth's motors: {name: Response}."""
+    """Return the Responses {name: Response} of the current loops of both azimuth motors."""
     added = sweep.signal(axis.CURRENT_LOOP_PERIOD_S)
     _, wanted, made = _run_inner(drive, 0, np.zeros(len(added) // axis.CURRENT_LOOP_STEP_COUNT), added)
     return {f'current/{motor}': response(sweep, wanted[:, j] - made[:, j], made[:, j])
@@ -130,7 +145,7 @@ def current(drive, sweep=CURRENT_SWEEP):
 
 
 def speed(drive, sweep=SPEED_SWEEP):
-    """Responses of the speed loops of both axes: {name: Response}."""
+    """Return the Responses {name: Response} of the speed loops of both axes."""
     added, responses = sweep.signal(axis.SPEED_LOOP_PERIOD_S), {}
     for i, name in enumerate(AXES):
         measured, _, _ = _run_inner(drive, i, added, np.zeros(len(added) * axis.CURRENT_LOOP_STEP_COUNT))
@@ -146,16 +161,16 @@ MOVING_CASE_PARAMETERS = {
     'tracking_receiver.target.angle.elevation': SWEEP_START_ANGLES_RAD[1],
     'tracking_receiver.target.angle.azimuth_rate': SWEEP_RATES_RAD_S[0],
     'tracking_receiver.target.angle.elevation_rate': SWEEP_RATES_RAD_S[1]}
-"""Both axes follow a program track of constant rates."""
+"""Parameters for a program track of constant rates on both axes."""
 
 
 def case(name, scenario, parameters):
-    """The Case of a position loop: a scenario with parameters changed, moving at constant rates."""
+    """Return the Case of a position loop: a scenario with changed parameters, moving at constant rates."""
     return Case(name, scenario, {**MOVING_CASE_PARAMETERS, **parameters})
 
 
 def position(case, axes=AXES, sweep=POSITION_SWEEP):
-    """Responses of the position loops of a case: {name: Response}."""
+    """Return the Responses {name: Response} of the position loops of a case."""
     loaded = dataclasses.replace(case, duration=(sweep.dropped + sweep.kept) * sweep.period).loaded()
     loop = closed_loop.Loop(loaded)
     added = np.zeros((loop.steps, 2))
@@ -166,7 +181,10 @@ def position(case, axes=AXES, sweep=POSITION_SWEEP):
 
 
 def _crossings(f, y, angle):
-    """(frequencies [Hz], angles [rad]) of the zeros of y (n,): both linear in log f, the angle along the short way."""
+    """Return (frequencies [Hz], angles [rad]) at the zeros of y (n,), both interpolated linearly in log f.
+
+    The angle changes by the short way round.
+    """
     i = np.flatnonzero(y[:-1] * y[1:] <= 0.0)
     share = y[i] / (y[i] - y[i + 1])
     change = np.angle(np.exp(1j * (angle[i + 1] - angle[i])))
@@ -174,11 +192,13 @@ def _crossings(f, y, angle):
 
 
 def margins(measured):
-    """{metric: (value, unit)} of a Response; NaN where the band has no such frequency.
+    """Return {metric: (value, unit)} of a Response; NaN if the band has no such frequency.
 
-    crossover: where |L| first falls below 1. phase_margin: the smallest phase shift, of either sign, that puts a point
-    of |L| = 1 on -1. gain_margin: the smallest gain that puts a point on -1. bandwidth: where |T| first falls below
-    -3 dB. peak: of |T|.
+    crossover     first frequency at which |L| falls below 1
+    phase_margin  smallest phase shift, of either sign, that moves a point of |L| = 1 to -1
+    gain_margin   smallest gain that moves a point to -1
+    bandwidth     first frequency at which |T| falls below -3 dB
+    peak          largest |T|
     """
     f, L, T = measured.frequency, measured.open_loop, np.abs(measured.closed_loop)
     gain, from_minus_one = np.log(np.abs(L)), np.angle(-L)

@@ -1,17 +1,17 @@
-"""`pedestal tune --loops`: gains of the drive's and the control unit's loops for the plant of a scenario.
+"""`pedestal tune --loops`: design the gains of drive and control unit for the plant of a scenario.
 
-Each axis is designed as a rigid one; the margins are then measured on the simulated plant, with its gears, lash,
-friction, structure, delays and sampling (frequency_response), and a loop that falls short of them becomes slower
-until it holds them. Per motor on its shaft, with the motors' inertia J_m, the load's J_L and the ratio N:
+Each axis is designed as a rigid axis. The margins are then measured on the simulated plant, with its gears, lash,
+friction, structure, delays and sampling (frequency_response). A loop without the required margins is made slower until
+it has them. Per motor on its shaft, with the inertia J_m of a motor, J_L of the load, and the ratio N:
 
-    J = J_m + J_L / (2 N^2)                          what one motor turns
+    J = J_m + J_L / (2 N^2)                          inertia that one motor moves
     K_p = w_s J,  K_i = K_p w_s / 5                  speed loop of crossover w_s
-    position loop: PI of K_p = w_s / 8               `feedforward.bandwidth`, or what is asked
-    feed-forward: J_L + 2 J_m N^2, the load's friction
+    position loop: PI of K_p = w_s / 8               `feedforward.bandwidth`, or the requirement
+    feed-forward: J_L + 2 J_m N^2, friction of the load
     shaper: a = 3/4 (2 T_max N - T_load) / (J_L + 2 J_m N^2), jerk a 3/4 w_s, h0 = 3.5 / w_s
-    bias: 0.4 of the rated torque, held to 0.47, gone at 1.5 of it
+    bias torque: 0.4 of the rated torque, held up to a torque of 0.47, zero at 1.5 of the rated torque
 
-T_load is friction, unbalance and mean wind together; a quarter of the torque stays for a load heavier than assumed.
+T_load is the sum of friction, unbalance and mean wind. A quarter of the torque is a reserve for a heavier load.
 """
 import dataclasses
 import math
@@ -26,25 +26,24 @@ from pedestal_common.graph.topics import AXES
 from pedestal_recording import configuration
 
 DEFAULT_SPEED_CROSSOVER_HZ, CROSSOVER_RATIO = 28.0, 8.0
-"""Where nothing is asked: crossover of the speed loop [Hz]; that over the one of the position loop."""
+"""Default crossover of the speed loop [Hz], and ratio of the crossovers of speed and position loop [-]."""
 
 SLOWDOWN_FACTOR, MAX_SLOWDOWNS = 0.85, 12
-"""A loop short of its margins becomes slower by this factor, at most so often."""
+"""Factor by which a loop without its margins is made slower, and number of tried crossovers."""
 
 STILL_AIR_PARAMETERS = {'scenario.ship': False, 'scenario.program.source': 'target', 'acu.initial_mode': 'program',
                         'adu.initially_enabled': True, 'adu.wind.azimuth': 0.0, 'adu.wind.elevation': 0.0,
                         'adu.wind.gust.kind': 'none'}
-"""A plant is measured ashore in still air."""
+"""Parameters for the measurement of a plant: ashore, in still air."""
 
 
 class LoopError(ValueError):
-    """A plant whose loops cannot be designed, or closed with the margins that are asked; one line."""
+    """The loops of a plant cannot be designed, or not closed with the required margins; one line."""
 
 
 @dataclasses.dataclass(frozen=True)
 class LoopRequirements:
-    """What the loops are to reach: crossovers of speed and position loop [Hz], None for what follows from the other;
-    margins [deg], [dB]."""
+    """Required crossovers of speed and position loop [Hz], None to derive from the other loop; margins [deg], [dB]."""
     speed: float | None = None
     position: float | None = None
     phase_margin: float = 45.0
@@ -60,47 +59,49 @@ class LoopRequirements:
 
 @dataclasses.dataclass(frozen=True)
 class Plant:
-    """One axis as its design knows it, from its adu_drive.params.AxisParameters and the mean wind torque [Nm]. Raises
-    LoopError where its motors cannot move it."""
+    """Rigid model of one axis, from its adu_drive.params.AxisParameters and the mean wind torque [Nm].
+
+    Raises LoopError if the motors cannot move the axis.
+    """
     name: str
     axis: object
     wind: float = 0.0
 
     def __post_init__(self):
         if self.acceleration <= 0.0:
-            raise LoopError(f'adu.{self.name}: the motors cannot move it: friction, unbalance and wind take more than '
-                            'both torque limits')
+            raise LoopError(f'adu.{self.name}: the motors cannot move the axis: friction, unbalance and wind need '
+                            'more torque than both torque limits')
 
     @property
     def motor_inertia(self):
-        """J_m [kg m2], the mean of both motors."""
+        """Inertia J_m of a motor, the mean of both [kg m2]."""
         return 0.5 * (self.axis.motor_1.inertia + self.axis.motor_2.inertia)
 
     @property
     def ratio(self):
-        """N."""
+        """Gear ratio N from motor to load [-]."""
         return self.axis.gear_train.ratio
 
     @property
     def inertia(self):
-        """J [kg m2] that one motor turns, on its shaft."""
+        """Inertia J that one motor moves, on its shaft [kg m2]."""
         return self.motor_inertia + self.axis.load.inertia / (2.0 * self.ratio**2)
 
     @property
     def whole_inertia(self):
-        """Load and motors [kg m2], seen at the load."""
+        """Inertia of load and motors, seen at the load [kg m2]."""
         return 2.0 * self.inertia * self.ratio**2
 
     @property
     def acceleration(self):
-        """Of the load [rad/s2] at the torque limit of the motors, less what the load takes."""
+        """Acceleration of the load at the torque limits of the motors, minus friction, unbalance and wind [rad/s2]."""
         torque = (self.axis.motor_1.torque_limit + self.axis.motor_2.torque_limit) * self.ratio
         return (torque - self.axis.friction.coulomb - abs(self.axis.load.unbalance) - abs(self.wind)
                 ) / self.whole_inertia
 
 
 def drive_gains(plant, w_s):
-    """{key of adu.AXIS: value} for a crossover w_s [rad/s] of the speed loop."""
+    """Return {key of adu.AXIS: value} for a crossover w_s [rad/s] of the speed loop."""
     K_p, rated = w_s * plant.inertia, plant.axis.thermal.rated_torque
     return {'speed_loop.proportional': K_p, 'speed_loop.integral': K_p * w_s / 5.0,
             'speed_loop.load_inertia': plant.axis.load.inertia, 'bias.torque': 0.4 * rated, 'bias.hold': 0.47 * rated,
@@ -108,7 +109,7 @@ def drive_gains(plant, w_s):
 
 
 def control_gains(plant, w_s, w_p):
-    """{key of acu.AXIS: value} for crossovers w_s, w_p [rad/s] of the speed and the position loop."""
+    """Return {key of acu.AXIS: value} for crossovers w_s, w_p [rad/s] of the speed and the position loop."""
     a = 0.75 * plant.acceleration
     return {'controller': 'feedforward', 'feedforward.bandwidth': w_p, 'feedforward.inertia': plant.whole_inertia,
             'feedforward.friction': plant.axis.friction.coulomb, 'shaper.rate': 0.94 * plant.axis.limits.rate,
@@ -120,15 +121,17 @@ def _rounded(gains):
     return {key: value if isinstance(value, str) else float(f'{value:.4g}') for key, value in gains.items()}
 
 
-def meets_margins(margins, asked):
-    """Whether margins, as frequency.margins gives them, are those that are asked. A gain margin beyond the band
-    counts as held; a loop that is never above 1 has none."""
+def meets_margins(margins, required):
+    """Return True if margins of frequency.margins meet LoopRequirements.
+
+    A gain margin outside the band (NaN) is met; a loop that is never above 1 has no phase margin and fails.
+    """
     phase, gain = margins['phase_margin_deg'][0], margins['gain_margin_db'][0]
-    return phase >= asked.phase_margin and not gain < asked.gain_margin
+    return phase >= required.phase_margin and not gain < required.gain_margin
 
 
 class Loops:
-    """The loops of a scenario while they are designed: gains {'adu.azimuth.speed_loop.proportional': value}.
+    """The loops of a scenario during their design: gains {'adu.azimuth.speed_loop.proportional': value}.
 
     source: a name or a path; overrides: texts 'node.key=value'. Raises LoopError for a drive without motors.
     """
@@ -143,23 +146,28 @@ class Loops:
         self.gains = {}
 
     def set(self, node, name, gains):
-        """Take gains {key: value} of an axis of a node."""
+        """Set gains {key: value} of an axis of a node."""
         self.gains |= {f'{node}.{name}.{key}': value for key, value in _rounded(gains).items()}
 
     def _case(self):
-        said = dict(text.split('=', 1) for text in self.overrides)
-        return frequency.case(self.name, self.source, {**said, **self.gains, **STILL_AIR_PARAMETERS})
+        given = dict(text.split('=', 1) for text in self.overrides)
+        return frequency.case(self.name, self.source, {**given, **self.gains, **STILL_AIR_PARAMETERS})
 
     def _sweep(self, axis, sweep, period):
-        """A sweep whose torque stays below half of the bias, so that the teeth stay closed, and whose highest
-        frequency lies below half of the drive's steps."""
+        """Return a sweep with limited peak and frequency.
+
+        To keep the teeth closed, its torque stays below half of the bias torque. Its highest frequency is below half
+        of the step rate of the drive.
+        """
         peak = 0.5 * axis.bias.torque / max(axis.speed_loop.proportional * axis.gear_train.ratio, 1e-9)
         return dataclasses.replace(sweep, peak=min(sweep.peak, peak or sweep.peak),
                                    highest=min(sweep.highest, 0.475 / period))
 
     def response(self, loop, name):
-        """frequency.Response of a loop of an axis with the gains as they are, None where the drive trips; loop:
-        'current' (of the motor with less phase margin), 'speed', 'position'."""
+        """Return the frequency.Response of a loop of an axis with the present gains, None if the drive trips.
+
+        loop: 'current' (of the motor with the smaller phase margin), 'speed' or 'position'.
+        """
         drive = self._case().loaded().node_parameters('adu')
         axis = getattr(drive, name)
         if loop == 'current':
@@ -172,37 +180,42 @@ class Loops:
                                                       SPEED_LOOP_PERIOD_S))[f'speed/{name}']
         sweep = self._sweep(axis, frequency.POSITION_SWEEP, drive.period)
         found = frequency.position(self._case(), (name,), sweep)[f'position/{name}/{self.name}']
-        # A drive that has tripped sends nothing.
+        # A tripped drive returns no signal.
         return found if np.isfinite(found.open_loop).all() and found.open_loop.all() else None
 
     def measured(self, loop, name):
-        """frequency.margins of `response`, None where the drive trips."""
+        """Return the frequency.margins of `response`, None if the drive trips."""
         found = self.response(loop, name)
         return frequency.margins(found) if found else None
 
-    def close(self, loop, name, asked, set_to, fastest):
-        """(w, margins) of the first loop, from crossover `fastest` [rad/s] down, that holds what is asked; set_to(w)
-        takes the gains for w. Raises LoopError where none does."""
+    def close(self, loop, name, required, set_to, fastest):
+        """Return (w, margins) of the first loop, from crossover `fastest` [rad/s] down, that meets LoopRequirements.
+
+        set_to(w) sets the gains for w. Raises LoopError if no loop meets the requirements.
+        """
         for w in fastest * SLOWDOWN_FACTOR**np.arange(MAX_SLOWDOWNS):
             set_to(w)
             margins = self.measured(loop, name)
-            if margins and meets_margins(margins, asked):
+            if margins and meets_margins(margins, required):
                 return w, margins
         found = 'the drive trips'
         if margins:
             phase, gain = margins['phase_margin_deg'][0], margins['gain_margin_db'][0]
             found = f'it has {phase:.3g} deg and {gain:.3g} dB'
-        raise LoopError(f'{self.name}, {name}: the {loop} loop cannot be closed with {asked.phase_margin:g} deg and '
-                        f'{asked.gain_margin:g} dB: at {w / (2.0 * math.pi):.3g} Hz {found}')
+        raise LoopError(f'{self.name}, {name}: the {loop} loop cannot be closed with {required.phase_margin:g} deg '
+                        f'and {required.gain_margin:g} dB: at {w / (2.0 * math.pi):.3g} Hz {found}')
 
 
-def design(loops, axes, asked, progress):
-    """Design the loops of some axes and return the table's rows [(loop, axis, asked Hz, margins)]. progress(share,
-    text) is called as it goes on. Raises LoopError."""
-    wanted_s = (2.0 * math.pi * (asked.speed or CROSSOVER_RATIO * (asked.position or DEFAULT_SPEED_CROSSOVER_HZ
-                                                                   / CROSSOVER_RATIO)))
+def design(loops, axes, required, progress):
+    """Design the loops of some axes for LoopRequirements.
+
+    Return the rows of the table [(loop, axis, required Hz, margins)]. progress(share, text) is called for each loop.
+    Raises LoopError.
+    """
+    speed_hz = required.speed or CROSSOVER_RATIO * (required.position or DEFAULT_SPEED_CROSSOVER_HZ / CROSSOVER_RATIO)
+    wanted_s = 2.0 * math.pi * speed_hz
     rows, reached = [], {}
-    for name in AXES:  # the other axis moves along, so it is designed too
+    for name in AXES:  # both axes are designed first, because both move in a measurement
         plant = loops.plants[name]
         loops.set('adu', name, drive_gains(plant, wanted_s))
         loops.set('acu', name, control_gains(plant, wanted_s, wanted_s / CROSSOVER_RATIO))
@@ -214,33 +227,35 @@ def design(loops, axes, asked, progress):
 
         def set_speed(w, name=name, plant=plant):
             loops.set('adu', name, drive_gains(plant, w))
-        reached[name], margins = loops.close('speed', name, asked, set_speed, wanted_s)
+        reached[name], margins = loops.close('speed', name, required, set_speed, wanted_s)
         rows.append(('speed', name, wanted_s / (2.0 * math.pi), margins))
     for i, name in enumerate(axes):
         progress((i + 0.5) / len(axes), f'{name}: position loop')
         plant, w_s = loops.plants[name], reached[name]
-        w_p = min(2.0 * math.pi * asked.position if asked.position else math.inf, wanted_s / CROSSOVER_RATIO)
-        if not asked.position:
+        w_p = min(2.0 * math.pi * required.position if required.position else math.inf, wanted_s / CROSSOVER_RATIO)
+        if not required.position:
             w_p = w_s / CROSSOVER_RATIO
 
         def set_position(w, name=name, plant=plant, w_s=w_s):
             loops.set('acu', name, control_gains(plant, w_s, w))
-        _, margins = loops.close('position', name, asked, set_position, w_p)
+        _, margins = loops.close('position', name, required, set_position, w_p)
         rows.append(('position', name, w_p / (2.0 * math.pi), margins))
     return rows
 
 
 def refuse_outside(loops):
-    """Raise ScenarioError where a gain leaves its range."""
+    """Raise ScenarioError if a gain is outside its range."""
     scenario.load(loops.source, [*loops.overrides, *(scenario.override(*gain) for gain in loops.gains.items())])
 
 
-def table(rows, asked):
-    """Lines: every loop, its margins as measured beside those asked."""
-    lines = [f'{"loop":20} {"asked":>9} {"crossover":>10} {"bandwidth":>10} {"phase margin":>21} {"gain margin":>20}']
+def table(rows, required):
+    """Return lines: each loop with measured and required values."""
+    lines = [f'{"loop":20} {"required":>9} {"crossover":>10} {"bandwidth":>10} {"phase margin":>21} '
+             f'{"gain margin":>20}']
     for loop, name, wanted, margins in rows:
         values = {key: value for key, (value, _) in margins.items()}
-        floor = (f'(>= {asked.phase_margin:g})', f'(>= {asked.gain_margin:g})') if loop != 'current' else ('', '')
+        limits = required.phase_margin, required.gain_margin
+        floor = [f'(>= {limit:g})' for limit in limits] if loop != 'current' else ('', '')
         lines.append(f'{f"{name} {loop}":20} {wanted:6.3g} Hz {_text(values["crossover_hz"]):>7} Hz '
                      f'{_text(values["bandwidth_hz"]):>7} Hz {_text(values["phase_margin_deg"]):>9} deg {floor[0]:>7} '
                      f'{_text(values["gain_margin_db"]):>9} dB {floor[1]:>7}')
@@ -252,21 +267,24 @@ def _text(value):
 
 
 def main(options, progress):
-    """Design as the verb's options say and write the parameter file: the lines to print. Raises LoopError."""
+    """Design the loops for the options of the verb, write the parameter file and return the lines to print.
+
+    Raises LoopError.
+    """
     for name in ('filter', 'feedforward', 'runs', 'seed', 'duration'):
         if getattr(options, name):
-            raise LoopError(f'--{name}: does not go with --loops, which measures the plant')
-    asked = LoopRequirements(options.speed_bandwidth, options.position_bandwidth, options.phase_margin,
-                             options.gain_margin)
+            raise LoopError(f'--{name}: cannot be combined with --loops, which measures the plant')
+    required = LoopRequirements(options.speed_bandwidth, options.position_bandwidth, options.phase_margin,
+                                options.gain_margin)
     axes = AXES if options.axis == 'both' else (options.axis,)
     loops = Loops(options.source, options.param)
     file = options.output or pathlib.Path(f'{loops.name}-loops.yaml')
     if file.exists() or not file.parent.is_dir():
         raise LoopError(f'--output {file}: must be a new file in a directory that exists')
-    rows = design(loops, axes, asked, progress)
+    rows = design(loops, axes, required, progress)
     loops.gains = {key: value for key, value in loops.gains.items() if key.split('.')[1] in axes}
     refuse_outside(loops)
-    lines = table(rows, asked)
+    lines = table(rows, required)
     made = [f'made by: {options.command}', f'git {configuration.git_revision() or "unknown"}', *lines]
     sections = {node: {key.removeprefix(f'{node}.'): value for key, value in loops.gains.items()
                        if key.startswith(f'{node}.')} for node in ('adu', 'acu')}

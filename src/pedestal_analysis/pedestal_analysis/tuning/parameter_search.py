@@ -1,9 +1,10 @@
-"""The one procedure that tunes the parameters of a filter.
+"""The procedure that tunes the parameters of a filter.
 
-It minimises a criterion (the angle rms of a study, the negative log-likelihood of a bag's innovations) over the
-logarithms of the kind's own parameters: first on their grids, for one or two of them; then, from the best point
-(from the given parameters where there are more than two), by the simplex of Nelder and Mead until the parameters stay
-within 2 %. The result must be judged on other seeds, or on another part of the recording.
+It minimises a criterion over the logarithms of the parameters of the filter kind. The criterion is the angle rms of a
+study or the negative log-likelihood of a bag's innovations. One or two parameters are first searched on their grids.
+The simplex of Nelder and Mead then starts from the best point, or from the given parameters if there are more than
+two. It ends when the parameters stay within 2 %. The result must be validated on other seeds or on another part of the
+recording.
 """
 import itertools
 import math
@@ -16,14 +17,14 @@ from acu_tracker.estimation.params import FilterParameters
 from pedestal_common import parameters
 
 LOG_TOLERANCE = 0.02
-"""Of the logarithms."""
+"""Tolerance of the logarithms of the parameters [-]."""
 
 FAILED_COST = 1e300
-"""Value of a criterion that is not finite; finite itself, so that the simplex can take differences."""
+"""Cost of a criterion that is not finite; the cost is finite because the simplex takes differences."""
 
 
 def names(params):
-    """The parameters that are searched for FilterParameters."""
+    """Return the names of the searched parameters of FilterParameters."""
     if params.kind.startswith('imm'):
         return ('imm.dwell', *(f'imm.{name}' for model in named_models(params.imm.models) for name in _of_kind(model)))
     return _of_kind(params.kind)
@@ -35,10 +36,10 @@ def _of_kind(kind):
 
 
 def tuned(params, criterion, searched=None):
-    """(parameters with the least criterion, that criterion), searched from FilterParameters or UkfParameters.
+    """Return (best parameters, their criterion), searched from FilterParameters or UkfParameters.
 
-    criterion: function of them, infinite or NaN where it has no value. searched: names, None: those of `names`.
-    Raises ValueError where it has no value anywhere.
+    criterion(parameters): infinite or NaN if it has no value. searched: names, None for those of `names`.
+    Raises ValueError if no parameters give a finite criterion.
     """
     searched = names(params) if searched is None else tuple(searched)
     given = parameters.as_dict(params)

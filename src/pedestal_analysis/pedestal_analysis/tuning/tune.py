@@ -1,16 +1,17 @@
-"""`pedestal tune`: tunes the parameters of a filter, or the gains of the feed-forward, to a recording or a scenario.
+"""`pedestal tune`: tune the parameters of a filter, or the gains of the feed-forward, to a recording or a scenario.
 
-recording   the recorded inputs go through the ACU's step function, as in `pedestal recompute`, with changed
-            parameters. The criterion maximises the mean log-density of the innovations of the angle, log N(nu; 0, S),
-            which rewards small innovations and a correct S alike. Beyond HUBER_LIMIT_SIGMAS sigmas it falls linearly,
-            so that an
-            outlier counts as one. Every other PIECE_LENGTH_S of time is kept apart and validates the result.
-scenario    the compiled closed loop runs on stated seeds. The criterion minimises the rms of the true pointing error
-            of the axis (cross-elevation, elevation) in settled autotrack; another seed validates the result.
-feed-forward    the rate loop of the drive is identified (identification.py); k_v and k_a follow from it. The closed
-            loop validates them.
+recording     The recorded inputs are recomputed by the ACU's unit, as in `pedestal recompute`, with changed
+parameters.
+              The criterion maximises the mean log-density of the innovations of the angle, log N(nu; 0, S), which
+              rewards small innovations and a correct S. To limit the weight of outliers, the log-density falls
+              linearly beyond HUBER_LIMIT_SIGMAS. Every second piece of PIECE_LENGTH_S is reserved to validate the
+              result.
+scenario      The compiled closed loop runs on given seeds. The criterion minimises the rms of the true pointing error
+              of the axis (cross-elevation, elevation) in settled autotrack. Another seed validates the result.
+feed-forward  The rate loop of the drive is identified (identification.py) and gives k_v and k_a. The closed loop
+              validates the gains.
 
-The search is that of parameter_search.py. The result is a ROS 2 parameter file, for nodes and `pedestal run` alike.
+The search is that of parameter_search.py. The result is a ROS 2 parameter file for nodes and for `pedestal run`.
 """
 import dataclasses
 import math
@@ -35,25 +36,30 @@ from pedestal_common.wire import records
 from pedestal_recording import configuration
 
 HUBER_LIMIT_SIGMAS = 4.0
-"""Standard deviations of an innovation beyond which it is an outlier."""
+"""Size above which an innovation is an outlier [standard deviations]."""
 CONVERGENCE_TIME_S, PIECE_LENGTH_S = 1.0, 0.5
-"""Recording: time for the filter to converge after the first error [s]; length of the pieces it is split into [s]."""
+"""Time for the filter to converge after the first receiver error, and length of the pieces of a recording [s]."""
 AXES = topics.AXES
+"""Names of the axes."""
 DEFAULT_SEED_COUNT = 2
-"""Seeds a scenario is tuned on."""
+"""Default number of seeds to tune a scenario on."""
 ESTIMATE_ERRORS = ('estimate_error_cross_elevation_rms_deg', 'estimate_error_elevation_rms_deg')
+"""Results of a recording in the table."""
 TUNED_UKF_PARAMETERS = ('cv_noise', 'ca_noise', 'dwell')
-"""Tuned parameters of tracker.ukf; the others matter only at the start."""
+"""Tuned parameters of tracker.ukf; the other parameters matter only at the start."""
 
 
 class TuneError(ValueError):
-    """A request that cannot be tuned; the message is one line."""
+    """Options or data that do not allow tuning; one line."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Score:
-    """How good parameters are on each axis (2,): the criterion, which is minimised, on the part that is searched and
-    on the one kept apart; mean NIS of the latter; pointing: {metric: (value, unit)}."""
+    """Score of parameters, arrays (2,) of both axes.
+
+    searched, kept: minimised criterion on the searched part and on the reserved part; nis: mean NIS of the reserved
+    part; pointing: {metric: (value, unit)}.
+    """
     searched: np.ndarray
     kept: np.ndarray
     nis: np.ndarray
@@ -61,14 +67,14 @@ class Score:
 
 
 def log_density(innovation, sigma):
-    """log N(nu; 0, sigma^2) less its constant, made linear beyond HUBER_LIMIT_SIGMAS sigmas (Huber 1964)."""
+    """Return log N(nu; 0, sigma^2) without its constant, linear beyond HUBER_LIMIT_SIGMAS (Huber 1964)."""
     z = np.abs(innovation / sigma)
     return -np.where(z <= HUBER_LIMIT_SIGMAS, 0.5 * z * z, HUBER_LIMIT_SIGMAS
                      * (z - 0.5 * HUBER_LIMIT_SIGMAS)) - np.log(sigma)
 
 
 def _mean(values):
-    """Mean (2,) of the finite values of each column; infinite where there are none."""
+    """Return the mean (2,) of the finite values of each column; infinite for a column without finite values."""
     return np.array([column[np.isfinite(column)].mean() if np.isfinite(column).any() else math.inf
                      for column in values.T])
 
@@ -76,10 +82,11 @@ def _mean(values):
 class RecordedSource:
     """A recording on which filters are tuned. criterion: the negative mean log-density of the innovations.
 
-    of_beams: whether it has several beams. Their nodes are `beam_1/acu`, ..., so that only pedestal resolves `acu`.
-    Raises TuneError where the receiver gave too few errors."""
+    of_beams: True for several beams. Their nodes are `beam_1/acu`, ..., so that only pedestal resolves `acu`.
+    Raises TuneError for too few receiver errors.
+    """
 
-    criterion_name, unit, kept = 'negative log-likelihood of an error', '', 'on the pieces kept apart'
+    criterion_name, unit, kept = 'negative log-likelihood of an error', '', 'on the reserved pieces'
 
     def __init__(self, path):
         self.recording = recompute.Recording(path)
@@ -93,30 +100,30 @@ class RecordedSource:
         t = self.feed.stamps / NS_PER_SECOND
         compared = np.isfinite(self._innovations(done.steps)[0]).all(axis=1)
         if not compared.any():
-            raise TuneError(f'{path}: the receiver gave no error that the filter could be compared with')
+            raise TuneError(f'{path}: no receiver error to compare the filter with')
         counted = compared & (t >= t[compared][0] + CONVERGENCE_TIME_S)
         even = np.floor(t / PIECE_LENGTH_S).astype(int) % 2 == 0
         self.parts = counted & even, counted & ~even
         if not all(part.any() for part in self.parts):
-            raise TuneError(f'{path}: the receiver gave errors for {np.ptp(t[compared]):.3g} s; must be at least '
+            raise TuneError(f'{path}: receiver errors span {np.ptp(t[compared]):.3g} s; must be at least '
                             f'{CONVERGENCE_TIME_S + 2.0 * PIECE_LENGTH_S:g} s')
 
     def _innovations(self, steps):
-        """Innovation, its sigma and NIS (3, n, 2) of both axes in steps (n,)."""
+        """Return innovation, its sigma and NIS (3, n, 2) of both axes in steps (n,)."""
         return np.array([layouts.of_filter(steps, name) for name in ('innovation', 'innovation_sigma', 'nis')])
 
     def _run(self, params):
-        """(the unit, what it writes in every step) with these parameters."""
+        """Return (unit, its outputs of each step) for these parameters."""
         unit = recompute.unit_of(self.recording, 'acu', params)
         return unit, recompute.compute(self.recording, unit, self.feed, requests=self.requests)[0]
 
     def criterion(self, params):
-        """The criterion (2,) of AcuParameters on the pieces that are searched."""
+        """Return the criterion (2,) of AcuParameters on the searched pieces."""
         innovation, sigma, _ = self._innovations(self._run(params)[1])
         return _mean(-log_density(innovation, sigma)[self.parts[0]])
 
     def score(self, params) -> Score:
-        """The Score of AcuParameters."""
+        """Return the Score of AcuParameters."""
         unit, steps = self._run(params)
         innovation, sigma, nis = self._innovations(steps)
         density = log_density(innovation, sigma)
@@ -126,13 +133,17 @@ class RecordedSource:
 
 
 class SimulatedSource:
-    """A scenario on whose closed loop parameters are tuned. criterion: rms pointing error [deg] in settled autotrack,
-    or in any mode but standby. Raises TuneError where it is never in such a mode."""
+    """A scenario on whose closed loop parameters are tuned.
 
-    criterion_name, unit, kept = 'pointing error rms', 'deg', 'on the seed kept apart'
+    criterion: rms pointing error [deg] in settled autotrack, or in any mode except standby. Raises TuneError if the
+    run is never in such a mode.
+    """
+
+    criterion_name, unit, kept = 'pointing error rms', 'deg', 'on the reserved seed'
 
     def __init__(self, load, seed, runs, any_mode):
-        """load(seed) -> Scenario; seed None: the scenario's own."""
+        """Load the scenarios; load(seed) -> Scenario; seed: None for its own; any_mode: True for all modes except
+        standby."""
         chosen = load(seed)
         self.any_mode = any_mode
         self.of_beams = chosen.prefixes != ('',)
@@ -146,7 +157,7 @@ class SimulatedSource:
             raise TuneError(f'scenario {chosen.name}: never {mode} for more than {HANDOVER_SETTLING_S:g} s')
 
     def runs(self, params, seeds):
-        """(steps, truth) of the settled parts of all runs, records of closed_loop.STEP and TRUTH."""
+        """Return (steps, truth) of the settled parts of all runs, records of closed_loop.STEP and TRUTH."""
         parts = []
         for seed in seeds:
             run = closed_loop.Loop(self._scenarios[seed], changed={'acu': params}).run()
@@ -157,11 +168,11 @@ class SimulatedSource:
         return tuple(map(np.concatenate, zip(*parts)))
 
     def criterion(self, params):
-        """The criterion (2,) [deg] of AcuParameters on the seeds that are searched."""
+        """Return the criterion (2,) [deg] of AcuParameters on the searched seeds."""
         return np.degrees(np.sqrt(_mean(self.runs(params, self.seeds)[1]['error']**2)))
 
     def score(self, params) -> Score:
-        """The Score of AcuParameters."""
+        """Return the Score of AcuParameters."""
         kept, truth = self.runs(params, self.kept_seeds)
         rms = np.degrees(np.sqrt(_mean(truth['error']**2)))
         difference = kept['acu/reference']['position'] - kept['joint_states']['position']
@@ -176,8 +187,10 @@ def _with_filter(params, axis, changed):
 
 
 def filters(source, kind, axes, progress):
-    """(AcuParameters with the tuned filter, {parameter: value} of it) for a Recorded or Simulated; raises
-    TuneError."""
+    """Return (AcuParameters with the tuned filter, {parameter: value} of the filter).
+
+    source: RecordedSource or SimulatedSource. Raises TuneError.
+    """
     count = 0
 
     def counted(criterion, part):
@@ -193,7 +206,7 @@ def filters(source, kind, axes, progress):
     if kind == 'imm_ukf':
         if not source.ranged:
             raise TuneError('--filter imm_ukf: needs a measured range (tracking_receiver.receiver.ranging.measured); '
-                            'there is none, and without one it is imm')
+                            'without range the filter equals imm')
         rows = [AXES.index(axis) for axis in axes]
 
         def with_ukf(ukf):
@@ -221,13 +234,13 @@ def filters(source, kind, axes, progress):
 
 
 def _rounded(params, names):
-    """The parameters with those of these names rounded to four digits."""
+    """Return the parameters, rounded to four digits for these names."""
     values = parameters.as_dict(params)
     return parameters.build(type(params), {**values, **{name: float(f'{values[name]:.4g}') for name in names}})
 
 
 def feedforward(chosen, source, axes, progress):
-    """(AcuParameters with the identified gains of the feed-forward, {parameter: value} of them); chosen: Scenario."""
+    """Return (AcuParameters with identified feed-forward gains, {parameter: value} of the gains); chosen: Scenario."""
     progress(0.1, 'identifying the rate loop')
     loops, params, settings = identification.identify(chosen), source.params, {}
     for axis in axes:
@@ -236,19 +249,21 @@ def feedforward(chosen, source, axes, progress):
                                   acceleration_feedforward=float(f'{loops[axis].k_a:.3g}'))
         params = dataclasses.replace(params, **{axis: dataclasses.replace(old, feedforward=new)})
         settings |= {f'{axis}.feedforward.rate_feedforward': new.rate_feedforward,
-                  f'{axis}.feedforward.acceleration_feedforward': new.acceleration_feedforward}
+                     f'{axis}.feedforward.acceleration_feedforward': new.acceleration_feedforward}
     return params, settings
 
 
 def main(options, command, progress):
-    """Tune as the verb's options say and write the parameter file: the lines to print. command: the whole command
-    line, for the head of the file. Raises TuneError."""
+    """Tune for the options of the verb, write the parameter file and return the lines to print.
+
+    command: the whole command line, for the head of the file. Raises TuneError.
+    """
     is_bag = pathlib.Path(options.source).is_dir() or options.source.endswith('.mcap')
     axes = AXES if options.axis == 'both' else (options.axis,)
-    what = options.filter or 'feedforward'
-    file = options.output or pathlib.Path(f'{pathlib.Path(options.source).stem}-{what}.yaml')
+    target = options.filter or 'feedforward'
+    file = options.output or pathlib.Path(f'{pathlib.Path(options.source).stem}-{target}.yaml')
     _check(options, is_bag, file)
-    progress(0.0, 'reading' if is_bag else 'compiling the laws (the first time)')
+    progress(0.0, 'reading' if is_bag else 'compiling the laws (first time only)')
     if is_bag:
         source = RecordedSource(pathlib.Path(options.source))
     else:
@@ -259,7 +274,7 @@ def main(options, command, progress):
         params, settings = feedforward(load(options.seed), source, axes, progress)
     else:
         params, settings = filters(source, options.filter, axes, progress)
-    progress(0.98, 'judging')
+    progress(0.98, 'validating')
     old, new = source.score(source.params), source.score(params)
     lines = [*_table(source, old, new, axes), *_remarks(source, old, new, axes, settings)]
     made = [f'made by: {" ".join(command.split())}', f'git {configuration.git_revision() or "unknown"}', *lines]
@@ -272,26 +287,26 @@ def main(options, command, progress):
 
 
 def _check(options, is_bag, file):
-    """Raises TuneError for options that do not fit together, or a file that exists."""
+    """Raise TuneError for options that do not fit together, or for an existing file."""
     if bool(options.filter) == options.feedforward:
         raise TuneError('one of --filter KIND and --feedforward must be given')
     if options.filter and options.filter not in FILTER_KINDS:
         raise TuneError(f'--filter {options.filter}: must be one of {", ".join(FILTER_KINDS)}')
     if is_bag and options.feedforward:
-        raise TuneError('--feedforward: identifies the drive of a scenario; a recording has none')
+        raise TuneError('--feedforward: identifies the drive of a scenario; use a scenario instead of a recording')
     for name in ('seed', 'runs', 'duration', 'param'):
         if is_bag and getattr(options, name) not in (None, []):
-            raise TuneError(f'--{name} {getattr(options, name)}: is for a scenario; a recording is as it is')
+            raise TuneError(f'--{name} {getattr(options, name)}: is for a scenario; a recording cannot be changed')
     if options.runs is not None and options.runs < 1:
         raise TuneError(f'--runs {options.runs}: must be at least 1')
     if file.exists():
-        raise TuneError(f'--output {file} exists already; it is not overwritten')
+        raise TuneError(f'--output {file} exists already; the file is not overwritten')
     if not file.parent.is_dir():
         raise TuneError(f'--output {file}: must be a file in a directory that exists')
 
 
 def _table(source, old, new, axes):
-    """Lines that compare the old Score with the new."""
+    """Return lines that compare the old Score with the new Score."""
     rows = []
     for i, axis in enumerate(AXES):
         if axis in axes:
@@ -304,17 +319,17 @@ def _table(source, old, new, axes):
 
 
 def _remarks(source, old, new, axes, settings):
-    """Lines: reasons to doubt the result."""
+    """Return lines with reasons to doubt the result."""
     doubts = []
     for axis in axes:
         i = AXES.index(axis)
         if not new.kept[i] <= old.kept[i] + 1e-3 * abs(old.kept[i]):
-            doubts.append(f'{axis}: {source.kept} the new parameters are no better than the old')
+            doubts.append(f'{axis}: {source.kept} the new parameters are no better than the old parameters')
     fields = dict(parameters.flatten(AcuParameters))
     for name, value in settings.items():
         meta = fields[name].metadata
         if 'low' in meta and not 1.05 * meta['low'] < value < 0.95 * meta['high'] and value > 0.0:
-            doubts.append(f'{name} is at the end of its range: the best lies there or beyond')
+            doubts.append(f'{name} is at the end of its range: the optimum may be outside the range')
     return doubts
 
 

@@ -1,1 +1,1 @@
-"""A scenario as a graph: its nodes as processes, started, watched and ended."""
+"""Scenario as a graph: its nodes as processes, started, watched and ended."""

@@ -1,8 +1,9 @@
-"""A node as a child of this process, with its log for an output: a copy of this process where that can be, else a new
+"""Node as a child of this process, with its log as output: a copy of this process where possible, else a new
 interpreter.
 
-A copy has imported already what every node does, half a second of a core. It can be as long as nothing of this process
-has threads that a fork would cut off, so until rclpy, whose libraries start some, is imported; OpenBLAS ends its own.
+A copy already has the imports of every node, which take half a second of a core. A copy is possible while no thread of
+this process would be lost in a fork, so until the import of rclpy, whose libraries start threads. OpenBLAS ends its
+own threads at a fork.
 """
 import contextlib
 import ctypes
@@ -26,10 +27,10 @@ _libc.sbrk.restype = _libc.malloc.restype = ctypes.c_void_p
 
 
 class Child:
-    """A process that is held until `begin` and then does what `python -m` would; otherwise like a subprocess.Popen.
+    """Process that is held until `begin` and then runs as `python -m` would; otherwise like a subprocess.Popen.
 
-    command: [interpreter, '-m', module, arguments ...]; output: descriptor of its log; rehearse: what a copy does
-    while it is held, and where nothing is said that fails. It heads a session of its own, and the kernel sends it
+    command: [interpreter, '-m', module, arguments ...]; output: descriptor of its log; rehearse: function that a copy
+    calls while it is held, whose errors are ignored. The child heads a session of its own, and the kernel sends it
     SIGTERM when this process ends.
     """
 
@@ -44,11 +45,11 @@ class Child:
         try:
             self.pid = os.fork()
             if not self.pid:
-                def life():
+                def run():
                     held = _settle(parent, output, gate, mask)
                     become = _as_copy if copy and _take_name(command) else _as_interpreter
                     return become(command, held, rehearse)
-                _run_child(life)
+                _run_child(run)
         except OSError:
             os.close(self._begin)
             raise
@@ -57,13 +58,13 @@ class Child:
             os.close(gate)
 
     def begin(self):
-        """Let it go on."""
+        """Release the process."""
         with contextlib.suppress(BrokenPipeError):
             os.write(self._begin, b'.')
         os.close(self._begin)
 
     def poll(self):
-        """Its exit code, -N where signal N ended it; None while it runs."""
+        """Return its exit code, -N after an end by signal N; None while it runs."""
         if self.returncode is None:
             pid, status = os.waitpid(self.pid, os.WNOHANG)
             if pid:
@@ -71,7 +72,7 @@ class Child:
         return self.returncode
 
     def wait(self, timeout=None):
-        """Its exit code when it has ended. timeout [s]; raises subprocess.TimeoutExpired."""
+        """Return its exit code after its end. timeout [s]; raises subprocess.TimeoutExpired."""
         end = math.inf if timeout is None else time.monotonic() + timeout
         while self.poll() is None:
             if time.monotonic() > end:
@@ -80,20 +81,20 @@ class Child:
         return self.returncode
 
     def send_signal(self, number):
-        """Send a signal, not to one that has ended."""
+        """Send a signal, unless the process has ended."""
         if self.poll() is None:
             os.kill(self.pid, number)
 
     def kill(self):
-        """SIGKILL."""
+        """Send SIGKILL."""
         self.send_signal(signal.SIGKILL)
 
 
-def _run_child(life):
-    """Call life(), and end with its exit code: nothing that goes wrong brings a child back to where its parent is."""
+def _run_child(run):
+    """Call run(), and end the process with its exit code: no error lets the child return into the parent's code."""
     code = 1
     try:
-        code = life() or 0
+        code = run() or 0
     except SystemExit as end:
         code = end.code or 0
     except BaseException:
@@ -106,8 +107,8 @@ def _run_child(life):
 
 
 def _settle(parent, output, gate, mask):
-    """Keep nothing of what belongs to the parent; the gate, which is elsewhere now."""
-    # Where the parent has no standard input one of them may be in its place.
+    """Detach the child from the resources of its parent; return the new descriptor of the gate."""
+    # Where the parent has no standard input, a descriptor may have the number of one of the standard streams.
     output, gate = (fcntl.fcntl(descriptor, fcntl.F_DUPFD, 3) for descriptor in (output, gate))
     os.setsid()
     _libc.prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
@@ -128,7 +129,7 @@ def _settle(parent, output, gate, mask):
 
 
 def _wait(gate):
-    """Until the parent says so; end where it has gone."""
+    """Wait for the parent's release; end the process if the parent has ended."""
     if not os.read(gate, 1):
         os._exit(0)
     os.close(gate)
@@ -144,7 +145,7 @@ def _as_copy(command, gate, rehearse):
                               for descriptor, buffering in ((1, -1), (2, 1)))
     module = command[2]
     sys.argv = [importlib.util.find_spec(module).origin, *command[3:]]
-    # Who is told to end while the rest is imported: the module does this first, by the name that is its own now.
+    # The module of the node imports `entry` first, which sets its signal handlers by the name of this process.
     sys.modules.pop('pedestal_common.entry', None)
     main = importlib.import_module(module).main
     with contextlib.suppress(Exception):
@@ -154,7 +155,7 @@ def _as_copy(command, gate, rehearse):
 
 
 def _take_name(command):
-    """Whether this process now has a command line of its own, as ps, pgrep and killall see it."""
+    """Return True if this process now has a command line of its own, as ps, pgrep and killall show it."""
     with contextlib.suppress(OSError, ValueError, struct.error):
         return _named(command)
     return False
@@ -166,7 +167,7 @@ def _named(command):
     begin = _libc.malloc(len(line))
     ctypes.memmove(begin, line, len(line))
     with open('/proc/self/stat') as stream:
-        # proc(5) counts its fields from 1; the second, a name in brackets, may hold anything.
+        # proc(5) counts its fields from 1; the second, a name in brackets, may contain any character.
         fields = [0, 0, 0, *stream.read().rpartition(')')[2].split()]
     code, data, stack, environment = (map(int, fields[a:b]) for a, b in ((26, 28), (45, 48), (28, 29), (50, 52)))
     memory = struct.pack('=12QIi', *code, *data, _libc.sbrk(0), *stack, begin, begin + len(line), *environment,

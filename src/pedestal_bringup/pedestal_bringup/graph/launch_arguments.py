@@ -1,4 +1,4 @@
-"""What pedestal.launch.py asks for and starts, without `launch`, which only a ROS 2 machine has."""
+"""Arguments and actions of pedestal.launch.py, without the package `launch`, which only a ROS 2 machine has."""
 import typing
 
 from pedestal_bringup.graph import graph, operator_servers, supervisor
@@ -10,7 +10,7 @@ from pedestal_common import parameters
 
 
 class Argument(typing.NamedTuple):
-    """An argument of the launch file: name, text for --show-args, value by default, the values there are (any)."""
+    """Argument of the launch file: name, text for --show-args, default, allowed values (() for any)."""
     name: str
     doc: str
     default: str = ''
@@ -21,28 +21,28 @@ SERVER_OFF, SERVER_ON = 'false', 'true'
 
 ARGUMENTS = (
     Argument('scenario', 'name of a scenario that comes with the product, or path of a .yaml', 'leo_pass'),
-    Argument('pacing', 'who waits for whom; empty: what the scenario says', choices=('', 'lockstep', 'realtime')),
-    Argument('duration', "length of the run in the drive's time [s]; empty: what the scenario says"),
-    Argument('seed', 'seed of every noise stream, a whole number; empty: what the scenario says'),
+    Argument('pacing', "pacing of the run; empty: the scenario's", choices=('', 'lockstep', 'realtime')),
+    Argument('duration', "length of the run in the drive's time [s]; empty: the scenario's"),
+    Argument('seed', "seed of every noise stream, a whole number; empty: the scenario's"),
     Argument('params_file', 'ROS 2 parameter file whose values replace those of the scenario'),
     Argument('bag', 'new folder for the recording; empty: bags/runs/SCENARIO-N'),
-    Argument('namespace', 'of all nodes, for example ship_1'),
+    Argument('namespace', 'ROS namespace of all nodes, for example ship_1'),
     *(Argument(name,
-               f'in realtime: {server.does}' + (f' on 127.0.0.1: {SERVER_OFF}, {SERVER_ON} (port {server.port}) or a port'
-                                                if server.port else ''),
+               f'in realtime: {server.does}' + (
+                   f' on 127.0.0.1: {SERVER_OFF}, {SERVER_ON} (port {server.port}) or a port' if server.port else ''),
                SERVER_OFF, () if server.port else (SERVER_OFF, SERVER_ON))
       for name, server in operator_servers.SERVERS.items()))
 
 
 def misspelt_arguments(names):
-    """A line on each of the names that launch was given and that look like a misspelt argument: launch takes any."""
+    """Return a line on each given name that looks like a misspelt argument, because launch accepts any name."""
     known = [argument.name for argument in ARGUMENTS]
     return [f'no argument {name}:=;{meant}' for name in names
             if name not in known and (meant := parameters.did_you_mean(name, known))]
 
 
 def _number(given, name, kind, what):
-    """A number among the given texts; None where it is empty. Raises ValueError."""
+    """Return a number among the given texts; None where it is empty. Raises ValueError."""
     try:
         return kind(given[name]) if given[name] else None
     except ValueError:
@@ -50,7 +50,7 @@ def _number(given, name, kind, what):
 
 
 def load_scenario(given):
-    """The Scenario that the texts {argument: value} ask for. Raises ValueError."""
+    """Return the Scenario of the texts {argument: value}. Raises ValueError."""
     changes = scenario.file_overrides(given['params_file']) if given['params_file'] else ()
     return scenario.load(given['scenario'], changes,
                          _number(given, 'seed', int, 'a whole number'),
@@ -58,8 +58,8 @@ def load_scenario(given):
 
 
 def servers(given, chosen):
-    """[(Server, its parameters)] of those that are asked for. Raises ValueError in lockstep, and where a library is
-    missing."""
+    """Return [(Server, its parameters)] of the requested servers. Raises ValueError in lockstep, and where a library
+    is missing."""
     wanted = {name: given[name] for name in operator_servers.SERVERS if given[name].lower() != SERVER_OFF}
     operator_servers.check(wanted, chosen.header, '{}:=')
     started = []
@@ -75,8 +75,8 @@ def servers(given, chosen):
 
 
 def prepare(given, chosen):
-    """Make what a Scenario starts with, its laws and the folder of its logs: (ROS 2 parameter file of all nodes, the
-    scenario as a file). Raises ValueError, RunError."""
+    """Make the laws of a Scenario and the folder of its logs; return (ROS 2 parameter file of all nodes, the scenario
+    as a file). Raises ValueError, RunError."""
     graph.read_files(Plan(chosen))
     bag = graph.new_bag(given['bag'], chosen.name)
     if chosen.header.pacing == 'realtime':

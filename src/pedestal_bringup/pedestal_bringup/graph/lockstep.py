@@ -1,5 +1,5 @@
-"""A lockstep run: every node is needed for the next step, so one that dies or falls silent ends the run with its name.
-"""
+"""Watch of a lockstep run: every node is needed for the next step, so a node that dies or is silent ends the run with
+its name."""
 import time
 
 from rclpy.executors import SingleThreadedExecutor
@@ -8,11 +8,11 @@ from pedestal_bringup.graph.processes import RunError, exit_description
 from pedestal_common.graph import nodes
 
 SELF_ENDING_NODES = (nodes.DRIVE_NODE, 'recorder')
-"""Nodes that end by themselves when the run is over."""
+"""Nodes that end by themselves at the end of the run."""
 
 
 def watch(graph, operator, tracks, progress):
-    """From the start of the nodes to their end. progress(the drive's time [s]). Raises RunError."""
+    """Watch the nodes from their start to their end. progress(the drive's time [s]). Raises RunError."""
     header = graph.scenario.header
     sent = False
     executor = SingleThreadedExecutor()
@@ -36,10 +36,10 @@ def watch(graph, operator, tracks, progress):
 
 
 def failure(graph, stuck, unheard=None):
-    """The error of a run in which a node has ended before its time, or `unheard` says nothing any more.
+    """Return the error of a run in which a node has ended too early, or the node `unheard` is silent.
 
-    stuck(names) -> those that do not answer. A node may accuse one that itself waits for the node that is stuck. When
-    the drive has come to its end all others were told to end, and only who could not do it well did so early.
+    stuck(names) -> nodes that do not answer. A node may accuse a node that itself waits for the stuck node. Once the
+    drive has ended, all other nodes get a signal to end, so only an exit code other than 0 counts as too early.
     """
     time.sleep(0.5)
     ended = graph.ended()
@@ -52,7 +52,7 @@ def failure(graph, stuck, unheard=None):
         node for node in (unheard,) if node is not None and node not in early]
     if silent and not killed:
         mute = stuck([node for node in graph.processes if node not in early])
-        # Who waits for the recorder to take what he sent answers nobody either; the recorder waits for no one.
+        # A node that waits for the recorder's acknowledgement does not answer either; the recorder waits for no node.
         silent = [node for node in mute if node == 'recorder'] or [
             node for node in silent if node in mute] or mute or silent
     culprit = (killed or silent or list(early))[0]
@@ -63,4 +63,4 @@ def failure(graph, stuck, unheard=None):
     else:
         reason = f'ended before the run did, with exit code {early[culprit]}'
     others = ''.join(f'\n  {node}: {lines[node][-1]}' for node in early if node != culprit and lines[node])
-    return RunError(graph.obituary(culprit, reason) + others)
+    return RunError(graph.exit_report(culprit, reason) + others)

@@ -1,4 +1,4 @@
-"""The operator inside `pedestal run` and `pedestal program`: sends the program tracks, hears who lives."""
+"""Operator inside `pedestal run` and `pedestal program`: sends the program tracks, receives the diagnostics."""
 import contextlib
 import socket
 import time
@@ -12,17 +12,16 @@ from pedestal_common.node.shell import Shell
 from pedestal_common.wire import messages
 
 DISCOVERY_TIME_S = 0.5
-"""Seconds a run looks for another graph on its domain before it starts its own."""
+"""Time for which a run looks for another graph on its domain before it starts its own [s]."""
 
 SERVICE_TIMEOUT_S = 2.0
-"""Seconds a node has to answer a parameter service before it counts as stuck."""
+"""Time in which a node must answer a parameter service, before it counts as stuck [s]."""
 
 
 class Operator(Shell):
-    """Sends the program tracks to a graph of `beams` (nodes.links) and listens to the diagnostics of its nodes:
-    on_diagnostics(status, monotonic time [s]) is called for each DiagnosticStatus. names: of these nodes; what others
-    publish there does not count.
-    """
+    """Node that sends the program tracks to a graph of `beams` (nodes.links) and receives the diagnostics of its
+    nodes: on_diagnostics(status, monotonic time [s]) is called for each DiagnosticStatus. names: nodes whose
+    diagnostics count."""
 
     def __init__(self, beams=0, names=()):
         super().__init__('operator', parameters.Parameters)
@@ -35,14 +34,14 @@ class Operator(Shell):
         self.message_reader('diagnostics', self._take)
 
     def send(self, tracks):
-        """The program tracks {topic: message}, latched."""
+        """Publish the program tracks {topic: message}, latched."""
         self._open(tracks)
         for topic, message in tracks.items():
             self._writers[topic](messages.serialize(message))
 
     def send_to(self, names, tracks):
-        """The same once all of the nodes that read them are there, or a short run may end before its recorder has
-        them; whether they are sent."""
+        """Publish the program tracks once all their subscribers are present, and return True if they are published.
+        Otherwise a short run might end before its recorder receives them."""
         self._open(tracks)
         if any(self._missing(publisher, nodes.readers(link, names))
                for link, publisher in self.publishers_by_link.items()):
@@ -55,8 +54,9 @@ class Operator(Shell):
             if name not in self._writers:
                 self._writers[name] = self.writer(name)
 
-    def refuse_company(self):
-        """Raise RunError when the nodes of another graph are on this domain: they would hear this one."""
+    def check_domain_free(self):
+        """Raise RunError when the nodes of another graph are on this domain, because they would receive the messages
+        of this one."""
         deadline = time.monotonic() + DISCOVERY_TIME_S
         while time.monotonic() < deadline:
             names = self.get_node_names()
@@ -72,47 +72,47 @@ class Operator(Shell):
                 self.on_diagnostics(status, self.latest[status.name])
 
     def silent(self, limit):
-        """The node that has said nothing for longer than limit [s] and longest of all; None while all speak."""
+        """Return the node with the oldest diagnostics, if they are older than limit [s]; else None."""
         last = min(self.latest, key=self.latest.get, default=None)
         return last if last is not None and time.monotonic() - self.latest[last] > limit else None
 
     def stuck(self, names, executor):
-        """Those of the nodes whose process does not even answer a parameter service."""
-        answers = self._ask(names, GetParameters.Request(), executor)
+        """Return the nodes among these whose process does not even answer a parameter service."""
+        answers = self._get_parameters(names, GetParameters.Request(), executor)
         return [node for node in names if node not in answers]
 
     def graph_start(self, node, executor):
-        """graph.start [ns UTC] of a running node. Raises RunError where it does not answer."""
-        answers = self._ask([node], GetParameters.Request(names=['graph.start']), executor)
+        """Return graph.start [ns UTC] of a running node. Raises RunError where it does not answer."""
+        answers = self._get_parameters([node], GetParameters.Request(names=['graph.start']), executor)
         if node not in answers or not answers[node].values:
-            raise RunError(f'{node} does not say when its graph began: is it running on ROS_DOMAIN_ID '
-                           f'{self.context.get_domain_id()}?')
+            raise RunError(f'{node} does not answer with graph.start, the beginning of its time: is it running on '
+                           f'ROS_DOMAIN_ID {self.context.get_domain_id()}?')
         return answers[node].values[0].integer_value
 
-    def _ask(self, names, request, executor):
-        """{node: its answer to a request for parameters} of those that answer in time."""
+    def _get_parameters(self, names, request, executor):
+        """Return {node: its answer to a request for parameters} of the nodes that answer in time."""
         clients = {node: self.create_client(GetParameters, f'{node}/get_parameters') for node in names}
-        asked = {}
+        calls = {}
         deadline = time.monotonic() + SERVICE_TIMEOUT_S
-        while time.monotonic() < deadline and not (len(asked) == len(clients) and all(
-                answer.done() for answer in asked.values())):
+        while time.monotonic() < deadline and not (len(calls) == len(clients) and all(
+                call.done() for call in calls.values())):
             for node, client in clients.items():
-                if node not in asked and client.service_is_ready():
-                    asked[node] = client.call_async(request)
+                if node not in calls and client.service_is_ready():
+                    calls[node] = client.call_async(request)
             executor.spin_once(timeout_sec=0.02)
-        return {node: answer.result() for node, answer in asked.items() if answer.done()}
+        return {node: call.result() for node, call in calls.items() if call.done()}
 
 
 def another_graph(domain_id):
-    """The RunError where somebody else runs a graph on this ROS domain."""
+    """Return the RunError of a ROS domain on which another graph runs."""
     return RunError(f'another graph runs on ROS_DOMAIN_ID {domain_id}; set a free one')
 
 
 @contextlib.contextmanager
 def sole_run(domain_id):
-    """Hold a ROS domain for one run on this machine: an abstract socket, gone with its process however that ends.
+    """Hold a ROS domain for one run on this machine, by an abstract socket that ends with its process in any case.
 
-    Raises RunError when another run holds it; discovery alone is too slow to tell on a busy machine.
+    Raises RunError when another run holds it; discovery alone is too slow for this on a busy machine.
     """
     with socket.socket(socket.AF_UNIX) as holder:
         try:

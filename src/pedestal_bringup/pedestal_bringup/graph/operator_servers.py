@@ -1,4 +1,5 @@
-"""Servers beside a realtime run, for other programs: each is a node of its own that knows the graph by its topics."""
+"""Servers beside a realtime run, for other programs: each is a node of its own that uses only the topics of the
+graph."""
 import contextlib
 import importlib.util
 import json
@@ -11,29 +12,29 @@ from pedestal_bringup.graph.processes import RunError, log_folder
 from pedestal_operator.page.page_security import PAGE_ROLES
 
 SERVER_STOP_TIMEOUT_S = 5.0
-"""Seconds a server has to end."""
+"""Grace period of a server at its end [s]."""
 
 
 class Server(typing.NamedTuple):
-    """A row of SERVERS.
+    """Row of SERVERS.
 
-    module   of the node; executable: its name for ROS 2
-    port     by default; 0: it has none
-    does     what it does, for the help
-    says     lines that it begins with on its standard output, which are for the user
-    library  a Python package that it needs; extra: by which pip installs that
+    module       module of the node; executable: its name for ROS 2
+    port         default port; 0: it has none
+    does         its task, for the help
+    first_lines  number of first lines on its standard output that are for the user
+    library      Python package that it needs; extra: its name for pip
     """
     module: str
     executable: str
     port: int
     does: str
-    says: int = 0
+    first_lines: int = 0
     library: str = ''
     extra: str = ''
 
     @property
     def package(self):
-        """The ROS package of its node."""
+        """ROS package of its node."""
         return self.module.partition('.')[0]
 
 
@@ -42,7 +43,7 @@ SERVERS = {'rotctld': Server('pedestal_operator.rotctld_node', 'rotctld_node', 4
            'easycomm': Server('pedestal_operator.easycomm_node', 'easycomm_node', 4535,
                               'serve EasyComm I, II and III'),
            'page': Server('pedestal_operator.page_node', 'operator_page', 8080,
-                          "serve the operator's page for a browser", says=len(PAGE_ROLES)),
+                          "serve the operator's page for a browser", first_lines=len(PAGE_ROLES)),
            'foxglove': Server('pedestal_operator.live_node', 'live_node', 8765, 'serve every topic to Foxglove',
                               library='foxglove', extra='pedestal_operator[live]'),
            'frames': Server('pedestal_operator.frames_node', 'frames_node', 0,
@@ -50,7 +51,7 @@ SERVERS = {'rotctld': Server('pedestal_operator.rotctld_node', 'rotctld_node', 4
 
 
 def add_arguments(parser):
-    """--rotctld [PORT] and so on."""
+    """Add an option of each server to a parser, as --rotctld [PORT]."""
     for name, server in SERVERS.items():
         if server.port:
             parser.add_argument(f'--{name}', nargs='?', type=port, const=server.port, metavar='PORT',
@@ -60,7 +61,7 @@ def add_arguments(parser):
 
 
 def port(text):
-    """A TCP port in an option. Raises ValueError."""
+    """Return a TCP port of an option. Raises ValueError."""
     port = int(text)
     if not 1 <= port <= 65535:
         raise ValueError(text)
@@ -68,21 +69,21 @@ def port(text):
 
 
 def check(names, header, option='--{} '):
-    """Raise ValueError where servers are asked for in lockstep, or one lacks its library. option: how a value is
-    given to whoever asks."""
+    """Raise ValueError where servers are requested in lockstep, or a library is missing. option: format of an option
+    with a value."""
     for name in names:
-        asked = option.format(name).strip()
+        requested = option.format(name).strip()
         if header.pacing != 'realtime':
-            raise ValueError(f'{asked} needs {option.format("pacing")}realtime')
+            raise ValueError(f'{requested} needs {option.format("pacing")}realtime')
         library = SERVERS[name].library
         if library and not importlib.util.find_spec(library):
-            raise ValueError(f"{asked} needs {library}: pip install '{SERVERS[name].extra}'")
+            raise ValueError(f"{requested} needs {library}: pip install '{SERVERS[name].extra}'")
 
 
 @contextlib.contextmanager
 def servers(options, header, bag):
-    """Run the servers that the options ask for as long as the context is open. Raises ValueError in lockstep, and
-    where a library is missing."""
+    """Run the servers of the options while the context is open. Raises ValueError in lockstep, and where a library is
+    missing."""
     wanted = {name: getattr(options, name) for name in SERVERS if getattr(options, name) is not None}
     check(wanted, header)
     if wanted:
@@ -95,10 +96,10 @@ def servers(options, header, bag):
                 processes.append(subprocess.Popen(
                     [sys.executable, '-m', server.module, '--ros-args', '-p', f'graph.beams:={header.graph_beams}',
                      *(['-p', f'port:={port}'] if port else [])], text=True,
-                    stdin=subprocess.DEVNULL, stdout=subprocess.PIPE if server.says else output,
-                    stderr=output if server.says else subprocess.STDOUT, start_new_session=True))
-            if server.says:
-                _pass_on(name, processes[-1], server.says)
+                    stdin=subprocess.DEVNULL, stdout=subprocess.PIPE if server.first_lines else output,
+                    stderr=output if server.first_lines else subprocess.STDOUT, start_new_session=True))
+            if server.first_lines:
+                _pass_on(name, processes[-1], server.first_lines)
             else:
                 print(f'{name}: 127.0.0.1:{port}' if port else f'{name}: robot_description, tf', flush=True)
         yield
@@ -116,7 +117,8 @@ def servers(options, header, bag):
 
 
 def _pass_on(name, process, lines):
-    """Print the first lines of a server. Raises RunError where it ends instead, which it tells in one."""
+    """Print the first lines of a server. Raises RunError for a server that ends instead, with the error that it
+    prints."""
     for _ in range(lines):
         line = process.stdout.readline()
         if not line.startswith(name):

@@ -1,4 +1,4 @@
-"""The nodes of a run as processes: direct children with their logs, told to end in order, never left behind."""
+"""Nodes of a run as processes: direct children with their logs, ended in order, never left behind."""
 import contextlib
 import ctypes
 import functools
@@ -14,21 +14,24 @@ from pedestal_bringup.graph.child import Child
 from pedestal_common.graph import nodes
 
 SHOWN_LOG_LINES = 8
+"""Number of log lines in an error."""
 NODE_STOP_TIMEOUT_S = 20.0
+"""Grace period of a node at its end [s]."""
 
 RESERVED_LOG_BYTES = 64 * 1024
-"""Bytes of the disk that a log holds in advance, so that the cause of an end is kept also when it is full by then."""
+"""Disk space that a log reserves in advance, so that the cause of an end is stored even on a full disk [bytes]."""
 
 FALLOC_FL_KEEP_SIZE = 1
 _libc = ctypes.CDLL(None)
 
 
 class RunError(RuntimeError):
-    """A run ended before its time; the message names the node, the reason and its last log lines."""
+    """Error of a run that ended too early; the message holds the node, the reason and its last log lines."""
 
 
 def command_line(node, module, file):
-    """What starts the module of a node, 'beam_2/acu' in the namespace of its beam, with a parameter file."""
+    """Return the command that starts the module of a node, 'beam_2/acu' in the namespace of its beam, with a parameter
+    file."""
     beam = nodes.beam_of(node)
     return [sys.executable, '-m', module, '--ros-args', *(['-r', f'__ns:=/{beam}'] if beam else []),
             '--params-file', str(file)]
@@ -36,7 +39,7 @@ def command_line(node, module, file):
 
 @contextlib.contextmanager
 def uninterrupted():
-    """A second Ctrl-C, or whatever else ends `pedestal`, does not cut the clean stop short."""
+    """Ignore the signals that end `pedestal`, as a second Ctrl-C, during the clean stop."""
     before = {number: signal.signal(number, signal.SIG_IGN)
               for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
     try:
@@ -47,8 +50,8 @@ def uninterrupted():
 
 
 def _load_laws(scenario, node):
-    """Load the laws of a node, unless they are still to be compiled."""
-    from pedestal_common.compiled import is_compiled  # with numba, which only a run needs
+    """Load the laws of a node, unless they are not compiled."""
+    from pedestal_common.compiled import is_compiled  # imported late, because only a run needs numba
     if scenario.row(node).unit:
         unit = scenario.unit(node)
         if is_compiled(unit):
@@ -56,12 +59,11 @@ def _load_laws(scenario, node):
 
 
 class Graph:
-    """The processes of one run and their logs, beside the bag. Use as a context, in which they are held until `begin`:
-    leaving it stops whatever still runs.
+    """Processes of one run and their logs, beside the bag. Use it as a context, in which they are held until `begin`;
+    its end stops all processes that still run.
 
-    They do not outlive `pedestal run`, however that ends: the kernel sends them SIGTERM then, and who does not listen
-    to it is ended by a process of its own (reaper).
-    Raises RunError when there is no writing beside the bag.
+    They do not outlive `pedestal run`, however that ends: the kernel sends them SIGTERM, and a reaper process kills
+    any node that ignores it. Raises RunError when the folder beside the bag cannot be written.
     """
 
     def __init__(self, scenario, bag):
@@ -71,13 +73,13 @@ class Graph:
         self.file = self.log / 'parameters.yaml'
         self.processes = {}
         self._log_starts = {}
-        with self._beside_the_bag():
+        with self._disk_errors_named():
             self.log.mkdir(parents=True, exist_ok=True)
             for left in (*self.log.glob('*.log'), *self.log.glob('*.state')):
                 left.unlink()
 
     @contextlib.contextmanager
-    def _beside_the_bag(self):
+    def _disk_errors_named(self):
         try:
             yield
         except OSError as error:
@@ -97,8 +99,8 @@ class Graph:
         self._reaper.wait()
 
     def write(self, parameters):
-        """The text of the ROS 2 parameter file with which every node starts."""
-        with self._beside_the_bag():
+        """Write the text of the ROS 2 parameter file with which every node starts."""
+        with self._disk_errors_named():
             self.file.write_text(parameters)
 
     def begin(self, parameters):
@@ -108,7 +110,7 @@ class Graph:
             process.begin()
 
     def start(self, node):
-        """Start a node again, which goes on in its log."""
+        """Start a node again; it appends to its log."""
         self._hold(node)
         self.processes[node].begin()
 
@@ -129,15 +131,15 @@ class Graph:
         self.processes[node].wait()
 
     def stop(self):
-        """Ask the nodes that still run to end; whether each ends with exit code 0. The recorder ends last, and in
-        realtime the drive first: it stops its axes while the others are there."""
+        """Stop the nodes that still run; return True if each ends with exit code 0. The recorder ends last. In
+        realtime the drive ends first, because it stops its axes while the other nodes are present."""
         first = [nodes.DRIVE_NODE] if self.scenario.header.pacing == 'realtime' else []
         others = [node for node in self.processes if node not in (*first, 'recorder')]
         with uninterrupted():
             return not any([code for group in (first, others, ['recorder']) for code in self._stop(group)])
 
     def _stop(self, names):
-        """Their exit codes; who does not listen is killed."""
+        """Stop these nodes and return their exit codes; a node that ignores SIGTERM is killed."""
         processes = [self.processes[node] for node in names if node in self.processes]
         for process in processes:
             if process.poll() is None:
@@ -155,17 +157,18 @@ class Graph:
         return self.log / f'{node.replace("/", ".")}.log'
 
     def _lines(self, node):
-        """What a node said since its last start."""
+        """Return the log of a node since its last start."""
         with open(self._log_of(node), 'rb') as log:
             log.seek(self._log_starts[node])
             return log.read().decode(errors='replace').strip().splitlines()
 
     def last_lines(self, node):
-        """The end of a node's log, its result left out."""
+        """Return the end of a node's log, without its result."""
         return [line for line in self._lines(node) if not line.startswith('{')][-SHOWN_LOG_LINES:]
 
     def result(self, node):
-        """The last JSON object in a node's log: its result, or why it ended (shell.main); {} where there is none."""
+        """Return the last JSON object in a node's log: its result, or the reason of its end (shell.main); {} without
+        one."""
         for line in reversed(self._lines(node)):
             if line.startswith('{'):
                 with contextlib.suppress(ValueError):
@@ -173,34 +176,34 @@ class Graph:
         return {}
 
     def outcome(self, node):
-        """The result of a node that has ended well. Raises RunError where it left none."""
+        """Return the result of a node that has ended well. Raises RunError where it left none."""
         result = self.result(node)
         if not result:
             raise RunError(f'{node} ended without its result; its log is {self._log_of(node)}')
         return result
 
     def ended(self):
-        """{node: exit code} of the processes that have ended."""
+        """Return {node: exit code} of the processes that have ended."""
         return {node: process.returncode for node, process in self.processes.items() if process.poll() is not None}
 
-    def obituary(self, node, reason):
-        """A text that says what became of a node, with the last lines of its log."""
+    def exit_report(self, node, reason):
+        """Return a text with the reason of a node's end and the last lines of its log."""
         log = '\n'.join(f'  | {line}' for line in self.last_lines(node)) or '  | (it logged nothing)'
         return f'{node} {reason}; its last log lines ({self._log_of(node)}):\n{log}'
 
     def cause(self, node, code):
-        """Why a node that ended by itself with this exit code did, as it said, in brackets; '' of one that was
-        killed."""
+        """Return the last log line of a node that ended by itself with this exit code, in brackets; '' of a killed
+        node."""
         lines = self.last_lines(node)
         return f' ({lines[-1]})' if lines and code > 0 else ''
 
 
 def exit_description(code):
-    """How a process with this exit code ended."""
+    """Return how a process with this exit code ended, in words."""
     return f'died by signal {signal.Signals(-code).name}' if code < 0 else f'ended with exit code {code}'
 
 
 def log_folder(bag):
-    """Where the logs of a run lie, beside its bag."""
+    """Return the folder of the logs of a run, beside its bag."""
     bag = pathlib.Path(bag)
     return bag.with_name(bag.name + '.log')

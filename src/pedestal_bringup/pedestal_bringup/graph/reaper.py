@@ -1,9 +1,9 @@
-"""Ends the nodes that a killed `pedestal run` left behind and that do not listen: hung or stopped ones.
+"""End nodes that a killed `pedestal run` left behind and that ignore SIGTERM, because they hang or are stopped.
 
-A node is told by the kernel when `pedestal run` dies (processes.Graph) and ends in order, the drive with a ramp. This
-process reads the numbers of the nodes from its standard input, one a line, holds on to each by a pidfd, so that nobody
-else with the same number is ever met, and comes into play when the input ends. Without pidfds (Linux before 5.3) it
-does nothing.
+When `pedestal run` dies, the kernel sends each node SIGTERM (processes.Graph), and the node ends in order, the drive
+with a ramp. This process reads the process numbers of the nodes from its standard input, one per line, and holds a
+pidfd of each. A pidfd avoids that a signal reaches another process with the same number. When the input ends, the
+grace period begins. Without pidfds (Linux before 5.3) this process does nothing.
 """
 import contextlib
 import os
@@ -13,11 +13,11 @@ import sys
 import time
 
 GRACE_PERIOD_S = 20.0
-"""Seconds the nodes have to end by themselves."""
+"""Time in which the nodes must end by themselves [s]."""
 
 
 def main():
-    """Read the numbers of the nodes, wait for the end of the input, end who is left."""
+    """Read the process numbers of the nodes, wait for the end of the input, kill the nodes that remain."""
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)
     nodes = []

@@ -1,13 +1,13 @@
-"""When a node that died is started again, and when it has died too often. No processes here, and no clock."""
+"""Rules of restarts: the time of a restart, and the limit of the number of deaths. No processes here, and no clock."""
 import collections
 import math
 
 
 class Restarts:
-    """Times are those of one steady clock [s].
+    """Restarts of nodes that died. Times are those of one steady clock [s].
 
-    attempts: how often a node may be started again within `within` [s]; 0: never. The first start comes at once, and
-    each further one of that time `delay` [s] later after the death than the one before.
+    attempts: number of restarts of a node within `within` [s]; 0: none. The first restart follows at once. The delay
+    between death and restart grows by `delay` [s] with each further restart within that time.
     """
 
     def __init__(self, attempts, within, delay):
@@ -16,8 +16,9 @@ class Restarts:
         self._deaths = collections.defaultdict(collections.deque)
         self._due = {}
 
-    def died(self, node, now):
-        """A node has died; which start within the window is its next, 0 where it has died too often."""
+    def note_death(self, node, now):
+        """Note the death of a node. Return the number of its next restart within the window, 0 where it has died too
+        often."""
         deaths = self._deaths[node]
         while deaths and deaths[0] <= now - self.within:
             deaths.popleft()
@@ -29,7 +30,7 @@ class Restarts:
         return len(deaths)
 
     def due(self, now):
-        """The nodes to be started now, each of them told once."""
+        """Return the nodes to be started now, each only once."""
         ready = [node for node, time in self._due.items() if time <= now]
         for node in ready:
             del self._due[node]
@@ -37,30 +38,32 @@ class Restarts:
 
 
 class Losses:
-    """Steps that the drive lost outside the RECOVERY after a death, from the number it tells, on the same clock."""
+    """Steps that the drive lost outside the RECOVERY after a death, from the number that it publishes, on the same
+    clock."""
     RECOVERY = 5.0
-    """Time after a death in which steps are lost because of it [s]: all is well within 2.3 (docs/reliability.md)."""
+    """Time after a death in which lost steps are its effect [s]. A graph recovers within 2.3 s
+    (docs/reliability.md)."""
 
     def __init__(self):
         self.count = 0
         self._last, self._until = 0, -math.inf
 
-    def died(self, now):
-        """Some node has died."""
+    def note_death(self, now):
+        """Note the death of a node."""
         self._until = now + self.RECOVERY
 
     def note(self, number, now):
-        """The drive says how many it has lost so far; one that was started anew begins at 0."""
+        """Note the number of steps that the drive has lost; a restarted drive begins at 0."""
         if now > self._until:
             self.count += number - (self._last if number >= self._last else 0)
         self._last = number
 
 
 class Silence:
-    """Which nodes have said nothing for how long, on the same clock.
+    """Times since the last diagnostics of the nodes, on the same clock.
 
-    Nobody is silent while the listener itself was held up: what it did not hear in a gap longer than `gap` [s] between
-    two looks does not count.
+    Diagnostics that this process could not receive do not count: a gap longer than `gap` [s] between two calls of
+    `look` is a stall of this process.
     """
 
     def __init__(self, gap=1.0):
@@ -69,19 +72,19 @@ class Silence:
         self._looked = None
 
     def note(self, node, now):
-        """A node was heard at the time now [s]."""
+        """Note diagnostics of a node at the time now [s]."""
         self._latest[node] = now
 
-    def forget(self, node):
-        """A node has died: it is silent again only after it has been heard again."""
+    def remove(self, node):
+        """Remove a node that has died, until its next diagnostics."""
         self._latest.pop(node, None)
 
     def longer_than(self, limit, now):
-        """The nodes that were heard once and then not for longer than limit [s]."""
+        """Return the nodes whose last diagnostics are older than limit [s]."""
         return [node for node, time in self._latest.items() if now - time > limit]
 
     def look(self, now):
-        """To be called at every look around, before `longer_than`."""
+        """Note a check at the time now [s]; called before `longer_than`."""
         if self._looked is not None and now - self._looked > self._gap:
             lost = now - self._looked
             self._latest = {node: time + lost for node, time in self._latest.items()}

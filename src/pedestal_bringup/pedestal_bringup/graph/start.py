@@ -1,4 +1,4 @@
-"""How a run starts: the time at which it begins and what its nodes are told; and what comes of it."""
+"""Start of a run: the time at which it begins, the parameters of its nodes, and its outcome."""
 import dataclasses
 import time
 
@@ -9,14 +9,19 @@ from pedestal_common.graph.steps import NS_PER_SECOND
 from pedestal_recording import configuration
 
 START_LEAD_TIME_S = 5.0
-"""Seconds from the start of the nodes of a realtime run to the beginning of its time: a warm start takes two of them.
-Who comes later has lost steps, no more."""
+"""Time from the start of the nodes of a realtime run to the beginning of its time [s]. A warm start takes 2 s; a later
+node only loses steps."""
 
 
 @dataclasses.dataclass
 class Outcome:
-    """What a run says of itself: the last JSON line of the drive and of the recorder, {} of one that left none; how
-    often a node was started again; the steps that the drive lost beside; whether the user stopped it."""
+    """Outcome of a run.
+
+    drive     last JSON line of the drive, {} without one; recorder: that of the recorder
+    restarts  number of restarts of nodes
+    losses    number of steps that the drive lost apart from restarts
+    stopped   True if the user stopped the run
+    """
     drive: dict
     recorder: dict
     restarts: int = 0
@@ -25,12 +30,13 @@ class Outcome:
 
 
 def begins(scenario):
-    """graph.start of a run whose nodes start now [ns UTC]; 0 in lockstep, where time is that of the steps."""
+    """Return graph.start of a run whose nodes start now [ns UTC]; 0 in lockstep, where time is that of the steps."""
     return time.time_ns() + round(START_LEAD_TIME_S * NS_PER_SECOND) if scenario.header.pacing == 'realtime' else 0
 
 
 def parameters_of_all(scenario, bag, start):
-    """The scenario as a ROS 2 parameter file, every node told of the graph it is in. start: graph.start [ns UTC]."""
+    """Return the scenario as a ROS 2 parameter file, in which every node has the parameters of its graph. start:
+    graph.start [ns UTC]."""
     names = ','.join(dict.fromkeys(map(nodes.plain, scenario.nodes)))
     shared = {'graph.pacing': scenario.header.pacing, 'graph.nodes': names, 'graph.beams': scenario.header.graph_beams,
               'graph.deadline': scenario.header.deadline, 'graph.start': start,

@@ -1,4 +1,5 @@
-"""A realtime run: the antenna goes on, so a node that dies is started again; one that falls silent is killed first."""
+"""Supervisor of a realtime run: the antenna must go on, so a node that dies is started again, and a silent node is
+killed first."""
 import contextlib
 import os
 import signal
@@ -16,17 +17,17 @@ from pedestal_common.graph.steps import NS_PER_SECOND
 from pedestal_recording.verify import count
 
 RESTART_CUTOFF_S = 0.5
-"""A node that dies in the last seconds of a run is not started again."""
+"""Time before the end of a run within which a dead node is not started again [s]."""
 
 SHUTDOWN_GRACE_S = 20.0
-"""Seconds the drive may go on after the end of the run before it is told to end."""
+"""Grace period of the drive after the end of the run [s]."""
 
 MAX_SILENCE_S = 5.0
-"""Seconds without diagnostics, which come every second, after which a node is called silent."""
+"""Time without diagnostics, which are published every second, after which a node is reported as silent [s]."""
 
 
 def prepare(scenario):
-    """Compile the laws that are not yet, of each node in a process of its own, so that the nodes start warm. Raises
+    """Compile the laws that are not cached, of each node in a process of its own, so that the nodes start warm. Raises
     RunError."""
     units = {nodes.plain(node): node for node in scenario.nodes
              if scenario.row(node).unit and not is_compiled(scenario.unit(node))}
@@ -38,21 +39,21 @@ def prepare(scenario):
             with contextlib.suppress(BrokenPipeError), process.stdin:
                 process.stdin.write(scenario.as_yaml())
         for node, process in processes.items():
-            complaint = process.stderr.read()
+            errors = process.stderr.read()
             if process.wait() != 0:
-                lines = complaint.strip().splitlines()
-                raise RunError(f'the laws of {node} do not compile: it {exit_description(process.returncode)}'
-                               + (f'; {lines[-1]}' if lines else ''))
+                lines = errors.strip().splitlines()
+                raise RunError(f'the laws of {node} do not compile: the process '
+                               f'{exit_description(process.returncode)}' + (f'; {lines[-1]}' if lines else ''))
     finally:
         for process in processes.values():
             if process.poll() is None:
-                os.killpg(process.pid, signal.SIGKILL)      # with the process that it compiles beside
+                os.killpg(process.pid, signal.SIGKILL)      # with its second process, which also compiles
             process.wait()
             process.stderr.close()
 
 
 class Supervisor:
-    """Watches the processes of a graph whose time is 0 at start [ns UTC]."""
+    """Supervisor of the processes of a graph whose time is 0 at start [ns UTC]."""
 
     def __init__(self, graph, operator, start):
         header = graph.scenario.header
@@ -66,20 +67,21 @@ class Supervisor:
         operator.on_diagnostics = self._note
 
     def watch(self, tracks, progress):
-        """Until the end of the run in UTC, which no restart prolongs. progress(time of the run [s]).
+        """Watch the nodes until the end of the run in UTC, which no restart prolongs. progress(time of the run [s]).
 
         Raises RunError when a node has died too often.
         """
         executor = SingleThreadedExecutor()
         executor.add_node(self._operator)
         self._operator.send(tracks)
-        while self._goes_on():
+        while self._is_running():
             executor.spin_once(timeout_sec=0.1)
             progress(min(max(time.time_ns() - self._start, 0), self._end - self._start) / NS_PER_SECOND)
             self.look(time.monotonic())
 
-    def _goes_on(self):
-        """Until the drive ends at the end of the run; where it is not there to do so, or does not, nobody waits."""
+    def _is_running(self):
+        """Return True until the drive ends at the end of the run, at the latest until SHUTDOWN_GRACE_S after it. A
+        missing drive ends the run at its end."""
         now, drive_runs = time.time_ns(), self._graph.processes[nodes.DRIVE_NODE].poll() is None
         if now < self._end:
             return drive_runs or not self._is_nearly_over()
@@ -89,7 +91,7 @@ class Supervisor:
         return time.time_ns() > self._end - RESTART_CUTOFF_S * NS_PER_SECOND
 
     def look(self, now):
-        """Start again what has died, kill what has been silent for too long. now: monotonic [s]."""
+        """Start dead nodes again, and kill nodes that were silent for too long. now: monotonic [s]."""
         self._silence.look(now)
         for node in self._silence.longer_than(min(MAX_SILENCE_S, self._limits.silence or MAX_SILENCE_S), now):
             if node not in self._called:
@@ -100,23 +102,23 @@ class Supervisor:
                 self._graph.kill(node)
         for node, code in self._graph.ended().items():
             if node not in self._dead and not self._is_nearly_over():
-                self._bury(node, code, now)
+                self._handle_exit(node, code, now)
         for node in self.restarts.due(now):
             self._dead.discard(node)
             self._graph.start(node)
 
-    def _bury(self, node, code, now):
-        """A node has died: it is started again, or the run is given up."""
+    def _handle_exit(self, node, code, now):
+        """Schedule the restart of a node that has died, or end the run. Raises RunError."""
         limits = self._limits
         reason = ('was silent and was killed' if node in self._called and code == -signal.SIGKILL
                   else exit_description(code))
         self._dead.add(node)
         self._called.discard(node)
-        self._silence.forget(node)
-        self.losses.died(now)
-        number = self.restarts.died(node, now)
+        self._silence.remove(node)
+        self.losses.note_death(now)
+        number = self.restarts.note_death(node, now)
         if not number:
-            raise RunError(self._graph.obituary(node, f'{reason}, after {limits.attempts} starts within '
+            raise RunError(self._graph.exit_report(node, f'{reason}, after {limits.attempts} starts within '
                                                 f'{limits.within:g} s'))
         report(f'{node} {reason}{self._graph.cause(node, code)}: starting it again, {number} of {limits.attempts} '
                f'within {limits.within:g} s')
@@ -130,10 +132,10 @@ class Supervisor:
                     self.losses.note(lost, now)
         if node in self._called:
             self._called.discard(node)
-            report(f'{node} is heard again')
+            report(f'{node} publishes diagnostics again')
 
 
 def report(line):
-    """A line for people; a terminal that is gone does not end the run."""
+    """Print a line for people; a closed terminal does not end the run."""
     with contextlib.suppress(OSError):
         print(f'pedestal: {line}', file=sys.stderr, flush=True)

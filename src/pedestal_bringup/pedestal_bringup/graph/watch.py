@@ -1,6 +1,6 @@
-"""What this process does as a node of the graph itself, the operator: watch the others, send the program track.
+"""This process as a node of the graph, the operator: it watches the other nodes and sends the program track.
 
-In lockstep a node that dies or falls silent ends the run with its name; in realtime it is started again (supervisor).
+In lockstep a node that dies or is silent ends the run with its name; in realtime it is started again (supervisor).
 """
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
@@ -14,14 +14,14 @@ from pedestal_common.wire import messages
 
 
 def run(graph, tracks, progress):
-    """Begin the nodes of a graph that are held and watch them to their end, or until Ctrl-C; the Outcome. tracks:
+    """Start the held nodes of a graph, watch them to their end or until Ctrl-C, and return the Outcome. tracks:
     {topic: program track}. Raises RunError."""
     middleware.initialise([])
     try:
         operator = Operator(graph.scenario.header.graph_beams, graph.scenario.nodes)
         try:
             with sole_run(operator.context.get_domain_id()):
-                operator.refuse_company()
+                operator.check_domain_free()
                 realtime = graph.scenario.header.pacing == 'realtime'
                 return (_in_realtime if realtime else _in_lockstep)(graph, operator, tracks, progress)
         finally:
@@ -61,8 +61,8 @@ def _in_realtime(graph, operator, tracks, progress):
 def send_program(plan, start=None, ros_arguments=()) -> int:
     """Send the program track of a program.Plan to a running ACU and keep it latched until Ctrl-C.
 
-    start: when its time is 0 [ns UTC]; None: when the graph's is, which the ACU is asked for. ros_arguments: for the
-    node that sends it, in the namespace of the graph.
+    start: UTC at which its time is 0 [ns]; None: graph.start of the ACU. ros_arguments: for the node that sends it, in
+    the namespace of the graph.
     """
     beams = plan.scenario.header.graph_beams
     middleware.initialise(ros_arguments)
@@ -73,12 +73,12 @@ def send_program(plan, start=None, ros_arguments=()) -> int:
         tracks = plan.tracks
         if start is None:
             acu = nodes.members(('acu',), beams)[0]
-            print(f'asks {acu} on ROS_DOMAIN_ID {operator.context.get_domain_id()} when its time began', flush=True)
+            print(f'requests graph.start of {acu} on ROS_DOMAIN_ID {operator.context.get_domain_id()}', flush=True)
             start = operator.graph_start(acu, executor)
         for track in tracks.values():
             messages.put_stamp(track.header.stamp, start)
         operator.send(tracks)
-        print(f'{", ".join(tracks) or "nothing to be"} sent; kept for who comes later until Ctrl-C', flush=True)
+        print(f'{", ".join(tracks) or "no program track"} sent; latched for late joiners until Ctrl-C', flush=True)
         while True:
             executor.spin_once(timeout_sec=0.2)
     except KeyboardInterrupt:

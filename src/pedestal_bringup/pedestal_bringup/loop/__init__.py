@@ -1,1 +1,1 @@
-"""The closed loop of a scenario without ROS: one run, several side by side, its laws made ready."""
+"""Closed loop of a scenario without ROS: one run, several side by side, the compilation of its laws."""

@@ -1,9 +1,9 @@
-"""The closed loop of a scenario without ROS: the units of its nodes in the graph's order, one compiled call.
+"""Closed loop of a scenario without ROS: the units of its nodes in the graph's order, in one compiled call.
 
-In step k the drive moves to t_k by what was said in step k - 1 and tells where it is; then ship, INS, receiver and
-control unit answer. All of them read and write one record that holds every topic, so a run holds what a lockstep
-recording of the scenario does, to the last bit. Of several beams each is a loop of its own: they share ship, INS and
-time, and nothing of one reaches another.
+In step k the drive moves to t_k by the commands of step k - 1 and publishes its position; then ship, INS, receiver and
+control unit answer. All units read and write one record that holds every topic, so a run equals a lockstep recording
+of the scenario to the last bit. Each of several beams is a loop of its own. The loops share ship, INS and time, and do
+not act on each other.
 """
 import dataclasses
 
@@ -26,16 +26,17 @@ COMMAND_TOPIC, REFERENCE_TOPIC = 'acu/rate_command', 'acu/reference'
 
 STEP_DTYPE = records.of(*(topic.name for topic in topics.TOPICS
                           if topic.rate == 'step' or records.is_text(topic.name)))
-"""One step: every topic but the program track, commands and the diagnostics."""
+"""Record of one step: every topic except the program track, commands and the diagnostics."""
 
 TRUTH_DTYPE = np.dtype([('bias', 'f8', 2), ('error', 'f8', 2)])
-"""What no topic tells of t_k: bias torques [Nm], the true error of the beam (cross-elevation, elevation) [rad]."""
+"""Numbers of t_k that no topic holds: bias torques [Nm], true error of the beam (cross-elevation, elevation) [rad]."""
 
 _LAWS = {memory: law for node in nodes.UNIT_NODES for memory, (law, _) in node.unit_type().LAWS.items()}
 
 
 def step(memory, stamp, inputs, outputs):
-    """The step of any unit, known by the type of its memory; nothing where there is none. Compiled code calls it."""
+    """Make the step of any unit, selected by the type of its memory; without a unit do nothing. Compiled code calls
+    it."""
     raise NotImplementedError
 
 
@@ -43,7 +44,7 @@ by_type(step, lambda memory: None if isinstance(memory, types.NoneType) else _LA
 
 
 def true_bias(drive, truth):
-    """Fill bias of a TRUTH_DTYPE from the memory of the drive; a beam has none. Compiled code calls it."""
+    """Fill the bias of a TRUTH_DTYPE from the memory of the drive; a beam has none. Compiled code calls it."""
     raise NotImplementedError
 
 
@@ -58,10 +59,11 @@ def _true_bias(drive, truth):
 
 @compiled
 def loop(units, first, period_ns, before, injected, steps, truth):
-    """Steps first, first + 1 ... into steps (n,) of STEP_DTYPE and truth (n,) of TRUTH_DTYPE.
+    """Make the steps first, first + 1 ... into steps (n,) of STEP_DTYPE and truth (n,) of TRUTH_DTYPE.
 
-    units: memories of drive, ship, INS (both None ashore), receiver and control unit. before (1,): the step before, as
-    the drive obeys it; injected (n, 2): added to the rate commands [rad/s] and to the angles [rad] on their way to it.
+    units     memories of drive, ship, INS (both None ashore), receiver and control unit
+    before    (1,): the step before, from which the drive takes its commands
+    injected  (n, 2): added to the rate commands [rad/s] and to the angles [rad] on their way to the drive
     """
     drive, ship, ins, receiver, acu = units
     for k in range(len(steps)):
@@ -81,17 +83,18 @@ def loop(units, first, period_ns, before, injected, steps, truth):
 
 
 UNIT_ORDER = ('adu', 'ship_motion', 'ins', 'tracking_receiver', 'acu')
-"""Of the units in a step."""
+"""Order of the units in a step."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Run:
-    """A run in memory: steps (n,) of STEP_DTYPE, or of some of its topics, truth (n,) of TRUTH_DTYPE, the stamps (n,)
-    [ns] of the
-    steps; units {name: Unit}; forecasts [(stamp [ns], announcement.numbers)] at every whole second, as the control
-    unit's diagnostics tell them.
+    """Run in memory, which `table` reads like a recording of the run.
 
-    `table` reads it as a recording of the run is read.
+    steps      (n,) of STEP_DTYPE, or of some of its topics
+    truth      (n,) of TRUTH_DTYPE
+    stamps     stamps of the steps (n,) [ns]
+    units      {name: Unit}
+    forecasts  [(stamp [ns], announcement.numbers)] at every whole second, as in the control unit's diagnostics
     """
     steps: np.ndarray
     truth: np.ndarray
@@ -105,27 +108,27 @@ class Run:
         return self.stamps * 1e-9
 
     def __getitem__(self, topic):
-        """The records (n,) of a topic, one per step."""
+        """Return the records (n,) of a topic, one per step."""
         return self.steps[topic]
 
     def where(self, steps):
-        """The Run of some steps, a mask (n,)."""
+        """Return the Run of some steps, a mask (n,)."""
         return dataclasses.replace(self, steps=self.steps[steps], truth=self.truth[steps], stamps=self.stamps[steps])
 
     @property
     def topics(self):
-        """{name: type} of what its nodes said."""
+        """{name: type} of the topics with a message."""
         written = [name for unit in self.units.values() for name in unit.writes]
         kept = [topic for topic in topics.TOPICS if topic.name in written and topic.name in self.steps.dtype.names]
         return {topic.name: topic.type for topic in kept
                 if records.is_text(topic.name) or (self.steps[topic.name]['stamp'] != records.NO_STAMP).any()}
 
     def table(self, topic):
-        """{column: array (n,)} of a topic, a row per message, as of a bag (columns.table)."""
+        """Return {column: array (n,)} of a topic, a row per message, as of a bag (columns.table)."""
         if records.is_text(topic):
             unit = next(unit for unit in self.units.values() if topic in unit.NODE.writes)
             if topics.TOPIC_BY_NAME[topic].type != 'std_msgs/msg/String':
-                # A list: what it said is not kept, only when it changed.
+                # A list: a run keeps the times of its changes, not its content.
                 return {'t': self.t[np.flatnonzero(np.diff(self.steps[topic], prepend=topics.NO_TEXT_CODE))]}
             stamps, texts = announced(unit, topic, self.stamps, self.steps)
             return {'t': stamps / NS_PER_SECOND, 'data': texts}
@@ -137,14 +140,15 @@ class Run:
 
 
 class Loop:
-    """The units of a scenario, ready for one run.
+    """Units of a scenario, ready for one run.
 
-    beam: of several, '' for the first; changed: {node: parameters} in the place of the scenario's.
+    beam: one of several, '' for the first; changed: {node: parameters} that replace those of the scenario.
     """
+    units: dict[str, Unit]
 
     def __init__(self, scenario, beam='', changed=()):
         prefix = f'{beam}/' if beam else scenario.prefixes[0]
-        self.units: dict[str, Unit] = {}
+        self.units = {}
         for name in UNIT_ORDER:
             full = prefix + name if nodes.row(name).of_beam else name
             if full in scenario.nodes:
@@ -156,30 +160,32 @@ class Loop:
         self.period_ns = round(period * NS_PER_SECOND)
         self.steps = round(scenario.header.duration / period) + 1
 
-    def attend(self, first, forecasts):
-        """Before step `first`: add to forecasts where a second begins, obey what the units' schedules say."""
+    def before_step(self, first, forecasts):
+        """Prepare step `first`: add to forecasts where a second begins, execute the scheduled commands of the
+        units."""
         stamp = first * self.period_ns
         if stamp // NS_PER_SECOND > (stamp - self.period_ns) // NS_PER_SECOND:
             forecasts.append((stamp, announcement.numbers(self.units['acu'].parts['state']['guidance']['lookahead'])))
         for unit in self.units.values():
-            unit.obey_due(stamp)
+            unit.execute_due(stamp)
 
     def free_until(self, first):
-        """The step after `first` before which to `attend` again."""
+        """Return the step after `first` before which `before_step` is due again."""
         due = min((first * self.period_ns // NS_PER_SECOND + 1) * NS_PER_SECOND,
                   *(unit.next_due for unit in self.units.values()))
         return min(-(-due // self.period_ns), self.steps)
 
     def run(self, injected=None, watch=None) -> Run:
-        """Every step of the scenario. injected (steps, 2): see `loop`. watch(steps made) -> steps until it is called
-        again: sees the units in between. To be called once."""
+        """Make every step of the scenario; to be called once. injected (steps, 2): see `loop`. watch(steps made) ->
+        steps until it is called again: a function that sees the units in between."""
         if injected is None:
             injected = np.zeros((self.steps, 2))
         steps, truth = records.empty(STEP_DTYPE, self.steps), np.zeros(self.steps, TRUTH_DTYPE)
-        before, forecasts = records.empty(STEP_DTYPE, 1), []
+        before = records.empty(STEP_DTYPE, 1)
+        forecasts: list[tuple] = []
         first = 0
         while first < self.steps:
-            self.attend(first, forecasts)
+            self.before_step(first, forecasts)
             last = min(first + (watch(first) if watch else MAX_BLOCK_STEPS), first + MAX_BLOCK_STEPS,
                        self.free_until(first))
             part = slice(first, last)

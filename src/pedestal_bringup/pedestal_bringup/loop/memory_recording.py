@@ -1,4 +1,4 @@
-"""A run in memory as what analysis/ and report/ read of a bag.Bag: a recording of it without a file."""
+"""Run in memory with the interface of a bag.Bag, as analysis/ and report/ use it: a recording without a file."""
 import functools
 
 import numpy as np
@@ -12,14 +12,15 @@ DIAGNOSTICS_TOPIC = 'diagnostics'
 
 
 def record(scenario, beam=''):
-    """The Recorded of a scenario.Scenario run in memory; beam: of several, '' for the first."""
+    """Return the MemoryRecording of a scenario.Scenario run in memory; beam: one of several, '' for the first."""
     return MemoryRecording(scenario, closed_loop.Loop(scenario, beam).run())
 
 
 class MemoryRecording:
-    """A closed_loop.Run of a scenario.Scenario, as the view of one beam of its recording.
+    """closed_loop.Run of a scenario.Scenario, as the view of one beam of its recording.
 
-    Of the diagnostics it holds what the control unit announces of keyholes; everything else is in no result.
+    Of the diagnostics it holds the keyhole forecasts of the control unit, because no result uses anything else of
+    them.
     """
 
     def __init__(self, scenario, run):
@@ -33,12 +34,12 @@ class MemoryRecording:
 
     @functools.cached_property
     def topics(self):
-        """{name: type} of what is in it."""
+        """{name: type} of its topics."""
         of_diagnostics = {DIAGNOSTICS_TOPIC: messages.DiagnosticArray.__msgtype__} if self._keyholes else {}
         return {**self._run.topics, **of_diagnostics}
 
     def table(self, topic):
-        """{column: array (n,)} of a topic, as of a bag (columns.table)."""
+        """Return {column: array (n,)} of a topic, as of a bag (columns.table)."""
         if topic == DIAGNOSTICS_TOPIC:
             return {'t': np.array([stamp for stamp, _ in self._keyholes]) / NS_PER_SECOND}
         if topic not in self._tables:
@@ -46,11 +47,11 @@ class MemoryRecording:
         return self._tables[topic]
 
     def rows(self, topic):
-        """Numbers (n,) of the messages of a topic."""
+        """Return the numbers (n,) of the messages of a topic."""
         return np.arange(len(self.table(topic)['t']))
 
     def messages(self, topic):
-        """Iterator of (topic, log time, publish time [ns], message) of the diagnostics."""
+        """Yield (topic, log time, publish time [ns], message) of the diagnostics."""
         for stamp, values in self._keyholes:
             status = messages.DiagnosticStatus(level=0, name='acu', message='', hardware_id='',
                                                values=[messages.KeyValue(key=key, value=value) for key, value in

@@ -1,9 +1,8 @@
-"""Compiles laws that are not in the cache, so that what calls them starts warm.
+"""Compile laws that are not in the cache, so that their callers start warm.
 
-`python -m pedestal_bringup.loop.prepare` compiles those of every node on both cores, then those of the closed loop;
-`... NAME` those of the nodes of one of COMPILED_UNITS; `... NODE NAME` those of one node of a scenario: the scenario
-of this
-name as YAML on the standard input.
+`python -m pedestal_bringup.loop.prepare` compiles the laws of every node on all cores, then those of the closed loop;
+`... NAME` those of the nodes of COMPILED_UNITS in the scenario NAME; `... NODE NAME` those of one node of the scenario
+NAME, which it reads as YAML from the standard input.
 """
 import concurrent.futures
 import multiprocessing
@@ -17,18 +16,18 @@ from pedestal_common.compiled import compiled_once, done, is_compiled
 
 COMPILED_UNITS = (('leo_pass', 'acu'), ('leo_pass', 'adu'), ('leo_pass', 'tracking_receiver'), ('ship_pass', 'ins'),
                   ('ship_pass', 'ship_motion'), ('phased_array_sway', 'adu'))
-"""(scenario, node) that have the laws of every unit, the slowest first."""
+"""(scenario, node) that together use the laws of every unit, the slowest first."""
 
 COMPILED_LOOPS = (('leo_pass', side_by_side.MIN_PARALLEL_LOOPS), ('ship_pass', 1), ('leo_pass', 1))
-"""(scenario, how many side by side) of closed loops that have the laws on lanes, on a ship and ashore, the slowest
+"""(scenario, number of parallel loops) of closed loops that use the laws on lanes, on a ship and ashore, the slowest
 first."""
 
 COMPILE_RUN_S = 0.1
-"""Length [s] of the run that compiles a closed loop."""
+"""Length of the run that compiles a closed loop [s]."""
 
 
 def of_node(unit):
-    """Compile the laws of a unit; two processes do that in less time than one."""
+    """Compile the laws of a unit, in two processes, which is faster than in one."""
     with compiled_once(unit):
         ahead = multiprocessing.get_context('fork').Process(target=unit.prepare_ahead)
         ahead.start()
@@ -64,7 +63,8 @@ def _compile_loop(name, count):
 
 
 def compile_cold(units, loops):
-    """Compile what is not in the cache of parts of COMPILED_UNITS and COMPILED_LOOPS, a line for each that was not."""
+    """Compile the laws that are not cached, of parts of COMPILED_UNITS and COMPILED_LOOPS, and print a line for
+    each."""
     units = [part for part in units if not is_compiled(_unit(*part))]
     loops = [part for part in loops if (mark := _loop_done(*part)) is None or not mark.exists()]
     if not units and not loops:
@@ -78,7 +78,7 @@ def compile_cold(units, loops):
 
 
 def main():
-    """Compile what the command line names; the exit code."""
+    """Compile the laws that the command line names; return the exit code."""
     match sys.argv[1:]:
         case []:
             compile_cold(COMPILED_UNITS, COMPILED_LOOPS)

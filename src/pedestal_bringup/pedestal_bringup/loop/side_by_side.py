@@ -1,8 +1,8 @@
-"""The closed loops of trials of one scenario side by side: their drives on lanes, in one compiled call.
+"""Closed loops of trials of one scenario side by side: their drives on lanes, in one compiled call.
 
 The drive takes two thirds of the time of a closed loop; on lanes (adu_drive.lanes) it takes a quarter of that.
-Receivers and control units work one after the other, on the records and with the laws that they have alone, so that
-every number is equal to the last bit to that of closed_loop.Loop.
+Receivers and control units run one after the other, with the records and laws of a single loop. Every number therefore
+equals that of closed_loop.Loop to the last bit.
 """
 import typing
 
@@ -19,21 +19,21 @@ from pedestal_common.wire import records
 from tracking_receiver_sim import unit as receiver_unit
 
 LANE_UNIT_TYPES = {'adu': drive_unit.Adu, 'tracking_receiver': receiver_unit.TrackingReceiver, 'acu': acu_unit.Acu}
-"""The units of a loop ashore, of which each trial has its own."""
+"""Units of a loop ashore; each trial has its own."""
 
 MIN_PARALLEL_LOOPS = 8
-"""Loops that are worth the lanes, most of which would be idle."""
+"""Smallest number of loops for lanes; with fewer, most lanes would be idle."""
 
 MAX_STEPS_PER_CALL = 200
-"""Steps of one call at most, for which the noise is drawn at once."""
+"""Largest number of steps of one call, for which the noise is drawn at once."""
 
 MAX_MEMORY_BYTES = 2**30
-"""For what trials side by side keep [bytes]."""
+"""Largest memory for the records of parallel trials [bytes]."""
 
 
 @compiled
 def _receiver_law(receivers, i, stamp, step):
-    """The step of receiver i."""
+    """Make the step of receiver i."""
     r = receivers
     receiver_unit.law(receiver_unit.Memory(r.record[i:i + 1], r.breaks[i], r.coefficients[i], r.normals[i]), stamp,
                       step, step)
@@ -41,13 +41,13 @@ def _receiver_law(receivers, i, stamp, step):
 
 @compiled
 def _track(rows, ends, i):
-    """Track i of `_one_after_another`."""
+    """Return track i of `_joined_tracks`."""
     return ProgramTrack(rows.times[ends[i]:ends[i + 1]], rows.angles[ends[i]:ends[i + 1]])
 
 
 class ControlUnits(typing.NamedTuple):
-    """Control units one after the other. tables: those of all as one, which end at ends (tables, n + 1), as
-    `_one_after_another` gives them."""
+    """Control units, run one after the other. tables: those of all units as one, with ends (tables, n + 1), as
+    `_joined_tracks` gives them."""
     record: np.ndarray
     tables: Tables
     ends: np.ndarray
@@ -55,27 +55,33 @@ class ControlUnits(typing.NamedTuple):
 
 @compiled
 def _acu_law(acus, i, stamp, step):
-    """The step of control unit i."""
+    """Make the step of control unit i."""
     of_all, ends = acus.tables, acus.ends
     tables = Tables(_track(of_all.program, ends[0], i), _track(of_all.tle, ends[1], i), _track(of_all.sun, ends[2], i))
     acu_unit.law(acu_unit.Memory(acus.record[i:i + 1], tables), stamp, step, step)
 
 
 class KeptSteps(typing.NamedTuple):
-    """What is kept of steps. words (m,): which 8-byte words of a STEP; said: the steps as `_words`; rows (trials, n,
-    m): where they are put, of all steps, because `_loop` would be compiled anew for a part of the columns."""
+    """Part of the steps that is kept.
+
+    words  (m,): indices of the kept 8-byte words of a STEP_DTYPE
+    steps  the steps as `_words`
+    rows   (trials, n, m): the kept words of all steps, because `_loop` would be compiled again for a part of the
+           columns
+    """
     words: np.ndarray
-    said: np.ndarray
+    steps: np.ndarray
     rows: np.ndarray
 
 
 @compiled
 def _loop(drives, receivers, acus, first, last, period_ns, steps, kept):
-    """Steps first ... last - 1 of every trial, of which a Kept keeps what it says.
+    """Make the steps first ... last - 1 of every trial, of which KeptSteps keeps a part.
 
-    drives: as of lanes.beside; receivers: a memory whose arrays have the trials as a further first dimension; acus:
-    ControlUnits. steps (2, trials) of STEP: those of even and of odd numbers, the present ones and the ones before by
-    turns.
+    drives     as of lanes.beside
+    receivers  a memory whose arrays have the trials as a further first dimension
+    acus       ControlUnits
+    steps      (2, trials) of STEP_DTYPE: of the even and of the odd steps, in turn the present and the previous step
     """
     moving = drive_unit.DRIVE_LANES(drives)
     for k in range(first, last):
@@ -85,16 +91,17 @@ def _loop(drives, receivers, acus, first, last, period_ns, steps, kept):
             _receiver_law(receivers, i, stamp, steps[now, i])
             _acu_law(acus, i, stamp, steps[now, i])
             for j in range(len(kept.words)):
-                kept.rows[i, k, j] = kept.said[now, i, kept.words[j]]
+                kept.rows[i, k, j] = kept.steps[now, i, kept.words[j]]
 
 
 def _words(records):
-    """View of records (n, m) as their 8-byte words (n, m, words)."""
+    """Return a view of records (n, m) as their 8-byte words (n, m, words)."""
     return records.view(np.int64).reshape(*records.shape, -1)
 
 
 def max_parallel_trials(scenario, names):
-    """How many trials of a scenario.Scenario can run side by side, which keep the topics named; 0 where none can."""
+    """Return the largest number of trials of a scenario.Scenario side by side, which keep the topics named; 0 where
+    that is not possible."""
     if scenario.header.ship or scenario.header.beam:
         return 0
     steps = scenario.header.duration / scenario.node_parameters('adu').period
@@ -102,8 +109,8 @@ def max_parallel_trials(scenario, names):
 
 
 def can_run_parallel(loops):
-    """Whether closed_loop.Loops can run side by side: of drives with motors ashore, alike in period, length and in the
-    shapes of what they work on."""
+    """Return True if closed_loop.Loops can run side by side: drives with motors ashore, with equal period, length and
+    shapes of their memories."""
     ours = all({name: type(unit) for name, unit in loop.units.items()} == LANE_UNIT_TYPES
                and loop.units['adu'].fits_lanes
                for loop in loops)
@@ -118,7 +125,7 @@ def _shape(loop):
 
 
 def _stacked(units):
-    """The memories of units as one, and their records in it: each unit goes on with its own part of it."""
+    """Join the records of units into one; each unit continues with its part. Return the record."""
     record = np.empty(len(units), units[0].memory.record.dtype)
     for i, unit in enumerate(units):
         record[i:i + 1] = unit.memory.record
@@ -127,14 +134,15 @@ def _stacked(units):
 
 
 def _joined_tracks(tracks):
-    """(the rows of ProgramTracks in one, where each ends (n + 1,), 0 first): they may differ in length."""
+    """Return (the rows of ProgramTracks as one, their ends (n + 1,), 0 first); the tracks may differ in length."""
     return ProgramTrack(*map(np.concatenate, zip(*tracks))), np.cumsum([0, *(len(track.times) for track in tracks)])
 
 
 def runs(loops, names, kept=None):
-    """The Run of each of some closed_loop.Loops that `fit`, of the topics named, without what no topic tells.
+    """Return the Run of each of some closed_loop.Loops that can run parallel, with the topics named, and without
+    truth.
 
-    kept: memory (trials, steps) of records.of(names) for what they say, which others in it overwrite; None: new.
+    kept: memory (trials, steps) of records.of(names) for the Runs, which the next call overwrites; None: new.
     """
     drives, receivers, acus = ([loop.units[name] for loop in loops] for name in LANE_UNIT_TYPES)
     drive_record, receiver_record, acu_record = _stacked(drives), _stacked(receivers), _stacked(acus)
@@ -144,13 +152,14 @@ def runs(loops, names, kept=None):
     period_ns, count = loops[0].period_ns, loops[0].steps
     steps = records.empty(STEP_DTYPE, 2 * len(loops)).reshape(2, len(loops))
     kept = np.empty((len(loops), count), records.of(*names)) if kept is None else kept
-    words = np.arange(STEP_DTYPE.itemsize // lanes.WORD_BYTES).view(STEP_DTYPE)[list(names)].astype(kept.dtype).view(np.int64)
+    all_words = np.arange(STEP_DTYPE.itemsize // lanes.WORD_BYTES).view(STEP_DTYPE)
+    words = all_words[list(names)].astype(kept.dtype).view(np.int64)
     keeps = KeptSteps(words, _words(steps), _words(kept))
     forecasts = [[] for _ in loops]
     first = 0
     while first < count:
-        for loop, told in zip(loops, forecasts):
-            loop.attend(first, told)
+        for loop, forecast in zip(loops, forecasts):
+            loop.before_step(first, forecast)
         last = min(first + MAX_STEPS_PER_CALL, *(loop.free_until(first) for loop in loops))
         blocks = [unit.block(last - first) for unit in receivers]
         tables, ends = zip(*map(_joined_tracks, zip(*(unit.memory.tables for unit in acus))))
@@ -159,5 +168,5 @@ def runs(loops, names, kept=None):
               ControlUnits(acu_record, Tables(*tables), np.array(ends)), first, last, period_ns, steps, keeps)
         first = last
     lanes.from_lanes(moving, drive_record)
-    return [Run(steps, np.zeros(0, TRUTH_DTYPE), np.arange(count) * period_ns, loop.units, told)
-            for loop, steps, told in zip(loops, kept, forecasts)]
+    return [Run(steps, np.zeros(0, TRUTH_DTYPE), np.arange(count) * period_ns, loop.units, forecast)
+            for loop, steps, forecast in zip(loops, kept, forecasts)]

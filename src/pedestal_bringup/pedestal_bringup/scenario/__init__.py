@@ -1,1 +1,1 @@
-"""A scenario: its file, its parameters, and the program track that follows from it."""
+"""Scenario: its file, its parameters, and the program track that follows from it."""

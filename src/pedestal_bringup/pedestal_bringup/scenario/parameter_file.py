@@ -1,5 +1,5 @@
-"""ROS 2 parameter files: those of a graph name its nodes /**/acu, which is acu in any namespace. A bare /** would give
-both axes' nodes what is meant for one."""
+"""ROS 2 parameter files. The files of a graph name its nodes /**/acu, which is acu in any namespace, because a bare
+/** would give the values of one node to all nodes."""
 import yaml
 
 from pedestal_common.text_files import plain_yaml
@@ -8,22 +8,22 @@ ANY_NAMESPACE = '/**/'
 
 
 class ParameterFileError(ValueError):
-    """A parameter file cannot be read; one line naming the file and the section."""
+    """Error of a parameter file that cannot be read; one line with the file and the section."""
 
 
 def text(sections):
-    """The file of {node: {name: value}}; a node of a beam is named as 'beam_2/acu'."""
+    """Return the file of {node: {name: value}}; a node of a beam is named as 'beam_2/acu'."""
     return yaml.safe_dump({ANY_NAMESPACE + node: {'ros__parameters': values} for node, values in sections.items()},
                           sort_keys=False)
 
 
 def node_of(section):
-    """The node that a section acu, /acu or /**/acu is of."""
+    """Return the node of a section acu, /acu or /**/acu."""
     return str(section).removeprefix(ANY_NAMESPACE).removeprefix('/')
 
 
 def dotted(tree, prefix=''):
-    """{dotted name: value} of nested values."""
+    """Return {dotted name: value} of nested values."""
     flat = {}
     for key, value in tree.items():
         if isinstance(value, dict):
@@ -34,7 +34,7 @@ def dotted(tree, prefix=''):
 
 
 def read(path):
-    """{node: {dotted name: value}} of a file. Raises ParameterFileError."""
+    """Return {node: {dotted name: value}} of a file. Raises ParameterFileError."""
     try:
         tree = plain_yaml.read(path)
     except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:

@@ -1,4 +1,4 @@
-"""The program track an operator sends before a pass: the predicted target as time-tagged azimuth and elevation."""
+"""Program track that an operator sends before a pass: the predicted target as time-tagged azimuth and elevation."""
 import dataclasses
 import datetime
 import functools
@@ -14,7 +14,7 @@ from tracking_receiver_sim.path import arrival
 
 @dataclasses.dataclass(frozen=True)
 class Plan:
-    """A scenario.Scenario with its targets and its program tracks; each is built once, when it is first needed."""
+    """scenario.Scenario with its targets and its program tracks; each is built once, at its first use."""
     scenario: Scenario
 
     @functools.cached_property
@@ -26,28 +26,28 @@ class Plan:
     def _parameters(self, prefix):
         return self.scenario.node_parameters(prefix + 'tracking_receiver').target
 
-    def _believed(self, prefix):
-        """The target of a beam as the operator knows it, who does not know UT1."""
+    def _nominal_target(self, prefix):
+        """Return the target of a beam as the operator knows it, with UT1 equal to UTC."""
         true = self._parameters(prefix)
-        believed = dataclasses.replace(true, leo_pass=dataclasses.replace(true.leo_pass, ut1_offset=0.0))
-        return self.targets[prefix] if believed == true else target.build(believed, self.scenario.header.duration)
+        nominal = dataclasses.replace(true, leo_pass=dataclasses.replace(true.leo_pass, ut1_offset=0.0))
+        return self.targets[prefix] if nominal == true else target.build(nominal, self.scenario.header.duration)
 
     @functools.cached_property
     def tables(self):
         """{prefix of the beam: (times (n,) s, angles (n, 2) earth azimuth (unwrapped), elevation [rad])} of the
-        prediction. The operator knows neither UT1 nor how late the target is seen, and of the air what `refractivity`
-        says.
+        prediction. It contains neither UT1 nor the travel time of the signal, and of the refraction only
+        `refractivity`.
 
-        From stamp 0 until two intervals past the end, so that the end of the run lies inside; where the target is not
-        known, it stands at its first or last known place. Times to the last bit as the ACU reads them from the
-        message.
+        The table begins at stamp 0 and ends two intervals after the run, so that the end of the run is inside. Outside
+        its known path the target is at its first or last known place. The times equal those that the ACU reads from
+        the message, to the last bit.
         """
         program, duration = self.scenario.header.program, self.scenario.header.duration
         nanoseconds = np.round(np.arange(0.0, duration + 2.0 * program.interval, program.interval) * 1e9)
         times = nanoseconds // 1e9 + nanoseconds % 1e9 * 1e-9
         tables = {}
         for prefix in self.scenario.prefixes:
-            built = self._believed(prefix)
+            built = self._nominal_target(prefix)
             known = np.clip(times - program.time_offset, built.breaks[0], built.breaks[-1])
             azimuth, elevation, _ = target.look_angles(built, known)
             if program.refractivity > 0.0:
@@ -58,31 +58,31 @@ class Plan:
 
     @functools.cached_property
     def tracks(self):
-        """{topic: JointTrajectory} of the program track for every beam; {} where there is none."""
+        """{topic: JointTrajectory} of the program track for every beam; {} without a program track."""
         if self.scenario.header.program.source == 'none':
             return {}
         return {f'{prefix}acu/program_track': program_message(*table) for prefix, table in self.tables.items()}
 
     def announced(self):
-        """Lines on the targets of the beams, each once: what a flight is, when a satellite is highest, rises and
-        sets."""
+        """Return lines on the targets of the beams, each once: the flight, or the times when a satellite culminates,
+        rises and sets."""
         lines = []
         for built in self.targets.values():
             lines += built.summary or _sky(built, self.scenario.header.duration)
         return list(dict.fromkeys(lines))
 
     def begins(self):
-        """UTC [ns] of the time 0 by the target. Raises ValueError where the target has no date."""
+        """Return the UTC [ns] of the time 0 by the target. Raises ValueError where the target has no date."""
         start_time = self.targets[self.scenario.prefixes[0]].start_time
         if not start_time:
-            raise ValueError(f'--start file: the target of {self.scenario.name} has no date; say a UTC instead')
+            raise ValueError(f'--start file: the target of {self.scenario.name} has no date; give a UTC instead')
         begin = orbit.instant('start', start_time).replace(tzinfo=datetime.timezone.utc)
         return round(begin.timestamp() * 1e3) * 1_000_000
 
 
 def _sky(built, duration):
-    """Lines on a target that has a date: the UTC of its highest place in a run of `duration` [s], of its rise and set
-    where they are within."""
+    """Return lines on a target with a date: the UTC of its highest place in a run of `duration` [s], and of its rise
+    and set within the run."""
     if not built.start_time:
         return ()
     times = np.linspace(0.0, duration, 1 + int(min(1e5, 10.0 * duration)))
@@ -102,7 +102,7 @@ def _sky(built, duration):
 
 
 def program_message(times, angles):
-    """The JointTrajectory of a table: times (n,) s, angles (n, 2) rad."""
+    """Return the JointTrajectory of a table: times (n,) s, angles (n, 2) rad."""
     points = []
     for time, positions in zip(times, angles):
         point = messages.trajectory_point(len(positions))

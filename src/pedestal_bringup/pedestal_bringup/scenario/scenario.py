@@ -1,8 +1,8 @@
 """Scenarios: a ROS 2 parameter file, one section per node, and a section `scenario` as its header.
 
 `ros2 run PACKAGE EXECUTABLE --ros-args --params-file SCENARIO.yaml` loads the same file unchanged, in any namespace
-where its sections are called /**/NODE, but without what several nodes must agree on (_spread). That is in the file
-that `pedestal run` leaves beside the bag, parameters.yaml.
+where its sections are named /**/NODE. Parameters that several nodes share (_spread) are missing then. They are in the
+file parameters.yaml that `pedestal run` writes beside the bag.
 """
 import contextlib
 import dataclasses
@@ -10,6 +10,8 @@ import functools
 import importlib.resources
 import json
 import pathlib
+import typing
+from collections.abc import Iterable, Iterator, Mapping
 
 import numpy as np
 import yaml
@@ -18,72 +20,85 @@ from pedestal_bringup.scenario import parameter_file
 from pedestal_common import parameters
 from pedestal_common.graph import nodes, topics
 from pedestal_common.graph.graph_parameters import GraphParameters
+from pedestal_common.graph.nodes import Node
 from pedestal_common.text_files import files, plain_yaml
+
+if typing.TYPE_CHECKING:
+    from importlib.abc import Traversable
+
+    from pedestal_common.node.unit import Unit
+
+Sections = dict[str, dict[str, typing.Any]]
+"""Values of each node and of `scenario`: {section: {dotted name: value}}."""
+
+
+_P = typing.TypeVar('_P', bound=parameters.Parameters)
 
 
 @dataclasses.dataclass(frozen=True)
 class ProgramParameters(parameters.Parameters):
-    """The program track the operator sends the ACU before the run: the target as predicted, with its error."""
-    source: str = parameters.choice('target', ('target', 'none'), 'what the table is made of')
+    """Program track that the operator sends to the ACU before the run: the predicted target, with the error of the
+    prediction."""
+    source: str = parameters.choice('target', ('target', 'none'), 'source of the program track; none: no track')
     interval: float = parameters.parameter(1.0, 0.002, 60.0, 's', 'time between two points')
-    time_offset: float = parameters.parameter(0.0, -60.0, 60.0, 's', 'the prediction is late by this much')
-    azimuth_offset: float = parameters.parameter(0.0, -0.2, 0.2, 'rad', 'added to the predicted azimuth')
-    elevation_offset: float = parameters.parameter(0.0, -0.2, 0.2, 'rad', 'added to the predicted elevation')
-    refractivity: float = parameters.parameter(0.0, 0.0, 500.0, 'N', 'of the air as the operator measures it: its '
-                                               'refraction is added to the prediction; 0: none is')
+    time_offset: float = parameters.parameter(0.0, -60.0, 60.0, 's', 'delay of the prediction')
+    azimuth_offset: float = parameters.parameter(0.0, -0.2, 0.2, 'rad', 'error of the predicted azimuth')
+    elevation_offset: float = parameters.parameter(0.0, -0.2, 0.2, 'rad', 'error of the predicted elevation')
+    refractivity: float = parameters.parameter(0.0, 0.0, 500.0, 'N', 'measured refractivity of the air, whose '
+                                               'refraction is added to the prediction; 0: no refraction')
 
 
 @dataclasses.dataclass(frozen=True)
 class RestartParameters(parameters.Parameters):
-    """How `pedestal run` treats a node that dies in realtime; in lockstep it ends the run."""
-    attempts: int = parameters.parameter(5, 0, 1_000_000, '', 'a node is started again at most so often within '
-                                         '`within`; 0: never')
-    within: float = parameters.parameter(60.0, 1.0, 86400.0, 's', 'the time in which its deaths are counted')
-    delay: float = parameters.parameter(0.5, 0.0, 60.0, 's', 'a node that dies is started again at once, and each '
-                                        'further time in `within` so much later after its death')
-    silence: float = parameters.parameter(30.0, 0.0, 3600.0, 's', 'a node that publishes no diagnostics for so long '
-                                          'is killed and started again; 0: never')
+    """Restarts of nodes that die in a realtime `pedestal run`; in lockstep a dead node ends the run."""
+    attempts: int = parameters.parameter(5, 0, 1_000_000, '', 'largest number of restarts of a node in the time '
+                                         '`within`; 0: no restart')
+    within: float = parameters.parameter(60.0, 1.0, 86400.0, 's', 'time in which the restarts of a node are counted')
+    delay: float = parameters.parameter(0.5, 0.0, 60.0, 's', 'delay that each further restart in `within` adds; the '
+                                        'first restart has none')
+    silence: float = parameters.parameter(30.0, 0.0, 3600.0, 's', 'time without diagnostics after which a node is '
+                                          'killed and started again; 0: never')
 
 
-def _of_graph(name):
-    """The parameter graph.NAME, which a scenario tells every node."""
+def _of_graph(name: str) -> typing.Any:
+    """Return the parameter graph.NAME, which a scenario gives to every node."""
     field = GraphParameters.__dataclass_fields__[name]
     return dataclasses.field(default=field.default, metadata=field.metadata)
 
 
 @dataclasses.dataclass(frozen=True)
 class ScenarioParameters(parameters.Parameters):
-    """The header of a scenario."""
-    title: str = parameters.text('', 'one line for people')
+    """Header of a scenario."""
+    title: str = parameters.text('', 'description in one line')
     duration: float = parameters.parameter(60.0, 0.1, 86400.0, 's', "length of the run in the drive's time")
-    pacing: str = parameters.choice('lockstep', ('lockstep', 'realtime'), 'who waits for whom')
+    pacing: str = parameters.choice('lockstep', ('lockstep', 'realtime'), 'pacing of the steps: by the '
+                                    'messages of the nodes, or by the clock')
     seed: int = parameters.parameter(1, 0, 2**31 - 1, '', 'seed of every noise stream')
-    ship: bool = parameters.flag(False, 'the pedestal stands on a ship: ship_motion and ins take part')
+    ship: bool = parameters.flag(False, 'the pedestal is on a ship: the nodes ship_motion and ins take part')
     beam: bool = parameters.flag(False, 'the drive is an electronically steered array: beam_steering_node')
-    beams: int = parameters.parameter(1, 1, nodes.MAX_BEAMS, '', 'its beams; of several, each has receiver and ACU '
-                                      'in a namespace beam_1 ...')
+    beams: int = parameters.parameter(1, 1, nodes.MAX_BEAMS, '', 'number of beams of the array; each of several has '
+                                      'receiver and ACU in a namespace beam_1 ...')
     deadline: float = _of_graph('deadline')
     priority: int = _of_graph('priority')
     program: ProgramParameters = parameters.group(ProgramParameters)
     restart: RestartParameters = parameters.group(RestartParameters)
 
-    def check(self):
-        """Raises ParameterError for several beams of a drive that has none."""
+    def check(self) -> None:
+        """Raise ParameterError for several beams of a drive with motors."""
         if self.beams > 1 and not self.beam:
             raise parameters.ParameterError(f'beams = {self.beams}: must be 1 unless beam = true')
 
     @property
-    def graph_beams(self):
-        """Beams of the graph as nodes.links counts them."""
+    def graph_beams(self) -> int:
+        """Number of beams of the graph as in nodes.links: 0 for a drive with motors."""
         return self.beams if self.beam else 0
 
 
 SECTION_NODES = tuple(node.name for node in nodes.NODES if node.module)
-"""Nodes that a scenario can have a section for."""
+"""Nodes that can have a section in a scenario."""
 
 BEAM_NODES = tuple(node.name for node in nodes.NODES if node.of_beam)
-"""Those that each beam of several has of its own."""
-
+"""Nodes that each beam of an array has of its own."""
 
 SHARED_PARAMETERS = (
     ('adu', 'period', 'acu', 'tracker.receiver.integration'),
@@ -101,30 +116,31 @@ SHARED_PARAMETERS = (
     *(('tracking_receiver', f'target.station.{name}', 'acu', f'prediction.station.{name}')
       for name in ('latitude_deg', 'longitude_deg', 'height')),
 )
-"""(node, parameter, node that knows it, as which parameter), unless a scenario says the other is mistaken about it."""
+"""(node, parameter, second node, its parameter with the same value), unless a scenario gives the second another
+value."""
 
 
 MEASUREMENT_FLAGS = tuple((node.name, topic.measured, topic.flag) for node in nodes.NODES if node.name != 'acu'
-                          for topic in map(topics.TOPIC_BY_NAME.get, node.writes) if topic.measured)
-"""(node, its parameter, that of its readers): whether one of its topics is there at all."""
+                          for topic in map(topics.TOPIC_BY_NAME.__getitem__, node.writes) if topic.measured)
+"""(node, its parameter, the parameter of its subscribers) that is true if one of its topics exists."""
 
 
 class ScenarioError(ValueError):
-    """A scenario is unknown or says something that is not allowed; one line naming file, node, key and value."""
+    """Error of a scenario that is unknown or has an invalid value; one line with file, node, key and value."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Scenario:
-    """A checked scenario: its header and, for each node that takes part, the values that differ from the defaults.
+    """Checked scenario: its header and, for each node that takes part, the values that differ from the defaults.
 
-    Of several beams the values of `acu` hold for each `beam_2/acu`, whose own come on top.
+    With several beams the values of `acu` hold for each `beam_2/acu`; its own values replace them.
     """
     name: str
     header: ScenarioParameters
-    values: dict
+    values: Sections
 
     @property
-    def nodes(self):
+    def nodes(self) -> tuple[str, ...]:
         """Nodes that take part, in the order of nodes.NODES and of the beams; the operator where there is a program
         track."""
         ship = ('ship_motion', 'ins') if self.header.ship else ()
@@ -133,40 +149,40 @@ class Scenario:
                               self.header.graph_beams)
 
     @property
-    def prefixes(self):
-        """What the names of each beam's nodes begin with; ('',) of a single one."""
+    def prefixes(self) -> tuple[str, ...]:
+        """Prefix of the names of each beam's nodes; ('',) for a single beam."""
         return nodes.prefixes(self.header.graph_beams)
 
-    def row(self, node):
-        """The nodes.Node of one of its nodes."""
+    def row(self, node: str) -> Node:
+        """Return the nodes.Node of one of its nodes."""
         return nodes.row(node, self.header.beam)
 
-    def given(self, node):
-        """{dotted name: value} of what this scenario says of a node."""
+    def given(self, node: str) -> dict[str, typing.Any]:
+        """Return {dotted name: value} of the values of this scenario for a node."""
         return _whole(self.values, node)
 
-    def node_parameters(self, node):
-        """The parameter dataclass of one node as this scenario sets it."""
+    def node_parameters(self, node: str) -> typing.Any:
+        """Return the parameter dataclass of one node with the values of this scenario."""
         return _built(self.row(node).parameters_type(), self.given(node))
 
-    def unit(self, node, parameters=None):
-        """The unit of one of its nodes; parameters: in the place of the scenario's."""
+    def unit(self, node: str, parameters: parameters.Parameters | None = None) -> 'Unit':
+        """Return the unit of one of its nodes; parameters: they replace those of the scenario."""
         row, chosen = self.row(node), parameters or self.node_parameters(node)
         flags = [flag for flag in topics.TOPIC_FLAGS if getattr(chosen, flag, False)]
         return row.unit_type()(chosen, nodes.reads(row, self.nodes, flags))
 
-    def as_yaml(self):
-        """The scenario as a ROS 2 parameter file."""
+    def as_yaml(self) -> str:
+        """Return the scenario as a ROS 2 parameter file."""
         sections = {'scenario': parameters.as_dict(self.header), **self.values}
         return yaml.safe_dump({node: {'ros__parameters': values} for node, values in sections.items()}, sort_keys=True)
 
 
-def _folder():
+def _folder() -> 'Traversable':
     return importlib.resources.files('pedestal_bringup') / 'scenarios'
 
 
-def available():
-    """{name: title} of the scenarios that come with the product."""
+def available() -> dict[str, str]:
+    """Return {name: title} of the scenarios that come with the product."""
     titles = {}
     for entry in sorted(_folder().iterdir(), key=lambda entry: entry.name):
         if entry.name.endswith('.yaml'):
@@ -175,32 +191,33 @@ def available():
     return titles
 
 
-def text(name_or_path):
-    """(name, YAML text) of a scenario that comes with the product, or of a .yaml file. Raises ScenarioError."""
+def text(name_or_path: str | pathlib.Path) -> tuple[str, str]:
+    """Return (name, YAML text) of a scenario that comes with the product, or of a .yaml file. Raises ScenarioError."""
     path = pathlib.Path(name_or_path)
     if path.suffix in ('.yaml', '.yml'):
         try:
             return path.stem, files.read_text(path, plain_yaml.MAX_YAML_BYTES)
         except (OSError, UnicodeDecodeError) as error:
             raise ScenarioError(f'scenario file {path}: {plain_yaml.problem(error)}') from None
-    entry = _folder() / f'{name_or_path}.yaml'
+    name = str(name_or_path)
+    entry = _folder() / f'{name}.yaml'
     if not entry.is_file():
         names = list(available())
-        raise ScenarioError(f'unknown scenario {name_or_path!r};{parameters.did_you_mean(name_or_path, names)} there '
-                            f'are {", ".join(names)} (or give a path that ends in .yaml)')
-    return name_or_path, entry.read_text()
+        raise ScenarioError(f'unknown scenario {name!r};{parameters.did_you_mean(name, names)} there are '
+                            f'{", ".join(names)} (or give a path that ends in .yaml)')
+    return name, entry.read_text()
 
 
-def _whole(sections, node):
-    """The values of a node, what holds for every beam first."""
+def _whole(sections: Sections, node: str) -> dict[str, typing.Any]:
+    """Return the values of a node, with those for every beam first."""
     return {**sections.get(nodes.plain(node), {}), **sections.get(node, {})}
 
 
-def _is_node(name):
+def _is_node(name: str) -> bool:
     return nodes.plain(name) in (BEAM_NODES if nodes.beam_of(name) else SECTION_NODES)
 
 
-def _sections(name, content):
+def _sections(name: str, content: str) -> Sections:
     try:
         tree = plain_yaml.parse(content)
     except yaml.YAMLError as error:
@@ -210,7 +227,8 @@ def _sections(name, content):
     sections = {}
     for section, body in ((parameter_file.node_of(section), body) for section, body in tree.items()):
         if section != 'scenario' and not _is_node(section):
-            raise ScenarioError(f'scenario {name}: section {section!r} is no node; there are {", ".join(SECTION_NODES)}')
+            raise ScenarioError(f'scenario {name}: section {section!r} is no node; there are '
+                                f'{", ".join(SECTION_NODES)}')
         whole = isinstance(body, dict) and list(body) == ['ros__parameters']
         values = body['ros__parameters'] or {} if whole else None
         if not isinstance(values, dict):
@@ -219,9 +237,9 @@ def _sections(name, content):
     return sections
 
 
-def parameters_of(node):
-    """The parameter dataclass of a node, of the header `scenario`, or of the array `beam_steering`; ScenarioError for
-    any other name."""
+def parameters_of(node: str) -> type[parameters.Parameters]:
+    """Return the parameter dataclass of a node, of the header `scenario`, or of the array `beam_steering`. Raises
+    ScenarioError for any other name."""
     if node in ('scenario', 'beam_steering'):
         return ScenarioParameters if node == 'scenario' else nodes.ARRAY_DRIVE.parameters_type()
     if not _is_node(node):
@@ -229,12 +247,13 @@ def parameters_of(node):
     return nodes.row(node).parameters_type()
 
 
-def parse_override(text):
-    """'node.key=value' -> (node, key, value); the value is read as YAML."""
+def parse_override(text: str) -> tuple[str, str, typing.Any]:
+    """Return (node, key, value) of 'node.key=value'; the value is read as YAML. Raises ScenarioError."""
     left, equals, right = text.partition('=')
     node, dot, key = left.partition('.')
     if not (equals and dot and key):
-        raise ScenarioError(f'--param {text!r}: must be node.key=value, as acu.azimuth.feedforward.bandwidth=20')
+        raise ScenarioError(f'--param {text!r}: must be node.key=value, as in '
+                            'acu.azimuth.feedforward.bandwidth=20')
     parameters_of(node)
     try:
         return node, key, plain_yaml.parse(right)
@@ -242,28 +261,28 @@ def parse_override(text):
         raise ScenarioError(f'--param {text!r}: {plain_yaml.problem(error)}') from None
 
 
-def override(name, value):
-    """'node.key=value' of a value, a text without quotes where it reads back as itself."""
+def override(name: str, value: typing.Any) -> str:
+    """Return 'node.key=value' of a value; a text is without quotes where YAML reads it as the same text."""
     with contextlib.suppress(yaml.YAMLError):
         if isinstance(value, str) and plain_yaml.parse(value) == value:
             return f'{name}={value}'
     return f'{name}={json.dumps(value, ensure_ascii=False)}'
 
 
-def file_overrides(path):
-    """Texts 'node.key=value' of a ROS 2 parameter file."""
+def file_overrides(path: str | pathlib.Path) -> list[str]:
+    """Return texts 'node.key=value' of a ROS 2 parameter file."""
     return [override(f'{node}.{key}', value)
             for node, values in parameter_file.read(path).items() for key, value in values.items()]
 
 
 @dataclasses.dataclass(frozen=True)
 class Draft:
-    """A scenario before it is checked as a whole: sections {node or `scenario`: {dotted name: value}}."""
+    """Scenario before the check of the whole: sections {node or `scenario`: {dotted name: value}}."""
     name: str
-    sections: dict
+    sections: Sections
 
-    def changed(self, overrides):
-        """The Draft with texts 'node.key=value' on top. Raises ScenarioError."""
+    def changed(self, overrides: Iterable[str]) -> 'Draft':
+        """Return the Draft changed by texts 'node.key=value'. Raises ScenarioError."""
         sections = {node: dict(values) for node, values in self.sections.items()}
         for override in overrides:
             node, key, value = parse_override(override)
@@ -271,40 +290,44 @@ class Draft:
         return Draft(self.name, sections)
 
     @property
-    def header(self):
-        """The ScenarioParameters."""
+    def header(self) -> ScenarioParameters:
+        """ScenarioParameters of the draft."""
         return _checked(self.name, 'scenario', ScenarioParameters, self.sections['scenario'])
 
     @property
-    def target(self):
-        """The target of a single receiver."""
+    def target(self) -> typing.Any:
+        """Target of a single receiver."""
         return _checked(self.name, 'tracking_receiver', nodes.row('tracking_receiver').parameters_type(),
                         self.sections.get('tracking_receiver', {})).target
 
 
-def draft(name_or_path):
-    """A Draft from a name or a YAML path. Raises ScenarioError."""
+def draft(name_or_path: str | pathlib.Path) -> Draft:
+    """Return the Draft of a name or a YAML path. Raises ScenarioError."""
     name, content = text(name_or_path)
     return Draft(name, _sections(name, content))
 
 
-def load(name_or_path, overrides=(), seed=None, duration=None, pacing=None):
-    """A Scenario from a name or a YAML path; see checked."""
+def load(name_or_path: str | pathlib.Path, overrides: Iterable[str] = (), seed: int | None = None,
+         duration: float | None = None, pacing: str | None = None) -> Scenario:
+    """Return the Scenario of a name or a YAML path; see checked."""
     return checked(draft(name_or_path).changed(overrides), seed, duration, pacing)
 
 
-def parse(name, content, overrides=(), seed=None, duration=None, pacing=None):
-    """A Scenario from its YAML text; parse(name, Scenario.as_yaml()) gives the same again.
+def parse(name: str, content: str, overrides: Iterable[str] = (), seed: int | None = None,
+          duration: float | None = None, pacing: str | None = None) -> Scenario:
+    """Return the Scenario of a YAML text; parse(name, Scenario.as_yaml()) returns the same scenario.
 
     overrides: texts 'node.key=value'; see checked.
     """
     return checked(Draft(name, _sections(name, content)).changed(overrides), seed, duration, pacing)
 
 
-def checked(changed, seed=None, duration=None, pacing=None):
-    """The Scenario of a Draft that `changed` made. seed, duration and pacing replace the header's where given.
+def checked(changed: Draft, seed: int | None = None, duration: float | None = None,
+            pacing: str | None = None) -> Scenario:
+    """Return the Scenario of a new Draft, which is changed in place. seed, duration and pacing replace the header's
+    where given.
 
-    Raises ScenarioError for anything unknown or out of range.
+    Raises ScenarioError for an unknown name or a value out of range.
     """
     name, sections = changed.name, dict(changed.sections)
     header_values = sections.pop('scenario')
@@ -335,32 +358,32 @@ def checked(changed, seed=None, duration=None, pacing=None):
     return Scenario(name, header, sections)
 
 
-def _follow_flight(name, receiver_values, header_values):
-    """Station, reference range and duration follow from the file of a recorded flight where the scenario leaves them
-    open. Raises ScenarioError, TableError."""
+def _follow_flight(name: str, receiver_values: dict[str, typing.Any], header_values: dict[str, typing.Any]) -> None:
+    """Derive station, reference range and duration from the file of a recorded flight, where the scenario does not
+    give them. Raises ScenarioError, TableError."""
     target = _checked(name, 'tracking_receiver', nodes.row('tracking_receiver').parameters_type(),
                       receiver_values).target
     if target.kind != 'track_file' or not target.track_file.path:
         return
-    from tracking_receiver_sim import track_files  # with scipy, which only a flight needs
+    from tracking_receiver_sim import track_files  # imported late, because only a flight needs scipy
     given = {*receiver_values, *({'duration'} & set(header_values))}
     if not given.issuperset(track_files.DERIVED_PARAMETERS):
         for key, value in track_files.derived_parameters(target, given).items():
             (header_values if key == 'duration' else receiver_values).setdefault(key, value)
 
 
-def _spread(name, sections, header, seed):
-    """Give every node what several must agree on: length and period of the run, seeds, ship, latencies, beam.
+def _spread(name: str, sections: Sections, header: ScenarioParameters, seed: int | None) -> None:
+    """Give every node the parameters that several share: length and period of the run, seeds, ship, latencies, beam.
 
     Raises ScenarioError where the section of a node has another value.
     """
-    def share(node, key, value):
+    def share(node: str, key: str, value: typing.Any) -> None:
         sections[node].setdefault(key, value)
         for section in [section for section in sections if nodes.plain(section) == node]:
             own = sections[section].get(key, value)
             if own != value:
-                raise ScenarioError(f'scenario {name}, {section}: {key} = {own}: must be {value}, as is said '
-                                    'elsewhere; leave it out here')
+                raise ScenarioError(f'scenario {name}, {section}: {key} = {own}: must be {value}, as for the other '
+                                    'nodes; leave it out here')
 
     for node in ('adu', 'recorder', 'tracking_receiver'):
         share(node, 'duration', header.duration)
@@ -374,14 +397,14 @@ def _spread(name, sections, header, seed):
         if key.startswith('ship.'):
             share('ins', key, value)
 
-    def said(node, key, otherwise=None):
+    def value_of(node: str, key: str, otherwise: typing.Any = None) -> typing.Any:
         default = parameters.defaults(nodes.row(node, header.beam).parameters_type()).get(key, otherwise)
         return sections[node].get(key, default)
 
     for node in ('acu', 'tracking_receiver'):
-        share(node, 'period', said('adu', 'period'))
+        share(node, 'period', value_of('adu', 'period'))
     for owner, key, flag in MEASUREMENT_FLAGS:
-        measured = (header.ship or not nodes.row(owner).optional) and said(owner, key, False)
+        measured = (header.ship or not nodes.row(owner).optional) and value_of(owner, key, False)
         for node in ('acu', 'recorder'):
             if measured or any(flag in values for section, values in sections.items()
                                if nodes.plain(section) == node):
@@ -390,13 +413,13 @@ def _spread(name, sections, header, seed):
                 if key.startswith('tracker.attitude.')]
     if modelled and sections['acu'].get('ins_error'):
         section, key = modelled[0]
-        raise ScenarioError(f'scenario {name}, {section}: {key}: the INS tells it; it is of use with '
+        raise ScenarioError(f'scenario {name}, {section}: {key}: the INS publishes its errors; this parameter needs '
                             'ins.error_told = false')
     for owner, key, node, known_as in SHARED_PARAMETERS:
         if key in sections[owner]:
             sections[node].setdefault(known_as, sections[owner][key])
     if header.beam:
-        # Only here, because its laws take half a second to import.
+        # Imported late, because its laws take half a second to import.
         from tracking_receiver_sim import receiver
         sections['tracking_receiver'].setdefault('receiver.beam', 'held')
         for prefix in nodes.prefixes(header.graph_beams):
@@ -408,8 +431,8 @@ def _spread(name, sections, header, seed):
                     sections[f'{prefix}acu'].setdefault(f'tracker.receiver.{key}', value)
 
 
-def _spread_to_beam(name, node, sections, header, seed):
-    """What a node of one beam is to know: of its own receiver, and a seed for its own noise."""
+def _spread_to_beam(name: str, node: str, sections: Sections, header: ScenarioParameters, seed: int | None) -> None:
+    """Give a node of one beam the parameters of its own receiver, and a seed for its own noise."""
     values, beam = sections[node], nodes.beam_of(node)
     own_receiver = f'{beam}/tracking_receiver'
     if node == own_receiver and (seed is not None or 'seed' not in values):
@@ -421,30 +444,32 @@ def _spread_to_beam(name, node, sections, header, seed):
             values.setdefault(known_as, own[key])
     for _, key, _ in MEASUREMENT_FLAGS:
         if key in sections[own_receiver]:
-            raise ScenarioError(f'scenario {name}, {own_receiver}: {key}: is the same for every beam; say it in '
+            raise ScenarioError(f'scenario {name}, {own_receiver}: {key}: must be equal for every beam; set it in '
                                 'tracking_receiver')
 
 
-def _checked(name, section, parameters_type, values):
+def _checked(name: str, section: str, parameters_type: type[_P], values: Mapping[str, typing.Any]) -> _P:
     with _named(name, section):
         return _built(parameters_type, values)
 
 
-def _built(parameters_type, values):
-    """parameters.build, once for the same values: trials of a scenario have most of theirs in common."""
+def _built(parameters_type: type[_P], values: Mapping[str, typing.Any]) -> _P:
+    """Return parameters.build, cached for equal values, because trials of a scenario share most of their values."""
     key = tuple((name, type(value), value) for name, value in values.items())
     hashable = all(isinstance(value, int | float | str | None) for value in values.values())
-    return _built_once(parameters_type, key) if hashable else parameters.build(parameters_type, values)
+    if not hashable:
+        return parameters.build(parameters_type, values)
+    return _built_once(parameters_type, key)  # type: ignore[arg-type]  # mypy takes a class of fields for unhashable
 
 
 @functools.lru_cache(256)
-def _built_once(parameters_type, key):
+def _built_once(parameters_type: type[_P], key: tuple[tuple[str, type, typing.Any], ...]) -> _P:
     return parameters.build(parameters_type, {name: value for name, _, value in key})
 
 
 @contextlib.contextmanager
-def _named(name, section):
-    """A ParameterError becomes a ScenarioError that names the section."""
+def _named(name: str, section: str) -> Iterator[None]:
+    """Turn a ParameterError into a ScenarioError that names the section."""
     try:
         yield
     except parameters.ParameterError as error:

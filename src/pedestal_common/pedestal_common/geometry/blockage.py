@@ -7,13 +7,16 @@ from pedestal_common.compiled import compiled
 from pedestal_common.parameters import ParameterError
 
 MAX_SECTORS = 8
-BLOCKAGE_DOC = ("sectors hidden by the superstructure, at most 8: 'azimuth_low azimuth_high elevation_high; ...' [rad] on the "
-                'deck, clockwise from low to high; empty: none')
+"""Largest number of hidden sectors."""
+
+BLOCKAGE_DOC = ("sectors hidden by the superstructure, at most 8: 'azimuth_low azimuth_high elevation_high; ...' "
+                '[rad] on the deck, clockwise from low to high; empty: none')
+"""Meaning of a parameter with hidden sectors."""
 
 
 def sectors(text) -> np.ndarray:
-    """The table (MAX_SECTORS, 3) [rad] that `blocked` takes, of a text as in BLOCKAGE_DOC; ParameterError names what
-    is wrong."""
+    """Return the table (MAX_SECTORS, 3) [rad] for `blocked`, of a text as in BLOCKAGE_DOC. ParameterError names the
+    sector and its allowed range."""
     table = np.full((MAX_SECTORS, 3), -math.inf)
     parts = [part.split() for part in text.split(';') if part.strip()]
     if len(parts) > MAX_SECTORS:
@@ -34,7 +37,7 @@ def sectors(text) -> np.ndarray:
 
 @compiled
 def blocked(table, azimuth, elevation):
-    """Whether a direction of the deck lies in a sector; not where it is NaN."""
+    """Return True if a direction of the deck is in a sector; False where it is NaN."""
     for i in range(MAX_SECTORS):
         low, high, top = table[i, 0], table[i, 1], table[i, 2]
         if elevation <= top:

@@ -8,22 +8,23 @@ from pedestal_common.parameters import Parameters, parameter
 from pedestal_common.reproducible import cos, sin
 
 EARTH_RADIUS_M, EARTH_FLATTENING = 6378137.0, 1.0 / 298.257223563
-"""WGS84 [m], [-]."""
+"""Equatorial radius of the WGS84 ellipsoid [m], and its flattening [-]."""
 
 EARTH_RATE = 7.29211514670698e-5
-"""Of the earth against TEME, per UT1 second [rad/s]; Vallado et al., AIAA 2006-6753, appendix C."""
+"""Rate of the earth against TEME, per UT1 second [rad/s]; Vallado et al., AIAA 2006-6753, appendix C."""
 
 
 @dataclasses.dataclass(frozen=True)
 class StationParameters(Parameters):
-    """Where the pedestal stands (WGS84)."""
+    """Place of the pedestal (WGS84)."""
     latitude_deg: float = parameter(47.4, -90.0, 90.0, 'deg', 'geodetic latitude')
     longitude_deg: float = parameter(8.5, -180.0, 360.0, 'deg', 'longitude, east positive')
     height: float = parameter(500.0, -500.0, 9000.0, 'm', 'height above the ellipsoid')
 
 
 def geocentric(latitude, longitude, height):
-    """Earth-fixed x, y, z [m], (..., 3), of WGS84 latitude, longitude [rad] and height [m], arrays or numbers."""
+    """Return earth-fixed x, y, z [m], (..., 3), of WGS84 latitude, longitude [rad] and height [m], arrays or
+    numbers."""
     e2 = EARTH_FLATTENING * (2.0 - EARTH_FLATTENING)
     N = EARTH_RADIUS_M / np.sqrt(1.0 - e2 * sin(latitude)**2)
     return np.stack([(N + height) * cos(latitude) * cos(longitude),
@@ -32,7 +33,7 @@ def geocentric(latitude, longitude, height):
 
 
 def station_frame(station):
-    """Earth-fixed position (3,) [m] and rotation (3, 3) earth-fixed -> ENU of a StationParameters."""
+    """Return the earth-fixed position (3,) [m] and the rotation (3, 3) earth-fixed -> ENU of a StationParameters."""
     latitude, longitude = math.radians(station.latitude_deg), math.radians(station.longitude_deg)
     sp, cp, sl, cl = math.sin(latitude), math.cos(latitude), math.sin(longitude), math.cos(longitude)
     to_enu = np.array([[-sl, cl, 0.0], [-sp * cl, -sp * sl, cp], [cp * cl, cp * sl, sp]])
@@ -40,8 +41,8 @@ def station_frame(station):
 
 
 def destination(latitude_deg, longitude_deg, bearing, distance):
-    """(latitude, longitude) [deg] of the place at a distance [m] along the great circle that leaves with a bearing
-    [rad, clockwise from north], on a sphere: the distance is right to 0.6 %."""
+    """Return (latitude, longitude) [deg] of the place at a distance [m] along the great circle that leaves with a
+    bearing [rad, clockwise from north], on a sphere: the distance is right to 0.6 %."""
     phi, delta = math.radians(latitude_deg), distance / EARTH_RADIUS_M
     sin_there = math.sin(phi) * math.cos(delta) + math.cos(phi) * math.sin(delta) * math.cos(bearing)
     east = math.atan2(math.sin(bearing) * math.sin(delta) * math.cos(phi),

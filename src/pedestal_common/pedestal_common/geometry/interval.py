@@ -1,10 +1,11 @@
-"""Where an instant lies in a table of increasing times."""
+"""Interval of an instant in a table of increasing times."""
 from pedestal_common.compiled import compiled
 
 
 @compiled
 def interval(breaks, t):
-    """The row i with breaks[i] <= t < breaks[i + 1] of two or more breaks; outside them the first or last interval."""
+    """Return the row i with breaks[i] <= t < breaks[i + 1] of two or more breaks; outside them the first or last
+    interval."""
     low, high = 0, len(breaks) - 1
     while high - low > 1:
         middle = (low + high) // 2

@@ -8,45 +8,46 @@ from pedestal_common.compiled import compiled
 
 @compiled
 def wrap(angle):
-    """The same angle in [-pi, pi)."""
+    """Return the same angle in [-pi, pi)."""
     return angle - 2.0 * math.pi * math.floor((angle + math.pi) / (2.0 * math.pi))
 
 
 @compiled
 def cross(ax, ay, az, bx, by, bz):
-    """a x b."""
+    """Return a x b."""
     return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
 
 
 @compiled
 def direction(azimuth, elevation):
-    """Unit vector (FLU, or north-west-up for earth angles) of an azimuth that turns clockwise."""
+    """Return the unit vector (FLU, or north-west-up for earth angles) of an azimuth, which turns clockwise, and an
+    elevation."""
     cos_el = math.cos(elevation)
     return cos_el * math.cos(azimuth), -cos_el * math.sin(azimuth), math.sin(elevation)
 
 
 @compiled
 def angles(x, y, z):
-    """Azimuth (clockwise) and elevation of a vector (FLU or north-west-up) of any length."""
+    """Return azimuth (clockwise) and elevation of a vector (FLU or north-west-up) of any length."""
     return math.atan2(-y, x), math.atan2(z, math.hypot(x, y))
 
 
 @compiled
 def earth_angles(east, north, up):
-    """Azimuth clockwise from north and elevation of an ENU vector."""
+    """Return azimuth clockwise from north and elevation of an ENU vector."""
     return angles(north, -east, up)
 
 
 @compiled
 def earth_direction(azimuth, elevation):
-    """ENU unit vector of an azimuth clockwise from north and an elevation."""
+    """Return the ENU unit vector of an azimuth clockwise from north and an elevation."""
     north, west, up = direction(azimuth, elevation)
     return -west, north, up
 
 
 @compiled
 def to_earth(mat_ed, x, y, z):
-    """A deck vector (FLU) in ENU; mat_ed (3, 3) rotates deck -> earth."""
+    """Return a deck vector (FLU) in ENU; mat_ed (3, 3) rotates deck -> earth."""
     return (mat_ed[0, 0] * x + mat_ed[0, 1] * y + mat_ed[0, 2] * z,
             mat_ed[1, 0] * x + mat_ed[1, 1] * y + mat_ed[1, 2] * z,
             mat_ed[2, 0] * x + mat_ed[2, 1] * y + mat_ed[2, 2] * z)
@@ -54,7 +55,7 @@ def to_earth(mat_ed, x, y, z):
 
 @compiled
 def to_deck(mat_ed, east, north, up):
-    """An ENU vector in the deck frame (FLU); the transpose of to_earth."""
+    """Return an ENU vector in the deck frame (FLU); the transpose of to_earth."""
     return (mat_ed[0, 0] * east + mat_ed[1, 0] * north + mat_ed[2, 0] * up,
             mat_ed[0, 1] * east + mat_ed[1, 1] * north + mat_ed[2, 1] * up,
             mat_ed[0, 2] * east + mat_ed[1, 2] * north + mat_ed[2, 2] * up)
@@ -62,9 +63,9 @@ def to_deck(mat_ed, east, north, up):
 
 @compiled
 def offsets(azimuth, elevation, x, y, z):
-    """How far a direction (same frame as the beam's angles) lies off the beam: (dX, dE).
+    """Return the offset (dX, dE) of a direction from the beam, in the frame of the beam's angles.
 
-    dX is cross-elevation, positive the way azimuth grows, dE elevation. Azimuthal equidistant: the
+    dX is cross-elevation, positive in the direction of growing azimuth, dE elevation. Azimuthal equidistant: the
     length hypot(dX, dE) is the angle between beam and direction, exact up to 180 deg.
     """
     sa, ca, se, ce = math.sin(azimuth), math.cos(azimuth), math.sin(elevation), math.cos(elevation)
@@ -80,9 +81,9 @@ def offsets(azimuth, elevation, x, y, z):
 
 @compiled
 def offset_rates(beam, beam_rate, r, v):
-    """The time derivative of `offsets`, (d dX/dt, d dE/dt) [rad/s].
+    """Return the time derivative of `offsets`, (d dX/dt, d dE/dt) [rad/s].
 
-    beam: (azimuth, elevation) [rad], beam_rate: theirs [rad/s]; r: vector of the direction, of any length, in the
+    beam: (azimuth, elevation) [rad], beam_rate: its rates [rad/s]; r: vector of the direction, of any length, in the
     frame of these angles, v: its time derivative.
     """
     azimuth, elevation = beam
@@ -107,7 +108,8 @@ def offset_rates(beam, beam_rate, r, v):
 
 @compiled
 def displaced(azimuth, elevation, cross_elevation, elevation_error):
-    """Azimuth and elevation of the direction that `offsets` saw: its inverse, the azimuth within pi of the beam's."""
+    """Return azimuth and elevation of a direction with these `offsets`, their inverse; the azimuth is within pi of the
+    beam's."""
     theta = math.hypot(cross_elevation, elevation_error)
     sinc = math.sin(theta) / theta if theta > 0.0 else 1.0
     b, c, e = math.cos(theta), sinc * cross_elevation, sinc * elevation_error
@@ -119,13 +121,13 @@ def displaced(azimuth, elevation, cross_elevation, elevation_error):
 @compiled
 def displaced_motion(azimuth, elevation, azimuth_rate, elevation_rate, cross_elevation, elevation_error,
                      cross_elevation_rate, elevation_error_rate):
-    """Unit vector of the direction that `offsets` and `offset_rates` saw, and its time derivative [1/s]: six floats
-    (FLU, or north-west-up for earth angles)."""
+    """Return the unit vector of a direction with these `offsets` and `offset_rates`, and its time derivative [1/s]:
+    six floats (FLU, or north-west-up for earth angles)."""
     theta2 = cross_elevation * cross_elevation + elevation_error * elevation_error
     theta = math.sqrt(theta2)
     cos_theta = math.cos(theta)
     sinc = math.sin(theta) / theta if theta > 0.0 else 1.0
-    # d sinc / d theta / theta; where it would lose digits, the first two terms of its series.
+    # d sinc / d theta / theta; near 0, where it would lose digits, the first two terms of its series.
     bend = (cos_theta - sinc) / theta2 if theta2 > 1e-4 else -1.0 / 3.0 + theta2 / 30.0
     along = cross_elevation * cross_elevation_rate + elevation_error * elevation_error_rate
     b, c, e = cos_theta, sinc * cross_elevation, sinc * elevation_error
@@ -159,7 +161,8 @@ def rotation(qx, qy, qz, qw, mat):
 
 @compiled
 def quaternion(roll, pitch, yaw):
-    """Unit quaternion (x, y, z, w) deck -> earth of fixed-axis roll, pitch, yaw (REP 103: yaw 0 is east)."""
+    """Return the unit quaternion (x, y, z, w) deck -> earth of fixed-axis roll, pitch, yaw (REP 103: yaw 0 is
+    east)."""
     cr, sr = math.cos(0.5 * roll), math.sin(0.5 * roll)
     cp, sp = math.cos(0.5 * pitch), math.sin(0.5 * pitch)
     cy, sy = math.cos(0.5 * yaw), math.sin(0.5 * yaw)
@@ -172,5 +175,5 @@ ASHORE_ATTITUDE = (0.0, 0.0, math.sqrt(0.5), math.sqrt(0.5))
 
 
 def ashore_matrix() -> np.ndarray:
-    """mat_ed (3, 3) of a pedestal ashore."""
+    """Return mat_ed (3, 3) of a pedestal ashore."""
     return np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])

@@ -1,8 +1,9 @@
-"""A satellite by SGP4: its TLE, where it is over a station, and Julian dates.
+"""Satellite by SGP4: its TLE, its position over a station, and Julian dates.
 
-Where no ut1_offset is given UT1 is taken for UTC; tracking_receiver_sim.target says what that costs.
+Without a ut1_offset UT1 equals UTC; tracking_receiver_sim.target gives the resulting error.
 """
 import datetime
+import re
 
 import numpy as np
 from sgp4.api import SGP4_ERRORS, WGS72, Satrec, jday
@@ -17,17 +18,18 @@ TLE_NUMBER_COLUMNS = (
     {'epoch year': (18, 20), 'epoch day': (20, 32)},
     {'inclination': (8, 16), 'ascending node': (17, 25), 'eccentricity': (26, 33), 'argument of perigee': (34, 42),
      'mean anomaly': (43, 51), 'mean motion': (52, 63)})
-"""Columns of the fields of both TLE lines that must be numbers."""
+"""{field: columns} of the numbers of both TLE lines."""
+LEAP_SECOND_PATTERN = re.compile(r'(T\d\d:59:)60\b')
 MAX_TLE_AGE_DAYS = 30.0
-"""Largest time from the TLE epoch [days]: beyond it SGP4 is useless."""
+"""Largest time from the TLE epoch at which SGP4 is used [days]."""
 
 
 class TargetError(ValueError):
-    """A target cannot be built; one line naming file or TLE line, row, field and value."""
+    """Error of a target that cannot be built; one line with file or TLE line, row, field and value."""
 
 
 def satellite(leo_pass) -> Satrec:
-    """The SGP4 record of the `line_1` and `line_2` of parameters; raises TargetError when the TLE is not one."""
+    """Return the SGP4 record of the `line_1` and `line_2` of parameters. Raises TargetError for an invalid TLE."""
     lines = leo_pass.line_1.rstrip(), leo_pass.line_2.rstrip()
     for number, line in enumerate(lines, 1):
         name = f'TLE line {number}'
@@ -50,8 +52,8 @@ def satellite(leo_pass) -> Satrec:
 
 
 def earth_fixed(julian, fractions, ut1_offset=0.0):
-    """Rotations (n, 3, 3) from TEME, the true equator and mean equinox of date, to the earth at julian + fractions
-    (n,), UTC."""
+    """Return rotations (n, 3, 3) from TEME, the true equator and mean equinox of date, to the earth at julian +
+    fractions (n,), UTC. ut1_offset: UT1 - UTC [s]."""
     theta = gstime(julian) + EARTH_RATE * SECONDS_PER_DAY * fractions + EARTH_RATE * ut1_offset
     c, s = cos(theta), sin(theta)
     to_fixed = np.zeros((len(fractions), 3, 3))
@@ -60,7 +62,8 @@ def earth_fixed(julian, fractions, ut1_offset=0.0):
 
 
 def enu(satrec, station, julian, fraction, times, ut1_offset=0.0):
-    """ENU position [m] and velocity against the earth [m/s], each (n, 3), at times [s] past julian + fraction, UTC.
+    """Return ENU position [m] and velocity against the earth [m/s], each (n, 3), at times [s] past julian + fraction,
+    UTC.
 
     ut1_offset: UT1 - UTC [s].
     """
@@ -78,31 +81,35 @@ def enu(satrec, station, julian, fraction, times, ut1_offset=0.0):
 
 
 def elevations(satrec, station, julian, fraction, times):
-    """Elevation [deg] (n,) at times [s] past julian + fraction."""
+    """Return the elevation [deg] (n,) at times [s] past julian + fraction."""
     east, north, up = enu(satrec, station, julian, fraction, times)[0].T
     return np.degrees(arctan2(up, np.hypot(east, north)))
 
 
 def calendar(julian, fraction):
-    """Calendar time of a Julian date, to the millisecond."""
+    """Return the calendar time of a Julian date, to the millisecond."""
     since_2000 = datetime.timedelta(days=julian - 2451544.5) + datetime.timedelta(days=fraction)
     return datetime.datetime(2000, 1, 1) + datetime.timedelta(milliseconds=round(since_2000.total_seconds() * 1e3))
 
 
 def julian_date(when):
-    """(Julian day, fraction) of a datetime in UTC."""
+    """Return (Julian day, fraction) of a datetime in UTC."""
     return jday(when.year, when.month, when.day, when.hour, when.minute, when.second + when.microsecond * 1e-6)
 
 
 def instant(name, text):
-    """UTC as a datetime without a zone, from ISO 8601; raises TargetError, which calls the text `name`."""
+    """Return UTC as a datetime without a zone, from ISO 8601. Raises TargetError, which calls the text `name`.
+
+    The leap second 23:59:60 counts as the first second of the next day.
+    """
+    leap = LEAP_SECOND_PATTERN.sub(r'\g<1>59', text)
     try:
-        when = datetime.datetime.fromisoformat(text.replace('Z', '+00:00'))
+        when = datetime.datetime.fromisoformat(leap.replace('Z', '+00:00')) + datetime.timedelta(seconds=leap != text)
     except ValueError:
         raise TargetError(f'{name} = {text!r}: must be UTC as ISO 8601, for example 2019-12-10T06:00:00') from None
     return when if when.tzinfo is None else when.astimezone(datetime.timezone.utc).replace(tzinfo=None)
 
 
 def iso(julian, fraction):
-    """Julian date as ISO 8601 to the millisecond."""
+    """Return a Julian date as ISO 8601 to the millisecond."""
     return calendar(julian, fraction).isoformat(timespec='milliseconds') + 'Z'

@@ -1,10 +1,8 @@
-"""Passes of a satellite over a station: from when it rises above the horizon until it sets.
+"""Passes of a satellite over a station, each from its rise above the horizon to its set.
 
-The elevation by SGP4 is looked at every SEARCH_STEP_S seconds. Where its sign changes the instant is found to a
-millisecond;
-the culmination is the highest instant between rise and set. A pass shorter than SEARCH_STEP_S may be missed: it stays
-below
-1 deg.
+The elevation by SGP4 is computed every SEARCH_STEP_S. Where its sign changes, the instant is found to a millisecond;
+the culmination is the highest instant between rise and set. A pass shorter than SEARCH_STEP_S may be missed; it stays
+below 1 deg.
 """
 import datetime
 import math
@@ -18,17 +16,21 @@ from pedestal_common.geometry.orbit import TargetError
 from pedestal_common.graph.steps import SECONDS_PER_DAY
 
 SEARCH_STEP_S = 20.0
-"""Time between two looks [s]."""
+"""Time between two elevations [s]."""
+
 MIN_CULMINATION_DEG = 10.0
-"""Culmination [deg] below which a pass is left out: it stays where refraction and buildings are."""
+"""Culmination below which a pass is left out, because of refraction and buildings [deg]."""
+
 SEARCH_DAYS = 5.0
-"""Time that is searched [days]."""
+"""Length of the search [days]."""
+
 MAX_PASS_DAYS = 1.0
-"""Of a pass that is searched for [days]: no run is longer."""
+"""Longest pass in the search, the longest run [days]."""
 
 
 class Pass(typing.NamedTuple):
-    """rise, top, set: UTC as datetime; azimuth at the rise and at the set, elevation at the top [deg]."""
+    """Pass of a satellite. rise, top, set: UTC as datetime; azimuth at the rise and at the set, elevation at the top
+    [deg]."""
     rise: datetime.datetime
     top: datetime.datetime
     set: datetime.datetime
@@ -38,13 +40,13 @@ class Pass(typing.NamedTuple):
 
     @property
     def duration(self):
-        """[s]"""
+        """Time from rise to set [s]."""
         return (self.set - self.rise).total_seconds()
 
 
 def passes_after(satrec, station, begin, days=SEARCH_DAYS) -> list[Pass]:
-    """The passes that rise after `begin` (datetime, UTC) and set within `days`, those below MIN_CULMINATION_DEG left
-    out.
+    """Return the passes that rise after `begin` (datetime, UTC) and set within `days`, without those below
+    MIN_CULMINATION_DEG.
 
     satrec: as of orbit.satellite; station: StationParameters. Raises TargetError where the satellite does not rise or
     set, or where SGP4 ends.
@@ -69,7 +71,7 @@ def passes_after(satrec, station, begin, days=SEARCH_DAYS) -> list[Pass]:
                           f'{days:g} days of {begin:%Y-%m-%dT%H:%M:%SZ} at latitude {station.latitude_deg:g}, '
                           f'longitude {station.longitude_deg:g} deg')
     rises, sets = np.flatnonzero(~above[:-1] & above[1:]), np.flatnonzero(above[:-1] & ~above[1:])
-    found = []
+    found: list[Pass] = []
     for i in rises:
         later = sets[sets > i]
         if not later.size:
@@ -80,13 +82,15 @@ def passes_after(satrec, station, begin, days=SEARCH_DAYS) -> list[Pass]:
         top = minimize_scalar(lambda t: -elevation(t)[0], bounds=(max(rise, times[best] - SEARCH_STEP_S),
                               min(down, times[best] + SEARCH_STEP_S)), method='bounded', options={'xatol': 1e-3})
         if -top.fun >= MIN_CULMINATION_DEG:
-            found.append(Pass(*(begin + datetime.timedelta(milliseconds=round(1e3 * t)) for t in (rise, top.x, down)),
-                              azimuth(rise), float(-top.fun), azimuth(down)))
+            rise_time, top_time, set_time = (begin + datetime.timedelta(milliseconds=round(1e3 * t))
+                                             for t in (rise, top.x, down))
+            found.append(Pass(rise_time, top_time, set_time, azimuth(rise), float(-top.fun), azimuth(down)))
     return found
 
 
 def search_start(satrec, now):
-    """(from when passes are counted, why not from now or ''): from now, or from the TLE epoch of an old TLE."""
+    """Return (beginning of the search for passes, reason if that is not now, else ''): now, or the epoch of an old
+    TLE."""
     epoch = orbit.calendar(satrec.jdsatepoch, satrec.jdsatepochF)
     age = (now - epoch).total_seconds() / SECONDS_PER_DAY
     if abs(age) <= orbit.MAX_TLE_AGE_DAYS:
@@ -96,27 +100,27 @@ def search_start(satrec, now):
 
 
 def chosen_pass(satrec, station, which, now) -> Pass:
-    """The pass that `which` names: 'next' after now, 'N' of those that `after` lists from `first_look`, or the one at
-    or after a UTC. now: datetime, UTC. Raises TargetError."""
+    """Return the pass that `which` names: 'next' after now, 'N' for number N of `passes_after` from `search_start`, or
+    the pass at or after a UTC. now: datetime, UTC. Raises TargetError."""
     begin, old = search_start(satrec, now)
     if which == 'next' or which.isdecimal():
         if which == 'next' and old:
             raise TargetError(f'--pass next: {old}. Take a new TLE, or name a pass of that time by its number or its '
                               'UTC (--pass list)')
         number = 1 if which == 'next' else int(which)
-        found = passes_after(satrec, station, begin)
-        if not 1 <= number <= len(found):
-            raise TargetError(f'--pass {which}: there are {len(found)} passes above {MIN_CULMINATION_DEG:g} deg within {SEARCH_DAYS:g} '
-                              f'days of {begin:%Y-%m-%dT%H:%M:%SZ}')
-        return found[number - 1]
+        passes = passes_after(satrec, station, begin)
+        if not 1 <= number <= len(passes):
+            raise TargetError(f'--pass {which}: there are {len(passes)} passes above {MIN_CULMINATION_DEG:g} deg '
+                              f'within {SEARCH_DAYS:g} days of {begin:%Y-%m-%dT%H:%M:%SZ}')
+        return passes[number - 1]
     when = orbit.instant('--pass', which)
     epoch = orbit.calendar(satrec.jdsatepoch, satrec.jdsatepochF)
     age = (when - epoch).total_seconds() / SECONDS_PER_DAY
     if abs(age) > orbit.MAX_TLE_AGE_DAYS:
         raise TargetError(f'--pass {which}: {age:.1f} days from the TLE epoch {epoch:%Y-%m-%dT%H:%M:%SZ}, must be '
                           f'within {orbit.MAX_TLE_AGE_DAYS:g}')
-    for found in passes_after(satrec, station, when - datetime.timedelta(days=MAX_PASS_DAYS), SEARCH_DAYS
-                              + MAX_PASS_DAYS):
+    for found in passes_after(satrec, station, when - datetime.timedelta(days=MAX_PASS_DAYS),
+                              SEARCH_DAYS + MAX_PASS_DAYS):
         if found.set > when:
             return found
     raise TargetError(f'--pass {which}: no pass above {MIN_CULMINATION_DEG:g} deg within {SEARCH_DAYS:g} days of it')

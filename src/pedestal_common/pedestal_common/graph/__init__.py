@@ -1,1 +1,1 @@
-"""The tables of the graph: its topics, their layouts, its nodes, and its steps."""
+"""Tables of the graph: its topics, their layouts, its nodes, and its steps."""

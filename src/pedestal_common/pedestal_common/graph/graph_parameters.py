@@ -1,5 +1,6 @@
-"""What every node is told about its graph (ROS parameters `graph.*`). No ROS here."""
+"""Parameters of every node about its graph (ROS parameters `graph.*`). No ROS here."""
 import dataclasses
+from collections.abc import Iterable
 
 from pedestal_common import parameters
 from pedestal_common.graph import nodes, topics
@@ -7,10 +8,10 @@ from pedestal_common.graph.nodes import MAX_BEAMS
 from pedestal_common.graph.steps import NS_PER_SECOND
 
 
-def topic_flags(names):
-    """Return the base of a parameter dataclass that has the flag of each of these topics that has one."""
-    flagged = {}
-    for topic in map(topics.TOPIC_BY_NAME.get, names):
+def topic_flags(names: Iterable[str]) -> type[parameters.Parameters]:
+    """Return the base of a parameter dataclass with the flag of each of these topics that has one."""
+    flagged: dict[str, list[str]] = {}
+    for topic in map(topics.TOPIC_BY_NAME.__getitem__, names):
         if topic.flag:
             flagged.setdefault(topic.flag, []).append(topic.name)
     return dataclasses.make_dataclass('TopicFlags', [
@@ -20,41 +21,40 @@ def topic_flags(names):
 
 @dataclasses.dataclass(frozen=True)
 class GraphParameters(parameters.Parameters):
-    """What every node is told about the run (ROS parameters `graph.*`)."""
-    pacing: str = parameters.choice('realtime', ('lockstep', 'realtime'), 'who waits for whom')
-    nodes: str = parameters.text('', 'names of the nodes of this run, comma separated; each waits for its readers '
-                                 'among them')
-    beams: int = parameters.parameter(0, 0, MAX_BEAMS, '', 'beams of an electronic array, each of several in '
-                                      'its namespace beam_i; 0: a drive with motors')
-    deadline: float = parameters.parameter(180.0, 0.1, 3600.0, 's', 'wall-clock time a silent node is waited for')
-    start: int = parameters.parameter(0, 0, 2**31 * NS_PER_SECOND, 'ns',
-                                      'realtime: UTC at which the time of the scenario is '
-                                      '0; 0: the day begins')
-    future: float = parameters.parameter(0.05, 1e-3, 10.0, 's', 'realtime: a stamp further ahead of the time of this '
-                                         'node is refused')
-    silence: float = parameters.parameter(0.2, 0.02, 60.0, 's', 'realtime: a node without its first input for this '
-                                          'long says so')
-    priority: int = parameters.parameter(0, 0, 98, '', 'realtime: priority (SCHED_RR) of the nodes that have a step '
-                                         'to make, where the system allows it, one more of the drive; 0: that of any '
-                                         'process')
+    """Parameters of every node about the run (ROS parameters `graph.*`)."""
+    pacing: str = parameters.choice('realtime', ('lockstep', 'realtime'), 'pacing of the steps: by the messages of '
+                                    'the nodes, or by the clock')
+    nodes: str = parameters.text('', 'names of the nodes of this run, comma separated; each waits for its '
+                                 'subscribers among them')
+    beams: int = parameters.parameter(0, 0, MAX_BEAMS, '', 'number of beams of an electronic array, each of several '
+                                      'in its namespace beam_i; 0: a drive with motors')
+    deadline: float = parameters.parameter(180.0, 0.1, 3600.0, 's', 'longest wait for a silent node, wall-clock time')
+    start: int = parameters.parameter(0, 0, 2**31 * NS_PER_SECOND, 'ns', 'realtime: UTC at which the time of the '
+                                      'scenario is 0; 0: beginning of the day')
+    future: float = parameters.parameter(0.05, 1e-3, 10.0, 's', 'realtime: largest accepted lead of a stamp over the '
+                                         'time of this node')
+    silence: float = parameters.parameter(0.2, 0.02, 60.0, 's', 'realtime: time without the trigger after which a '
+                                          'node reports its silence')
+    priority: int = parameters.parameter(0, 0, 98, '', 'realtime: priority (SCHED_RR) of the nodes with a unit, where '
+                                         'the system allows it, one more for the drive; 0: the default scheduling')
 
-    def check(self):
-        """Raises ParameterError for a name in `nodes` that is no node."""
+    def check(self) -> None:
+        """Raise ParameterError for a name in `nodes` that is no node."""
         for name in self._names:
             if name not in nodes.NODE_NAMES:
-                raise parameters.ParameterError(f"nodes = '{self.nodes}': '{name}' is none of "
+                raise parameters.ParameterError(f"nodes = '{self.nodes}': '{name}': must be one of "
                                                 f'{", ".join(nodes.NODE_NAMES)}')
 
     @property
-    def members(self):
+    def members(self) -> tuple[str, ...]:
         """`nodes` as a tuple, with the nodes of every beam."""
         return nodes.members(self._names, self.beams)
 
     @property
-    def _names(self):
+    def _names(self) -> tuple[str, ...]:
         return tuple(name for name in self.nodes.replace(' ', '').split(',') if name)
 
     @property
-    def lockstep(self):
-        """Whether every step waits for everybody."""
+    def lockstep(self) -> bool:
+        """True if every step waits for all its inputs."""
         return self.pacing == 'lockstep'

@@ -1,28 +1,31 @@
-"""What the numbers of a message are: their names, units and tolerances, by the type of the message.
+"""Names, units and tolerances of the numbers of a message, by its type.
 
 A column is one number of the messages of a topic, 'azimuth.velocity' of joint_states for example. The records of the
 nodes, the tables of a bag, the comparison of recordings and the export all take their columns from here.
 """
 import re
 import typing
+from collections.abc import Mapping
+
+import numpy as np
 
 from pedestal_common.graph import topics
 
 
 class Field(typing.NamedTuple):
-    """A group of numbers of a message.
+    """Group of numbers of a message.
 
-    name        of the field in a record
-    path        of its numbers in the message, a pattern whose group 1 says which of them
-    components  what group 1 can be, in the order of the record; None: the places of Topic.names
-    column      the name of a column, with {} for the component (or the name of the joint)
-    unit        of the numbers where the topic gives none
-    tolerance   absolute difference between recorded and recomputed numbers that is let pass, in that unit
-    recorded    whether it is in the record of our topics
+    name        name of the field in a record
+    path        path of its numbers in the message, a pattern whose group 1 is the component
+    components  values of group 1, in the order of the record; None: the indices of Topic.names
+    column      name of a column, with {} for the component (or the name of the joint)
+    unit        unit of the numbers where the topic gives none
+    tolerance   largest accepted difference between recorded and recomputed numbers, in that unit
+    recorded    True if it is in the record of our topics
     """
     name: str
     path: str
-    components: tuple | None
+    components: tuple[str, ...] | None
     column: str
     unit: str = ''
     tolerance: float = 1e-9
@@ -59,10 +62,11 @@ LAYOUTS = {
               'orientation_variance.{}', 'rad2')),
     'rosgraph_msgs/msg/Clock': (),
 }
-"""The diagonal of an Imu's orientation_covariance says how well an INS knows its attitude."""
+"""{message type: its Fields}. The diagonal of an Imu's orientation_covariance is the variance of the attitude of an
+INS."""
 
 _JOINTS = {'sensor_msgs/msg/JointState': 'name', 'trajectory_msgs/msg/JointTrajectory': 'joint_names'}
-"""Where a message tells whose numbers its fields are."""
+"""{message type: its field with the names of the joints}."""
 
 
 class Column(typing.NamedTuple):
@@ -73,31 +77,31 @@ class Column(typing.NamedTuple):
     tolerance: float
 
 
-def fields(topic) -> tuple:
-    """The Fields of a topic of the table, whose numbers make its record; () of a text."""
+def fields(topic: str) -> tuple[Field, ...]:
+    """Return the Fields of a topic of the table, whose numbers make its record; () for a text."""
     row = topics.TOPIC_BY_NAME[topic]
     return tuple(field for field in LAYOUTS.get(row.type, ())
                  if field.recorded and field.name in (row.only or (field.name,)))
 
 
-def _names(field, row):
-    """What stands for {} in the columns of a field."""
+def _names(field: Field, row: topics.Topic) -> tuple[str, ...]:
+    """Return the text for {} of each column of a field."""
     if field.components is None:
         return row.names
     return tuple('xyz'[int(c) // 4] if c.isdigit() else c for c in field.components)
 
 
-def columns(topic) -> tuple:
-    """The Columns of a topic of the table, in the order of its record."""
+def columns(topic: str) -> tuple[Column, ...]:
+    """Return the Columns of a topic of the table, in the order of its record."""
     row = topics.TOPIC_BY_NAME[topic]
     return tuple(Column(name := field.column.format(part), field.name, row.units.get(name, field.unit),
                         field.tolerance)
                  for field in fields(topic) for part in _names(field, row))
 
 
-def column(type_name, path, texts):
-    """The name of the column of a number at a path in a message of any type, None for one that is left out: header and
-    covariances. texts: {path: text} of the message."""
+def column(type_name: str, path: str, texts: Mapping[str, str]) -> str | None:
+    """Return the name of the column of a number at a path in a message of any type; None for header and covariances,
+    which have no column. texts: {path: text} of the message."""
     for field in LAYOUTS.get(type_name, ()):
         match = re.fullmatch(field.path, path)
         if match:
@@ -110,8 +114,8 @@ def column(type_name, path, texts):
     return path
 
 
-def unit(topic, type_name, column) -> str:
-    """The unit of a column of a topic of this type, '' for one that has none or is not known."""
+def unit(topic: str, type_name: str, column: str) -> str:
+    """Return the unit of a column of a topic of this type, '' without or with an unknown unit."""
     row = topics.TOPIC_BY_NAME.get(topic)
     if row is None or row.type != type_name:
         return ''
@@ -124,7 +128,7 @@ def unit(topic, type_name, column) -> str:
     return 's' if column.endswith('time_from_start') else ''
 
 
-def of_filter(steps, name):
-    """(n, 2): a number of topics.FILTER for both axes, in records (n,) that hold acu/filter."""
+def of_filter(steps: np.ndarray, name: str) -> np.ndarray:
+    """Return (n, 2): a number of topics.FILTER_UNITS for both axes, in records (n,) that hold acu/filter."""
     numbers = steps['acu/filter']['position'].reshape(len(steps), len(topics.AXES), len(topics.FILTER_UNITS))
     return numbers[:, :, list(topics.FILTER_UNITS).index(name)]

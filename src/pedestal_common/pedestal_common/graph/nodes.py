@@ -1,45 +1,46 @@
-"""The nodes of the graph as one table: what runs them, what they read and write; and the graph they make.
+"""Nodes of the graph as a table: their executables, and the topics that they read and write; and the resulting graph.
 
-An electronic array of several beams has the nodes `of_beam` and their topics once per beam, with the prefix `beam_1/`
-... `beam_N/`; everything else is shared. No ROS here.
+In an electronic array of several beams the nodes `of_beam` and their topics exist once per beam, with the prefix
+`beam_1/` ... `beam_N/`; all other nodes and topics are shared. No ROS here.
 """
 import functools
 import importlib
 import re
 import typing
+from collections.abc import Collection, Iterable
 
 from pedestal_common.graph.topics import TOPIC_BY_NAME, TOPICS
 
 MAX_BEAMS = 16
 
 REPLAY_NODE = 'replay'
-"""The node that replays a recording to the others."""
+"""Name of the node that replays a recording to the other nodes."""
 
 DRIVE_NODE = 'adu'
-"""The node that owns the time."""
+"""Name of the node that owns the time."""
 
 
 class Node(typing.NamedTuple):
-    """One node.
+    """Row of the table: one node.
 
-    name          in the graph
-    module        that runs it, PACKAGE.EXECUTABLE; '' for one that has no process of its own
+    name          name in the graph
+    module        executable, PACKAGE.EXECUTABLE; '' for a node without a process of its own
     parameters    module and name of its parameter class
-    unit          module and name of its unit (unit.Unit); '' for one without a law
-    reads         topics, of a unit the one first that begins its steps
-    writes        topics, the one first that others wait for
-    answer        topic by which it answers every step, stamped alike; '' of one that answers late
-    obeys         topic of the commands it obeys, by whomever; replies: topic on which it tells what came of them
-    doc           what it is; stands_for: what takes its place on a real antenna
-    of_beam       whether each beam of an array has one of its own
-    optional      whether the others do without it in a graph that does not name it
+    unit          module and name of its unit (unit.Unit); '' for a node without a law
+    reads         topics that it subscribes to; the first topic of a unit is its trigger, which begins its steps
+    writes        topics that it publishes; other nodes wait for the first
+    answer        topic with which it answers every step, with the same stamp; '' for a node that answers late
+    obeys         topic of its commands, from any client; replies: topic of its replies
+    doc           its task; stands_for: the equipment that replaces it on a real antenna
+    of_beam       True if each beam of an array has a node of its own
+    optional      True if the other nodes run without it in a graph that does not name it
     """
     name: str
     module: str = ''
     parameters: str = ''
     unit: str = ''
-    reads: tuple = ()
-    writes: tuple = ()
+    reads: tuple[str, ...] = ()
+    writes: tuple[str, ...] = ()
     answer: str = ''
     obeys: str = ''
     replies: str = ''
@@ -49,25 +50,25 @@ class Node(typing.NamedTuple):
     optional: bool = False
 
     @property
-    def package(self):
-        """The ROS package that it is in."""
+    def package(self) -> str:
+        """ROS package of the node."""
         return self.module.partition('.')[0]
 
     @property
-    def executable(self):
-        """The name of its executable in that package."""
+    def executable(self) -> str:
+        """Name of its executable in that package."""
         return self.module.rpartition('.')[2]
 
-    def parameters_type(self):
-        """Its parameter dataclass."""
+    def parameters_type(self) -> type[typing.Any]:
+        """Return its parameter dataclass."""
         return _named(self.parameters)
 
-    def unit_type(self):
-        """Its unit, a class."""
+    def unit_type(self) -> type[typing.Any]:
+        """Return the class of its unit."""
         return _named(self.unit)
 
 
-def _named(path):
+def _named(path: str) -> typing.Any:
     module, _, name = path.partition(':')
     return getattr(importlib.import_module(module), name)
 
@@ -83,7 +84,7 @@ NODES = (
          reads=('ship/imu/data_raw',),
          writes=('ship/imu/data', 'ins/state', 'ins/error'),
          obeys='ins/inject', replies='ins/injected',
-         doc='attitude with parametrised error and latency, or from its IMU: aligns by itself, then navigates',
+         doc='attitude with parametrised error and latency, or from its IMU with alignment and navigation',
          stands_for='INS', optional=True),
     Node('tracking_receiver', 'tracking_receiver_sim.tracking_receiver_node',
          'tracking_receiver_sim.params:TrackingReceiverNodeParameters', 'tracking_receiver_sim.unit:TrackingReceiver',
@@ -108,12 +109,12 @@ NODES = (
          doc='antenna drive unit: two axes, two motors each, and the plant; owns the time',
          stands_for='servo drive and pedestal'),
     Node('recorder', 'pedestal_recording.recorder_node', 'pedestal_recording.recorder_params:RecorderParameters',
-         doc='reads every topic, raw, into a rosbag2 directory'),
+         doc='writes the messages of every topic, as received, into a rosbag2 directory'),
     Node('operator', reads=('diagnostics',), writes=('acu/program_track',),
-         doc='sends the program track, listens to diagnostics: inside `pedestal run`, or `pedestal program`',
+         doc='sends the program track, receives diagnostics: inside `pedestal run`, or `pedestal program`',
          stands_for='the operator'),
 )
-"""In the order in which a graph is started. Those with a unit write `diagnostics` as well."""
+"""Rows of the nodes, in the order in which a graph is started. Nodes with a unit also publish `diagnostics`."""
 
 ARRAY_DRIVE = Node(DRIVE_NODE, 'adu_drive.beam_steering_node', 'adu_drive.params:BeamParameters',
                    'adu_drive.array.beam_unit:Beam',
@@ -122,7 +123,7 @@ ARRAY_DRIVE = Node(DRIVE_NODE, 'adu_drive.beam_steering_node', 'adu_drive.params
                    answer='joint_states',
                    doc='electronically steered array in the place of the drive (`beam: true`): no motors',
                    stands_for='beam steering computer and array')
-"""The drive of an array: it obeys angles instead of rates and does not feel the ship."""
+"""Drive of an array: it follows angles instead of rates, and the motion of the ship exerts no torque on it."""
 
 NODE_NAMES = tuple(node.name for node in NODES)
 UNIT_NODES = (*(node for node in NODES if node.unit), ARRAY_DRIVE)
@@ -130,56 +131,58 @@ UNIT_NODES = (*(node for node in NODES if node.unit), ARRAY_DRIVE)
 BEAM_TOPICS = frozenset(('joint_states', 'adu/truth', 'acu/program_track',
                          *(topic for node in NODES if node.of_beam
                            for topic in (*node.writes, node.obeys, node.replies) if topic)))
-"""Topics that each beam of several has of its own: what its nodes write, and what shared nodes write for each."""
+"""Topics that exist once per beam of an array: those of the nodes `of_beam`, and those that shared nodes publish per
+beam."""
 
 
-def row(name, array=False) -> Node:
-    """The Node of a name, 'beam_2/acu' as well as 'acu'; array: of a graph whose drive is an electronic array."""
+def row(name: str, array: bool = False) -> Node:
+    """Return the Node of a name, 'beam_2/acu' as well as 'acu'; array: True for a graph whose drive is an electronic
+    array."""
     if array and name == DRIVE_NODE:
         return ARRAY_DRIVE
     return NODES[NODE_NAMES.index(plain(name))]
 
 
-def of_executable(module) -> Node:
-    """The Node that a module runs."""
+def of_executable(module: str) -> Node:
+    """Return the Node of an executable."""
     return next(node for node in (*NODES, ARRAY_DRIVE) if node.module == module)
 
 
-def beam_of(name):
-    """'beam_2' of a node or topic 'beam_2/...'; '' of one without a beam."""
+def beam_of(name: str) -> str:
+    """Return 'beam_2' of a node or topic 'beam_2/...'; '' of a name without a beam."""
     match = re.match(r'beam_[1-9]\d*(?=/)', name)
     return match[0] if match else ''
 
 
-def plain(name):
-    """The name of a node or topic without its beam."""
+def plain(name: str) -> str:
+    """Return the name of a node or topic without its beam."""
     return name[len(beam_of(name)) + 1:] if beam_of(name) else name
 
 
-def prefixes(beams):
-    """What the names of each beam's nodes and topics begin with: nothing where there is one only."""
+def prefixes(beams: int) -> tuple[str, ...]:
+    """Return the prefix of each beam's nodes and topics; ('',) for at most one beam."""
     return tuple(f'beam_{i}/' for i in range(1, beams + 1)) if beams > 1 else ('',)
 
 
-def members(names, beams):
-    """The nodes of a graph, each of those of a beam once per beam."""
+def members(names: Iterable[str], beams: int) -> tuple[str, ...]:
+    """Return the nodes of a graph, each node `of_beam` once per beam."""
     return tuple(prefix + name for name in names for prefix in (prefixes(beams) if row(name).of_beam else ('',)))
 
 
 class Link(typing.NamedTuple):
-    """A topic in a graph: its name there, its type, rate and flag (see Topic), the nodes that write and read it."""
+    """Topic in a graph: its name there, its type, rate and flag (see Topic), its publishers and subscribers."""
     name: str
     type: str
     rate: str
     flag: str
-    writers: tuple
-    readers: tuple
+    writers: tuple[str, ...]
+    readers: tuple[str, ...]
 
 
 @functools.cache
-def links(beams=0) -> dict:
-    """{name: Link} of a graph, in the order of TOPICS; beams 0: its drive has motors, else it is an electronic array
-    of so many beams."""
+def links(beams: int = 0) -> dict[str, Link]:
+    """Return {name: Link} of a graph, in the order of TOPICS; beams: number of beams of an electronic array, 0 for a
+    drive with motors."""
     rows = [row(node.name, beams > 0) for node in NODES]
     links = {}
     for topic in TOPICS:
@@ -196,33 +199,34 @@ def links(beams=0) -> dict:
     return links
 
 
-def recorded(names, flags=(), beams=0) -> list:
-    """The Links that a graph of these nodes has a writer for, or that anybody may write; flags: those of topics.FLAGS
-    that are set."""
+def recorded(names: Collection[str], flags: Collection[str] = (), beams: int = 0) -> list[Link]:
+    """Return the Links that have a publisher in a graph of these nodes, or that any client may publish; flags: those
+    of topics.TOPIC_FLAGS that are set."""
     return [link for link in links(beams).values()
             if any(name in names for name in (link.readers if link.rate == 'command' else link.writers))
             and (not link.flag or link.flag in flags)]
 
 
-def held(names) -> frozenset:
-    """Those of these topics of a graph that hold (see Topic)."""
+def held(names: Iterable[str]) -> frozenset[str]:
+    """Return the topics among these of a graph whose messages hold (see Topic)."""
     return frozenset(name for name in names if TOPIC_BY_NAME[plain(name)].holds)
 
 
-def readers(link, names):
-    """The nodes of a graph that must read a topic before it may start; the recorder reads every one."""
+def readers(link: Link, names: Iterable[str]) -> list[str]:
+    """Return the nodes of a graph that must read a topic before it may start; the recorder reads every topic."""
     return [name for name in names if name in link.readers or name == 'recorder']
 
 
-def reads(node, names, flags=()) -> tuple:
-    """The topics that a Node hears in a graph of these nodes, in the order of its row, its trigger first.
+def reads(node: Node, names: Iterable[str], flags: Collection[str] = ()) -> tuple[str, ...]:
+    """Return the topics that a Node subscribes to in a graph of these nodes, in the order of its row, its trigger
+    first.
 
-    What is not in the graph may be real equipment, so all of its topics are heard, but those of an optional node that
-    is not among the names, and those whose flag is not set.
+    A node that is not in the graph may be real equipment, so its topics are included. Excluded are the topics of an
+    optional node that is not among the names, and topics whose flag is not set.
     """
     plain_names = {plain(name) for name in names}
 
-    def is_read(topic):
+    def is_read(topic: str) -> bool:
         writers = [other for other in NODES if topic in other.writes]
         absent = all(other.optional and other.name not in plain_names for other in writers)
         flag = TOPIC_BY_NAME[topic].flag

@@ -4,6 +4,6 @@ import numpy as np
 from pedestal_common.graph import nodes
 
 
-def generator(seed, node) -> np.random.Generator:
-    """The stream of a node (a name of nodes.NODES) for a run's seed."""
+def generator(seed: int, node: str) -> np.random.Generator:
+    """Return the stream of a node (a name of nodes.NODES) for a run's seed."""
     return np.random.default_rng((seed, nodes.NODE_NAMES.index(node)))

@@ -1,52 +1,60 @@
-"""Step matching: which messages belong to step t_k. No ROS here: a recorded run is matched as its nodes were."""
+"""Step matching: the messages that belong to step t_k. No ROS here: a recorded run is matched as in its nodes."""
 import collections
+import typing
+from collections.abc import Callable, Collection, Iterable, Mapping
 
 NS_PER_SECOND = 1_000_000_000
-"""[ns]"""
+"""Nanoseconds in a second [ns]."""
+
 SECONDS_PER_DAY = 86_400
-"""[s]"""
+"""Seconds in a day [s]."""
 
 
 class GraphError(RuntimeError):
-    """The graph around a node is not what it must be; one line that names topic, stamp or node. silent: the nodes that
-    were waited for."""
+    """Defect of the graph around a node; one line that names topic, stamp or node. silent: the silent nodes."""
 
-    def __init__(self, message, silent=()):
+    def __init__(self, message: str, silent: Iterable[str] = ()) -> None:
         super().__init__(message)
         self.silent = tuple(silent)
 
-    def __str__(self):
+    def __str__(self) -> str:
         return super().__str__() + (f'; silent: {", ".join(self.silent)}' if self.silent else '')
 
 
 class Steps:
-    """Brings a node's inputs together: the trigger stamped t_k and, of each follower, the message due at t_k.
+    """Matcher of a node's inputs: the trigger stamped t_k and, of each follower, the message due at t_k.
 
-    followers: {topic: latency in ns}; due is the newest trigger stamp <= t_k - latency (none at the start).
-    Lockstep waits for exactly that message; triggers that come meanwhile wait their turn, for who makes them may be
-    ahead by as much as others look back. Realtime answers t_k at the latest when the trigger of the next step arrives,
-    with whatever newest message is there and None for a follower that sent nothing new; prompt: at once. It waits for
-    none of the followers that are `held`.
-    `answer(stamp_ns, trigger_message, {topic: message or None})` is called once per step, in order.
+    followers  {topic: latency in ns}; the message due has the newest trigger stamp <= t_k - latency, none at the
+               start
+    answer     answer(stamp_ns, trigger_message, {topic: message or None}), called once per step, in order
+    prompt     True if a realtime step is answered at once
+    held       followers for which a realtime step does not wait
+
+    In lockstep a step waits for exactly the messages due. Triggers that arrive meanwhile are queued, because their
+    publisher may run ahead by as much as other latencies reach back. In realtime the step t_k is answered at the
+    latest when the trigger of the next step arrives, with the newest messages, and None for a follower without a new
+    message.
     """
 
-    def __init__(self, trigger, followers, lockstep, answer, prompt=False, held=frozenset()):
+    def __init__(self, trigger: str, followers: Mapping[str, int], lockstep: bool,
+                 answer: Callable[[int, typing.Any, dict[str, typing.Any]], object], prompt: bool = False,
+                 held: Collection[str] = frozenset()) -> None:
         self.trigger, self._lockstep, self._answer = trigger, lockstep, answer
         self._prompt = prompt and not lockstep
-        self._passed_over = frozenset() if lockstep else held
+        self._passed_over: Collection[str] = frozenset() if lockstep else held
         self._latency = dict(followers)
-        self._awaited = {topic: collections.deque() for topic in followers}
-        self._due = dict.fromkeys(followers)
-        self._arrived = {topic: collections.deque() for topic in followers}
-        self._last = dict.fromkeys((trigger, *followers))
-        self._pending = None
-        self._ahead = collections.deque()
-        self._period = None
+        self._awaited: dict[str, collections.deque[int]] = {topic: collections.deque() for topic in followers}
+        self._due: dict[str, int | None] = dict.fromkeys(followers)
+        self._arrived: dict[str, collections.deque] = {topic: collections.deque() for topic in followers}
+        self._last: dict[str, int | None] = dict.fromkeys((trigger, *followers))
+        self._pending: tuple[int, typing.Any] | None = None
+        self._ahead: collections.deque[tuple[int, typing.Any]] = collections.deque()
+        self._period: int | None = None
         self.refused = 0
         self.refusal = ''
 
-    def take(self, topic, stamp, message):
-        """One input has come; stamp in ns. Raises GraphError in lockstep when the stamp is not the next one."""
+    def take(self, topic: str, stamp: int, message: typing.Any) -> None:
+        """Take one input; stamp in ns. Raises GraphError in lockstep when the stamp is not the next one."""
         last = self._last[topic]
         if last is not None and stamp <= last:
             self._refuse(f'{topic} stamp went back from {last / NS_PER_SECOND:.6f} to {stamp / NS_PER_SECOND:.6f} s')
@@ -55,8 +63,9 @@ class Steps:
         if topic == self.trigger:
             if self._lockstep and last is not None:
                 if self._period is not None and stamp - last != self._period:
-                    raise GraphError(f'{topic} stamp jumped from {last / NS_PER_SECOND:.6f} to {stamp / NS_PER_SECOND:.6f} s; '
-                                     f'the period is {self._period / NS_PER_SECOND:.6f} s')
+                    raise GraphError(f'{topic} stamp jumped from {last / NS_PER_SECOND:.6f} to '
+                                     f'{stamp / NS_PER_SECOND:.6f} s; the period is '
+                                     f'{self._period / NS_PER_SECOND:.6f} s')
                 self._period = stamp - last
             self._ahead.append((stamp, message))
             if self._pending is not None and not self._lockstep:
@@ -70,7 +79,7 @@ class Steps:
                 break
             self._close()
 
-    def _begin(self, stamp, message):
+    def _begin(self, stamp: int, message: typing.Any) -> None:
         self._pending = (stamp, message)
         for name, awaited in self._awaited.items():
             awaited.append(stamp)
@@ -78,26 +87,26 @@ class Steps:
             while awaited and awaited[0] <= stamp - self._latency[name]:
                 self._due[name] = awaited.popleft()
 
-    def begin_anew(self, topic):
-        """The next message of this topic does not continue those before; of the trigger, no message does."""
+    def reset_after_gap(self, topic: str) -> None:
+        """Reset the state of a topic whose next message does not continue the earlier ones. The trigger resets all
+        topics."""
         for name in (topic,) if topic != self.trigger else self._last:
             self._last[name] = None
-            for queue in (self._awaited, self._arrived):
-                if name in queue:
-                    queue[name].clear()
             if name in self._due:
+                self._awaited[name].clear()
+                self._arrived[name].clear()
                 self._due[name] = None
         if topic == self.trigger:
             self._pending = self._period = None
             self._ahead.clear()
 
-    def _refuse(self, reason):
+    def _refuse(self, reason: str) -> None:
         if self._lockstep:
             raise GraphError(reason)
         self.refused += 1
         self.refusal = reason
 
-    def _ready(self, topic):
+    def _ready(self, topic: str) -> bool:
         due, arrived = self._due[topic], self._arrived[topic]
         if due is None or topic in self._passed_over:
             return True
@@ -106,19 +115,21 @@ class Steps:
         if not arrived:
             return False
         if self._lockstep and arrived[0][0] != due:
-            raise GraphError(f'{topic} is stamped {arrived[0][0] / NS_PER_SECOND:.6f} s where {due / NS_PER_SECOND:.6f} s is due; '
-                             f'is its latency what this node was told ({self._latency[topic] / NS_PER_SECOND:.6f} s)?')
+            raise GraphError(f'{topic} is stamped {arrived[0][0] / NS_PER_SECOND:.6f} s where '
+                             f'{due / NS_PER_SECOND:.6f} s is due; is its latency the one of this node '
+                             f'({self._latency[topic] / NS_PER_SECOND:.6f} s)?')
         return arrived[0][0] >= due
 
-    def give_up(self):
-        """Realtime: answer the step that waits, if one does, without what has not come."""
+    def answer_incomplete(self) -> None:
+        """Answer the pending realtime step, if there is one, without its missing inputs."""
         if self._pending is not None:
             self._close()
 
-    def _close(self):
+    def _close(self) -> None:
+        assert self._pending is not None
         stamp, message = self._pending
         self._pending = None
-        inputs = {}
+        inputs: dict[str, typing.Any] = {}
         for topic, arrived in self._arrived.items():
             inputs[topic] = None
             if self._lockstep:
@@ -130,11 +141,11 @@ class Steps:
         self._answer(stamp, message, inputs)
 
     @property
-    def pending_stamp(self):
+    def pending_stamp(self) -> int | None:
         """Stamp of the step that waits for its inputs [ns], or None."""
         return None if self._pending is None else self._pending[0]
 
     @property
-    def waiting_for(self):
-        """Topics the pending step still waits for."""
+    def waiting_for(self) -> list[str]:
+        """Topics that the pending step still waits for."""
         return [topic for topic in self._due if self._pending is not None and not self._ready(topic)]

@@ -1,5 +1,5 @@
-"""Faults injected into simulated nodes: which there are (table), when they are in force (schedule), how a message is
-spoilt (spoil).
+"""Faults injected into simulated nodes: the table of faults (table), the times at which they are in force (schedule),
+faults of the numbers of a message (message_faults).
 
-What a fault does to the law of a node stands in the package of that node, in its module `injected`.
+The effect of a fault on the law of a node is in the package of that node, in its module `injected`.
 """

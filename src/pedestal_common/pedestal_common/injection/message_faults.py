@@ -1,4 +1,4 @@
-"""How the numbers of a message are spoilt, whatever they are."""
+"""Faults of the numbers of a message, of any kind: frozen, NaN, noisy."""
 import math
 
 import numpy as np
@@ -7,18 +7,18 @@ from pedestal_common.compiled import compiled
 from pedestal_common.injection import table
 
 MAX_HELD_NUMBERS = 32
-"""Numbers that a node holds at most."""
+"""Largest number of values that a node freezes."""
 
 MESSAGE_FAULT_DTYPE = np.dtype([('drop', 'i8'), ('freeze', 'i8'), ('nan', 'i8'), ('holds', 'i8'),
                                 ('held', 'f8', (MAX_HELD_NUMBERS,)),
                                 ('sigma', 'f8'), ('seed', 'i8')], align=True)
-"""drop, freeze, nan: 1 while it is so; held: the numbers of the first frozen step, holds: 1 once they are there; sigma
-and seed of white noise, sigma 0: none."""
+"""Faults in force. drop, freeze, nan: 1 while in force; held: the numbers of the first frozen step, holds: 1 once they
+are stored; sigma and seed of white noise, sigma 0: none."""
 
 
 @compiled
 def clear(e):
-    """Nothing is spoilt from now on; what is held stays, for a freeze that goes on."""
+    """End every fault of the message; the held numbers stay, for a freeze that goes on."""
     e.holds = e.freeze
     e.drop, e.freeze, e.nan, e.sigma = 0, 0, 0, 0.0
 
@@ -44,7 +44,7 @@ def apply(e, codes, fault, values):
 
 @compiled
 def numbers(e, values, first):
-    """Freeze values (n,) or make them NaN; held from number `first` on."""
+    """Freeze values (n,) or make them NaN; e.held stores them from number `first` on."""
     for i in range(len(values)):
         if e.freeze != 0:
             if e.holds != 0:
@@ -57,7 +57,7 @@ def numbers(e, values, first):
 
 @compiled
 def _mixed(x):
-    """The finaliser of SplitMix64 (Steele, Lea and Flood, OOPSLA 2014), 64 bits to 64 bits."""
+    """Return the 64 bits that the finaliser of SplitMix64 makes of 64 bits (Steele, Lea and Flood, OOPSLA 2014)."""
     x = (x ^ (x >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
     x = (x ^ (x >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
     return x ^ (x >> np.uint64(31))
@@ -65,14 +65,14 @@ def _mixed(x):
 
 @compiled
 def _uniform(seed, stamp, i):
-    """A number in (0, 1) of a key: counter-based, so that it depends on nothing that was drawn before (Salmon et al.,
-    SC 2011)."""
+    """Return a number in (0, 1) of a key. It is counter-based, so it depends on no earlier number (Salmon et al., SC
+    2011)."""
     x = _mixed(_mixed(_mixed(np.uint64(seed) + np.uint64(0x9E3779B97F4A7C15)) ^ np.uint64(stamp)) ^ np.uint64(i))
     return (float(x >> np.uint64(11)) + 0.5) * 2.0**-53
 
 
 @compiled
 def noise(e, stamp, i):
-    """White noise number i of a step: e.sigma times a standard normal (Box and Muller 1958)."""
+    """Return white noise number i of a step: e.sigma times a standard normal (Box and Muller 1958)."""
     u, v = _uniform(e.seed, stamp, 2 * i), _uniform(e.seed, stamp, 2 * i + 1)
     return e.sigma * math.sqrt(-2.0 * math.log(u)) * math.cos(2.0 * math.pi * v)

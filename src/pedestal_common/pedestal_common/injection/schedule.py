@@ -1,12 +1,12 @@
-"""Which injected faults are in force: a record that a law looks into once per step.
+"""Injected faults in force: a record that a law checks once per step.
 
 A law begins with
 
     if schedule.pending(m.schedule, stamp):
         injected.take(m, stamp)
 
-so that a node without a fault is what it was. `take` mends all that can be broken and then lets every row that is in
-force break it again: no fault has to remember what it found.
+so that a node without a fault is unchanged. `take` clears all faults, then applies the fault of every row that is in
+force again. A fault therefore has no state to restore.
 """
 import numpy as np
 
@@ -16,20 +16,29 @@ from pedestal_common.injection import table
 from pedestal_common.wire.records import NO_STAMP
 
 MAX_ACTIVE_FAULTS = 16
-"""Faults that can be in force in a node at a time."""
+"""Largest number of faults in force in a node at a time."""
 
 FAULT_DTYPE = np.dtype([('used', 'i8'), ('fault', 'i8'), ('end', 'i8'), ('duration', 'i8'),
                         ('values', 'f8', (table.MAX_FAULT_VALUES,))], align=True)
-"""used: 1 of one that is in force; fault: table.code; end: the stamp [ns] of the first step in which it is not, NEVER
-before its first step; duration [ns]; values of its arguments, of an option its place."""
+"""Row of a fault.
+
+used      1 for a fault in force
+fault     table.code
+end       stamp [ns] of the first step without the fault, NO_STAMP before its first step
+duration  duration [ns]
+values    its arguments, an option as its index
+"""
 
 SCHEDULE_DTYPE = np.dtype([('stamp', 'i8'), ('pending', 'i8'), ('row', FAULT_DTYPE, (MAX_ACTIVE_FAULTS,))], align=True)
-"""stamp: of the last step [ns], NEVER before the first; pending: 1 while the law has to look: a fault is in force, or
-was in the last step."""
+"""Faults of a node.
+
+stamp    stamp of the last step [ns], NO_STAMP before the first
+pending  1 while the law must check the rows, because a fault is in force or was in the last step
+"""
 
 
 def empty() -> np.ndarray:
-    """SCHEDULE_DTYPE (1,) before the first step: nothing is injected."""
+    """Return SCHEDULE_DTYPE (1,) before the first step, without a fault."""
     made = np.zeros(1, SCHEDULE_DTYPE)
     made['stamp'] = NO_STAMP
     return made
@@ -37,20 +46,20 @@ def empty() -> np.ndarray:
 
 @compiled
 def pending(schedule, stamp):
-    """Whether the law of a step of a stamp [ns] has to look into the rows."""
+    """Return True if the law of the step of a stamp [ns] must check the rows."""
     schedule.stamp = stamp
     return schedule.pending != 0
 
 
 @compiled
 def begin(schedule):
-    """Before the rows are looked at: none is known to be in force any more."""
+    """Begin a check of the rows: no fault is known to be in force."""
     schedule.pending = 0
 
 
 @compiled
 def in_force(schedule, row, stamp):
-    """Whether a row is in force in the step of a stamp [ns]; a new one is from this step on."""
+    """Return True if a row is in force in the step of a stamp [ns]. A new row is in force from this step."""
     if row.used == 0:
         return False
     if row.end == NO_STAMP:
@@ -63,12 +72,11 @@ def in_force(schedule, row, stamp):
 
 
 def add(schedule, code, values, duration):
-    """Put a fault into a SCHEDULE_DTYPE, in force from the next step on for a duration [s]. Raises ValueError where
-    no slot
+    """Add a fault to a SCHEDULE_DTYPE, in force from the next step for a duration [s]. Raise ValueError where no row
     is free."""
     free = np.flatnonzero(schedule['row']['used'] == 0)
     if not free.size:
-        raise ValueError(f'{MAX_ACTIVE_FAULTS} faults are in force, which is all a node can have at a time')
+        raise ValueError(f'{MAX_ACTIVE_FAULTS} faults are in force, must be at most {MAX_ACTIVE_FAULTS} at a time')
     row = schedule['row'][free[0]]
     row['used'], row['fault'], row['end'], row['duration'] = 1, code, NO_STAMP, round(duration * NS_PER_SECOND)
     row['values'] = 0.0
@@ -77,6 +85,6 @@ def add(schedule, code, values, duration):
 
 
 def clear(schedule):
-    """End all faults: in the next step nothing is broken."""
+    """End all faults from the next step."""
     schedule['row']['used'] = 0
     schedule['pending'] = 1

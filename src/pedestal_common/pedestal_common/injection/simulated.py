@@ -1,4 +1,4 @@
-"""A unit of simulated equipment: faults can be injected into it."""
+"""Unit of simulated equipment, with faults that can be injected."""
 from pedestal_common.graph.steps import NS_PER_SECOND
 from pedestal_common.injection import schedule, table
 from pedestal_common.node.unit import Unit
@@ -7,15 +7,15 @@ from pedestal_common.wire.records import NO_STAMP
 
 
 class Simulated(Unit):
-    """A Unit whose record holds a schedule.SCHEDULE, `schedule`, that its law looks into, and whose parameters have
+    """Unit whose record holds a schedule.SCHEDULE_DTYPE, `schedule`, for its law, and whose parameters have
     `inject`."""
 
     def schedule(self):
-        """[(at [ns], Command)] of the parameter `inject`."""
+        """Return [(at [ns], Command)] of the parameter `inject`."""
         return table.due(self.NODE.name, self.parameters.inject)
 
-    def obey(self, command, arguments):
-        """Inject a fault, from the next step on; the Reply names the stamp of the step before."""
+    def execute(self, command, arguments):
+        """Inject a fault from the next step; the Reply states the stamp of the step before."""
         part, node = self.parts['schedule'], self.NODE.name
         since = '' if part['stamp'] == NO_STAMP else f' from the step after {part["stamp"] / NS_PER_SECOND:.6f} s on'
         if command.verb == table.CLEAR_COMMAND.name:

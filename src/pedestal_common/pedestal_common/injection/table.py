@@ -1,7 +1,7 @@
-"""The faults that can be injected, as one table. No ROS here, nothing compiled.
+"""Faults that can be injected, as a table. No ROS here, nothing compiled.
 
-A fault is a verb that a simulated node obeys on its topic `NODE/inject` and in its parameter `inject`, for example
-'12 encoder_jump axis=azimuth size=0.01 duration=5'.
+A fault is a command that a simulated node accepts on its topic `NODE/inject` and in its parameter `inject`, for
+example '12 encoder_jump axis=azimuth size=0.01 duration=5'.
 """
 import typing
 
@@ -10,10 +10,10 @@ from pedestal_common.wire.commands import Argument, CommandDefinition, schedule
 
 
 class Fault(typing.NamedTuple):
-    """A fault that a simulated node can be given: a commands.Verb.
+    """Fault that can be injected into a simulated node: a commands.CommandDefinition.
 
-    lockstep: whether a lockstep graph can have it; not where a message stays away or has another stamp, for which
-    everybody would wait.
+    lockstep: True if a lockstep graph can have the fault. A fault that deletes a message or changes its stamp would
+    stop a lockstep graph, because every node would wait for the message.
     """
     name: str
     doc: str
@@ -22,13 +22,14 @@ class Fault(typing.NamedTuple):
 
 
 MAX_FAULT_DURATION_S = 86400.0
+"""Longest duration of a fault [s]; it also stands for a fault without an end."""
 
-_DURATION = Argument('duration', 'how long; left out: to the end', 1e-3, MAX_FAULT_DURATION_S, 's',
+_DURATION = Argument('duration', 'duration; left out: to the end of the run', 1e-3, MAX_FAULT_DURATION_S, 's',
                      default=MAX_FAULT_DURATION_S)
 
 
 def _fault(name, doc, *arguments, lockstep=True):
-    """A Fault, of which every one has a duration."""
+    """Return a Fault with an argument `duration` added."""
     return Fault(name, doc, (*arguments, _DURATION), lockstep)
 
 
@@ -37,103 +38,113 @@ def _option(name, doc, *options):
 
 
 def _number(name, doc, default, high, unit='', low=None):
-    """An Argument between -high and high, or low and high."""
+    """Return an Argument between -high and high, or between low and high."""
     return Argument(name, doc, -high if low is None else low, high, unit, default=default)
 
 
 def _noise(default, high, unit):
-    return (_number('sigma', 'of each number', default, high, unit, low=0.0),
-            _number('seed', 'of the noise', 1.0, 1e9, low=0.0))
+    return (_number('sigma', '1-sigma of each number', default, high, unit, low=0.0),
+            _number('seed', 'seed of the noise', 1.0, 1e9, low=0.0))
 
 
-_AXIS = _option('axis', 'of the pedestal', 'azimuth', 'elevation')
-_MOTOR = _option('motor', 'of its axis', '1', '2')
-_DECK_AXIS = _option('axis', 'of the deck, FLU', 'x', 'y', 'z')
-_DELAY = _number('time', 'by which', 0.05, 0.1, 's', low=1e-3)
-_CLOCK_OFFSET = _number('time', 'by which, positive ahead', 0.1, 10.0, 's')
+_AXIS = _option('axis', 'axis of the pedestal', 'azimuth', 'elevation')
+_MOTOR = _option('motor', 'motor of the axis', '1', '2')
+_DECK_AXIS = _option('axis', 'axis of the deck, FLU', 'x', 'y', 'z')
+_DELAY = _number('time', 'delay', 0.05, 0.1, 's', low=1e-3)
+_CLOCK_OFFSET = _number('time', 'size of the clock step, positive: ahead', 0.1, 10.0, 's')
 
 INJECTED_FAULTS = {
     'adu': (
         _fault('motor_loss', 'the inverter of a motor is off: no current, no torque', _AXIS, _MOTOR),
-        _fault('encoder_jump', 'the load encoder reads more', _AXIS, _number('size', 'by which', 0.01, 3.2, 'rad')),
-        _fault('encoder_stuck', 'the load encoder stays at what it read last', _AXIS),
-        _fault('brake_stuck', 'the brakes of an axis stay on or off, whatever the drive orders', _AXIS,
-               _option('state', 'in which they stay', 'on', 'off')),
-        _fault('lost_tooth', 'a tooth of a pinion is gone: half a pitch of play where it was', _AXIS, _MOTOR,
-               _number('teeth', 'that the pinion had', 17.0, 200.0, low=8.0)),
-        _fault('gust', 'a torque on the load, at once', _AXIS, _number('torque', 'on the axis', 2000.0, 1e5, 'Nm')),
-        _fault('pin_stuck', 'a stow pin stays where it is', _AXIS),
-        _fault('drop', 'commands do not reach it'),
-        _fault('delay', 'commands reach it late', _DELAY),
-        _fault('freeze', '`joint_states` and `adu/motor_states` keep their numbers under new stamps'),
-        _fault('bias', 'the rate on `joint_states` is wrong', _AXIS, _number('size', 'by which', 0.1, 3.0, 'rad/s')),
+        _fault('encoder_jump', 'the angle of the load encoder jumps', _AXIS,
+               _number('size', 'size of the jump', 0.01, 3.2, 'rad')),
+        _fault('encoder_stuck', 'the load encoder repeats its last angle', _AXIS),
+        _fault('brake_stuck', 'the brakes of an axis stay on or off, whatever the drive commands', _AXIS,
+               _option('state', 'state of the brakes', 'on', 'off')),
+        _fault('lost_tooth', 'a tooth of a pinion is missing: half a pitch of play in its place', _AXIS, _MOTOR,
+               _number('teeth', 'teeth of the pinion', 17.0, 200.0, low=8.0)),
+        _fault('gust', 'a torque on the load, without a ramp', _AXIS,
+               _number('torque', 'torque on the axis', 2000.0, 1e5, 'Nm')),
+        _fault('pin_stuck', 'a stow pin stays at its place', _AXIS),
+        _fault('drop', 'the drive receives no commands'),
+        _fault('delay', 'the drive receives commands late', _DELAY),
+        _fault('freeze', '`joint_states` and `adu/motor_states` repeat their numbers with new stamps'),
+        _fault('bias', 'the rate on `joint_states` is offset', _AXIS,
+               _number('size', 'offset of the rate', 0.1, 3.0, 'rad/s')),
         _fault('nan', 'the numbers of `joint_states` are NaN'),
         _fault('noise', 'white noise on the angles of `joint_states`', *_noise(1e-3, 1.0, 'rad'))),
     'tracking_receiver': (
-        _fault('drop', 'its results do not come', lockstep=False),
-        _fault('delay', 'its results come late, their stamps are right', _DELAY, lockstep=False),
-        _fault('freeze', 'its results keep their numbers under new stamps'),
-        _fault('bias', 'its errors are wrong', _number('cross_elevation', 'by which', 0.002, 0.1, 'rad'),
-               _number('elevation', 'by which', 0.0, 0.1, 'rad')),
-        _fault('nan', 'the numbers of its results are NaN'),
-        _fault('noise', 'white noise on its errors', *_noise(0.01, 1.0, 'rad')),
-        _fault('fade', 'the carrier is weaker', _number('depth', 'by which', 30.0, 200.0, 'dB', low=0.0)),
+        _fault('drop', 'the receiver publishes no measurements', lockstep=False),
+        _fault('delay', 'measurements are published late, with correct stamps', _DELAY, lockstep=False),
+        _fault('freeze', 'measurements repeat their numbers with new stamps'),
+        _fault('bias', 'the measured errors are offset',
+               _number('cross_elevation', 'offset of the cross-elevation error', 0.002, 0.1, 'rad'),
+               _number('elevation', 'offset of the elevation error', 0.0, 0.1, 'rad')),
+        _fault('nan', 'the numbers of the measurements are NaN'),
+        _fault('noise', 'white noise on the measured errors', *_noise(0.01, 1.0, 'rad')),
+        _fault('fade', 'the carrier is weaker', _number('depth', 'loss of level', 30.0, 200.0, 'dB', low=0.0)),
         _fault('wrong_slope', 'difference channels have the wrong sign',
-               _option('axis', 'which of them', 'both', 'cross_elevation', 'elevation')),
-        _fault('phase_180', 'the difference channels are turned by 180 deg against the sum'),
-        _fault('clock_step', 'its clock steps: the stamps of its results are wrong', _CLOCK_OFFSET, lockstep=False)),
+               _option('axis', 'channel', 'both', 'cross_elevation', 'elevation')),
+        _fault('phase_180', 'the difference channels are shifted by 180 deg against the sum channel'),
+        _fault('clock_step', 'the clock of the receiver steps: the stamps of the measurements are wrong',
+               _CLOCK_OFFSET, lockstep=False)),
     'ship_motion': (
         _fault('drop', 'the IMU is silent', lockstep=False),
-        _fault('freeze', 'the IMU keeps its numbers under new stamps'),
-        _fault('bias', 'rate and specific force of the IMU are wrong', _DECK_AXIS,
-               _number('rate', 'by which', 0.01, 1.0, 'rad/s'), _number('force', 'by which', 0.0, 20.0, 'm/s2')),
+        _fault('freeze', 'the IMU repeats its numbers with new stamps'),
+        _fault('bias', 'rate and specific force of the IMU are offset', _DECK_AXIS,
+               _number('rate', 'offset of the rate', 0.01, 1.0, 'rad/s'),
+               _number('force', 'offset of the specific force', 0.0, 20.0, 'm/s2')),
         _fault('nan', 'the numbers of the IMU are NaN'),
         _fault('noise', 'white noise on the rates of the IMU', *_noise(0.05, 1.0, 'rad/s'))),
     'ins': (
-        _fault('drop', 'its attitude does not come', lockstep=False),
-        _fault('delay', 'its attitude comes late, its stamps are right', _DELAY, lockstep=False),
-        _fault('freeze', 'attitude and rate keep their numbers under new stamps'),
-        _fault('bias', 'its deck rate is wrong', _DECK_AXIS, _number('rate', 'by which', 0.01, 1.0, 'rad/s')),
-        _fault('nan', 'its numbers are NaN'),
-        _fault('noise', 'white noise on its attitude', *_noise(0.01, 0.5, 'rad')),
-        _fault('ins_jump', 'its attitude jumps, and back at the end', _number('roll', 'by which', 0.0, 3.2, 'rad'),
-               _number('pitch', 'by which', 0.0, 1.6, 'rad'),
-               _number('heading', 'by which, clockwise', 0.02, 3.2, 'rad')),
-        _fault('clock_step', 'its clock steps: the stamps of its attitude are wrong', _CLOCK_OFFSET, lockstep=False))}
+        _fault('drop', 'the INS publishes no attitude', lockstep=False),
+        _fault('delay', 'the attitude is published late, with correct stamps', _DELAY, lockstep=False),
+        _fault('freeze', 'attitude and rate repeat their numbers with new stamps'),
+        _fault('bias', 'the deck rate is offset', _DECK_AXIS,
+               _number('rate', 'offset of the rate', 0.01, 1.0, 'rad/s')),
+        _fault('nan', 'the numbers of the INS are NaN'),
+        _fault('noise', 'white noise on the attitude', *_noise(0.01, 0.5, 'rad')),
+        _fault('ins_jump', 'the attitude jumps, and jumps back at the end',
+               _number('roll', 'jump of the roll', 0.0, 3.2, 'rad'),
+               _number('pitch', 'jump of the pitch', 0.0, 1.6, 'rad'),
+               _number('heading', 'jump of the heading, clockwise', 0.02, 3.2, 'rad')),
+        _fault('clock_step', 'the clock of the INS steps: the stamps of the attitude are wrong', _CLOCK_OFFSET,
+               lockstep=False))}
 """{node: its Faults}, by the names of nodes.NODES."""
 
-CLEAR_COMMAND = CommandDefinition('clear', 'ends all faults of the node')
+CLEAR_COMMAND = CommandDefinition('clear', 'end all injected faults of the node')
 
 INJECT_COMMANDS = {node: (*faults, CLEAR_COMMAND) for node, faults in INJECTED_FAULTS.items()}
-"""{node: what it obeys on `NODE/inject`}."""
+"""{node: its commands on `NODE/inject`}."""
 
 MAX_FAULT_VALUES = max(len(fault.arguments) for faults in INJECTED_FAULTS.values() for fault in faults) - 1
-"""Arguments of a fault beside its duration."""
+"""Largest number of arguments of a fault, without its duration."""
 
 INJECT_DOC = "faults injected at times [s]: 'AT FAULT argument=value ... duration=s; ...'; empty: none"
-"""Of the parameter `inject`."""
+"""Meaning of the parameter `inject`."""
 
 
 def code(node, name) -> int:
-    """The number of a fault among those of its node, for compiled laws."""
+    """Return the number of a fault among those of its node, for compiled laws."""
     return [fault.name for fault in INJECTED_FAULTS[node]].index(name)
 
 
 def due(node, text) -> list:
-    """[(at [ns], Command)] of the parameter `inject` of a node, in order of time. Raises ParameterError."""
+    """Return [(at [ns], Command)] of the parameter `inject` of a node, in order of time. Raise ParameterError for a
+    text that is no schedule."""
     return schedule('inject', text, INJECT_COMMANDS[node])
 
 
 def check_pacing(node, text, lockstep):
-    """Raise ParameterError where `inject` of a node says what its graph cannot have."""
+    """Raise ParameterError where `inject` of a node contains a fault that a lockstep graph cannot have."""
     refusals = [refused_in_lockstep(node, command.verb) for _, command in due(node, text)] if lockstep else ()
     for refusal in filter(None, refusals):
         raise ParameterError(f'inject: {refusal}')
 
 
 def refused_in_lockstep(node, name) -> str:
-    """Why a lockstep graph cannot have a fault of a node, '' where it can."""
+    """Return why a lockstep graph cannot have a fault of a node, '' for a fault that it can have."""
     fault = next((fault for fault in INJECTED_FAULTS[node] if fault.name == name), None)
     if fault is None or fault.lockstep:
         return ''
-    return f'{name} of {node}: {fault.doc}; in lockstep everybody would wait, it takes pacing realtime'
+    return f'{name} of {node}: {fault.doc}; every lockstep node would wait, so this fault needs pacing realtime'

@@ -1,1 +1,1 @@
-"""The shell of a node: a unit, its topics, its clock and its diagnostics."""
+"""Shell of a node: a unit, its topics, its clock and its diagnostics."""

@@ -1,4 +1,4 @@
-"""What the nodes ask of the middleware: quality of service, discovery on this machine, the executor."""
+"""Settings of the middleware: quality of service, discovery on this machine, the executor."""
 import importlib
 import os
 import pathlib
@@ -15,8 +15,8 @@ DDS_PROFILES = {'LOCALHOST': 'fastdds.xml', 'SUBNET': 'fastdds_subnet.xml'}
 
 
 def qos(rate, role='lockstep') -> QoSProfile:
-    """The profile of topics of a rate: in lockstep for writers and readers, in realtime of a role `written`, `read` or
-    `recorded` (see topics.Qos)."""
+    """Return the profile of topics of a rate: in lockstep for publishers and subscribers, in realtime for a role
+    `written`, `read` or `recorded` (see topics.Qos)."""
     row = topics.QOS_BY_RATE[rate]
     depth, reliable = getattr(row, role), role != 'read' or row.reliable
     return QoSProfile(history=HistoryPolicy.KEEP_LAST if depth else HistoryPolicy.KEEP_ALL, depth=depth or 1,
@@ -25,18 +25,18 @@ def qos(rate, role='lockstep') -> QoSProfile:
 
 
 def message_class(type_name):
-    """The rclpy class of 'package/msg/Name'."""
+    """Return the rclpy class of 'package/msg/Name'."""
     package, _, name = type_name.split('/')
     return getattr(importlib.import_module(f'{package}.msg'), name)
 
 
 def set_defaults():
-    """What DDS of this process and its children does, by ROS_AUTOMATIC_DISCOVERY_RANGE, unless the user names a
-    profile of his own.
+    """Set the DDS profile of this process and its children by ROS_AUTOMATIC_DISCOVERY_RANGE, unless the user names a
+    profile.
 
-    Not set, or LOCALHOST: the graph stays on this machine and on its loopback (fastdds.xml). rclpy is then told
-    SYSTEM_DEFAULT, because under LOCALHOST rmw_fastrtps opens transports of its own on every interface.
-    SUBNET: the graph may spread over several hosts, by UDP (fastdds_subnet.xml).
+    Not set, or LOCALHOST: the graph stays on this machine and on its loopback (fastdds.xml). rclpy then gets
+    SYSTEM_DEFAULT, because under LOCALHOST rmw_fastrtps opens transports of its own on every interface. SUBNET: the
+    graph may spread over several hosts, by UDP (fastdds_subnet.xml).
     """
     scope = os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
     if scope in DDS_PROFILES:
@@ -47,8 +47,8 @@ def set_defaults():
 
 
 def initialise(args=None):
-    """rclpy in this process, its arguments those of the command line unless given: DDS as in set_defaults, signals
-    left to the caller, and logs on stderr only, for which neither a home nor a disk is needed."""
+    """Initialise rclpy in this process with arguments, by default those of the command line. DDS is set as in
+    set_defaults, and signals are left to the caller. Logs go to stderr only, which needs neither a home nor a disk."""
     set_defaults()
     given = sys.argv if args is None else args
     rclpy.init(args=[*given, '--ros-args', '--disable-external-lib-logs'],
@@ -56,7 +56,7 @@ def initialise(args=None):
 
 
 def make_executor(context=None):
-    """The executor every node runs in. context: an rclpy.Context, None for the default one."""
+    """Return the executor that every node runs in. context: an rclpy.Context, None for the default."""
     try:
         from rclpy.experimental.events_executor import EventsExecutor
         return EventsExecutor(context=context)

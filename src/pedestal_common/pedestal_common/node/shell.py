@@ -1,4 +1,4 @@
-"""What every node is: parameters, clock, topics of the table, waiting for its graph, `main`."""
+"""Shell of every node: parameters, clock, topics of the table, the wait for its graph, `main`."""
 import contextlib
 import gc
 import inspect
@@ -31,38 +31,38 @@ from pedestal_common.realtime import utc
 from pedestal_common.wire import messages
 
 START_DEADLINE_S = 300.0
-"""Seconds a node waits for its graph: the others may be compiling their laws for the first time."""
+"""Longest time that a node waits for its graph, whose other nodes may compile their laws for the first time [s]."""
 
 ACKNOWLEDGE_TIMEOUT_S = 1.0
-"""Seconds a node that ends waits for readers to take what it published."""
+"""Longest time that a node waits at its end for the acknowledgement of its messages [s]."""
 
 EXIT_DELAY_S = 0.1
-"""Seconds it stays when its endpoints have left."""
+"""Time that a process stays after its endpoints have left the graph [s]."""
 
-class Stopped(BaseException):  # noqa: N818  no error: the node was told to stop
-    """SIGINT or SIGTERM came while a node was waiting or compiling. Like KeyboardInterrupt it is no Exception, which
-    numba would take for an error of the law it compiles."""
+
+class Stopped(BaseException):  # noqa: N818  not an error: a signal stops the node
+    """Arrival of SIGINT or SIGTERM while a node waits or compiles. Like KeyboardInterrupt it is no Exception, because
+    numba would take an Exception for an error of the law that it compiles."""
 
 
 EXPECTED_ERRORS = (parameters.ParameterError, GraphError, ValueError, OSError, InvalidParameterTypeException,
                    InvalidParameterValueException, Stopped)
-"""What a node may end with in one line; anything else is a defect and shows its traceback."""
+"""Errors that end a node with one line; any other error is a defect and shows its traceback."""
 
-_stop = []
-"""Not empty once SIGINT or SIGTERM has come to this process."""
+_stop: list[bool] = []
+"""Not empty after SIGINT or SIGTERM."""
 
-_compiling = []
-"""Not empty while it compiles, which can be cut short."""
-
+_compiling: list[bool] = []
+"""Not empty while the process compiles, which a signal may interrupt."""
 
 STOP_SIGNALS = signal.SIGINT, signal.SIGTERM, signal.SIGALRM
-"""What a node is stopped by; the last only by itself, see _on_signal."""
+"""Signals that stop a node; the last is sent only by the node itself, see _on_signal."""
 
 STOP_RETRY_S = 0.02
-"""Seconds after which a node that could not be stopped at once stops itself."""
+"""Time after which a node that could not stop at once retries [s]."""
 
 _HOOKS = '_raw_object_cache_getbuffer', '_raw_object_cache_notify'
-"""Functions of llvmlite that LLVM calls around making machine code, in which it hears of no exception."""
+"""Functions of llvmlite that LLVM calls before and after it makes machine code; it ignores exceptions from them."""
 
 
 def _on_signal(_number, frame):
@@ -71,8 +71,8 @@ def _on_signal(_number, frame):
         return
     while frame is not None:
         if frame.f_code.co_name in _HOOKS:
-            # A signal that comes while machine code is made is always told here: it would be a message on stderr, and
-            # the code would be lost.
+            # While machine code is made, Python runs its signal handlers only in these functions. An exception there
+            # would become a message on stderr, and the code would be lost. This avoids both by a retry.
             signal.setitimer(signal.ITIMER_REAL, STOP_RETRY_S)
             return
         frame = frame.f_back
@@ -80,7 +80,7 @@ def _on_signal(_number, frame):
 
 
 def readings():
-    """(steady, system) clock [ns] at one moment: read anew where something came between."""
+    """Return the (steady, system) clock [ns] at one moment, read again after an interruption."""
     for _ in range(3):
         steady, system = time.monotonic_ns(), time.time_ns()
         if time.monotonic_ns() - steady < 100_000:
@@ -89,7 +89,8 @@ def readings():
 
 
 def node_of(info, root='/'):
-    """The name in the graph at a namespace (with a '/' at its end) of the node behind an endpoint, as 'beam_2/acu'."""
+    """Return the name in the graph of the node of an endpoint, 'beam_2/acu' for example. root: namespace of the graph,
+    with a '/' at its end."""
     return f'{info.node_namespace.rstrip("/")}/{info.node_name}'.removeprefix(root)
 
 
@@ -108,11 +109,11 @@ def _descriptor(field, read_only):
 
 
 class Shell(Node):
-    """A node of the graph.
+    """Node of the graph.
 
-    parameters_type: the node's dataclass; its fields become ROS parameters of the same dotted names.
-    live: prefixes of parameters that may change while running; the node then implements `reconfigure()`.
-    Raises parameters.ParameterError for an unknown or refused parameter.
+    parameters_type: the node's dataclass; its fields become ROS parameters of the same dotted names. live: prefixes of
+    parameters that may change while the node runs; the node then implements `reconfigure()`. Raises
+    parameters.ParameterError for an unknown or refused parameter.
     """
 
     def __init__(self, name, parameters_type, live=()):
@@ -135,7 +136,8 @@ class Shell(Node):
         self.listeners = []
 
     def _place(self, name):
-        """(namespace of the graph, prefix of this node's beam in it, '' without one), both with a '/' at their end."""
+        """Return (namespace of the graph, prefix of this node's beam in it, '' without one), both with a '/' at their
+        end."""
         namespace = self.get_namespace().rstrip('/') + '/'
         prefix = next((prefix for prefix in nodes.prefixes(self.graph.beams) if name in nodes.NODE_NAMES
                        and nodes.row(name).of_beam and namespace.endswith('/' + prefix)), '')
@@ -152,13 +154,14 @@ class Shell(Node):
         self.parameters.check_graph(self.graph.beams, self.graph.lockstep)
         if '--params-file' in sys.argv and not self._parameter_overrides:
             self.get_logger().warning(f'no parameter of {self.get_fully_qualified_name()} is in the parameter file: a '
-                                      'section /**/NODE is for a node in any namespace, NODE for one in none')
+                                      'section /**/NODE is for a node in any namespace, NODE for a node without one')
         if live:
             self.add_on_set_parameters_callback(self._on_set)
             self.add_post_set_parameters_callback(self._post_set)
 
     def _declare_all(self, cls, live, prefix=''):
-        """{dotted name: value} of the ROS parameters of a dataclass, those that begin with one of `live` writable."""
+        """Declare the ROS parameters of a dataclass, those that begin with one of `live` writable; return {dotted
+        name: value}."""
         defaults = parameters.as_dict(cls(), prefix)
         return {name: self.declare_parameter(name, defaults[name],
                                              _descriptor(field, not name.startswith(tuple(live)))).value
@@ -183,27 +186,28 @@ class Shell(Node):
         self.reconfigure()
 
     def reconfigure(self):
-        """`self.parameters` has changed; overridden by a node with live parameters."""
+        """Take the changed `self.parameters`; overridden by a node with live parameters."""
 
     def _link(self, name):
-        """(Link, its name for ROS) of a topic of the graph; a node of a beam names its own without the prefix."""
+        """Return (Link, its ROS name) of a topic of the graph; a node of a beam gives its own topics without the
+        prefix."""
         link = self.links.get(self.beam + name) or self.links[name]
         return link, self._root + link.name if self.beam else link.name
 
     def clock(self):
-        """(steady clock, UTC) of now [ns]."""
+        """Return (steady clock, UTC) of now [ns]."""
         steady, system = readings()
         return steady, self.utc.at(steady, system)
 
     def epoch(self, stamp):
-        """The stamp [ns] at which the time of the units is 0: 0 in lockstep, `graph.start`, or the day's beginning
-        of the first stamp that is asked for."""
+        """Return the stamp [ns] at which the time of the units is 0: 0 in lockstep, else `graph.start`, or without it
+        the beginning of the day of the first `stamp`."""
         if self._epoch is None:
             self._epoch = stamp // (SECONDS_PER_DAY * NS_PER_SECOND) * SECONDS_PER_DAY * NS_PER_SECOND
         return self._epoch
 
     def writer(self, name):
-        """A function that publishes the CDR bytes of a message on a topic of the graph."""
+        """Return a function that publishes the CDR bytes of a message on a topic of the graph."""
         link, ros_name = self._link(name)
         publisher = self.create_publisher(middleware.message_class(link.type), ros_name,
                                           middleware.qos(link.rate, 'lockstep' if self.graph.lockstep else 'written'))
@@ -211,9 +215,10 @@ class Shell(Node):
         return publisher.publish
 
     def reader(self, name, decode, take):
-        """Call take(message, anew) for every message on a topic of the graph that decode(CDR bytes) -> (stamp [ns] or
-        None, message) can read; it raises ValueError for others. In lockstep these end the node. In realtime they are
-        dropped, as is all that an Intake does not take; anew: it does not continue the one before."""
+        """Call take(message, after_gap) for every message on a topic of the graph. decode(CDR bytes) -> (stamp [ns] or
+        None, message) raises ValueError for other bytes, which end a lockstep node. In realtime they are dropped, like
+        the messages that a PublisherGate refuses; after_gap: True for a message that does not continue the one
+        before."""
         link, ros_name = self._link(name)
 
         if self.graph.lockstep:
@@ -225,22 +230,23 @@ class Shell(Node):
             self.listeners.append(listener)
             listener.open(lambda: subscribe(self, link, ros_name, self._guarded(listener.callback), 'read'))
 
-    def writers_of(self, ros_name):
-        """Names of the nodes that write a topic now."""
+    def publishers_of(self, ros_name):
+        """Return the names of the nodes that publish a topic now."""
         return [node_of(info, self._root) for info in self.get_publishers_info_by_topic(ros_name)]
 
     def message_reader(self, name, take):
         """Call take(message) for every message on a topic."""
         type_name = self._link(name)[0].type
         self.reader(name, lambda data: (None, messages.deserialize(data, type_name)),
-                    lambda message, anew: take(message))
+                    lambda message, after_gap: take(message))
 
     def every(self, period, function):
-        """A timer on the steady wall clock [s]."""
+        """Return a timer that calls a function at a period of the steady wall clock [s]."""
         return self.create_timer(period, self._guarded(function), clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def _guarded(self, function):
-        """The same callback, an expected error kept for `main`: rclpy would print a traceback of its own first."""
+        """Return the same callback, with an expected error kept for `main`: rclpy would print a traceback of its own
+        first."""
         def call(*args):
             try:
                 function(*args)
@@ -251,18 +257,18 @@ class Shell(Node):
         return call
 
     def diagnose_with(self, diagnose):
-        """Publish diagnose() -> (level, message, [(key, value text)]) at every whole second of the drive's time,
-        in realtime at every second of the wall and when what is urgent changes."""
+        """Publish diagnose() -> (level, message, [(key, value text)]) at every whole second of the drive's time; in
+        realtime at every second of the wall clock, and when its urgent part changes."""
         self.diagnostics = Diagnostics(self, diagnose)
 
     def diagnose_now(self):
-        """Realtime: something has changed, which its diagnostics tell before their second; False where that would be
-        too soon after the last ones."""
+        """Publish the diagnostics in realtime before their second, because of a change. Return False in lockstep, and
+        too soon after the last diagnostics."""
         return self.diagnostics is not None and not self.graph.lockstep and self.diagnostics.publish_urgent()
 
     def begin_step(self, stamp):
-        """To be called with t_k [ns] before anything of step k is published. In lockstep the first call waits for the
-        graph, and every whole second publishes diagnostics; in realtime nobody is waited for."""
+        """Note the step t_k [ns] before any message of step k is published. In lockstep the first call waits for the
+        graph, and diagnostics are published at every whole second; in realtime there is no wait."""
         self._stamp = stamp
         if not self._started:
             self._started = True
@@ -279,7 +285,8 @@ class Shell(Node):
         self._started, self._stamp, self._next_second = False, 0, 0
 
     def prepare(self, unit):
-        """Compile the laws of a unit, cold half a minute and more, unless told to stop."""
+        """Compile the laws of a unit, which takes half a minute and more when they are not cached. Raises Stopped
+        after a signal."""
         from pedestal_common.compiled import compiled_once  # with numba, which a node without a law does not need
         _compiling.append(True)
         try:
@@ -291,15 +298,16 @@ class Shell(Node):
             _compiling.clear()
 
     def await_acknowledged(self):
-        """Wait until every reader has received all that this node published. Raises GraphError after the deadline: in
-        lockstep it is the recorder that is silent, for everyone else has answered the step before."""
+        """Wait until every subscriber has received all messages of this node. Raises GraphError after the deadline. In
+        lockstep the silent subscriber is then the recorder, because all other nodes have answered the step before."""
         for link, publisher in self.publishers_by_link.items():
             if not publisher.wait_for_all_acked(Duration(seconds=self.graph.deadline)):
-                raise GraphError(f'a reader of {link.name} took nothing for {self.graph.deadline:g} s', ('recorder',))
+                raise GraphError(f'a subscriber of {link.name} took no message in {self.graph.deadline:g} s',
+                                 ('recorder',))
 
     def announce(self, publish, message):
-        """Publish what has no stamp. In lockstep it keeps its place between two steps: what was published
-        before has arrived everywhere before it, and it has before anything that follows."""
+        """Publish a message without a stamp. In lockstep, wait before and after it until all subscribers have
+        acknowledged all messages, so that the order is deterministic."""
         if self.graph.lockstep:
             self.await_acknowledged()
         publish(messages.serialize(message))
@@ -307,27 +315,28 @@ class Shell(Node):
             self.await_acknowledged()
 
     def await_graph(self):
-        """Wait until every topic this node writes has all its readers of the run.
+        """Wait until every topic of this node has all its subscribers of the run.
 
-        Raises GraphError after START_DEADLINE_S, or when another graph writes the same topics.
+        Raises GraphError after START_DEADLINE_S, or when another graph publishes the same topics.
         """
         deadline = time.monotonic() + START_DEADLINE_S
         for link, publisher in self.publishers_by_link.items():
             wanted = nodes.readers(link, self.graph.members)
             while missing := self._missing(publisher, wanted):
                 if time.monotonic() > deadline:
-                    raise GraphError(f'{link.name} is not read by {", ".join(missing)} after {START_DEADLINE_S:g} s')
+                    raise GraphError(f'{link.name} lacks the subscribers {", ".join(missing)} after '
+                                     f'{START_DEADLINE_S:g} s')
                 if _stop:
                     raise Stopped
                 time.sleep(0.01)
         for link, publisher in self.publishers_by_link.items():
             if len(link.writers) == 1 and self.count_publishers(publisher.topic_name) > 1:
-                raise GraphError(f'{link.name} already has a writer: another graph runs on ROS_DOMAIN_ID '
+                raise GraphError(f'{link.name} already has a publisher: another graph runs on ROS_DOMAIN_ID '
                                  f'{self.context.get_domain_id()}; set a free one')
 
     def _missing(self, publisher, wanted):
-        """Which of the wanted readers a topic has not got yet. By name: a stranger who listens is no substitute, but
-        a replay stands in for whoever is not there."""
+        """Return the wanted subscribers that a topic lacks, by name: no other subscriber replaces them, except a
+        replay."""
         if not wanted:
             return []
         there = self.get_subscriptions_info_by_topic(publisher.topic_name)
@@ -336,29 +345,30 @@ class Shell(Node):
         return missing or (list(wanted) if publisher.get_subscription_count() < len(there) else [])
 
     def spin(self, executor):
-        """Take one turn of the executor; overridden by who has steps of his own to make."""
+        """Take one turn of the executor; overridden by a node that makes steps of its own."""
         executor.spin_once(timeout_sec=0.1)
 
     @property
     def awaits(self):
-        """What a node that is ready waits for, as a person calls it; overridden by who begins otherwise."""
+        """Awaited inputs of a node that is ready, in words; overridden by a node with other inputs."""
         return 'messages'
 
     def draining(self):
-        """Asked after the end: True while a node must go on receiving before `close`; overridden by the recorder."""
+        """Return True while a node that has finished must go on receiving before `close`; overridden by the
+        recorder."""
         return False
 
     def close(self):
-        """Called once before the node ends; overridden by a node that has something to put away. What was published
-        and is still on its way would die with the node, so it waits a little for the readers."""
+        """Wait a little for the acknowledgement of the last messages, which would be lost with the node. Called once
+        before the node ends; overridden by a node with data to store."""
         deadline = time.monotonic() + ACKNOWLEDGE_TIMEOUT_S
         for publisher in self.publishers_by_link.values():
             publisher.wait_for_all_acked(Duration(seconds=max(deadline - time.monotonic(), 0.0)))
 
 
 def _write_line(stream, line):
-    """A last line, past Python's buffer: what a full disk or a closed pipe does not take is no reason for another end
-    than the one it tells."""
+    """Write a last line without Python's buffer. A full disk or a closed pipe loses the line, and must not change the
+    reason of the end."""
     with contextlib.suppress(OSError):
         os.write(stream.fileno(), f'{line}\n'.encode())
 
@@ -366,9 +376,11 @@ def _write_line(stream, line):
 def _end_process(node, code):
     """End the process with an exit code as soon as the endpoints of its node have left the graph.
 
-    The participant is not destroyed: where others leave at that moment Fast DDS 2.14 may hang in it, in 1 of 100 ends
-    of a graph (DomainParticipant::set_listener waits for a callback with the mutex that the callback wants). So it
-    stays for EXIT_DELAY_S: others who do not hear that a reader has left wait for it, for the 20 s of its lease."""
+    The participant is not destroyed. Fast DDS 2.14 may hang in its destructor while other participants leave, in 1 of
+    100 ends of a graph: DomainParticipant::set_listener waits for a callback with the mutex that the callback needs.
+    The process stays for EXIT_DELAY_S, because a node that misses the departure of a subscriber waits for it for the
+    20 s of its lease.
+    """
     with node.handle, contextlib.suppress(OSError):
         node.destroy_node()
         sys.stdout.flush()
@@ -377,10 +389,10 @@ def _end_process(node, code):
 
 
 def main(make_node, args=None):
-    """Run the node of make_node() until it is finished or told to stop, and end the process.
+    """Run the node of make_node() until it is finished or a signal stops it, and end the process.
 
-    Exit code 0; 1 with one line on stderr. On stdout its `result`, if it has one, as a JSON object, to which an error
-    adds {'error': the line, 'silent': the nodes that it waited for}.
+    Exit code 0; 1 with one line on stderr. The node's `result`, if any, is printed on stdout as a JSON object; an
+    error adds {'error': the line, 'silent': the silent nodes}.
     """
     for number in STOP_SIGNALS:
         signal.signal(number, _on_signal)
@@ -408,7 +420,7 @@ def main(make_node, args=None):
         result = node.result if node is not None else {}
         _write_line(sys.stdout, json.dumps({**result, 'error': str(error), 'silent': getattr(error, 'silent', ())}))
         _write_line(sys.stderr, f'{name}: error: {error}')
-    # It ends anyway; Python's own end would give a late signal its deadly default back.
+    # Python would restore the default action of late signals at its end, which would kill the process.
     for number in STOP_SIGNALS:
         signal.signal(number, signal.SIG_IGN)
     if node is not None:

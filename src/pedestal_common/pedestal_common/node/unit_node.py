@@ -1,7 +1,8 @@
-"""The node of a unit: what its topics hold becomes a record, the unit answers it, the answer becomes messages.
+"""Node of a unit: the content of its topics becomes a record, the unit answers the record, the answer becomes
+messages.
 
-One class runs every unit. A node of its own kind adds what is no law: the drive owns the time
-(adu_drive.timekeeper_node), the ship speaks NMEA.
+One class runs every unit. A node of its own kind adds tasks that are no law: the drive owns the time
+(adu_drive.timekeeper_node), the ship publishes NMEA.
 """
 import collections
 import dataclasses
@@ -22,7 +23,7 @@ REPLAY_POLL_S = 0.2
 
 
 class Port:
-    """A unit and its topics. prefix: of the beam it serves in a node that serves several, else ''."""
+    """Unit and its topics. prefix: of its beam in a node that serves several beams, else ''."""
 
     def __init__(self, node, unit, prefix=''):
         self.prefix = prefix
@@ -49,12 +50,12 @@ class Port:
         self._epoch, self._last = 0, None
 
     def named(self, topic):
-        """The topic as the graph names it."""
+        """Return the name of the topic in the graph."""
         return self.prefix + topic if topic in nodes.BEAM_TOPICS else topic
 
     def step(self, stamp, values):
-        """Make the step of a stamp [ns]. values: {topic: (stamp, numbers), None where nothing came}. The unit counts
-        its time from the epoch on: its numbers keep their places however late it is."""
+        """Make the step of a stamp [ns]. values: {topic: (stamp, numbers), None where nothing arrived}. The unit
+        counts its time from the epoch, so its numbers keep their resolution at any stamp."""
         self._epoch, self._last = self._epoch_of(stamp), stamp
         self.unit.epoch = self._epoch
         for name, decoder in self.decoders.items():
@@ -63,26 +64,26 @@ class Port:
         self.stamps[0] = stamp - self._epoch
         self.unit.step(self.stamps, self.unit.inputs, self.unit.outputs)
 
-    def begin_anew(self):
-        """Forget what the unit knows of the steps so far, not what it was told once."""
+    def reset_after_gap(self):
+        """Reset the state of the unit's steps; texts, and messages of rate `once`, stay."""
         self.unit.memory.record[...] = self._initial
         self.unit.configure(self.unit.parameters)
 
     def command(self, command):
-        """Ask the unit for a Command and tell what came of it: the Reply."""
+        """Return the Reply of the unit to a Command, and publish it."""
         reply = self.unit.command(command)
         self.reply()
         return reply
 
     def reply(self):
-        """Tell what came of what was asked."""
-        while self.unit.answered:
-            answer = commands.reply_message(*self.unit.answered.popleft())
+        """Publish the replies to the commands."""
+        while self.unit.pending_replies:
+            answer = commands.reply_message(*self.unit.pending_replies.popleft())
             if self._reply:
                 self._announce(self._reply, answer)
 
     def publish(self):
-        """What was asked since the last step, the texts that have changed, then every message that is due."""
+        """Publish the replies since the last step, the changed texts, then every message that is due."""
         self.reply()
         self.announce()
         for encoder, publish in self._encoders:
@@ -90,30 +91,30 @@ class Port:
                 publish(encoder.encoded(self._epoch))
 
     def announce(self):
-        """The texts that have changed; a list of them has the stamp of the step."""
+        """Publish the texts that have changed; a list of texts has the stamp of the step."""
         outputs = self.unit.outputs[0]
         for name, last in self._texts.items():
             code = outputs[name]
             if code != last[1]:
                 last[1] = code
-                said = self.unit.encode(name, int(code))
-                if said != last[2]:
-                    last[2] = said
-                    self._announce(last[0], messages.String(data=said) if isinstance(said, str)
-                                   else self._stamped(said))
+                text = self.unit.encode(name, int(code))
+                if text != last[2]:
+                    last[2] = text
+                    self._announce(last[0], messages.String(data=text) if isinstance(text, str)
+                                   else self._stamped(text))
 
     def _stamped(self, message):
-        """A message with the stamp of the last step, of now before the first."""
+        """Return a message with the stamp of the last step, before the first step with the time of now."""
         header = messages.header('')
         messages.put_stamp(header.stamp, self._clock()[1] if self._last is None else self._last)
         return dataclasses.replace(message, header=header)
 
 
 class UnitNode(shell.Shell):
-    """Runs the unit of a module (nodes.Node.module)."""
+    """Node that runs the unit of a module (nodes.Node.module)."""
 
     PRECEDENCE = 0
-    """Added to graph.priority."""
+    """Priority of this node above graph.priority."""
 
     def __init__(self, module, serves_beams=False):
         self.row = nodes.of_executable(module)
@@ -148,10 +149,11 @@ class UnitNode(shell.Shell):
         if self.graph.priority and not self.graph.lockstep:
             refusal = priority.take(self.graph.priority + self.PRECEDENCE)
             if refusal:
-                self.get_logger().info(f'runs like any process: graph.priority = {self.graph.priority}: {refusal}')
+                self.get_logger().info(f'runs with default scheduling: graph.priority = {self.graph.priority}: '
+                                       f'{refusal}')
 
     def _listen(self, port):
-        """Subscribe to what does not belong to a step: texts, what comes once, commands."""
+        """Subscribe to the topics that do not belong to a step: texts, topics of rate `once`, commands."""
         if self.row.obeys:
             self.message_reader(port.named(self.row.obeys), self._command_taker(port))
         for name in port.unit.reads:
@@ -194,29 +196,30 @@ class UnitNode(shell.Shell):
         return take
 
     def _settle(self):
-        """What had arrived when the executor began has been taken."""
+        """Note that all messages queued at start-up have been processed."""
         self._settling.cancel()
         self._settled = True
         self._release()
 
     def _release(self):
-        """Answer the first steps once nothing keeps them any more."""
+        """Answer the first steps once nothing holds them."""
         while self._held and self._settled and not self._waiting_for_once:
             self.answer(*self._held.popleft())
 
     @property
     def awaits(self):
-        """What it waits for: its trigger, and the messages that come once and have not come yet."""
+        """Names of the awaited topics: the trigger, and the topics of rate `once` without a message."""
         return ', '.join((self.unit.trigger, *sorted(self._waiting_for_once)))
 
     def begin(self):
-        """Start to follow the trigger of the unit; overridden by who makes the time."""
+        """Start to follow the trigger of the unit; overridden by the node that makes the time."""
         self.follow(self.unit.trigger, self.unit.latencies)
 
     def follow(self, trigger, latencies):
-        """Bring the inputs of each step together (see Steps) and `answer` it. latencies: {topic: s}.
+        """Match the inputs of each step (see Steps) and `answer` it. latencies: {topic: s}.
 
-        In lockstep a step whose inputs stay away for the deadline ends the node with the names of the silent writers.
+        In lockstep a step whose inputs are absent for the deadline ends the node with the names of the silent
+        publishers.
         """
         self.steps = Steps(trigger, {name: round(latency * NS_PER_SECOND) for name, latency in latencies.items()},
                            self.graph.lockstep, self._answer, held=nodes.held(latencies))
@@ -252,7 +255,7 @@ class UnitNode(shell.Shell):
             unit.lockstep = self.graph.lockstep
             port.use(unit)
         self.unit = self.ports[0].unit
-        self.steps.begin_anew(self.steps.trigger)
+        self.steps.reset_after_gap(self.steps.trigger)
         self.refused = self.steps.refusal = ''
         self._waiting_for_once = set(self._once)
         self._held.clear()
@@ -263,20 +266,20 @@ class UnitNode(shell.Shell):
     def _step_taker(self, name):
         steps = self.steps
 
-        def take(message, anew):
+        def take(message, after_gap):
             if message[0] <= self._stamp:
                 self._look_for_replay()
-            if anew:
-                steps.begin_anew(name)
+            if after_gap:
+                steps.reset_after_gap(name)
                 if name == steps.trigger and message[0] <= self._stamp:
                     for port in self.ports:
-                        port.begin_anew()
+                        port.reset_after_gap()
             steps.take(name, message[0], message)
         return take
 
     def _answer(self, stamp, trigger, values):
-        """A step is complete. In lockstep the first one waits for what comes once, and for the texts that arrived
-        before the executor began: it takes what it finds then in any order."""
+        """Answer a complete step. In lockstep the first step waits for the topics of rate `once`, and for the texts
+        that arrived before the executor began, because the executor takes the queued messages in any order."""
         values[self.steps.trigger] = trigger
         if self._settled and not self._waiting_for_once:
             self.answer(stamp, values)
@@ -292,14 +295,14 @@ class UnitNode(shell.Shell):
         self.begin_step(stamp)
         for port in self.ports:
             port.publish()
-        self.look_after()
+        self.after_step()
 
-    def look_after(self):
-        """Realtime, after a step: tell what has become wrong, call for what a unit wants of others."""
+    def after_step(self):
+        """Publish urgent diagnostics after a step in realtime, and call the services that a unit needs."""
         if self.graph.lockstep:
             return
         if [port.unit.urgent for port in self.ports] != self._urgent and self.diagnose_now():
-            # A diagnosis takes notes away: this is what is left of them.
+            # A diagnosis clears notes of the unit, so its urgent part is read again.
             self._urgent = [port.unit.urgent for port in self.ports]
         self._answered = time.monotonic_ns()
         if self._callees:
@@ -309,18 +312,18 @@ class UnitNode(shell.Shell):
             self._called = calls
 
     def _watch_trigger(self):
-        """Realtime: whether the trigger stays away; unless it was this node that was held up, or the graph has not
-        begun."""
+        """Set `silent` of the units in realtime while the trigger is absent, except after a stall of this node and
+        before graph.start."""
         now, limit = time.monotonic_ns(), self.graph.silence * NS_PER_SECOND
         if self.clock()[1] < self.graph.start:
             self._answered = self._begun = now
-        held_up, self._watched = now - self._watched > limit, now
-        silent = now - self._answered > limit and not held_up
+        stalled, self._watched = now - self._watched > limit, now
+        silent = now - self._answered > limit and not stalled
         if silent and self.steps.pending_stamp is not None:
-            # Its trigger was the last one. Left until the others are back it would be a step of before the silence
-            # that meets what they say after it.
+            # Its trigger was the last before the silence. If the step waited for its inputs, it would be answered with
+            # messages from after the silence.
             answered = self._answered
-            self.steps.give_up()
+            self.steps.answer_incomplete()
             self._answered = answered
         if silent != self.unit.silent:
             for port in self.ports:
@@ -340,7 +343,7 @@ class UnitNode(shell.Shell):
                                    f'{self.graph.deadline:g} s', silent)
 
     def _service(self, name):
-        """The callback of a service: asks every unit between two steps and answers with what it reads back."""
+        """Return the callback of a service, which commands every unit between two steps and answers with the reply."""
         def serve(_request, response):
             [reply] = {port.command(commands.Command(name, commands.SERVICE_CLIENT)) for port in self.ports}
             if name.endswith('/reset_faults') and reply.granted:
@@ -350,16 +353,17 @@ class UnitNode(shell.Shell):
         return serve
 
     def reconfigure(self):
-        """Hand the changed parameters to the units."""
+        """Pass the changed parameters to the units."""
         for port in self.ports:
             port.unit.configure(self.parameters)
 
     def diagnosed(self):
-        """The Diagnosis of the unit; overridden by who runs several."""
+        """Return the Diagnosis of the unit; overridden by a node that runs several."""
         return self.unit.diagnose()
 
     def diagnose(self):
-        """A silent trigger and a refused input come before anything but an error of the unit."""
+        """Return the Diagnosis, in which a silent trigger and a refused input precede everything except an error of
+        the unit."""
         diagnosis = self.diagnosed()
         if self.unit.silent:
             since = (time.monotonic_ns() - self._answered) * 1e-9
@@ -374,7 +378,7 @@ class UnitNode(shell.Shell):
 
 
 def decoding(decoder):
-    """decode(CDR bytes) -> (stamp [ns], what the Decoder makes of them), for Shell.reader."""
+    """Return decode(CDR bytes) -> (stamp [ns], result of the Decoder), for Shell.reader."""
     decoded = decoder.decoded
 
     def decode(data):
@@ -384,5 +388,5 @@ def decoding(decoder):
 
 
 def main(module, args=None) -> int:
-    """Run the unit of a module."""
+    """Run the unit of a module and return the exit code."""
     return shell.main(lambda: UnitNode(module), args)

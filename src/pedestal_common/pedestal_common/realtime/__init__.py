@@ -1,1 +1,1 @@
-"""What a node of a realtime graph believes: the time, and of what arrives the messages of the right writer."""
+"""Checks of a node in a realtime graph: its time, and the right publisher of each message."""

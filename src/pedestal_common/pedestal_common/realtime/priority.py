@@ -1,11 +1,12 @@
-"""The priority of a process with a deadline in every step: the kernel runs it before all that have none (sched(7))."""
+"""Priority of a process with a deadline in every step: the kernel runs it before all processes without one
+(sched(7))."""
 import contextlib
 import os
 
 
 def take(priority):
-    """Run every thread of this process, those of the middleware too, in SCHED_RR at a priority (1 to 99); what they
-    start inherits it. '' or why the system refuses."""
+    """Set SCHED_RR at a priority (1 to 99) for every thread of this process, including those of the middleware; new
+    threads inherit it. Return '' or why the system refuses."""
     try:
         for thread in os.listdir('/proc/self/task'):
             with contextlib.suppress(ProcessLookupError):

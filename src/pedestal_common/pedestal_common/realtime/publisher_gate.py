@@ -1,76 +1,76 @@
-"""Which messages of a topic a node of a realtime graph takes: of the writer in charge, sound and newer than the last.
+"""Gate of a topic in a realtime graph: it accepts messages of the active publisher, valid and newer than the last.
 
-The first writer is in charge. Another one is dropped and named, whatever it says. A writer that begins anew is taken
-up once the one in charge was silent for SILENCE_LIMIT_NS. One that spoke together with it, or whose numbers are
-higher than
-that silence explains, is another one, taken up only when it has been alone for CONFIRMED_TAKEOVER_NS and the graph
-shows nobody
-who should not write. Where nobody can say which is which, nothing is taken: what the topic commands comes to a stop.
-No ROS and no clock here.
+The first publisher becomes active. Messages of any other publisher are dropped and reported. A publisher that restarts
+becomes active once the active one was silent for SILENCE_LIMIT_NS. A publisher that overlapped with the active one, or
+whose sequence numbers are higher than this silence allows, is a different node. It becomes active only after it was
+the only publisher for CONFIRMED_TAKEOVER_NS and the graph shows no unexpected publisher. While the publishers are
+unclear every message is dropped, so the motion that the topic commands stops. No ROS and no clock here.
 """
 import collections
 
 from pedestal_common.realtime.streams import Streams
 
 SILENCE_LIMIT_NS = 200_000_000
-"""Time [ns] after which the writer in charge is taken for gone, and after which stamps that went back are believed."""
+"""Silence of the active publisher after which another may become active, and time after which stamps that went back
+are accepted [ns]."""
 
 CONFIRMED_TAKEOVER_NS, UNCONFIRMED_TAKEOVER_NS = 1_000_000_000, 5_000_000_000
-"""Time [ns] of silence of the writer in charge after which another one that spoke while it did is taken, if it is the
-only one that speaks: where the graph shows no stranger, and where it does not tell."""
+"""Silence of the active publisher after which a publisher that overlapped with it may become active, as the only
+publisher [ns]. The first applies where the graph shows no unexpected publisher, the second where the graph is
+unknown."""
 
 PUBLISHER_POLL_NS = 50_000_000
-"""Time [ns] between two looks at who else may write the topic, for each writer that wants to be in charge."""
+"""Time between two checks of the graph for unexpected publishers, for each candidate [ns]."""
 
 DROP_UNDECODABLE, DROP_STALE, DROP_FUTURE, DROP_OTHER_PUBLISHER, DROP_UNCLEAR_PUBLISHER = (
-    'undecodable', 'stale', 'future', 'another writer', 'writers not told apart')
-"""Why a message is dropped."""
+    'undecodable', 'stale', 'future', 'another publisher', 'publishers unclear')
+"""Reasons to drop a message."""
 
 WARNING_DROP_REASONS = DROP_OTHER_PUBLISHER, DROP_UNCLEAR_PUBLISHER
-"""Reasons that somebody should look after."""
+"""Reasons that an operator should look after."""
 
 
 class PublisherGate:
-    """The intake of one topic.
+    """Gate of one topic.
 
-    decode(data) -> (stamp [ns], or None of a topic without stamps, message); raises ValueError for what is none.
-    future: how far a stamp may be ahead of this node's UTC [ns].
-    strangers() -> how many writers the graph shows that should not write this topic, None where it does not tell;
-    asked when somebody wants to be in charge: as many must be known by what they wrote, or the candidate may be one of
-    them. None in its place: the topic is everybody's, who is not told apart.
-    paced: whether its messages come at a pace, which tells writers apart. Where they do not, nothing is taken while
-    the graph shows a stranger: what was said before it came still holds.
-    oldest: the longest time from sent to heard [ns] of what is taken; None: any.
+    decode      decode(data) -> (stamp [ns], None of a topic without stamps; message); ValueError for invalid data
+    future      largest accepted lead of a stamp over this node's UTC [ns]
+    unexpected  unexpected() -> number of unexpected publishers in the graph, None where it is unknown. It is called
+                when a candidate may become active. As many publishers must be known by their messages, because the
+                candidate may be one of them. None in its place: every publisher is accepted.
+    paced       True if the messages have a pace, which distinguishes publishers. Without a pace every message is
+                dropped while the graph shows an unexpected publisher; the last accepted message stays valid.
+    oldest      largest accepted time from sending to reception [ns]; None: any
 
-    dropped: {reason: count}; reason: of the last message that was dropped, detail: in numbers; dropped_at: when [ns];
-    anew: whether the message just taken does not continue the one taken before it.
+    dropped     {reason: count}; reason: of the last dropped message, detail: in numbers; dropped_at: its time [ns]
+    after_gap   True if the last accepted message does not continue the one before it
     """
 
-    def __init__(self, decode, future, strangers=lambda: 0, paced=True, oldest=None):
-        self._decode, self._future, self._strangers, self._paced = decode, future, strangers, paced
+    def __init__(self, decode, future, unexpected=lambda: 0, paced=True, oldest=None):
+        self._decode, self._future, self._unexpected, self._paced = decode, future, unexpected, paced
         self._oldest = oldest
-        self.writers = Streams()
-        self.in_charge = None
+        self.streams = Streams()
+        self.active = None
         self.dropped = collections.Counter()
         self.reason = self.detail = ''
         self.dropped_at = None
-        self.anew = False
+        self.after_gap = False
         self.offset = None
-        self._obeyed = None     # when the writer in charge was heard last [ns]
+        self._active_at = None  # time of the last message of the active publisher [ns]
         self._stamp = None
         self._back_since = self._back = None
 
     def take(self, data, number, source, now, utc):
-        """What decode made of a message, None where it is dropped. number: its sequence number; source: when its
-        writer sent it [ns UTC]; now, utc: this moment [ns], steady and UTC."""
-        self.anew = False
+        """Return the decoded message, None for a dropped message. number: its sequence number; source: its time of
+        sending [ns UTC]; now, utc: this moment [ns], steady and UTC."""
+        self.after_gap = False
         if not self._paced:
-            if self._strangers():
+            if self._unexpected():
                 return self._drop(DROP_OTHER_PUBLISHER, '', now)
-        elif self._strangers and not self._of_charge(self.writers.of(number, source, now), now):
+        elif self._unexpected and not self._is_active(self.streams.of(number, source, now), now):
             return None
         if self._oldest is not None and utc - source > self._oldest:
-            return self._drop(DROP_STALE, f'{(utc - source) * 1e-9:.3f} s on its way', now)
+            return self._drop(DROP_STALE, f'{(utc - source) * 1e-9:.3f} s from sending to reception', now)
         try:
             stamp, message = self._decode(data)
         except ValueError as error:
@@ -80,60 +80,61 @@ class PublisherGate:
         self._note_offset(utc - source)
         return message
 
-    def _of_charge(self, stream, now):
-        """Whether the writer of a message, which may be unclear, is in charge."""
-        if stream is not None and stream is self.in_charge and self._may_be_another(stream, now):
-            self.in_charge = None
+    def _is_active(self, stream, now):
+        """Return True if the publisher of a message, None for an unclear one, is active."""
+        if stream is not None and stream is self.active and self._may_be_another(stream, now):
+            self.active = None
         if stream is None:
             self._drop(DROP_UNCLEAR_PUBLISHER, '', now)
-        elif stream is self.in_charge:
-            for other in self._speaking_beside(stream, now):
+        elif stream is self.active:
+            for other in self._other_active(stream, now):
                 other.known = True
-            self._obeyed = now
+            self._active_at = now
             return True
         elif self._may_take_over(stream, now):
-            self.in_charge, self.anew = stream, self._obeyed is not None
+            self.active, self.after_gap = stream, self._active_at is not None
             self._stamp = self._back_since = self.offset = None
-            self._obeyed = now
+            self._active_at = now
             return True
         else:
             self._drop(DROP_OTHER_PUBLISHER, '', now)
         return False
 
     def _may_be_another(self, stream, now):
-        """Whether the writer in charge, silent until now, left out numbers and the graph shows a stranger that was not
-        heard yet: this node was held up perhaps, and what comes first is the stranger's."""
-        return (now - self._obeyed >= SILENCE_LIMIT_NS and stream.skipped[1] == stream.last
-                and (self._strangers() or 0) > sum(other.known for other in self._speaking_beside(stream, now)))
+        """Return True if the active publisher was silent until now and left out numbers, while the graph shows an
+        unexpected publisher without messages. This node may have stalled, and the first message may come from that
+        publisher."""
+        return (now - self._active_at >= SILENCE_LIMIT_NS and stream.skipped[1] == stream.last
+                and (self._unexpected() or 0) > sum(other.known for other in self._other_active(stream, now)))
 
     def _may_take_over(self, stream, now):
-        """Whether a writer that is not in charge is from now on."""
-        charge = self.in_charge
-        silent = SILENCE_LIMIT_NS if charge is None else now - charge.arrival
-        # What a stranger that has gone said before may come late: then the graph no longer shows it.
-        stream.known = stream.known or (charge is not None and stream.last > charge.growth(silent))
+        """Return True if an inactive publisher becomes active now."""
+        active = self.active
+        silent = SILENCE_LIMIT_NS if active is None else now - active.arrival
+        # A message of an unexpected publisher may arrive after that publisher has left the graph.
+        stream.known = stream.known or (active is not None and stream.last > active.growth(silent))
         if silent < (CONFIRMED_TAKEOVER_NS if stream.known else SILENCE_LIMIT_NS):
             return False
         if stream.looked is not None and now - stream.looked < PUBLISHER_POLL_NS:
             return False
         stream.looked = now
-        strangers, speaking = self._strangers(), self._speaking_beside(stream, now)
+        count, others = self._unexpected(), self._other_active(stream, now)
         if stream.known:
-            free = (not strangers and not speaking and silent >= (UNCONFIRMED_TAKEOVER_NS if strangers is None
-                                                                  else CONFIRMED_TAKEOVER_NS))
+            free = not count and not others and silent >= (UNCONFIRMED_TAKEOVER_NS if count is None
+                                                           else CONFIRMED_TAKEOVER_NS)
         else:
-            free = not strangers or strangers <= sum(other.known for other in speaking)
+            free = not count or count <= sum(other.known for other in others)
         stream.known = stream.known and not free
         return free
 
-    def _speaking_beside(self, stream, now):
-        """The other streams that speak."""
-        return [other for other in self.writers.streams if other is not stream and now
-                - other.arrival < SILENCE_LIMIT_NS]
+    def _other_active(self, stream, now):
+        """Return the other streams that are active."""
+        return [other for other in self.streams.streams
+                if other is not stream and now - other.arrival < SILENCE_LIMIT_NS]
 
     def _in_order(self, stamp, now, utc):
-        """Whether a stamp is later than the last one and not ahead of the time. One that goes back is believed once
-        those that came instead went on for SILENCE_LIMIT_NS."""
+        """Return True if a stamp is later than the last one and not ahead of the time. A stamp that goes back is
+        accepted once such stamps have arrived for SILENCE_LIMIT_NS."""
         if stamp > utc + self._future:
             self._drop(DROP_FUTURE, f'{(stamp - utc) * 1e-9:.3f} s ahead', now)
             return False
@@ -144,7 +145,7 @@ class PublisherGate:
             self._back_since = now
         self._back = stamp
         if now - self._back_since >= SILENCE_LIMIT_NS:
-            self._stamp, self._back_since, self.anew = stamp, None, True
+            self._stamp, self._back_since, self.after_gap = stamp, None, True
             return True
         self._drop(DROP_STALE, f'{(self._stamp - stamp) * 1e-9:.3f} s older than the last', now)
         return False

@@ -1,60 +1,67 @@
-"""Who wrote a message: those of each writer of a topic carry numbers of its own, one more from each to the next.
+"""Assignment of messages to publishers: the messages of each publisher of a topic have consecutive sequence numbers.
 
-rclpy names no writer, so a message belongs to the stream that it continues: a higher number, by no more than there was
-time for. Two writers whose messages could continue one stream are not told apart. When their numbers have parted again
-both are known by their pace, if that is another for each; otherwise neither is, until only one of them speaks.
+rclpy names no publisher, so a message belongs to the stream that it continues: with a higher number, by no more than
+the elapsed time permits. Two streams that a message could both continue are unclear. Once their numbers have moved
+apart, both are identified by their pace, if the paces differ. Otherwise both stay unclear until only one of them is
+active.
 """
 import collections
 
 DEFAULT_INTERVAL_NS = 5_000_000
-"""Time between two messages [ns] taken for that of a stream of which only one has come."""
+"""Assumed time between two messages of a stream with only one message [ns]."""
 
 NUMBER_SLACK = 4
-"""Numbers by which a stream may be ahead of twice its pace and of what it owes."""
+"""Numbers that a stream may gain above twice its pace and its backlog."""
 
 MAX_BACKLOG_NS = 1_000_000_000
-"""Time [ns] of whose messages a stream may be behind: a writer that was held up catches up, and of its burst some are
-left out."""
+"""Largest backlog of a stream, as time of its messages [ns]. A publisher that stalled catches up in a burst, of which
+some messages are lost."""
 
 MAX_PAUSE_INTERVALS = 4.0
-"""Time between two messages, in intervals of their stream, that is believed of its interval."""
+"""Longest time between two messages that counts for the mean interval of their stream [intervals]."""
 
 CLOSE_NUMBER_GAP = 20
-"""Two streams that both speak and whose numbers are this close are not told apart."""
+"""Largest difference of the numbers of two active streams that are unclear."""
 
 PACE_WINDOW_MESSAGES, PACE_STRIDE_MESSAGES = 40, 8
-"""Messages of which a stream's pace is the median time per number over PACE_STRIDE_MESSAGES of them: one that is held
-up, and a few
-that then come at once, do not change it."""
+"""Number of messages, and stride, of a stream's pace: the median time per number over PACE_STRIDE_MESSAGES messages. A
+message that is held up, and a burst of a few, do not change it."""
 
 MAX_PACE_RATIO = 0.85
-"""Of two streams that were close the faster one is told by its pace if that takes less than this part of the time of
-the other's, and if both have kept theirs to the square root of this."""
+"""Largest ratio of the paces of two unclear streams that are identified by pace, the faster one over the slower one
+[time per number]. The pace of each must also stay within the square root of this ratio."""
 
 ACTIVE_LIMIT_NS = 200_000_000
-"""A stream speaks while it was heard within this time [ns]. Of two that are close one has gone when for so long the
-numbers were those of one."""
+"""Time since its last message within which a stream is active [ns]. Of two unclear streams one has left when the
+numbers were those of one stream for this time."""
 
 RECENT_LIMIT_NS = 1_000_000_000
-"""A stream that was silent for so long [ns] takes part with the next few of its numbers only."""
+"""Silence after which a stream is continued only by one of its next few numbers [ns]."""
 
 EXPIRY_LIMIT_NS = 30_000_000_000
-"""A stream that was silent for so long [ns] is no longer known."""
+"""Silence after which a stream is deleted [ns]."""
 
 
 class Stream:
-    """The messages of one writer. last: number of the last one; source: when it was sent, arrival: when it came [ns];
-    begun: when the first one came [ns]; interval: mean time between two [ns]; owed: messages by which it is behind its
-    pace; lost: numbers left out; skipped: (before, after) the last of them; unclear: whether it is one of those that
-    are not told apart.
+    """Messages of one publisher.
 
-    An Intake notes on it: known, whether it spoke together with the writer in charge; looked, when it was last asked
-    who else may write [ns]."""
-    __slots__ = ('_heard', 'arrival', 'begun', 'interval', 'known', 'last', 'looked', 'lost', 'owed', 'skipped',
+    last      sequence number of the last message; source: its time of sending, arrival: its time of arrival [ns]
+    begun     time of arrival of the first message [ns]
+    interval  mean time between two messages [ns]
+    owed      backlog against its pace [messages]
+    lost      number of messages left out; skipped: (before, after) the last gap
+    unclear   True if the stream cannot be distinguished from another
+
+    A PublisherGate adds:
+
+    known     True if it was active together with the active publisher
+    looked    time of the last check for other publishers [ns]
+    """
+    __slots__ = ('_messages', 'arrival', 'begun', 'interval', 'known', 'last', 'looked', 'lost', 'owed', 'skipped',
                  'source', 'unclear')
 
     def __init__(self, number, source, now):
-        self._heard = collections.deque([(number, source)], PACE_WINDOW_MESSAGES)
+        self._messages = collections.deque([(number, source)], PACE_WINDOW_MESSAGES)
         self.begun = now
         self.last, self.source, self.arrival = number, source, now
         self.interval = self.looked = None
@@ -62,100 +69,100 @@ class Stream:
         self.known = self.unclear = False
 
     def fits(self, number, source):
-        """Whether a message can be of this stream."""
+        """Return True if a message can be of this stream."""
         gap = number - self.last
         return gap == 1 or 0 < gap <= self.growth(source - self.source) + self.owed
 
     def growth(self, elapsed):
-        """By how much its numbers grow at the most in a time [ns]."""
+        """Return the largest growth of its numbers in a time [ns]."""
         return NUMBER_SLACK + 2.0 * elapsed / (self.interval or DEFAULT_INTERVAL_NS)
 
     def near(self, other):
-        """Whether what this one says next could be of the other one, or the other way round."""
+        """Return True if the next message of this stream could be of the other stream, or the reverse."""
         behind, ahead = (self, other) if self.last < other.last else (other, self)
         return ahead.last - behind.last <= CLOSE_NUMBER_GAP or behind.fits(ahead.last, ahead.source)
 
     def follow(self, number, source, now):
-        """The message is of this stream; how many were left out before it."""
+        """Add a message to this stream and return how many were left out before it."""
         gap, elapsed = number - self.last, source - self.source
         if elapsed > 0:
             interval = self.interval or DEFAULT_INTERVAL_NS
             self.owed = min(max(self.owed + elapsed / interval - gap, 0.0), MAX_BACKLOG_NS / interval)
-            # A silence, as of a cut cable, says little about the pace: it is taken for MAX_PAUSE_INTERVALS intervals
-            # at the most.
+            # Because a silence, as of a cut cable, is no measure of the pace, it counts for at most
+            # MAX_PAUSE_INTERVALS intervals.
             step = min(elapsed / gap, ACTIVE_LIMIT_NS if self.interval is None else MAX_PAUSE_INTERVALS
                        * self.interval)
             self.interval = step if self.interval is None else self.interval + 0.05 * (step - self.interval)
         if gap > 1:
             self.skipped = self.last, number
-        self._heard.append((number, source))
+        self._messages.append((number, source))
         self.last, self.source, self.arrival = number, source, now
         self.lost += gap - 1
         return gap - 1
 
     def pace(self):
-        """Time per number [ns], None of a stream that has not said enough."""
-        heard = list(self._heard)
-        if len(heard) < 3 * PACE_STRIDE_MESSAGES:
+        """Return the time per number [ns], None for a stream with too few messages."""
+        messages = list(self._messages)
+        if len(messages) < 3 * PACE_STRIDE_MESSAGES:
             return None
+        pairs = zip(messages, messages[PACE_STRIDE_MESSAGES:], strict=False)
         paces = sorted((source - earlier_source) / (number - earlier)
-                       for (earlier, earlier_source), (number, source) in zip(heard, heard[PACE_STRIDE_MESSAGES:],
-                                                                              strict=False))
+                       for (earlier, earlier_source), (number, source) in pairs)
         return paces[len(paces) // 2]
 
     def revive(self, stream):
-        """Go on as a stream that turned out to be this one."""
-        self._heard = stream._heard
+        """Continue as a stream that turned out to be this one."""
+        self._messages = stream._messages
         self.last, self.source, self.arrival = stream.last, stream.source, stream.arrival
         self.interval, self.owed, self.skipped = stream.interval, stream.owed, stream.skipped
 
 
 class Streams:
-    """The streams of one topic. lost: messages that were left out in all of them."""
+    """Streams of one topic. lost: messages that were left out in all of them."""
 
     def __init__(self):
         self.streams = []
         self.lost = 0
-        self._close = ()                # streams that are not told apart; what is said since is of unclear ones
-        self._parted = 0, -EXPIRY_LIMIT_NS    # (lowest number, when [ns]) of those that were close last
-        self._heard = -ACTIVE_LIMIT_NS
+        self._close = ()                # unclear streams; later messages belong to new, unclear streams
+        self._parted = 0, -EXPIRY_LIMIT_NS    # (lowest number, time [ns]) of the last unclear streams
+        self._previous = -ACTIVE_LIMIT_NS
 
     def of(self, number, source, now):
-        """The Stream of a message, a new one where it continues none; None where it may be of several. number: its
-        sequence number; source: when it was sent, now: when it came [ns]."""
-        heard, self._heard = self._heard, now
-        recent = [stream for stream in self.streams if heard - stream.arrival < RECENT_LIMIT_NS]
-        speaking = [stream for stream in recent if heard - stream.arrival < ACTIVE_LIMIT_NS]
+        """Return the Stream of a message, a new one where it continues none; None where it may be of several. number:
+        its sequence number; source: time of sending, now: time of arrival [ns]."""
+        previous, self._previous = self._previous, now
+        recent = [stream for stream in self.streams if previous - stream.arrival < RECENT_LIMIT_NS]
+        active = [stream for stream in recent if previous - stream.arrival < ACTIVE_LIMIT_NS]
         fitting = [stream for stream in recent
-                   if stream.fits(number, source) and (stream in speaking or number - stream.last <= CLOSE_NUMBER_GAP)]
+                   if stream.fits(number, source) and (stream in active or number - stream.last <= CLOSE_NUMBER_GAP)]
         if len(fitting) == 1 or not fitting and (fitting := self._silent(number, source)):
             stream = fitting[0]
             self.lost += stream.follow(number, source, now)
             close = []
         else:
-            # A number that was left out by what seemed one stream: two writers have spoken in it.
+            # A number that a stream left out: the stream was that of two publishers.
             close = fitting or [other for other in recent if other.skipped[0] < number < other.skipped[1]]
             stream = self._begun(number, source, now)
         if len(self.streams) > 1:
-            near = [other for other in speaking
+            near = [other for other in active
                     if other is not stream and other not in close and other.near(stream)]
             if close or near:
-                stream = self._confuse(stream, close + near if close else [stream, *near], now)
+                stream = self._mark_unclear(stream, close + near if close else [stream, *near], now)
         if stream.unclear:
-            self._tell_apart(now)
+            self._resolve_unclear(now)
         return None if stream.unclear else stream
 
     def several(self, now):
-        """Whether more than one of the streams speaks at the time now [ns]."""
+        """Return True if more than one of the streams is active at the time now [ns]."""
         return sum(now - stream.arrival < ACTIVE_LIMIT_NS for stream in self.streams) > 1
 
     def _silent(self, number, source):
-        """[the stream heard last] of those that do not speak and that the message can be of."""
+        """Return [the stream with the latest message] of the inactive streams that the message can continue."""
         return sorted((stream for stream in self.streams if stream.fits(number, source)),
                       key=lambda stream: stream.arrival)[-1:]
 
     def _begun(self, number, source, now):
-        """A new stream: of a writer that was close to another one perhaps, which then is known."""
+        """Add a new stream. It is known if its publisher may have been close to another one."""
         self.streams = [other for other in self.streams if now - other.arrival < EXPIRY_LIMIT_NS]
         stream = Stream(number, source, now)
         stream.unclear = bool(self._close)
@@ -164,23 +171,23 @@ class Streams:
         self.streams.append(stream)
         return stream
 
-    def _confuse(self, latest, streams, now):
-        """Note that these streams are not told apart. What the latest has said just now begins a new one."""
+    def _mark_unclear(self, latest, streams, now):
+        """Mark these streams as unclear, and begin a new stream with the last message."""
         self._close += tuple(stream for stream in streams if not stream.unclear)
         self._parted = min(stream.last for stream in streams), now
         self.streams = [stream for stream in self.streams if stream is not latest and stream not in streams]
         return self._begun(latest.last, latest.source, now)
 
-    def _tell_apart(self, now):
-        """Streams that were close, once two have parted and are known by their pace, or one of them has gone."""
+    def _resolve_unclear(self, now):
+        """Identify unclear streams, once two have moved apart and are known by their pace, or one of them has left."""
         for stream in self._close:
             stream.arrival = now
-        speaking = [stream for stream in self.streams if stream.unclear and now - stream.arrival < ACTIVE_LIMIT_NS]
-        if len(speaking) == 1 and now - speaking[0].begun >= ACTIVE_LIMIT_NS:
-            speaking[0].known = True    # as whoever spoke beside the one in charge: nobody knows which this is
-            self._cleared(speaking)
-        elif len(speaking) == len(self._close) == 2:
-            before, after = (_by_pace(pair) for pair in (self._close, speaking))
+        active = [stream for stream in self.streams if stream.unclear and now - stream.arrival < ACTIVE_LIMIT_NS]
+        if len(active) == 1 and now - active[0].begun >= ACTIVE_LIMIT_NS:
+            active[0].known = True    # because this may be the publisher that was active beside the active one
+            self._cleared(active)
+        elif len(active) == len(self._close) == 2:
+            before, after = (_by_pace(pair) for pair in (self._close, active))
             if before and after and all(_same_pace(was, pace) for (was, _), (pace, _) in zip(before, after,
                                                                                              strict=True)):
                 for (_, stream), (_, found) in zip(before, after, strict=True):
@@ -188,7 +195,7 @@ class Streams:
                 self._cleared([stream for _, stream in before])
 
     def _cleared(self, streams):
-        """These are told apart; what else was unclear is given up."""
+        """Keep these streams as identified, and delete the other unclear streams."""
         self.streams = [stream for stream in self.streams if not stream.unclear] + streams
         self._close = ()
         for stream in streams:
@@ -196,7 +203,7 @@ class Streams:
 
 
 def _by_pace(pair):
-    """[(pace, stream)] of two streams, the faster first; [] where that is not clear."""
+    """Return [(pace, stream)] of two streams, the faster first; [] where the paces do not differ."""
     paced = [(stream.pace(), stream) for stream in pair]
     if any(pace is None for pace, _ in paced):
         return []
@@ -206,5 +213,5 @@ def _by_pace(pair):
 
 
 def _same_pace(was, pace):
-    """Whether a pace [ns] is the one that was."""
+    """Return True if a pace [ns] equals the earlier one within MAX_PACE_RATIO."""
     return MAX_PACE_RATIO < min(was, pace)**2 / max(was, pace)**2

@@ -1,27 +1,26 @@
-"""UTC for stamps that never go back: a steady clock and a bounded, slewed offset to the system's clock. No clock is
-read here; who runs it hands over pairs of readings.
+"""UTC for stamps that never go back: a steady clock with a bounded, slewed offset to the system's clock. No clock is
+read here; the caller passes pairs of readings.
 
     t = steady + offset,    |d offset / d steady| <= MAX_SLEW_RATE
 
 The offset follows the system's clock, which NTP or PTP slews, at no more than MAX_SLEW_RATE. A difference beyond
-MIN_CLOCK_STEP_NS is a step
-of the system's clock and is named. A step forward is taken at once. After a step back the time goes on as it was and
-is slewed: it would take a stamp twice otherwise. It then is ahead of nodes that start later, by `ahead`; the way out
-is a restart of the node that says so.
+MIN_CLOCK_STEP_NS is a step of the system's clock and is reported. A step forward is followed at once. After a step
+back the time continues and is slewed, because otherwise a stamp would occur twice. The time is then ahead of nodes
+that start later, by `ahead`; a restart of the reporting node mends this.
 """
 MAX_SLEW_RATE = 500e-6
-"""Largest rate at which the offset follows [s/s]: that of adjtime(3)."""
+"""Largest slew rate of the offset, that of adjtime(3) [s/s]."""
 
 MIN_CLOCK_STEP_NS = 10_000_000
-"""Difference [ns] between two readings beyond which the system's clock was stepped: MAX_SLEW_RATE would need 20 s for
+"""Difference between two readings above which the system's clock was stepped [ns]; MAX_SLEW_RATE would need 20 s for
 it."""
 
 
 class Utc:
-    """steady, system: one pair of readings [ns] at the beginning.
+    """Slewed UTC. steady, system: one pair of readings [ns] at the beginning.
 
-    steps: how often the system's clock was stepped, last_step: by how much the last time [ns, forward is positive];
-    ahead: by how much this time is ahead of the system's clock [ns]
+    steps: number of steps of the system's clock, last_step: size of the last [ns, forward is positive]; ahead: lead of
+    this time over the system's clock [ns]
     """
 
     def __init__(self, steady, system):
@@ -30,7 +29,7 @@ class Utc:
         self.steps = self.last_step = 0
 
     def at(self, steady, system) -> int:
-        """UTC [ns] at a pair of readings. steady must not go back; one that does gives the last time again."""
+        """Return UTC [ns] at a pair of readings. A steady clock that went back gives the last time again."""
         elapsed = max(steady - self._steady, 0)
         self._steady += elapsed
         jump = system - steady - self._system_offset
@@ -46,5 +45,5 @@ class Utc:
 
     @property
     def ahead(self):
-        """How far it is ahead of the system's clock [ns]."""
+        """Lead of this time over the system's clock [ns]."""
         return self._offset - self._system_offset

@@ -1,1 +1,1 @@
-"""Text files of other people, read within bounds."""
+"""Readers of text files of other programs, with limits on their size."""

@@ -1,46 +1,70 @@
-"""Tables of numbers in CSV files: named columns, each with its range, the first of them increasing."""
+"""Tables of numbers in CSV files: named columns, each with its range, the first of them increasing.
+
+Separators are comma, semicolon, tab, bar and blanks; with another separator than the comma, numbers may have a decimal
+comma. Blank lines, titles and lines that begin with a comment mark are passed over, `sep=` is read, the case of a name
+does not matter. Of a file of JPL Horizons, the rows between $$SOE and $$EOE are read.
+"""
 import array
 import contextlib
 import csv
 import io
+import itertools
+import re
 
 import numpy as np
 
-from pedestal_common.text_files import files
+from pedestal_common.text_files import columns as _columns
+from pedestal_common.text_files import content, files
 
 MAX_CSV_BYTES = 64_000_000
-"""Bytes of a file."""
+"""Largest size of a file [bytes]."""
 
 MAX_CSV_ROWS = 1_000_000
+"""Largest number of rows of a file."""
+
+SEPARATORS = ('\t;|', ',')
+"""Characters that may separate cells; the comma comes last, because it may be a decimal comma."""
+DEFAULT_SEPARATORS = ', '
+"""Separators of a line in which no separator is found."""
+COMMENT_MARKS = ('#', '%', '//')
+HORIZONS_MARKS = '$$SOE', '$$EOE'
+"""Lines before the first and after the last row in a file of JPL Horizons."""
+MAX_HEAD_LINES = 2000
+"""Largest number of lines before the first row."""
+SNIFFED_LINES = 10
+"""Number of lines by which the separator is found."""
+
+_DIGIT_FIRST_PATTERN = re.compile(r'[-+]?\.?\d', re.ASCII)
+_DECIMAL_COMMA_PATTERN = re.compile(r'[-+]?\d+,\d+(?:[eE][-+]?\d+)?', re.ASCII)
 
 
 class TableError(ValueError):
-    """A file is no such table; one line naming file, line, column, value and allowed range."""
+    """Error of a file that is no such table; one line with file, line, column, value and allowed range."""
 
 
 def read(path, columns, least_rows=2, max_step=np.inf, step_name='its greatest step', optional=None) -> np.ndarray:
-    """The rows of a CSV file with a header, (n, k) in the order of columns {name: (low, high)}, then of the optional
-    ones, which are 0 where the file has none.
+    """Return the rows of a CSV file with a header, (n, k) in the order of columns {name: (low, high)}, then of the
+    optional columns, which are 0 where the file has none.
 
+    A name ends with the unit of the values, as in time_s; the file may have another known unit, as in `time [min]`.
     The first column grows from row to row, by at most max_step (called step_name in the error). Columns of other
-    names are passed over. Units are the last part of a name, as in time_s. Raises TableError.
+    names are ignored. Raises TableError.
     """
     first, *_ = columns
-    optional = optional or {}
-    unit = first.rpartition('_')[2]
+    unit = first.partition('_')[2]
+    limits = {**columns, **(optional or {})}
     rows = array.array('d')
-    width = len(columns) + len(optional)
-    with opened(path) as reader:
-        require(path, reader, columns)
-        there = {**columns, **{name: limits for name, limits in optional.items() if name in reader.fieldnames}}
-        for row in reader:
-            rows.extend(number(path, reader.line_num, name, row[name], *there[name]) if name in there else 0.0
-                        for name in (*columns, *optional))
+    width = len(limits)
+    with opened(path) as table:
+        there = {name: table.column(_columns.quantity(name), name in columns) for name in limits}
+        for row in table:
+            rows.extend(table.number(column, row[column.name], *limits[name]) if column else 0.0
+                        for name, column in there.items())
             step = rows[-width] - rows[-2 * width] if len(rows) > width else max_step
             if len(rows) > MAX_CSV_ROWS * width:
-                raise too_long(path, reader.line_num)
+                raise too_long(path, table.line_num)
             if not 0.0 < step <= max_step:
-                raise bad_step(path, reader.line_num, f'{first} = {rows[-width]:.10g}', step, unit, max_step,
+                raise bad_step(path, table.line_num, f'{first} = {rows[-width]:.10g}', step, unit, max_step,
                                step_name)
     if len(rows) < least_rows * width:
         raise TableError(f'{path}: {len(rows) // width} rows, must be at least {least_rows}')
@@ -49,33 +73,206 @@ def read(path, columns, least_rows=2, max_step=np.inf, step_name='its greatest s
 
 @contextlib.contextmanager
 def stream(path):
-    """Context with the bytes of a file of at most MAX_CSV_BYTES. What cannot be read raises TableError."""
+    """Yield the bytes of a file of at most MAX_CSV_BYTES, as a context. Raises TableError for a file that cannot be
+    read, and for a packed file."""
     try:
         with files.open_regular(path, MAX_CSV_BYTES) as file:
+            packed = content.packed(file.read(content.MAX_MARK_BYTES))
+            if packed:
+                raise TableError(f'{path}: {packed}')
+            file.seek(0)
             yield file
     except OSError as error:
         raise TableError(f'{path}: {error.strerror}') from None
 
 
-@contextlib.contextmanager
-def opened(path):
-    """Context with a csv.DictReader of a file, see `stream`."""
+def text(path):
+    """Return the text of a file, see `content.decode`. Raises TableError."""
     with stream(path) as file:
+        read_bytes = file.read(MAX_CSV_BYTES)
+    try:
+        return content.decode(read_bytes)
+    except UnicodeDecodeError as error:
+        line = 1 + read_bytes.count(b'\n', 0, error.start)
+        byte = f'byte {read_bytes[error.start]:#04x}' if error.start < len(read_bytes) else 'the end'
+        raise TableError(f'{path}: line {line}: {byte}: must be text in UTF-8, UTF-16 or Windows-1252 '
+                         '(latin-1)') from None
+
+
+READ_ERRORS = (TableError, csv.Error)
+"""Errors of a text that is no table."""
+
+
+@contextlib.contextmanager
+def opened(path, bare=()):
+    """Yield the Table of a file, as a context, see `text` and `Table`. Raises TableError."""
+    try:
+        yield Table(path, text(path), bare)
+    except csv.Error as error:
+        raise TableError(f'{path}: not a CSV text file: {error}') from None
+
+
+class Table:
+    """The rows of a CSV text as dictionaries {name of the column: cell}, without the blanks around a cell.
+
+        fieldnames      names of the columns, without the blanks around them
+        head_line       line of the names in the file
+        line_num        line of the last row
+        bare            names of the columns of a text without names, whose first line is a row of as many numbers
+    """
+
+    def __init__(self, path, content, bare=()):
+        self.path = path
+        lines = io.StringIO(content, newline='')
+        before, begin, separator = _beginning(lines)
+        self.line_num = self.head_line = len(before) + 1
+        sample = ''.join([begin, *itertools.islice(lines, SNIFFED_LINES)])
+        lines.seek(sum(map(len, before)))
+        self.separator = separator or _separator(begin, sample)
+        self._rows = csv.reader(lines, delimiter=self.separator, skipinitialspace=True)
+        self._passed, self._decimal, self._again = len(before), {}, None
+        first = self._cells() or []
+        self.fieldnames = tuple(first)
+        if _is_row(first):
+            names = _names_above(before, self.separator, bare) if before else []
+            if len(names) == len(first) and not _is_row(names):
+                self.fieldnames, self._again = tuple(map(str.strip, names)), first
+            elif len(bare) == len(first):
+                self.fieldnames, self._again = tuple(bare), first
+
+    def __iter__(self):
+        count = len(self.fieldnames)
+        while (cells := self._again or self._cells()) is not None:
+            self._again = None
+            if len(cells) > count and any(cells[count:]):
+                raise TableError(f'{self.path}: line {self.line_num}: {len(cells)} cells, must be {count} as in line '
+                                 f'{self.head_line} (separator {self.separator!r})')
+            yield dict(itertools.zip_longest(self.fieldnames, cells[:count]))
+
+    def _cells(self):
+        """Return the cells of the next row that is not blank, None at the end of the table."""
+        for cells in self._rows:
+            self.line_num = self._passed + self._rows.line_num
+            if cells and cells[0].strip() == HORIZONS_MARKS[1]:
+                return None
+            if cells and not cells[0].lstrip().startswith((*COMMENT_MARKS, HORIZONS_MARKS[0])) and any(
+                    map(str.strip, cells)) and set(''.join(cells)) != {'*'}:
+                return [cell.strip() for cell in cells]
+        return None
+
+    def column(self, quantity, required=True):
+        """Return the columns.Column of a columns.Quantity; None if there is none and it is not required. Raises
+        TableError."""
         try:
-            yield csv.DictReader(io.TextIOWrapper(file, newline='', encoding='utf-8-sig'))
-        except (UnicodeDecodeError, csv.Error) as error:
-            raise TableError(f'{path}: not a CSV text file: {error}') from None
+            column = _columns.find(self.fieldnames, quantity, required)
+        except _columns.ColumnError as error:
+            raise TableError(f'{self.path}: line {self.head_line}: {error}; {self._listed()}') from None
+        if column is None and required:
+            raise self.missing(quantity.label)
+        return column
+
+    def missing(self, name):
+        """Return the TableError of a column that is not in the table."""
+        return TableError(f'{self.path}: line {self.head_line}: column {name!r} is missing; '
+                          f'{self._listed()}')
+
+    def _listed(self):
+        return f'{_columns.listed(self.fieldnames)} (separator {self.separator!r})'
+
+    def number(self, column, cell, low, high):
+        """Return the number in a cell of a columns.Column, in the unit of its quantity, between low and high. Raises
+        TableError."""
+        return column.size * number(self.path, self.line_num, column.name, self.point(column.name, cell),
+                                    low / column.size, high / column.size)
+
+    def point(self, name, cell):
+        """Return a cell with a decimal point instead of a decimal comma. Raises TableError if the table has both."""
+        if self.separator == ',' or not cell:
+            return cell
+        for sign in ',.':
+            if sign in cell:
+                self._decimal.setdefault(sign, (self.line_num, name, cell))
+        if len(self._decimal) == 2:
+            line, other, was = next(iter(self._decimal.values()))
+            raise TableError(f'{self.path}: line {self.line_num}: {name} = {cell!r:.60}: must have the decimal sign '
+                             f'of line {line}, {other} = {was!r:.60}')
+        return cell.replace(',', '.') if _DECIMAL_COMMA_PATTERN.fullmatch(cell) else cell
 
 
-def require(path, reader, columns):
-    """Raise TableError where the header of a csv.DictReader lacks one of these columns."""
-    missing = [name for name in columns if name not in (reader.fieldnames or ())]
-    if missing:
-        raise TableError(f'{path}: line 1: column {missing[0]!r} is missing')
+def _beginning(lines):
+    """Return (lines before the names of the columns, line of the names, separator that the file names or '').
+
+    lines: stream of the text. The last comment before the names stays the last line before them.
+    """
+    before, separator, horizons = [], '', None
+    for line in itertools.islice(lines, MAX_HEAD_LINES):
+        before.append(line)
+        if line.strip() == HORIZONS_MARKS[0]:
+            horizons = next((i for i in range(len(before) - 2, -1, -1) if before[i].strip(' *\r\n\t')), None)
+            break
+    if horizons is not None:
+        lines.seek(sum(map(len, before[:horizons + 1])))
+        return before[:horizons], before[horizons], ''
+    for i, line in enumerate(before):
+        bare = line.strip()
+        if bare.lower().startswith('sep=') and len(line.strip('\r\n').lstrip()) == 5:
+            separator = line.strip('\r\n').lstrip()[4]
+        elif bare and not bare.startswith(COMMENT_MARKS) and not _is_title(bare, before[i + 1:]):
+            lines.seek(sum(map(len, before[:i + 1])))
+            return before[:i], line, separator
+    lines.seek(0, io.SEEK_END)
+    return before, '', separator
+
+
+def _names_above(before, separator, bare):
+    """Return the cells of the last line with text before the first row, which may be names in a comment.
+
+    Names between blanks count if one of them begins like one of `bare`, the names of a text without names.
+    """
+    line = next((line.strip().lstrip('#%/ \t') for line in reversed(before) if line.strip()), '')
+    cells, words = next(csv.reader([line], delimiter=separator, skipinitialspace=True), []), line.split()
+    named = any(word.lower().startswith(name[:2]) for word in words for name in bare)
+    return words if named and len(cells) < 2 else cells
+
+
+def _is_title(line, after):
+    """Return True if a line has no separator of cells and the next line with text has one."""
+    following = next((text.strip() for text in after if text.strip()), '')
+    separators = set(''.join(SEPARATORS))
+    return separators.isdisjoint(line) and not separators.isdisjoint(following)
+
+
+def _separator(begin, sample):
+    """Return the separator of the cells by the first line of a table and a sample of its lines."""
+    for separators in SEPARATORS:
+        there = ''.join(separator for separator in separators if separator in begin)
+        with contextlib.suppress(csv.Error):
+            if there:
+                return csv.Sniffer().sniff(sample, there).delimiter
+    return next((separator for separator in DEFAULT_SEPARATORS if separator in begin.strip()), DEFAULT_SEPARATORS[0])
+
+
+def _is_row(cells):
+    """Return True if cells are those of a row and not names: the first begins with a digit, another is a number."""
+    return bool(cells) and bool(_DIGIT_FIRST_PATTERN.match(cells[0])) and any(map(_is_number, cells[1:]))
+
+
+def _is_number(cell):
+    with contextlib.suppress(ValueError):
+        float(cell.replace(',', '.'))
+        return True
+    return False
+
+
+def require(table, names):
+    """Raise TableError where a Table lacks one of these columns."""
+    for name in names:
+        if name not in table.fieldnames:
+            raise table.missing(name)
 
 
 def number(path, line, name, cell, low, high):
-    """The number in a cell of text, between low and high. Raises TableError."""
+    """Return the number in a cell of text, between low and high. Raises TableError."""
     try:
         value = float(cell)
     except (TypeError, ValueError):
@@ -86,11 +283,11 @@ def number(path, line, name, cell, low, high):
 
 
 def too_long(path, line):
-    """The TableError of a file with more than MAX_CSV_ROWS rows."""
+    """Return the TableError of a file with more than MAX_CSV_ROWS rows."""
     return TableError(f'{path}: line {line}: must be at most {MAX_CSV_ROWS} rows')
 
 
 def bad_step(path, line, value, step, unit, max_step, step_name):
-    """The TableError of a row whose `value` does not grow from that of the row before by at most max_step."""
+    """Return the TableError of a row whose `value` does not grow from that of the row before by at most max_step."""
     limit = f' and at most {step_name} = {max_step:g} {unit}' if np.isfinite(max_step) else ''
     return TableError(f'{path}: line {line}: {value}: {step:g} {unit} after the row before, must be above 0{limit}')

@@ -1,17 +1,19 @@
-"""Files that others wrote, opened so that nothing in their name or their length hangs or fills the process."""
+"""Files of other programs, opened so that neither their kind nor their length hangs or fills the process."""
 import errno
 import hashlib
 import os
 import stat
 
 SPARSE_FILE_LIMITS = 16_000_000, 100
-"""A file longer than this [bytes], of which the disk holds less than one part in so many, is one large hole."""
+"""Length [bytes] above which a file may be refused as sparse, and the ratio of its length to its blocks on the disk
+above which it is refused."""
 
 
 def open_regular(path, largest=None):
-    """A regular file as an open binary stream: no device, no pipe, no directory, at most `largest` bytes where given.
+    """Return a regular file as an open binary stream: no device, no pipe, no directory, at most `largest` bytes where
+    given.
 
-    Raises OSError, whose strerror says what is wrong.
+    Raises OSError, whose strerror is the reason.
     """
     descriptor = os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK)
     try:
@@ -30,13 +32,13 @@ def open_regular(path, largest=None):
 
 
 def read_text(path, largest):
-    """The text of a regular UTF-8 file of at most `largest` bytes. Raises OSError, UnicodeDecodeError."""
+    """Return the text of a regular UTF-8 file of at most `largest` bytes. Raises OSError, UnicodeDecodeError."""
     with open_regular(path, largest) as stream:
         return stream.read(largest + 1).decode()
 
 
 def sha256(path) -> str:
-    """The SHA-256 of a file, read piece by piece. Raises OSError."""
+    """Return the SHA-256 of a file, read in pieces. Raises OSError."""
     digest = hashlib.sha256()
     with open(path, 'rb') as stream:
         while piece := stream.read(1 << 20):

@@ -1,45 +1,46 @@
-"""YAML as parameter files use it: sections, lists, numbers, true, false and texts, each what it looks like.
+"""YAML as parameter files use it: sections, lists, numbers, true, false and texts, each as it is written.
 
-YAML 1.1 takes 1:30 for 90, 010 for 8, 1_0 for 10, 2024-01-01 for a date and `on` for true; here they are texts, so
-that a parameter which is a number refuses them. A section says a key once. Tags are refused, and aliases with which a
-few lines stand for billions of values.
+YAML 1.1 reads 1:30 as 90, 010 as 8, 1_0 as 10, 2024-01-01 as a date and `on` as true. Here they are texts, so that a
+parameter which is a number refuses them. A section has each key once. Tags are refused, and so are aliases, where a
+few lines would stand for billions of values.
 """
 import re
+import typing
 
 import yaml
 
 from pedestal_common.text_files import files
 
 MAX_YAML_BYTES = 2_000_000
-"""Bytes of a file; every parameter of an array of 16 beams is a tenth of it."""
+"""Largest size of a file [bytes]; every parameter of an array of 16 beams is a tenth of it."""
 
 MAX_DEPTH, MAX_VALUES = 20, 200_000
-"""Sections in sections, and values with those that aliases stand for, at the most."""
+"""Largest depth of sections, and largest number of values, with those that aliases stand for."""
 
 _TAG = 'tag:yaml.org,2002:'
 _PLAIN = ('null', 'bool', 'int', 'float', 'str', 'seq', 'map')
-_Base = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
+_Base: typing.Any = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
 
 
 class _Loader(_Base):
-    """A loader of the plain values."""
+    """Loader of the plain values."""
 
-    yaml_implicit_resolvers = {}
+    yaml_implicit_resolvers: dict = {}
     yaml_constructors = {tag: _Base.yaml_constructors[tag] for tag in (*(_TAG + name for name in _PLAIN), None)}
 
     def construct_mapping(self, node, deep=False):
-        """A section {text: value}, each of its keys there once."""
+        """Return a section {text: value}, with each of its keys once."""
         section = {}
         for key, value in node.value:
             if not isinstance(key, yaml.ScalarNode):
                 raise yaml.constructor.ConstructorError(None, None, 'a key must be a text', key.start_mark)
             if key.value in section:
-                raise yaml.constructor.ConstructorError(None, None, f'{key.value!r} is said twice', key.start_mark)
+                raise yaml.constructor.ConstructorError(None, None, f'{key.value!r} is given twice', key.start_mark)
             section[key.value] = self.construct_object(value, deep=deep)
         return section
 
     def construct_integer(self, node):
-        """A whole number of 64 bits, as ROS 2 has them."""
+        """Return an integer of 64 bits, the range of ROS 2."""
         if len(node.value) > 20 or not -2**63 <= int(node.value, 0) < 2**63:
             raise yaml.constructor.ConstructorError(None, None, f'{node.value[:20]}... has more than 64 bits',
                                                     node.start_mark)
@@ -56,19 +57,19 @@ for _name, _pattern, _first in (
 
 
 def parse(text):
-    """The values of a YAML text. Raises yaml.YAMLError."""
+    """Return the values of a YAML text. Raises yaml.YAMLError."""
     _check(yaml.parse(text, Loader=_Base))
     return yaml.load(text, Loader=_Loader)
 
 
 def _check(events):
-    """Raise yaml.YAMLError where a text is too deep, says a tag or stands for too many values."""
+    """Raise yaml.YAMLError where a text is too deep, contains a tag or stands for too many values."""
     count, begun, sizes = 0, [], {}
     for event in events:
         if getattr(event, 'tag', None):
             raise yaml.composer.ComposerError(None, None, f'tag {event.tag}', event.start_mark)
         if isinstance(event, yaml.AliasEvent):
-            count += sizes.get(event.anchor, MAX_VALUES)  # of nothing, or of what it stands in
+            count += sizes.get(event.anchor, MAX_VALUES)  # an unknown anchor, or one around this alias, has no size
         elif isinstance(event, yaml.CollectionStartEvent):
             begun.append((event.anchor, count))
         elif isinstance(event, yaml.CollectionEndEvent):
@@ -83,13 +84,13 @@ def _check(events):
 
 
 def read(path):
-    """The values of a YAML file of at most MAX_YAML_BYTES bytes. Raises OSError, UnicodeDecodeError,
+    """Return the values of a YAML file of at most MAX_YAML_BYTES bytes. Raises OSError, UnicodeDecodeError,
     yaml.YAMLError."""
     return parse(files.read_text(path, MAX_YAML_BYTES))
 
 
 def problem(error) -> str:
-    """What an error of `read` or `parse` says, on one line and without the path."""
+    """Return the reason of an error of `read` or `parse`, on one line and without the path."""
     if isinstance(error, OSError):
         return error.strerror or str(error)
     if isinstance(error, UnicodeDecodeError):

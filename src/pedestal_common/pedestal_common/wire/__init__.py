@@ -1,1 +1,1 @@
-"""Messages as numbers: CDR, records, and the commands that a node takes."""
+"""Messages as numbers: CDR, records, and the commands of a node."""

@@ -1,7 +1,7 @@
-"""Where the numbers of a message lie in its CDR bytes.
+"""Places of the numbers of a message in its CDR bytes.
 
-Messages of a topic that differ in their numbers only have them at the same places, so one is walked by the definition
-of its type, and the others are read at the places found.
+Messages of a topic that differ only in their numbers have them at the same places. One message is therefore parsed by
+the definition of its type, and the others are read at the places found.
 """
 import struct
 
@@ -15,23 +15,24 @@ _DTYPES = {'bool': 'u1', 'byte': 'u1', 'char': 'u1', **{name: f'{name[0]}{size}'
                                                        if name[0] in 'iuf'}}
 
 STAMPED_TYPES = {'rosgraph_msgs/msg/Clock'}
+"""Types whose bytes 4 to 12 are their stamp."""
 STAMPED_TYPES.update(name for name, (_, fields) in ROS_TYPESTORE.fielddefs.items()
                      if fields and fields[0] == ('header', (Nodetype.NAME, 'std_msgs/msg/Header')))
 """Types whose bytes 4 to 12 are their stamp."""
 
 MAX_MESSAGE_NUMBERS = 400_000
-"""Numbers in one message at the most; a program track of a whole day has 350,000."""
+"""Largest number of numbers in one message; a program track of a whole day has 350,000."""
 
 PADDING_LIMIT_BYTES = 4
-"""Bytes that DDS may add behind a message, less than this."""
+"""Number of bytes [bytes] that DDS adds behind a message, always less than this."""
 
 
 class Places:
-    """The places in one message, CDR bytes of a type.
+    """Places in one message, given as CDR bytes of a type.
 
-    numbers [(path, start, dtype)], texts {path: text}, fixed [(start, stop)]: the bytes that must be the same in
-    another message for its numbers to lie at these places; stop: where the message ends.
-    Raises ValueError when the bytes are no message of the type.
+    numbers [(path, start, dtype)], texts {path: text}, fixed [(start, stop)]: bytes that must be equal in another
+    message for its numbers to be at these places; stop: end of the message. Raises ValueError when the bytes are no
+    message of the type.
     """
 
     def __init__(self, data, type_name):
@@ -51,7 +52,7 @@ class Places:
             self._node(node, prefix + name)
 
     def _take(self, size, alignment, path):
-        """Start of the next `size` bytes."""
+        """Return the start of the next `size` bytes."""
         self.stop += -(self.stop - 4) % alignment
         start, self.stop = self.stop, self.stop + size
         if self.stop > len(self.data):
@@ -75,7 +76,7 @@ class Places:
             size = _SIZES[what[0]]
             self.numbers.append((path, self._take(size, size, path), self.order + _DTYPES[what[0]]))
             if len(self.numbers) > MAX_MESSAGE_NUMBERS:
-                raise ValueError(f'a {len(self.data)} bytes long message has more than {MAX_MESSAGE_NUMBERS} numbers')
+                raise ValueError(f'message of {len(self.data)} bytes: must have at most {MAX_MESSAGE_NUMBERS} numbers')
         else:
             count = what[1] if kind == Nodetype.ARRAY else self._length(path)
             for i in range(count):

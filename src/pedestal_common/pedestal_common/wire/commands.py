@@ -1,8 +1,8 @@
-"""Commands: what somebody asks of a node by a verb with arguments, and what came of it.
+"""Commands to a node, with arguments, and the replies to them.
 
-On a topic a command is a diagnostic_msgs/DiagnosticStatus: name = verb, hardware_id = who asks, message = the number
-of the request, values = the arguments as texts. The reply says the same again, with level OK or WARN and two values
-more, `granted` (true or false) and `reply`. In a parameter commands stand in a schedule of lines 'AT VERB name=value',
+On a topic a command is a diagnostic_msgs/DiagnosticStatus: name = command, hardware_id = client, message = number of
+the request, values = arguments as texts. The reply repeats these fields, with level OK or WARN and two more values,
+`granted` (true or false) and `reply`. In a parameter, commands stand in a schedule of entries 'AT COMMAND name=value',
 separated by semicolons. No ROS here.
 """
 import math
@@ -13,25 +13,27 @@ from pedestal_common.parameters import ParameterError, did_you_mean
 from pedestal_common.wire import messages
 
 SERVICE_CLIENT, SCHEDULE_CLIENT = 'service', 'scenario'
-"""Who asks by a service, which does not know its caller, and by a schedule."""
+"""Clients of a command by service, whose caller is unknown, and of a command by schedule."""
 
 RESERVED_KEYS = ('granted', 'reply')
-"""Values of a reply beside the arguments."""
+"""Keys of a reply beside the arguments."""
 
 MAX_TEXT_CHARACTERS = 200
-"""Characters of a name or value at the most."""
+"""Largest length of a name or value [characters]."""
 
 MAX_ARGUMENTS = 20
-"""Arguments of a command at the most."""
+"""Largest number of arguments of a command."""
 
 MAX_COMMAND_AGE_NS = 1_000_000_000
-"""Time [ns] from sent to heard after which a command is too old to be obeyed."""
+"""Time from the sending of a command to its reception, after which a node drops the command [ns]."""
 
-SCHEDULE_DOC = "to be obeyed at times [s]: 'AT VERB name=value ...; AT VERB ...'; empty: none"
+SCHEDULE_DOC = "commands executed at times [s]: 'AT COMMAND name=value ...; AT COMMAND ...'; empty: none"
+"""Meaning of a parameter that holds a schedule."""
 
 
 class Command(typing.NamedTuple):
-    """What is asked: the verb, or the name of a service; who asks; the number of the request; {argument: text}."""
+    """Request of a client. verb: name of the command or service; who: the client; number: number of the request;
+    arguments: {argument: text}."""
     verb: str
     who: str = ''
     number: str = ''
@@ -42,13 +44,13 @@ class Command(typing.NamedTuple):
 
 
 class Reply(typing.NamedTuple):
-    """What came of it: whether it was granted, and one line for people."""
+    """Answer to a command. granted: True if the node accepts it; text: one line for people."""
     granted: bool
     text: str
 
 
 class Argument(typing.NamedTuple):
-    """An argument of a verb: a number between low and high, or one of the options; without either any text.
+    """Argument of a command: a number between low and high, or one of the options; without either, any text.
 
     default: its value where it is left out; None: it must be given.
     """
@@ -62,25 +64,26 @@ class Argument(typing.NamedTuple):
 
     @property
     def range(self):
-        """What it may be, in words."""
+        """Allowed values, in words."""
         if self.options:
             return f'one of {", ".join(self.options)}'
         return f'{self.low:g} to {self.high:g}' if self.low > -math.inf else 'text'
 
 
 class CommandDefinition(typing.NamedTuple):
-    """A row of a unit's table of verbs."""
+    """Row of a unit's table of commands."""
     name: str
     doc: str
     arguments: tuple = ()
 
 
 def values(verbs, command) -> dict:
-    """{argument: number or text} of a command by the table of verbs, defaults included. Raises ValueError."""
+    """Return {argument: number or text} of a command by the table of commands, defaults included. Raises
+    ValueError."""
     verb = next((verb for verb in verbs if verb.name == command.verb), None)
     if verb is None:
         names = [verb.name for verb in verbs]
-        raise ValueError(f'unknown verb {command.verb!r};{did_you_mean(command.verb, names)} there are '
+        raise ValueError(f'unknown command {command.verb!r};{did_you_mean(command.verb, names)} there are '
                          f'{", ".join(names)}')
     known = [argument.name for argument in verb.arguments]
     for name in command.arguments:
@@ -114,67 +117,68 @@ def _value(verb, argument, text):
 
 
 def of_message(status) -> Command:
-    """The Command in a DiagnosticStatus. Raises ValueError."""
+    """Return the Command in a DiagnosticStatus. Raises ValueError."""
     given = [(value.key, value.value) for value in status.values]
     if len(given) > MAX_ARGUMENTS:
         raise ValueError(f'{len(given)} arguments: must be at most {MAX_ARGUMENTS}')
     for text in (status.name, status.hardware_id, status.message, *(text for pair in given for text in pair)):
         if len(text) > MAX_TEXT_CHARACTERS or not text.isprintable():
-            raise ValueError(f'a text of {len(text)} characters: must be at most {MAX_TEXT_CHARACTERS}, all of them printable')
+            raise ValueError(f'a text of {len(text)} characters: must be at most {MAX_TEXT_CHARACTERS}, all of them '
+                             'printable')
     arguments = dict(given)
     if len(arguments) < len(given) or set(arguments) & {*RESERVED_KEYS, ''}:
-        raise ValueError(f'arguments {", ".join(key for key, _ in given)}: each must be there once and none be called '
-                         f'{" or ".join(RESERVED_KEYS)}')
+        raise ValueError(f'arguments {", ".join(key for key, _ in given)}: each must be given once, and none may be '
+                         f'named {" or ".join(RESERVED_KEYS)}')
     return Command(status.name, status.hardware_id, status.message, arguments)
 
 
 def message(command):
-    """The DiagnosticStatus of a Command."""
+    """Return the DiagnosticStatus of a Command."""
     return messages.DiagnosticStatus(level=0, name=command.verb, hardware_id=command.who, message=command.number,
                                      values=[messages.KeyValue(key=key, value=str(text))
                                              for key, text in command.arguments.items()])
 
 
 def reply_message(command, reply):
-    """The DiagnosticStatus that tells what came of a Command."""
-    told = message(command)
-    told.level = 0 if reply.granted else 1
-    told.values += [messages.KeyValue(key='granted', value=str(reply.granted).lower()),
-                    messages.KeyValue(key='reply', value=reply.text)]
-    return told
+    """Return the DiagnosticStatus of the Reply to a Command."""
+    status = message(command)
+    status.level = 0 if reply.granted else 1
+    status.values += [messages.KeyValue(key='granted', value=str(reply.granted).lower()),
+                      messages.KeyValue(key='reply', value=reply.text)]
+    return status
 
 
 def of_reply(status):
-    """(Command, Reply) of a DiagnosticStatus on a topic of replies. Raises ValueError."""
+    """Return (Command, Reply) of a DiagnosticStatus on a topic of replies. Raises ValueError."""
     rest = [value for value in status.values if value.key not in RESERVED_KEYS]
-    told = {value.key: value.value for value in status.values if value.key in RESERVED_KEYS}
-    if set(told) != set(RESERVED_KEYS):
-        raise ValueError(f'a reply without {" and ".join(RESERVED_KEYS)}')
+    result = {value.key: value.value for value in status.values if value.key in RESERVED_KEYS}
+    if set(result) != set(RESERVED_KEYS):
+        raise ValueError(f'a reply must have {" and ".join(RESERVED_KEYS)}')
     bare = messages.DiagnosticStatus(level=0, name=status.name, hardware_id=status.hardware_id,
                                      message=status.message, values=rest)
-    return of_message(bare), Reply(told['granted'] == 'true', told['reply'])
+    return of_message(bare), Reply(result['granted'] == 'true', result['reply'])
 
 
 def parsed(text) -> Command:
-    """The Command of a text 'VERB name=value ...' by nobody. Raises ValueError."""
+    """Return the Command of a text 'COMMAND name=value ...', without a client. Raises ValueError."""
     verb, *pairs = text.split()
     arguments = {}
     for pair in pairs:
         name, equals, value = pair.partition('=')
         if not (name and equals and value) or name in arguments:
-            raise ValueError(f'{pair!r}: must be name=value, each once')
+            raise ValueError(f'{pair!r}: must be name=value, each name once')
         arguments[name] = value
     return Command(verb, arguments=arguments)
 
 
 def schedule(name, text, verbs) -> list:
-    """[(at [ns], Command)] of the schedule in a parameter of this name, in order of time. Raises ParameterError."""
+    """Return [(at [ns], Command)] of the schedule in the parameter `name`, in order of time. Raises ParameterError."""
     due = []
     for part in filter(None, (part.strip() for part in text.split(';'))):
         at, _, rest = part.partition(' ')
         try:
             if not (re.fullmatch(r'\d+(\.\d+)?', at) and len(at) < 20 and rest.strip()):
-                raise ValueError('must be AT VERB name=value ..., AT in seconds')
+                raise ValueError('must be AT COMMAND name=value ..., AT in seconds')
             command = parsed(rest)._replace(who=SCHEDULE_CLIENT)
             values(verbs, command)
         except ValueError as error:

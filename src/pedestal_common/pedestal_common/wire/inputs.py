@@ -1,8 +1,8 @@
-"""The inputs of a unit that follow from the rows of the topics that it reads: their record, and the copy into it.
+"""Inputs of a unit that follow from the rows of its topics: their record, and the copy into it.
 
 Topic.inputs names them by the fields of the record of the topic. A name that stands for several numbers is an array.
-Beside the fields of its layout a message has `stamp`, here in seconds, and `came`: 1 in a step in which it came, else
-0. The others keep what the last message said. A text has `code`.
+Beside the fields of its layout a message has `stamp`, here in seconds, and `came`: 1 in a step in which it arrived,
+else 0. The other inputs keep the values of the last message. A text has `code`.
 """
 import itertools
 
@@ -49,9 +49,9 @@ def _lines(topic):
 
 
 def taking(names):
-    """Return the function take(u, inputs) for laws: the records of these topics -> inputs u."""
+    """Return the function take(u, inputs) for laws, which copies the records of these topics into the inputs u."""
     made = {}
     lines = [line for topic in names if topics.TOPIC_BY_NAME[topic].inputs for line in _lines(topic)]
-    exec('\n'.join(('def take(u, inputs):', *lines)), made)    # static, as the compiler needs the names of fields
+    exec('\n'.join(('def take(u, inputs):', *lines)), made)    # static, because numba needs the names of the fields
     overload(made['take'], inline='always')(lambda u, inputs: made['take'])
     return made['take']

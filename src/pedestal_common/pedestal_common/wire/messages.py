@@ -1,8 +1,8 @@
 """Messages as rosbags builds them: the same classes in a node, a bag and a test.
 
-Nodes publish bytes that rosbags serialised. rclpy's own serialiser leaves the alignment padding of CDR
-undefined (measured: stale bytes of earlier messages, in 297 of 300 diagnostics), so that no recording of
-it could be the same twice; rosbags writes zeros there, and reads a JointState in half the time.
+Nodes publish bytes that rosbags serialised. Because rclpy's own serialiser leaves the alignment padding of CDR
+undefined, its recordings are never identical (measured: stale bytes of earlier messages, in 297 of 300 diagnostics).
+The serialiser of rosbags writes zeros there. It also reads a JointState in half the time.
 """
 import struct
 
@@ -16,7 +16,7 @@ _TYPES = ROS_TYPESTORE.types
 _STAMP = struct.Struct('<iI')
 
 MAX_CDR_BYTES = 8_000_000
-"""Bytes of a message at the most; a program track of a whole day has 7 million."""
+"""Largest size of a message [bytes]; a program track of a whole day has 7 million."""
 
 Clock = _TYPES['rosgraph_msgs/msg/Clock']
 DiagnosticArray = _TYPES['diagnostic_msgs/msg/DiagnosticArray']
@@ -41,14 +41,15 @@ TwistWithCovariance = _TYPES['geometry_msgs/msg/TwistWithCovariance']
 Vector3 = _TYPES['geometry_msgs/msg/Vector3']
 Vector3Stamped = _TYPES['geometry_msgs/msg/Vector3Stamped']
 
+
 def serialize(message) -> bytes:
-    """CDR bytes of a message, padding zeroed."""
+    """Return the CDR bytes of a message, padding zeroed."""
     return bytes(ROS_TYPESTORE.serialize_cdr(message, message.__msgtype__))
 
 
 def deserialize(data, type_name):
-    """The message in CDR bytes; raises ValueError naming the type when they do not hold one, or are over
-    MAX_CDR_BYTES."""
+    """Return the message in CDR bytes. Raises ValueError, which names the type, for bytes without such a message and
+    for more than MAX_CDR_BYTES."""
     if len(data) > MAX_CDR_BYTES:
         raise ValueError(f'{len(data)} bytes of a {type_name}, must be at most {MAX_CDR_BYTES}')
     try:
@@ -58,17 +59,18 @@ def deserialize(data, type_name):
 
 
 def definition(type_name) -> bytes:
-    """The definition of a message type and of those in it, as a reader of `ros2msg` schemas wants it."""
+    """Return the definition of a message type and of the types in it, as a reader of `ros2msg` schemas needs it."""
     return ROS_TYPESTORE.generate_msgdef(type_name, ros_version=2)[0].encode()
 
 
 def nanoseconds(stamp) -> int:
-    """A Time as integer nanoseconds."""
+    """Return a Time as integer nanoseconds."""
     return stamp.sec * 1_000_000_000 + stamp.nanosec
 
 
 def stamp_of(data) -> int:
-    """The stamp [ns] in the CDR bytes of a message that begins with one; raises ValueError when there is none."""
+    """Return the stamp [ns] in the CDR bytes of a message that begins with a stamp. Raises ValueError for other
+    bytes."""
     if len(data) >= 12:
         seconds, nanosec = _STAMP.unpack_from(data, 4)
         if seconds >= 0 and nanosec < 1_000_000_000:
@@ -83,24 +85,24 @@ def put_stamp(stamp, ns):
 
 
 def since(message, epoch):
-    """The message with its header's stamp counted from an epoch [ns]; a stamp 0 is the epoch itself."""
+    """Return the message with its header's stamp counted from an epoch [ns]; a stamp 0 is the epoch itself."""
     stamp = nanoseconds(message.header.stamp)
     put_stamp(message.header.stamp, stamp - epoch if stamp else 0)
     return message
 
 
-def header(frame_id) -> Header:
-    """A Header at stamp 0."""
+def header(frame_id):
+    """Return a Header at stamp 0."""
     return Header(stamp=Time(sec=0, nanosec=0), frame_id=frame_id)
 
 
-def vector3(x=0.0, y=0.0, z=0.0) -> Vector3:
-    """A Vector3."""
+def vector3(x=0.0, y=0.0, z=0.0):
+    """Return a Vector3."""
     return Vector3(x=x, y=y, z=z)
 
 
-def trajectory_point(size) -> JointTrajectoryPoint:
-    """A point of so many joints, all zero, without effort."""
+def trajectory_point(size):
+    """Return a point of `size` joints, all zero, without effort."""
     return JointTrajectoryPoint(positions=np.zeros(size), velocities=np.zeros(size), accelerations=np.zeros(size),
                                 effort=np.zeros(0), time_from_start=Duration(sec=0, nanosec=0))
 
@@ -121,13 +123,13 @@ def _vector3_stamped(row):
 
 
 def _range(row):
-    """Of radio, which the type has no code for (its 0 is the other one that is no light); any distance."""
+    """Return a Range of radio, any distance. The type has no code for radio; its 0 is the code that is not light."""
     return Range(header=header(row.frame), radiation_type=0, field_of_view=0.0, min_range=0.0, max_range=float('inf'),
                  range=0.0, variance=0.0)
 
 
 def _odometry(row):
-    """At rest in the origin, covariances zero (unknown)."""
+    """Return an Odometry at rest in the origin, covariances zero (unknown)."""
     pose = Pose(position=Point(x=0.0, y=0.0, z=0.0), orientation=Quaternion(x=0.0, y=0.0, z=0.0, w=1.0))
     return Odometry(header=header(row.frame), child_frame_id=row.child,
                     pose=PoseWithCovariance(pose=pose, covariance=np.zeros(36)),
@@ -148,13 +150,13 @@ _TEMPLATES = {'sensor_msgs/msg/JointState': _joint_state, 'trajectory_msgs/msg/J
 
 
 def template(topic):
-    """A message of a stamped topic of the table as its writer begins it: names and frames set, numbers zero."""
+    """Return a message of a stamped topic of the table, with its names and frames set and its numbers zero."""
     row = topics.TOPIC_BY_NAME[topic]
     return _TEMPLATES[row.type](row)
 
 
-def program_track(points) -> JointTrajectory:
-    """An acu/program_track of JointTrajectoryPoints."""
+def program_track(points):
+    """Return an acu/program_track of JointTrajectoryPoints."""
     message = template('acu/program_track')
     message.points = points
     return message

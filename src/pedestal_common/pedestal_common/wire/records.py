@@ -1,13 +1,13 @@
-"""The numbers of messages as records: of one message in a node, of a whole run in the closed loop, of many in a bag.
+"""Numbers of messages as records: of one message in a node, of a whole run in the closed loop, of many in a bag.
 
 A unit reads and writes one record that has a field for each of its topics:
 
-    stamped message     stamp [ns], then the fields of its layout; one that did not come, or is not to be sent, has
-                        stamp NO_STAMP
-    text, list of texts a whole number, its code; topics.SILENT before the first
+    stamped message     stamp [ns], then the fields of its layout; stamp NO_STAMP for a message that did not arrive or
+                        that is not to be published
+    text, list of texts an integer, its code; topics.NO_TEXT_CODE before the first
 
-A Decoder takes the numbers out of the CDR bytes of a message, an Encoder puts numbers into them, both by the places at
-which they lie (cdr.Places); neither builds a message object.
+A Decoder reads the numbers from the CDR bytes of a message, an Encoder writes numbers into them, both by their places
+(cdr.Places). Neither builds a message object.
 """
 import struct
 
@@ -17,7 +17,7 @@ from pedestal_common.graph import layouts, topics
 from pedestal_common.wire import cdr, messages
 
 NO_STAMP = -2**63
-"""Stamp [ns] of a message that did not come."""
+"""Stamp [ns] of a message that did not arrive."""
 
 TEXT_TYPES = ('std_msgs/msg/String', 'diagnostic_msgs/msg/DiagnosticArray')
 """Types of a text and of a list of texts."""
@@ -35,17 +35,17 @@ def _type(topic):
 
 
 def of(*names) -> np.dtype:
-    """The record of these topics."""
+    """Return the type of the record of these topics."""
     return np.dtype([(name, _type(name)) for name in names])
 
 
 def is_text(topic) -> bool:
-    """Whether a topic of the table is a text, or a list of them, told by its code."""
+    """Return True if a topic of the table is a text or a list of texts, held in records by its code."""
     return topics.TOPIC_BY_NAME[topic].type in TEXT_TYPES and topics.TOPIC_BY_NAME[topic].rate == 'change'
 
 
 def empty(record_type, count) -> np.ndarray:
-    """Records (count,) in which nothing came and nothing was said."""
+    """Return records (count,) without any message or text."""
     made = np.zeros(count, record_type)
     for name in record_type.names:
         if record_type[name].names is None:
@@ -56,19 +56,19 @@ def empty(record_type, count) -> np.ndarray:
 
 
 def numbers(records, topic) -> np.ndarray:
-    """View (n, columns) of the numbers of a stamped topic in records (n,)."""
+    """Return a view (n, columns) of the numbers of a stamped topic in records (n,)."""
     start = records.dtype.fields[topic][1] // 8 + 1
     return records.view('f8').reshape(len(records), -1)[:, start:start + len(layouts.columns(topic))]
 
 
 def code_of(topic, text) -> int:
-    """The code of a text that a reader tells apart; of any other the number of those."""
+    """Return the code of a text: its index in Topic.texts, or their number for any other text."""
     texts = topics.TOPIC_BY_NAME[topic].texts
     return texts.index(text) if text in texts else len(texts)
 
 
 class _Shape:
-    """Where the columns of a topic lie in messages alike in everything but their numbers, from one of them.
+    """Places of the columns of a topic, from one message, valid for messages that differ only in their numbers.
 
     fields: [(column, start, dtype)]; reader: the Struct that reads these numbers at once.
     """
@@ -89,13 +89,13 @@ class _Shape:
         self.reader = struct.Struct(form)
 
     def fits(self, data):
-        """Whether the numbers of a message lie at the same places."""
+        """Return True if the numbers of a message are at the same places."""
         return 0 <= len(data) - self.size < cdr.PADDING_LIMIT_BYTES and all([data[start:stop] == text
                                                                              for start, stop, text in self.guard])
 
 
 def _joined(fixed):
-    """Neighbouring (start, stop) as one."""
+    """Return the list of (start, stop) with neighbours merged."""
     joined = []
     for start, stop in sorted(fixed):
         if joined and joined[-1][1] == start:
@@ -106,7 +106,7 @@ def _joined(fixed):
 
 
 def _runs(fields):
-    """[(columns as a slice, dtype, count, start)] of numbers [(column, start, dtype)], neighbours written at once."""
+    """Return [(columns as a slice, dtype, count, start)] of numbers [(column, start, dtype)], neighbours merged."""
     runs = []
     for column, start, dtype in fields:
         dtype = np.dtype(dtype)
@@ -120,7 +120,7 @@ def _runs(fields):
 
 
 class Decoder:
-    """Takes the messages of one stamped topic apart. record: (1,), whose field of this topic `put` fills."""
+    """Reader of the messages of one stamped topic. record: (1,), whose field of this topic `put` fills."""
 
     def __init__(self, topic, record):
         self.topic = topic
@@ -129,8 +129,8 @@ class Decoder:
         self._stamp, self._numbers = record[topic]['stamp'], numbers(record, topic)[0]
 
     def decoded(self, data):
-        """(stamp [ns], numbers (columns,)) of CDR bytes; NaN for a number the message has not. Raises ValueError when
-        they are no message of the topic's type, or their stamp is none."""
+        """Return (stamp [ns], numbers (columns,)) of CDR bytes, NaN for a number that the message does not contain.
+        Raises ValueError for bytes that are no message of the topic's type, and for an invalid stamp."""
         if not self._shape.fits(data):
             self._shape = _Shape(self.topic, data)
         seconds, nanoseconds = _STAMP.unpack_from(data, 4)
@@ -144,7 +144,7 @@ class Decoder:
         return seconds * 1_000_000_000 + nanoseconds, values
 
     def put(self, stamp, values):
-        """Put what `decoded` gave into the record; values None: nothing came."""
+        """Put the result of `decoded` into the record; values None: no message arrived."""
         if values is None:
             self._stamp[0] = NO_STAMP
         else:
@@ -153,10 +153,10 @@ class Decoder:
 
 
 class Encoder:
-    """Makes the messages of one stamped topic.
+    """Maker of the messages of one stamped topic.
 
     template: a message whose names, frames and constants stay; record: (1,), whose field of this topic holds the
-    numbers; None where only `bytes_of` is asked for.
+    numbers; None where only `bytes_of` is used.
     """
 
     def __init__(self, topic, template, record=None):
@@ -170,15 +170,15 @@ class Encoder:
 
     @property
     def due(self):
-        """Whether the record holds a message."""
+        """True if the record holds a message."""
         return self._stamp[0] != NO_STAMP
 
     def encoded(self, epoch=0) -> bytes:
-        """The message with the numbers of the record, its stamp counted from the epoch [ns]."""
+        """Return the message with the numbers of the record, its stamp counted from the epoch [ns]."""
         return self.bytes_of(self._stamp.item() + epoch, self._numbers)
 
     def bytes_of(self, stamp, values) -> bytes:
-        """The message with a stamp [ns] and numbers (columns,)."""
+        """Return the message with a stamp [ns] and numbers (columns,)."""
         _STAMP.pack_into(self._buffer, 4, *divmod(stamp, 1_000_000_000))
         for columns, view in self._views:
             view[:] = values[columns]

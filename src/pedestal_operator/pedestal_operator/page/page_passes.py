@@ -68,8 +68,8 @@ def upcoming_passes(query):
     except orbit.TargetError:
         known = []
     return [{'aos': _seconds(each.rise) - query.ahead, 'los': _seconds(each.set) - query.ahead,
-             'highest': round(each.elevation, 1), 'from': round(each.rise_azimuth, 1),
-             'to': round(each.set_azimuth, 1)} for each in known]
+             'highest': round(each.elevation, 1), 'from': round(each.rise_azimuth, 1) % 360.0,
+             'to': round(each.set_azimuth, 1) % 360.0} for each in known]
 
 
 def _seconds(utc):

@@ -54,7 +54,7 @@ def _deck(antenna):
 def now(antenna) -> dict:
     """Return the present numbers: angles and rates [deg, deg/s], errors [deg], level [dB-Hz], torques [Nm]."""
     actual, commanded = antenna.angles('joint_states'), antenna.angles('acu/reference')
-    receiver, torques = (math.nan,) * 3, ()
+    receiver, torques = (math.nan,) * 3, []
     if antenna.present(ANGLE_ERROR_TOPIC):
         x, y, level = antenna.numbers[ANGLE_ERROR_TOPIC]
         receiver = math.degrees(x), math.degrees(y), level

@@ -12,7 +12,7 @@ MAX_LINE_BYTES = 256
 VERB_BY_WORD = {'SA': 'stop', 'SE': 'stop', 'RESET': 'acu/reset_faults', 'PARK': 'stow'}
 """{word: command of the control unit}."""
 
-MOVE_DIRECTIONS = {'ML': (-1, 0), 'MR': (1, 0), 'MU': (0, 1), 'MD': (0, -1)}
+MOVE_DIRECTIONS: dict[str, tuple] = {'ML': (-1, 0), 'MR': (1, 0), 'MU': (0, 1), 'MD': (0, -1)}
 """{word of a move at the jog rate: direction (azimuth, elevation)}."""
 
 VELOCITY_DIRECTIONS = {'VL': (-1, 0), 'VR': (1, 0), 'VU': (0, 1), 'VD': (0, -1)}

@@ -50,10 +50,10 @@ def joints(description=PEDESTAL_URDF) -> tuple:
     """Return the Joints of a URDF in its order; all frames must be parallel at angle 0 (no `rpy`)."""
     found = []
     for joint in ElementTree.fromstring(description).iter('joint'):
-        axis = joint.find('axis')
-        found.append(Joint(joint.get('name'), joint.find('parent').get('link'), joint.find('child').get('link'),
-                           _numbers(joint.find('origin').get('xyz')), None if axis is None else
-                           _numbers(axis.get('xyz'))))
+        parts = {part.tag: part.attrib for part in joint}
+        found.append(Joint(joint.attrib['name'], parts['parent']['link'], parts['child']['link'],
+                           _numbers(parts['origin']['xyz']),
+                           _numbers(parts['axis']['xyz']) if 'axis' in parts else None))
     return tuple(found)
 
 

@@ -1,7 +1,8 @@
 """The floor of `pedestal bench graph`: bare rclpy nodes that pass the graph's messages and compute nothing.
 
-python -m pedestal_studies.bench.bare_ring ROLE STEPS, one process per role; the role `adu` prints the time of a lap.
-Same topics, types, QoS and executor as the graph, messages made once and published by rclpy itself.
+`python -m pedestal_studies.bench.bare_ring ROLE STEPS` runs one process per role; the role `adu` prints the time of a
+lap. Topics, types, QoS and executor are those of the graph. The messages are made once, and rclpy itself publishes
+them.
 """
 import json
 import sys
@@ -13,13 +14,15 @@ from pedestal_common.graph import layouts, nodes, topics
 from pedestal_common.node import middleware, shell
 
 RING_NODES = ('tracking_receiver', 'acu', 'adu', 'recorder')
+"""Nodes of the ring."""
 TRIGGER_TOPICS = {'tracking_receiver': 'adu/truth', 'acu': 'tracking_receiver/angle_error', 'adu': 'acu/rate_command'}
+"""{node: topic whose message triggers a lap of the node}."""
 WARM_UP_LAPS = 300
 """Laps before the clock starts."""
 
 
 def _filled(topic):
-    """An rclpy message with as many values as the graph's."""
+    """Return an rclpy message with as many values as the message of the graph."""
     type_name = topic.type
     message = middleware.message_class(type_name)()
     if type_name.endswith('JointState'):
@@ -34,7 +37,7 @@ def _filled(topic):
 
 
 class Ring(Node):
-    """A node of the ring: it passes on what comes on its trigger and drops everything else."""
+    """Node of the ring: it publishes its messages when a message arrives on its trigger, and drops all others."""
     awaits = 'its trigger'
     spin = shell.Shell.spin
 
@@ -51,30 +54,30 @@ class Ring(Node):
             if role == 'recorder':
                 self.create_subscription(kind, topic.name, self.ignore, profile, raw=True)
             elif role in topic.readers:
-                take = self.pass_on if TRIGGER_TOPICS[role] == topic.name else self.ignore
-                self.create_subscription(kind, topic.name, take, profile)
+                callback = self.pass_on if TRIGGER_TOPICS[role] == topic.name else self.ignore
+                self.create_subscription(kind, topic.name, callback, profile)
         if role == 'adu':
             self.start_timer = self.create_timer(0.01, self.start)
 
     def start(self):
-        """Send the first lap when every reader is there."""
+        """Send the first lap as soon as every subscriber is there."""
         if all(publisher.get_subscription_count() >= readers for publisher, _, readers in self.writers):
             self.start_timer.cancel()
             time.sleep(1.0)
             self.send()
 
     def ignore(self, _message):
-        """Read a message, no more."""
+        """Drop a message."""
 
     def draining(self):
-        """Nothing is waited for at the end."""
+        """Return False: the node waits for nothing at the end."""
         return False
 
     def close(self):
-        """Nothing is left to do at the end."""
+        """Do nothing at the end."""
 
     def pass_on(self, _message):
-        """Send what this node writes in a lap; the drive prints the time of a lap [us] after the last."""
+        """Publish the messages of a lap; after the last lap the drive prints the time of a lap [us]."""
         self.lap += 1
         if self.lap == WARM_UP_LAPS:
             self.begun = time.perf_counter()
@@ -91,7 +94,7 @@ class Ring(Node):
 
 
 def main(args=None) -> int:
-    """ROLE STEPS of the command line; the exit code."""
+    """Run a ROLE for STEPS laps, from the command line; return the exit code."""
     role, steps = (args or sys.argv[1:])[:2]
     return shell.main(lambda: Ring(role, int(steps)), args=[])
 

@@ -24,8 +24,9 @@ from pedestal_studies.bench import solve_ivp_axis
 from pedestal_studies.bench.table import best_of, show
 
 CORE_DURATION_S, TRIAL_DURATION_S = 20.0, 10.0
+"""Simulated durations of the closed loop and of a trial [s]."""
 SHORT_RUN_STEPS, SHORT_RUN_COUNT = 40, 100
-"""Drive steps that nobody else is likely to interrupt, and how often."""
+"""Drive steps of a run that is short enough to be rarely interrupted by other processes; number of these runs."""
 SUBSTEPS_PER_STEP = 2 * 100
 """Plant sub-steps of both axes in one drive step of 5 ms."""
 SOLVE_IVP_TICKS = 100
@@ -33,12 +34,14 @@ SOLVE_IVP_TICKS = 100
 
 @compiled
 def _drive_steps(state, constants, inputs, outputs, count):
+    """Run `count` steps of one drive."""
     for _ in range(count):
         drive_unit.step(state[0], constants[0], inputs[0], outputs[0])
 
 
 @compiled
 def _steps_on_lanes(drives, count):
+    """Run `count` steps of the drives on all lanes."""
     moving = adu_unit.DRIVE_LANES(drives)
     for _ in range(count):
         drive_unit.step(moving.state, moving.constants, moving.inputs, moving.outputs)
@@ -50,7 +53,7 @@ FILTER_PERIOD_S = 0.01
 
 
 def filter_step(**parameters):
-    """Time [us] of one prediction and correction of an axis_filter of FilterParameters on a noisy ramp."""
+    """Return the time [us] of one prediction and correction of an axis_filter of FilterParameters on a noisy ramp."""
     constants = axis_filter.constants(build(FilterParameters, parameters))
     t = FILTER_PERIOD_S * np.arange(FILTER_STEPS)
     y = 0.02 * t + 5e-4 * np.random.default_rng(1).standard_normal(FILTER_STEPS)
@@ -61,6 +64,7 @@ def filter_step(**parameters):
 
 @compiled
 def _filter_steps(state, constants, t, y, R):
+    """Run a filter over angles y (n,) [rad] of variance R (n,) at times t (n,) [s]."""
     f, c = state[0], constants[0]
     axis_filter.start(f, c, y[0], R[0], 0.1)
     for k in range(1, len(y)):
@@ -69,7 +73,7 @@ def _filter_steps(state, constants, t, y, R):
 
 
 def unscented_step():
-    """Time [us] of one prediction and correction of both Cartesian filters, azimuth, elevation and range measured."""
+    """Return the time [us] of one step of both Cartesian filters, with azimuth, elevation and range measured."""
     state, constants = np.zeros(1, unscented.STATE_DTYPE), unscented.constants(UkfParameters())
     noise = np.random.default_rng(1).standard_normal((FILTER_STEPS, 3)) * (5e-4, 5e-4, 1.0)
     measured = noise + np.outer(FILTER_PERIOD_S * np.arange(FILTER_STEPS), (0.001, 0.0, 0.0)) + (0.0, 0.3, 500.0)
@@ -79,6 +83,7 @@ def unscented_step():
 
 @compiled
 def _unscented_steps(state, constants, measured):
+    """Run the Cartesian filters over measured azimuth, elevation [rad] and range [m] (n, 3)."""
     s, c = state[0], constants[0]
     R = 2.5e-7
     known = AxisVariances(R, 0.0, 0.01)
@@ -94,8 +99,8 @@ def _unscented_steps(state, constants, measured):
 
 
 def filterpy_unscented():
-    """filterpy's IMMEstimator of two UnscentedKalmanFilter of nine states, three numbers measured."""
-    def one():
+    """Return filterpy's IMMEstimator of two UnscentedKalmanFilter of nine states with three measured numbers."""
+    def unscented_filter():
         made = UnscentedKalmanFilter(
             9, 3, FILTER_PERIOD_S, lambda x: np.array([np.arctan2(x[0], x[1]), np.arctan2(x[2], np.hypot(x[0], x[1])),
                                                        np.linalg.norm(x[:3])]),
@@ -106,13 +111,17 @@ def filterpy_unscented():
 
     T = FILTER_PERIOD_S
     F = np.kron([[1.0, T, 0.5 * T * T], [0.0, 1.0, T], [0.0, 0.0, 1.0]], np.eye(3))
-    return IMMEstimator([one(), one()], np.full(2, 0.5), np.array([[0.998, 0.002], [0.002, 0.998]]))
+    return IMMEstimator([unscented_filter(), unscented_filter()], np.full(2, 0.5),
+                        np.array([[0.998, 0.002], [0.002, 0.998]]))
 
 
 def filterpy_steps():
-    """Times [us] of predict and update of filterpy's KalmanFilter of three states, and of IMMEstimator of three such
-    and of two unscented filters."""
-    def three():
+    """Return the times [us] of predict and update of three filters of filterpy.
+
+    The filters are a KalmanFilter of three states, an IMMEstimator of three of them, and an IMMEstimator of two
+    unscented filters.
+    """
+    def kalman_filter():
         made = KalmanFilter(3, 1)
         made.F = np.array([[1.0, FILTER_PERIOD_S, 0.5 * FILTER_PERIOD_S**2], [0.0, 1.0, FILTER_PERIOD_S],
                            [0.0, 0.0, 1.0]])
@@ -126,13 +135,14 @@ def filterpy_steps():
 
     chain = 0.001 + 0.997 * np.eye(3)
     angle = np.zeros((1, 1))
-    cases = ((three(), angle), (IMMEstimator([three() for _ in range(3)], np.full(3, 1 / 3), chain), angle),
+    cases = ((kalman_filter(), angle),
+             (IMMEstimator([kalman_filter() for _ in range(3)], np.full(3, 1 / 3), chain), angle),
              (filterpy_unscented(), np.array([0.0, 0.3, 500.0])))
     return [best_of(lambda case=case: steps(*case), 3) / FILTERPY_STEPS * 1e6 for case in cases]
 
 
 def filter_rows():
-    """One step of one filter, of three interacting and of two unscented ones, against filterpy's in the same run."""
+    """Return the rows of a step of one filter, of an IMM of three and of two unscented filters, beside filterpy."""
     steps = (filter_step(kind='current_statistical'),
              filter_step(**{'kind': 'imm', 'imm.models': 'cv ca current_statistical'}), unscented_step())
     rows = []
@@ -145,7 +155,7 @@ def filter_rows():
 
 
 def drive_rows():
-    """One drive beside as many as there are lanes, by turns; whole trials on lanes, by the time of one core."""
+    """Return the rows of one drive beside drives on all lanes, and of whole trials on lanes in time of one core."""
     params = AduParameters(initial_elevation=0.7)
     one = np.zeros(1, adu_unit.RECORD_DTYPE)
     one['state'], one['constants'] = drive_unit.initial_state(params), drive_unit.constants(params)
@@ -155,8 +165,8 @@ def drive_rows():
     _drive_steps(state, constants, inputs, outputs, 200)
     _steps_on_lanes(drives, 200)
     alone, together = zip(*((best_of(lambda: _drive_steps(state, constants, inputs, outputs, SHORT_RUN_STEPS), 1),
-                             best_of(lambda: _steps_on_lanes(drives, SHORT_RUN_STEPS),
-                                     1)) for _ in range(SHORT_RUN_COUNT)))
+                             best_of(lambda: _steps_on_lanes(drives, SHORT_RUN_STEPS), 1))
+                            for _ in range(SHORT_RUN_COUNT)))
     substep = min(alone) / SHORT_RUN_STEPS / SUBSTEPS_PER_STEP * 1e9
     on_lanes = min(together) / SHORT_RUN_STEPS / SUBSTEPS_PER_STEP / lanes.LANE_COUNT * 1e9
     trials = [scenario.load('leo_pass', seed=seed, duration=TRIAL_DURATION_S) for seed in range(lanes.LANE_COUNT)]

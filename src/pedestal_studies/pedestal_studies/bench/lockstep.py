@@ -1,4 +1,4 @@
-"""The lockstep ring against its floor, the bare ring, interleaved on this machine; latency of the ring in realtime."""
+"""The lockstep ring beside its floor, the bare ring, interleaved on this machine; latency of the ring in realtime."""
 import contextlib
 import json
 import os
@@ -25,32 +25,32 @@ LATENCY_DURATION_S = 10.0
 
 
 def bare_lap():
-    """Lap time [us] of the bare ring: as many processes, the same messages, no work."""
+    """Return the lap time [us] of the bare ring: as many processes and the same messages, without any work."""
     processes = {role: subprocess.Popen([sys.executable, '-m', bare_ring.__name__, role, str(RING_STEPS)],
                                         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
                  for role in bare_ring.RING_NODES}
     try:
-        output, complaint = processes['adu'].communicate(timeout=120.0)
+        output, error_text = processes['adu'].communicate(timeout=120.0)
     except subprocess.TimeoutExpired:
-        raise RuntimeError('the bare ring did not close within 120 s') from None
+        raise RuntimeError('the bare ring did not finish within 120 s') from None
     finally:
         for process in processes.values():
             process.kill()
             process.wait()
     if not output:
-        raise RuntimeError(f'the bare ring failed: {complaint.strip()}')
+        raise RuntimeError(f'the bare ring failed: {error_text.strip()}')
     return json.loads(output.splitlines()[-1])['lap_us']
 
 
 def graph_run(folder, number, pacing, seconds):
-    """(start.Outcome, bag folder) of a run of the demo scenario."""
+    """Return (start.Outcome, bag folder) of a run of the demo scenario."""
     path = pathlib.Path(folder) / f'run-{number}'
     chosen = scenario.load('leo_pass', pacing=pacing, duration=seconds)
     return graph.run(Plan(chosen), path, contextlib.nullcontext(lambda seconds: None)), path
 
 
 def latencies(path):
-    """Wall-clock times [s] from the publication of joint_states(t_k) to that of rate_command(t_k), a realtime bag."""
+    """Return the wall-clock times [s] from joint_states(t_k) to rate_command(t_k), both at publication, of a bag."""
     sent = {topic: {log: published for _, log, published, _ in bag.read(path).raw(topic)}
             for topic in ('joint_states', 'acu/rate_command')}
     return np.array([(published - sent['joint_states'][stamp]) * 1e-9

@@ -1,4 +1,4 @@
-"""The recorder, verify and recompute on this machine, against its disk and bare deserialisation."""
+"""The recorder, verify and recompute on this machine, beside its disk and bare deserialisation."""
 import json
 import os
 import pathlib
@@ -19,12 +19,15 @@ from pedestal_studies.bench.table import best_of, show
 ROUND_COUNT = 3
 BAG_DURATION_S = 30.0
 TRAFFIC_FACTOR = 5.0
-"""Times the traffic of the demo in real time that the recorder is given."""
+"""Rate of the messages sent to the recorder, over the rate of the demo in real time."""
 DISK_TEST_BYTES = 200_000_000
 
 
 def measure_recorder(path, again, rate):
-    """(messages/s, lost, CPU time over wall time) of a recorder given a bag's messages, rate times real time."""
+    """Return (messages/s, lost, CPU time over wall time) of a recorder that receives a bag.
+
+    rate: speed of the messages over real time.
+    """
     with open(pathlib.Path(again).with_suffix('.log'), 'w+') as log:
         recorder = subprocess.Popen([sys.executable, '-m', 'pedestal_recording.recorder_node', '--ros-args',
                                      '--params-file', str(path.with_name(path.name + '.log') / 'parameters.yaml'),
@@ -51,13 +54,13 @@ def measure_recorder(path, again, rate):
 
 
 def _cpu_time(pid):
-    """CPU time [s] a process has used."""
+    """Return the CPU time [s] that a process has used."""
     fields = pathlib.Path(f'/proc/{pid}/stat').read_text().rpartition(')')[2].split()
     return (int(fields[11]) + int(fields[12])) / os.sysconf('SC_CLK_TCK')
 
 
 def disk_rate(folder):
-    """Bytes/s that a file of the folder takes, all of it on the disk in the end."""
+    """Return the bytes/s that can be written to a file of the folder, with all of them on the disk at the end."""
     block = os.urandom(1_000_000)
 
     def fill():
@@ -69,7 +72,7 @@ def disk_rate(folder):
 
 
 def run():
-    """Print the table and return its rows: the recorder under TRAFFIC_FACTOR, and given all at once."""
+    """Print the table and return its rows: the recorder at TRAFFIC_FACTOR and at unlimited rate, verify, recompute."""
     with tempfile.TemporaryDirectory() as folder:
         _, path = graph_run(folder, 'demo', 'lockstep', BAG_DURATION_S)
         rate, lost, load = measure_recorder(path, f'{folder}/paced', TRAFFIC_FACTOR)
@@ -94,10 +97,11 @@ def run():
             row('recompute', 'realtime_factor', factor, '', '>= 100')]
     show(f'bags: {count} messages of the demo, {BAG_DURATION_S:g} s, recorded again at {TRAFFIC_FACTOR:g} x real time',
          rows)
-    print(f'record: given all at once, the recorder and whoever feeds it reach {limit:.0f} messages/s, '
-          f'{limit * BAG_DURATION_S / count:.0f} x the demo; the disk ({disk / 1e6:.0f} MB/s) would take '
-          f'{disk * count / size:.0f}.\n'
-          f'The limit is their own work per message, at {limit * size / count / disk:.2%} of the disk.\n'
-          f'verify: {checked / scanned:.0%} of what finding the messages in the file allows; to deserialise them all '
-          f'would allow {read:.0f} messages/s.')
+    print(f'record: with unlimited rate, the publisher and the recorder together reach {limit:.0f} messages/s, '
+          f'{limit * BAG_DURATION_S / count:.0f} x the demo. The disk ({disk / 1e6:.0f} MB/s) could store '
+          f'{disk * count / size:.0f} messages/s.\n'
+          'The work per message of these two processes is the limit, at '
+          f'{limit * size / count / disk:.2%} of the rate of the disk.\n'
+          f'verify: {checked / scanned:.0%} of the rate at which the messages are found in the file. Deserialisation '
+          f'of all messages would allow {read:.0f} messages/s.')
     return rows

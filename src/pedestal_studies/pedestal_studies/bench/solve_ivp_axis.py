@@ -1,6 +1,7 @@
-"""What a user would run instead: one axis of the drive through scipy's solve_ivp, the floor of `pedestal bench core`.
+"""One axis of the drive through scipy's solve_ivp, the usual tool of a user: the floor of `pedestal bench core`.
 
-The plant's equations once more, as one writes them for scipy: an outside measure of speed, never part of the product.
+The equations of the plant are written a second time in the form for scipy. They measure speed only and are not part of
+the product.
 """
 import math
 
@@ -9,19 +10,19 @@ from scipy.integrate import solve_ivp
 
 
 def right_hand_side(t, x, p, v_q):
-    """d/dt of (i_d, i_q, w, theta) of both motors and (w, theta, z) of the load, constant q voltages [V].
+    """Return d/dt of (i_d, i_q, w, theta) of both motors and (w, theta, z) of the load, with constant q voltages [V].
 
     p: adu_drive.params.AxisParameters.
     """
     g, f, N = p.gear_train, p.friction, p.gear_train.ratio
     w, theta, z = x[8:]
-    slopes, pushed = [], 0.0
+    slopes, mesh_torque = [], 0.0
     for m, (i_d, i_q, w_m, theta_m), v in ((p.motor_1, x[0:4], v_q[0]), (p.motor_2, x[4:8], v_q[1])):
         delta = theta_m / N - theta
         over = delta - math.copysign(min(abs(delta), 0.5 * g.lash), delta)
         mesh = g.stiffness * over + g.damping * (w_m / N - w) if over != 0.0 else 0.0
         mesh = mesh if mesh * over > 0.0 else 0.0
-        pushed += mesh
+        mesh_torque += mesh
         omega_e = m.pole_pairs * w_m
         friction = m.friction * math.tanh(w_m / m.friction_speed) + m.viscous * w_m
         slopes += [(-m.resistance * i_d + omega_e * m.inductance * i_q) / m.inductance,
@@ -30,11 +31,14 @@ def right_hand_side(t, x, p, v_q):
     sliding = f.coulomb + (f.breakaway - f.coulomb) * math.exp(-(w / f.stribeck_rate)**2)
     dz = w - f.stiffness * abs(w) * z / sliding
     bearing = f.stiffness * z + f.damping * dz + p.load.viscous * w
-    return np.array([*slopes, (pushed - bearing) / p.load.inertia, w, dz])
+    return np.array([*slopes, (mesh_torque - bearing) / p.load.inertia, w, dz])
 
 
 def run(p, ticks, period, v_q):
-    """`ticks` control ticks of `period` [s] from rest with voltages v_q, RK45 at scipy's own tolerances; the state."""
+    """Return the state after `ticks` control ticks of `period` [s] from rest with voltages v_q.
+
+    RK45 has scipy's own tolerances.
+    """
     x = np.zeros(11)
     for _ in range(ticks):
         x = solve_ivp(right_hand_side, (0.0, period), x, 'RK45', args=(p, v_q)).y[:, -1]

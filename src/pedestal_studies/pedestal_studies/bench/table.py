@@ -1,4 +1,4 @@
-"""How a benchmark is shown, and how a function is timed."""
+"""Functions that print the rows of a benchmark and time a function."""
 import time
 
 from rich.console import Console
@@ -16,7 +16,7 @@ def show(title, rows):
 
 
 def best_of(function, repeats=5):
-    """Shortest wall time [s] of some calls."""
+    """Return the shortest wall time [s] of several calls."""
     times = []
     for _ in range(repeats):
         begun = time.perf_counter()

@@ -1,1 +1,1 @@
-"""The numbers that the documentation prints, and where each comes from."""
+"""The numbers that the documentation prints, and the source of each number."""

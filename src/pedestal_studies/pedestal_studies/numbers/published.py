@@ -1,7 +1,7 @@
-"""The numbers of the documentation: rows of the studies, kept in docs/rows.json, and the tables made of them.
+"""The numbers of the documentation: rows of the studies, kept in docs/rows.json, and the tables made from these rows.
 
-`python -m pedestal_studies.numbers.published` (make numbers) runs the studies and writes the rows that the tables use,
-with names of studies those of them only; make docs writes the tables from those.
+`python -m pedestal_studies.numbers.published [STUDY ...]` (`make numbers`) runs all published studies, or the named
+studies only. It writes the rows that the tables use. `make docs` writes the tables from these rows.
 """
 import inspect
 import json
@@ -31,40 +31,46 @@ ROWS_FILE = 'docs/rows.json'
 
 SCENARIO_RESULTS = (
     ('`leo_pass`: pointing error against truth, per axis, rms', 'leo_pass', 'pointing_rms_deg'),
-    ('the same, largest', 'leo_pass', 'pointing_max_deg'),
-    ("the rms over the receiver's single-sample noise", 'leo_pass', 'pointing_to_noise'),
-    ('`ship_pass`, sea state 5, INS one step late: rms', 'ship_pass', 'pointing_rms_deg'),
-    ('the same over that of `leo_pass`', 'ship_pass', 'pointing_to_leo_pass'),
-    ('the same, INS 20 ms late (`ins.latency=0.02`)', 'ship_pass-late', 'pointing_to_leo_pass'),
-    ("isolation from the ship's rotation", 'ship_pass', 'isolation_db'),
-    ('what noise alone would show', 'ship_pass', 'isolation_limit_db'),
-    ('isolation without noise', 'ship_pass-quiet', 'isolation_db'),
-    ('`ship_pass_ss6`: rms over that of `leo_pass`', 'ship_pass_ss6', 'pointing_to_leo_pass'),
-    ('isolation', 'ship_pass_ss6', 'isolation_db'),
+    ('`leo_pass`: largest pointing error', 'leo_pass', 'pointing_max_deg'),
+    ('`leo_pass`: rms pointing error over the noise of a receiver sample', 'leo_pass', 'pointing_to_noise'),
+    ('`ship_pass`, sea state 5, INS one step late: pointing error, rms', 'ship_pass', 'pointing_rms_deg'),
+    ('`ship_pass`: rms pointing error over that of `leo_pass`', 'ship_pass', 'pointing_to_leo_pass'),
+    ('`ship_pass`, INS 20 ms late (`ins.latency=0.02`): rms pointing error over that of `leo_pass`', 'ship_pass-late',
+     'pointing_to_leo_pass'),
+    ("`ship_pass`: isolation from the ship's rotation", 'ship_pass', 'isolation_db'),
+    ('`ship_pass`: isolation that the noise alone would show', 'ship_pass', 'isolation_limit_db'),
+    ('`ship_pass` without noise: isolation', 'ship_pass-quiet', 'isolation_db'),
+    ('`ship_pass_ss6`: rms pointing error over that of `leo_pass`', 'ship_pass_ss6', 'pointing_to_leo_pass'),
+    ('`ship_pass_ss6`: isolation', 'ship_pass_ss6', 'isolation_db'),
     ('`ship_overhead`: time outside half a beamwidth', 'ship_overhead', 'loss_s'),
-    ('the same over what is announced before the slew', 'ship_overhead', 'loss_to_predicted'),
-    ('`ship_align_and_track`: heading from 180 deg wrong to a stated 0.2 deg', 'ship_align_and_track', 'aligned_s'),
-    ('heading error from then on, rms', 'ship_align_and_track', 'heading_error_rms_deg'),
-    ('autotrack after that', 'ship_align_and_track', 'autotrack_after_alignment_s'),
-    ('`uav_flyby`, 500 m: noise of a sample over that of the estimate, cross-elevation', 'uav_flyby',
+    ('`ship_overhead`: that time over the time announced before the slew', 'ship_overhead', 'loss_to_predicted'),
+    ('`ship_align_and_track`: time from a heading 180 deg wrong to a stated 1 sigma of 0.2 deg',
+     'ship_align_and_track', 'aligned_s'),
+    ('`ship_align_and_track`: heading error after the alignment, rms', 'ship_align_and_track',
+     'heading_error_rms_deg'),
+    ('`ship_align_and_track`: time from the alignment to autotrack', 'ship_align_and_track',
+     'autotrack_after_alignment_s'),
+    ('`uav_flyby`, 500 m: noise of a sample over noise of the estimate, cross-elevation', 'uav_flyby',
      'noise_reduction_cross_elevation'),
-    ('the same, elevation', 'uav_flyby', 'noise_reduction_elevation'),
-    ('at 60 m (`pedestal study scenarios` says how), cross-elevation', 'uav_flyby-60m',
-     'noise_reduction_cross_elevation'),
-    ('the same, elevation', 'uav_flyby-60m', 'noise_reduction_elevation'))
-"""(what, case, metric) of the study scenarios in docs/measured.md."""
+    ('`uav_flyby`, 500 m: the same ratio, elevation', 'uav_flyby', 'noise_reduction_elevation'),
+    ('`uav_flyby` at 60 m (`pedestal study scenarios` prints its command): the same ratio, cross-elevation',
+     'uav_flyby-60m', 'noise_reduction_cross_elevation'),
+    ('`uav_flyby` at 60 m: the same ratio, elevation', 'uav_flyby-60m', 'noise_reduction_elevation'))
+"""(text, case, metric) of the results of the study scenarios in docs/measured.md."""
 HEADLINE_RESULTS = (
     ('a satellite pass ashore: pointing error against truth, per axis, rms', 'leo_pass', 'pointing_rms_deg'),
-    ("the same over the receiver's single-sample noise", 'leo_pass', 'pointing_to_noise'),
-    ('a UAV at 500 m: noise of a sample over that of the estimate, elevation', 'uav_flyby',
+    ('the same pass: rms pointing error over the noise of a receiver sample', 'leo_pass', 'pointing_to_noise'),
+    ('a UAV at 500 m: noise of a sample over noise of the estimate, elevation', 'uav_flyby',
      'noise_reduction_elevation'),
-    ('the pass from a ship in sea state 5: its rms over that ashore', 'ship_pass', 'pointing_to_leo_pass'),
-    ('from a ship in sea state 6: isolation from its rotation', 'ship_pass_ss6', 'isolation_db'))
-"""The few of them in README.md."""
+    ('a satellite pass from a ship in sea state 5: rms pointing error over that ashore', 'ship_pass',
+     'pointing_to_leo_pass'),
+    ("a satellite pass from a ship in sea state 6: isolation from the ship's rotation", 'ship_pass_ss6',
+     'isolation_db'))
+"""(text, case, metric) of the results of the study scenarios in README.md."""
 
 
 class Rows(dict):
-    """{(study, case, metric): row}; `used` are the keys that were asked for."""
+    """{(study, case, metric): row}; `used` holds the rows that were read."""
 
     def __init__(self, rows):
         super().__init__(rows)
@@ -76,17 +82,17 @@ class Rows(dict):
 
 
 def rows_by_key(rows_of):
-    """Rows of {study: its rows}."""
+    """Return the Rows of {study: its rows}."""
     return Rows({(study, row['case'], row['metric']): row for study, rows in rows_of.items() for row in rows})
 
 
 def read(root='.'):
-    """The Rows in FILE of a checkout."""
+    """Return the Rows in ROWS_FILE of a checkout."""
     return rows_by_key(json.loads(pathlib.Path(root, ROWS_FILE).read_text()))
 
 
 def write(rows, root='.'):
-    """Write the rows that all tables use into FILE."""
+    """Write the rows that the tables use into ROWS_FILE."""
     for table in TABLES.values():
         table(rows)
     lines = {}
@@ -97,17 +103,21 @@ def write(rows, root='.'):
 
 
 def _cells(row):
-    """Texts of a row: its value with the unit, its interval, its runs."""
+    """Return the texts of a row: value with unit, interval, number of runs."""
     value = f'{console.number(row["value"])} {row["unit"].removeprefix("-")}'.strip()
     return value, console.interval(row), str(row.get('runs', ''))
 
 
 def _target_text(row):
+    """Return the target of a row, marked MISSED if the row misses it."""
     return f'{row["target"] or ""}{" MISSED" if missed(row) else ""}'.strip()
 
 
 def _spread(row):
-    """The mean of a row and half its interval to two digits, 'a +- b'; the mean alone where all runs give the same."""
+    """Return the mean of a row and half its interval to two digits, 'a +- b'.
+
+    Return the mean alone if all runs give the same value.
+    """
     half = 0.5 * (row['ci_high'] - row['ci_low']) if 'runs' in row else 0.0
     if half <= 1e-9 * abs(row['value']):
         return console.number(row['value'])
@@ -115,48 +125,48 @@ def _spread(row):
     return f'{row["value"]:.{decimals}f} +- {half:.{decimals}f}'
 
 
-def results_table(seen):
-    """rows -> the table of what is said of the scenarios, SCENARIO_RESULTS or HEADLINE_RESULTS."""
+def results_table(results):
+    """Return the function rows -> table of results as of SCENARIO_RESULTS."""
     def table(rows):
-        of = [rows['scenarios', case, metric] for _, case, metric in seen]
-        return ('what', 'mean', '95 % interval', 'seeds', 'asked'), [
-            (what, *_cells(row), _target_text(row)) for (what, *_), row in zip(seen, of)]
+        of_results = [rows['scenarios', case, metric] for _, case, metric in results]
+        return ('result', 'mean', '95 % interval', 'seeds', 'target'), [
+            (text, *_cells(row), _target_text(row)) for (text, *_), row in zip(results, of_results)]
     return table
 
 
 def claim_table(paper):
-    """rows -> the table of the claims of a paper."""
+    """Return the function rows -> table of the claims of a paper."""
     def table(rows):
         lines = []
         for claim in claims.CLAIMS_BY_PAPER[paper]:
-            where, asked, cells = '', '', ('', '', '')
+            place, target, cells = '', '', ('', '', '')
             if claim.study:
                 row = rows[claim.study, claim.case, claim.metric]
-                where, asked, cells = f'{claim.study}: {claim.case}', _target_text(row), _cells(row)
-            lines.append((claim.claim, claim.reading, *cells, asked, where))
-        return ('claim', 'reading', 'ours', '95 % interval', 'runs', 'asked', 'study: case'), lines
+                place, target, cells = f'{claim.study}: {claim.case}', _target_text(row), _cells(row)
+            lines.append((claim.claim, claim.reading, *cells, target, place))
+        return ('claim', 'reading', 'ours', '95 % interval', 'runs', 'target', 'study: case'), lines
     return table
 
 
 COLOURED_NOISE = filters.SHOWN_NOISE.replace('white', 'coloured')
 FILTER_METRICS = ('angle_rms_deg', 'reduction', 'rate_rms_deg_s', 'nis_mean', 'rate_over_sigma')
+"""Metrics of the study filters in its table."""
 
 
 def filter_numbers(rows):
-    """Angle rms, reduction and rate rms of every filter on every motion."""
+    """Return the table of angle rms, reduction, rate rms and consistency of every filter on every motion."""
     lines = []
     for name in filters.SHOWN_FILTERS:
-        on = [profile for profile in PROFILES
-              if ('filters', f'{profile}/{name}/{filters.SHOWN_NOISE}', 'reduction') in rows]
-        lines += [(name, profile, *(_spread(rows['filters', f'{profile}/{name}/{filters.SHOWN_NOISE}', metric])
-                                    for metric in FILTER_METRICS),
-                   _spread(rows['filters', f'{profile}/{name}/{COLOURED_NOISE}', 'reduction'])) for profile in on]
+        cases = {profile: f'{profile}/{name}/{filters.SHOWN_NOISE}' for profile in PROFILES}
+        lines += [(name, profile, *(_spread(rows['filters', case, metric]) for metric in FILTER_METRICS),
+                   _spread(rows['filters', f'{profile}/{name}/{COLOURED_NOISE}', 'reduction']))
+                  for profile, case in cases.items() if ('filters', case, 'reduction') in rows]
     return ('filter', 'motion', 'angle rms deg', 'reduction', 'rate rms deg/s', 'mean NIS',
-            'rate error over own sigma', 'reduction of noise within 5 Hz'), lines
+            'rate error over own sigma', 'reduction, noise within 5 Hz'), lines
 
 
 def manoeuvre_numbers(rows):
-    """Errors of rate and acceleration inside every reversal."""
+    """Return the table of the errors of rate and acceleration inside every reversal."""
     lines = [(name, f'{reversal:g} s', *(_spread(rows['manoeuvre', f'reversal-{reversal:g}s/{name}', metric])
                                          for metric in ('rate_rms_deg_s', 'acceleration_rms_deg_s2')))
              for name in manoeuvre.FILTERS for reversal in manoeuvre.REVERSAL_DURATIONS_S]
@@ -164,7 +174,7 @@ def manoeuvre_numbers(rows):
 
 
 def feedforward_numbers(rows):
-    """Miss and rate noise of the sources of paper 003's feed-forward."""
+    """Return the table of miss and rate noise of the sources of paper 003's feed-forward."""
     lines = []
     for axis in REVERSAL_S_BY_AXIS:
         for name in ('kalman-cv', 'imm', 'imm-predicted', 'perfect-state', 'kalman-ca-40-predicted'):
@@ -175,70 +185,74 @@ def feedforward_numbers(rows):
                 'miss_rms_deg', 'rate_noise_deg_s')), ratio))
         lines += [(case, _spread(rows['imm-feedforward', case, 'miss_rms_deg']), '', '')
                   for case in imm_feedforward.DRIVE_CASES if case.startswith(axis)]
-    return ('case', 'miss rms deg', 'rate noise deg/s', 'x less than a conventional filter of equal rate noise'), lines
+    return ('case', 'miss rms deg', 'rate noise deg/s',
+            'miss of a conventional filter of equal rate noise, over this miss'), lines
 
 
 def matrix_table(rows):
-    """The matrices of paper 004's proof of stability, in seconds, with rank and condition."""
+    """Return the table of the matrices of paper 004's proof of stability, in seconds, with rank and condition."""
     lines = [(name, '; '.join(' '.join(f'{value:.4g}' for value in line) for line in matrix),
               *(console.number(rows['telemetry-flight', name, metric]['value'])
                 for metric in ('rank', 'condition', 'condition_in_seconds')))
              for name, (matrix, _) in telemetry_flight.matrices().items()]
-    return ('matrix', 'its lines, in seconds', 'rank', 'condition, time in T', 'in seconds'), lines
+    return ('matrix', 'rows of the matrix, in seconds', 'rank', 'condition, time in T',
+            'condition, time in seconds'), lines
 
 
 def pareto_numbers(rows):
-    """What is left of the miss by any tuning of a filter, and at the rate noise of the IMM."""
+    """Return the table of the least miss of any tuning of a filter, and of its miss at the rate noise of the IMM."""
     lines = [(name, *(_spread(rows['pareto', name, metric]) for metric in (
         'least_miss_deg', 'rate_noise_at_least_miss_deg_s')),
         _spread(rows['pareto', name, 'miss_ratio_at_equal_rate_noise'])
         if ('pareto', name, 'miss_ratio_at_equal_rate_noise') in rows else '') for name in pareto.FILTER_TUNINGS]
-    return ('filter', 'least miss of any tuning, deg', 'rate noise then, deg/s',
-            'miss over that of imm-predicted, with its rate noise'), lines
+    return ('filter', 'least miss of any tuning, deg', 'rate noise at the least miss, deg/s',
+            'miss at the rate noise of imm-predicted, over the miss of imm-predicted'), lines
 
 
 def flyby_numbers(rows):
-    """Errors on the 60 m flyby with a rate that is measured, or differenced from the angles."""
+    """Return the table of the errors on the 60 m flyby with a measured rate and with a differenced rate."""
     lines = [(name, *(_spread(rows['rate-measurement', f'{rate_measurement.FLYBY_PROFILE}/{name}', metric])
                       for metric in ('angle_rms_deg', 'rate_rms_deg_s'))) for name in rate_measurement.FLYBY_CASES]
-    return ('rate', 'angle rms deg', 'rate rms deg/s'), lines
+    return ('source of the rate', 'angle rms deg', 'rate rms deg/s'), lines
 
 
 def alignment_numbers(rows):
-    """The methods of alignment beside the information limit."""
+    """Return the table of the methods of alignment beside the information limit."""
     metrics = ('time_to_12arcmin_rms_s', *(f'azimuth_rms_arcmin_{t}s' for t in (100, 250, 300, 600)),
                'level_rms_arcmin')
     swell = [f'azimuth_{metric}_{alignment.SWELL_EVALUATION_TIME_S}s' for metric in ('rms_arcmin', 'error_over_sigma')]
     lines = [(name, *(_spread(rows['alignment', name, metric]) for metric in metrics),
-              *(_spread(rows['alignment', f'{name}/swell',
-                             metric]) for metric in swell)) for name in alignment.CASE_METHODS]
-    return ('method', 'below 12 arcmin, s', '100 s', '250 s', '300 s', '600 s', 'level', 'on swell, 200 s',
-            'the same over own sigma'), [
+              *(_spread(rows['alignment', f'{name}/swell', metric]) for metric in swell))
+             for name in alignment.CASE_METHODS]
+    return ('method', 'time to 12 arcmin, s', *(f'azimuth at {t} s, arcmin' for t in (100, 250, 300, 600)),
+            'level, arcmin', 'azimuth on swell at 200 s, arcmin', 'that error over own sigma'), [
         *lines, ('limit', *(_spread(rows['alignment', 'limit', metric]) for metric in metrics), '', '')]
 
 
 def acquisition_numbers(rows):
-    """How long acquisition takes, and how often it succeeds."""
+    """Return the table of the time that acquisition takes, and of the share of runs in which it succeeds."""
     lines = []
     for case in acquisition.CASE_NAMES:
         if case == 'steptrack_geo':
             continue
         time, found, least = (rows['acquisition', case, metric] for metric in (
             'tracked_after_s', 'found_percent', 'found_percent_low'))
-        lines.append((f'`{case}`', *_cells(time), f'{found["value"]:.0f} %', f'{least["value"]:.1f} %',
+        lines.append((f'`{case}`: time until tracked', *_cells(time), f'{found["value"]:.0f} %',
+                      f'{least["value"]:.1f} %',
                       _target_text(found)))
     loss, off = (rows['acquisition', 'steptrack_geo', metric] for metric in (
         'level_loss_rms_db', 'pointing_max_beamwidths'))
-    return ('case', 'tracked after', '95 % interval', 'runs', 'found', 'at least', 'asked'), [
+    return ('case', 'result', '95 % interval', 'runs', 'found', 'found, lower limit', 'target'), [
         *lines, ('`steptrack_geo`: level lost after 90 s, rms', *_cells(loss), '', '', _target_text(loss)),
-        ('the same: largest error', *_cells(off), '', '', '')]
+        ('`steptrack_geo`: largest error after 90 s', *_cells(off), '', '', '')]
 
 
 ARRAY_LOOPS = ('paper', 'paper-delta', 'type-2', 'type-2-delta', 'tracked-10ms', 'best')
+"""Loops of the study phased-array in the table of its loops."""
 
 
 def array_numbers(rows):
-    """True errors of the loops of paper 002's plant without noise, and the jitter that noise adds."""
+    """Return the table of the loops of paper 002's plant: true errors without noise, and jitter due to noise."""
     lines = []
     for case in (*(f'{loop}/{target}' for loop in ARRAY_LOOPS for target in ('ramp', 'sine', 'sway')
                    if target == 'sway' or not loop.endswith('-delta')),
@@ -254,15 +268,15 @@ MDEG_PER_DEG = 1e3
 
 
 def _milli(row):
-    """A row in degrees as millidegrees, mean and half its interval."""
+    """Return a row in degrees as text in millidegrees, mean and half its interval."""
     return _spread({key: value * MDEG_PER_DEG if key in ('value', 'ci_low', 'ci_high') else value
                     for key, value in row.items()})
 
 
 def budget_table(mode):
-    """rows -> the error budget of a mode: each term alone, then what they add up to."""
-    sums = {'systematic': ('', 'the systematic ones, added as signed vectors'),
-            'whole': ('', 'the run with everything on')}
+    """Return the function rows -> error budget of a mode: each term alone, then their sums."""
+    sums = {'systematic': ('', 'sum of the systematic terms, added as signed vectors'),
+            'whole': ('', 'runs with every term on')}
 
     def table(rows):
         kinds = {**{name: ('systematic', doc) for name, doc in budget.documented(mode, random=False).items()},
@@ -271,15 +285,15 @@ def budget_table(mode):
             'cross_elevation_rms_deg', 'elevation_rms_deg', 'rms_deg'))) for name, (kind, doc) in kinds.items()]
         whole = lines.pop()
         ratio = rows['budget', f'{mode}/combined', 'to_whole']
-        combined = ('combined', '', f'all of it; over the whole {_spread(ratio)}, asked {_target_text(ratio)}', '', '',
-                    _milli(rows['budget', f'{mode}/combined', 'rms_deg']))
-        return ('term', 'kind', 'what it is', 'cross-elevation, mdeg rms', 'elevation', 'together'), [
+        combined = ('combined', '', f'all terms; combined over whole: {_spread(ratio)}, target {_target_text(ratio)}',
+                    '', '', _milli(rows['budget', f'{mode}/combined', 'rms_deg']))
+        return ('term', 'kind', 'source', 'cross-elevation, mdeg rms', 'elevation, mdeg rms', 'both axes, mdeg rms'), [
             *lines, combined, whole]
     return table
 
 
 def direction_table(mode):
-    """rows -> the systematic contributions of a mode along the pass, both axes with their signs."""
+    """Return the function rows -> table of the signed systematic contributions of a mode along the pass."""
     def table(rows):
         cases = [f'{mode}/{time}s' for time in budget.TABLE_TIMES_S]
         head = [f'az {rows["budget", case, "azimuth_deg"]["value"]:.0f}, '
@@ -298,17 +312,18 @@ TABLES = {'results over seeds': results_table(SCENARIO_RESULTS), 'headline resul
           'filters compared': filter_numbers, 'manoeuvre': manoeuvre_numbers, 'feed forward': feedforward_numbers,
           'pareto': pareto_numbers, 'flyby with a rate': flyby_numbers, 'alignment': alignment_numbers,
           'acquisition': acquisition_numbers, 'array loops': array_numbers, 'matrices': matrix_table}
-"""{name: rows -> (head, lines)}."""
+"""{name of a table: function rows -> (head, lines)}."""
 
-PUBLISHED_STUDIES = tuple(dict.fromkeys((*(claim.study for of in claims.CLAIMS_BY_PAPER.values() for claim in of
-                                           if claim.study),
-                                         'filters', 'pareto', 'scenarios', 'budget', 'acquisition')))
+PUBLISHED_STUDIES = tuple(dict.fromkeys((
+    *(claim.study for of_paper in claims.CLAIMS_BY_PAPER.values() for claim in of_paper if claim.study),
+    'filters', 'pareto', 'scenarios', 'budget', 'acquisition')))
 
 
 def main(names=(), root='.') -> int:
-    """Run the PUBLISHED_STUDIES of these names, by default all, with their own number of runs, and write FILE; the
-    rows of the
-    others stay."""
+    """Run the named PUBLISHED_STUDIES, by default all, with their own number of runs, and write ROWS_FILE.
+
+    Rows of studies that are not named stay.
+    """
     rows_of = json.loads(pathlib.Path(root, ROWS_FILE).read_text()) if names else {}
     with monte_carlo.Pool() as pool, console.progress_of_share() as progress:
         for name in names or PUBLISHED_STUDIES:

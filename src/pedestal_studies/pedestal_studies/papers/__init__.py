@@ -1,1 +1,1 @@
-"""Studies of what the five papers claim."""
+"""Studies of the claims of the five papers."""

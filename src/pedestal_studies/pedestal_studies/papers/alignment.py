@@ -1,10 +1,11 @@
 """Alignment of the INS: paper 001's figures 3 and 4 for five methods, over many seeds, beside the information limit.
 
-Paper 001's IMU, sway and white velocity of 0.05 m/s per axis (section 5 and table 1), misaligned by 3, 3 and 180 deg.
-The velocity has one value per 0.02 s, which the paper does not state (results scale with it). Cases: method; limit,
-what the gyros and that velocity allow: covariance of riccati_eso and the gyros' bias over w_N; method/swell, 0.5 m/s
-at 0.1 Hz on every axis beside; method/quadrant-N, any heading of the ship and error of azimuth in quadrant N, biases
-drawn at random.
+The IMU, the sway and the white velocity of 0.05 m/s per axis are those of paper 001 (section 5 and table 1), with a
+misalignment of 3, 3 and 180 deg. The velocity has one value per 0.02 s. The paper does not state this period, and the
+results scale with it. The case `limit` is the limit that the gyros and this velocity permit: the covariance of
+riccati_eso and the gyros' bias over w_N. Cases <method> are the conditions of the paper. Cases <method>/swell have a
+velocity of 0.5 m/s at 0.1 Hz on every axis in addition. Cases <method>/quadrant-N have any heading of the ship, an
+error of azimuth in quadrant N, and random biases.
 """
 import dataclasses
 import functools
@@ -45,36 +46,39 @@ from ship_motion_sim.params import (
 from ship_motion_sim.sea import motion
 
 DEFAULT_RUNS = 400
-"""Of the cases without a suffix and of swell; a quarter of them for each quadrant. With 50 an rms is known to 10 %
-only, which is more than the best methods are apart."""
+"""Runs of the cases without a suffix and of swell; each quadrant has a quarter of them.
+
+With 50 runs an rms is known only to 10 %, which is more than the difference between the best methods.
+"""
 
 BATCH_RUNS = 5
 """Runs that one worker makes at a time."""
 
 BASE_SEED, QUADRANT_SEED, SWELL_SEED = 1, 2, 3
 IMU_PERIOD_S, LAW_STEP_S, EVALUATION_PERIOD_S = 0.01, 0.02, 1.0
-"""Step of the IMU, of the laws, of what is evaluated [s]."""
+"""Steps of the IMU, of the laws and of the evaluation [s]."""
 
 RUN_DURATION_S, SHORT_RUN_DURATION_S = 600.0, 300.0
-"""Length of a run; of one in a quadrant or on swell [s]."""
+"""Duration of a run, and of a run in a quadrant or on swell [s]."""
 
 ARCMIN_RAD = math.radians(1.0 / 60.0)
 HOUR_S = 3600.0
 GYRO_BIAS_RAD_S, GYRO_NOISE_DENSITY = math.radians(0.01) / HOUR_S, math.radians(0.005) / 60.0
+"""Bias and noise of the gyros, from paper 001, section 5."""
 G = 9.80665
 ACCELEROMETER_BIAS_M_S2, ACCELEROMETER_NOISE_DENSITY = 3e-5 * G, 6e-6 * G
-"""Paper 001, section 5."""
+"""Bias and noise of the accelerometers, from paper 001, section 5."""
 
 SHIP_PARAMETERS = ShipParameters(motion='plain', speed=0.0, latitude_deg=34.0, plain=PlainParameters(
     roll_amplitude_deg=7.0, roll_period=1.0 / 0.3, pitch_amplitude_deg=5.0, pitch_period=1.0 / 0.5,
     yaw_amplitude_deg=9.0, yaw_period=1.0 / 0.2))
-"""Its table 1: x is to starboard, y to the bow."""
+"""Sway of paper 001, table 1, where x is to starboard and y to the bow."""
 
 MISALIGNMENT_RAD = np.radians((3.0, 3.0, 180.0))
-"""a_x, a_y, a_z."""
+"""Misalignment a_x, a_y, a_z [rad]."""
 
 VELOCITY_NOISE_M_S, SWELL_VELOCITY_M_S, SWELL_FREQUENCY_HZ = 0.05, 0.5, 0.1
-"""[m/s], [m/s], [Hz]."""
+"""White velocity [m/s]; velocity [m/s] and frequency [Hz] of the swell."""
 
 INS_PARAMETERS = AlignmentParameters(step=LAW_STEP_S, aligned_sigma=1e-5, velocity_disturbance=VELOCITY_NOISE_M_S,
                                      gyro_noise=GYRO_NOISE_DENSITY, gyro_bias=GYRO_BIAS_RAD_S,
@@ -84,42 +88,45 @@ INS_PARAMETERS = AlignmentParameters(step=LAW_STEP_S, aligned_sigma=1e-5, veloci
 CASE_METHODS = {method.replace('_', '-'): method for method in INS_METHODS if method != 'model'}
 CASE_COLOURS = dict(zip(CASE_METHODS, (RAW_COLOUR, TRUTH_COLOUR, MOTOR_1_COLOUR, FILTERED_COLOUR, MOTOR_2_COLOUR)))
 SETTLED_AZIMUTH_ARCMIN = 12.0
-"""Azimuth has settled when the rms over the runs stays below this [arcmin]."""
+"""Rms over the runs below which the azimuth counts as settled [arcmin]."""
 EVALUATION_TIMES_S = (100, 250, 300, 600)
 """Instants of the rows of the azimuth's rms [s]."""
 SWELL_EVALUATION_TIME_S = 200
+"""Instant of the rows of the azimuth on swell [s]."""
 
 ALIGNMENT_ESTIMATE = np.dtype([('quaternion', 'f8', (4,)), ('azimuth_sigma', 'f8'), ('level_sigma', 'f8')])
 """Attitude deck -> earth (x, y, z, w) and 1 sigmas [rad] of a navigator."""
 
 Sensors = namedtuple('Sensors', 'state constants ship inputs truth outputs')
-"""Records (1,) of an IMU on its ship: imu.STATE, CONSTANTS, motion.CONSTANTS, imu.INPUTS, motion.OUTPUTS,
-imu.OUTPUTS."""
+"""Records (1,) of an IMU on its ship: state and constants of imu, constants of motion, inputs of imu, outputs of
+motion and of imu."""
 
 Increments = namedtuple('Increments', 'angle force attitude')
 """Increments of an IMU, angle (n, 3) [rad], force (n, 3) [m/s], FLU, and the true attitude (n, 4) at their ends."""
 
 
 class Sums(typing.NamedTuple):
-    """Sums over runs: squared errors (n, 3) about east, north, up [rad2]; squared ratio of the error in azimuth to its
-    1 sigma (n,); wall time [s]; steps; runs. first: errors (n, 3) [rad] of the first run, None where it is not among
-    them."""
-    squares: np.ndarray = 0.0
-    ratios: np.ndarray = 0.0
+    """Sums over runs.
+
+    `squares` (n, 3): squared errors about east, north, up [rad2]. `ratios` (n,): squared ratio of the error in azimuth
+    to its 1 sigma. `first` (n, 3): errors of the first run [rad], None if it is not among the runs. `wall_time`: [s].
+    """
+    squares: np.ndarray | float = 0.0
+    ratios: np.ndarray | float = 0.0
     first: np.ndarray | None = None
     wall_time: float = 0.0
     steps: float = 0.0
     runs: int = 0
 
     def plus(self, more):
-        """These sums and more Sums."""
+        """Return the sum of these and more Sums."""
         return Sums(self.squares + more.squares, self.ratios + more.ratios,
                     more.first if self.first is None else self.first, self.wall_time + more.wall_time,
                     self.steps + more.steps, self.runs + more.runs)
 
 
 JACKKNIFE_PARTS = 20
-"""Parts of the runs from which the intervals of what is measured over all of them follow."""
+"""Parts of the runs for the jackknife, which gives the intervals of statistics over all runs."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -129,7 +136,7 @@ class Accuracy:
 
     @functools.cached_property
     def whole(self):
-        """The Sums of all runs."""
+        """Sums of all runs."""
         return functools.reduce(Sums.plus, self.parts)
 
     @property
@@ -158,7 +165,7 @@ class Accuracy:
         return 1e6 * self.whole.wall_time / self.whole.steps
 
     def over_parts(self, statistic):
-        """intervals.pseudo_values of statistic(Accuracy)."""
+        """Return intervals.pseudo_values of statistic(Accuracy)."""
         return pseudo_values(self.parts, lambda parts: statistic(Accuracy(parts)))
 
 
@@ -171,14 +178,16 @@ class Batch:
 
     @property
     def duration(self):
-        """Length of its runs [s]."""
+        """Duration of its runs [s]."""
         return SHORT_RUN_DURATION_S if self.kind else RUN_DURATION_S
 
 
 @compiled
 def simulate(sensors, normals, velocity, out):
-    """Fill the Increments `out` of Sensors; normals (n, NORMALS); velocity (n + 1, 3): added to the ship's, ENU
-    [m/s]."""
+    """Fill the Increments `out` of Sensors.
+
+    normals: (n, IMU_NORMALS_PER_STEP). velocity (n + 1, 3): added to the velocity of the ship, ENU [m/s].
+    """
     u, truth, measured = sensors.inputs[0], sensors.truth[0], sensors.outputs[0]
     dt = u.dt
     for k in range(len(out.angle)):
@@ -197,7 +206,7 @@ def simulate(sensors, normals, velocity, out):
 
 @compiled
 def align(state, constants, angle, force, dt, every, estimates):
-    """Run a navigator on increments (n, 3) of dt [s]; estimates: ALIGNMENT_ESTIMATE after every `every`-th of them."""
+    """Run a navigator on increments (n, 3) of dt [s]; estimates: an ALIGNMENT_ESTIMATE every `every` increments."""
     aid = np.zeros(3)
     for k in range(len(angle)):
         navigator.step(state[0], constants[0], angle[k], force[k], dt, aid)
@@ -209,31 +218,33 @@ def align(state, constants, angle, force, dt, every, estimates):
 
 
 def quaternion(axis, angle):
-    """Quaternion (x, y, z, w) of a rotation by an angle [rad] about an axis of ENU (0, 1, 2)."""
+    """Return the quaternion (x, y, z, w) of a rotation by an angle [rad] about an axis of ENU (0, 1, 2)."""
     q = np.zeros(4)
     q[axis], q[3] = math.sin(0.5 * angle), math.cos(0.5 * angle)
     return q
 
 
 def misaligned(attitude, angles):
-    """Attitude deck -> n' of an attitude deck -> n: C_n^n' = R_y(a_y)^T R_x(a_x)^T R_z(a_z)^T; angles a_x, a_y, a_z
-    [rad]."""
+    """Return the attitude deck -> n' of an attitude deck -> n: C_n^n' = R_y(a_y)^T R_x(a_x)^T R_z(a_z)^T.
+
+    angles: a_x, a_y, a_z [rad].
+    """
     for axis in (2, 0, 1):
         attitude = product(quaternion(axis, -angles[axis]), attitude)
     return attitude
 
 
 def draw_conditions(batch, random):
-    """(heading [deg], misalignment (3,) [rad], signs or sizes of the six biases) of one run."""
+    """Return (heading [deg], misalignment (3,) [rad], signs or sizes of the six biases) of one run."""
     if not batch.kind.startswith('quadrant'):
-        # The paper's axes are starboard and bow; here x is to the bow, y to port.
+        # The paper's axes point to starboard and to the bow; our x points to the bow, our y to port.
         return 0.0, MISALIGNMENT_RAD, np.array((1.0, -1.0, 1.0, 1.0, -1.0, 1.0))
     azimuth = 0.5 * math.pi * (int(batch.kind[-1]) - 1 + random.random())
     return random.uniform(0.0, 360.0), np.array((*MISALIGNMENT_RAD[:2], azimuth)), random.standard_normal(6)
 
 
 def disturbance(batch, random, n):
-    """Velocity (n + 1, 3) of sea and swell at the IMU's samples, ENU [m/s]."""
+    """Return the velocity (n + 1, 3) of sea and swell at the IMU's samples, ENU [m/s]."""
     held = round(LAW_STEP_S / IMU_PERIOD_S)
     velocity = np.repeat(VELOCITY_NOISE_M_S * random.standard_normal((n // held + 1, 3)), held, axis=0)[:n + 1]
     if batch.kind == 'swell':
@@ -243,7 +254,7 @@ def disturbance(batch, random, n):
 
 
 def simulated_run(batch, run):
-    """(Increments, misaligned attitude (x, y, z, w) at 0 s) of one run of a batch."""
+    """Return (Increments, misaligned attitude (x, y, z, w) at 0 s) of one run of a batch."""
     seed = {'': BASE_SEED, 'swell': SWELL_SEED}.get(batch.kind, QUADRANT_SEED)
     random = np.random.default_rng((seed, *batch.kind.encode()[-1:], run))
     heading, angles, biases = draw_conditions(batch, random)
@@ -265,7 +276,7 @@ def simulated_run(batch, run):
 
 
 def errors(estimated, attitude):
-    """Errors (n, 3) about east, north, up [rad] of an estimated attitude (n, 4) against the true one (n, 4)."""
+    """Return the errors (n, 3) about east, north, up [rad] of an estimated attitude (n, 4) against the true one."""
     x, y, z, w = product(estimated.T, (attitude * (-1.0, -1.0, -1.0, 1.0)).T)
     size = np.sqrt(x * x + y * y + z * z)
     angle = 2.0 * np.arctan2(size, np.abs(w)) * np.sign(np.where(w == 0.0, 1.0, w))
@@ -273,7 +284,7 @@ def errors(estimated, attitude):
 
 
 def align_batch(batch):
-    """{case: Sums} of a batch."""
+    """Return {case: Sums} of a batch."""
     every, latitude = round(EVALUATION_PERIOD_S / IMU_PERIOD_S), math.radians(SHIP_PARAMETERS.latitude_deg)
     n, sums = round(batch.duration / EVALUATION_PERIOD_S), {}
     for i in range(batch.count):
@@ -281,7 +292,7 @@ def align_batch(batch):
         for case, method in CASE_METHODS.items():
             constants = navigator.constants(INS_PARAMETERS, method, 'none', latitude)
             state, estimates = navigator.initial_state(constants, start), np.zeros(n, ALIGNMENT_ESTIMATE)
-            align(state.copy(), constants, angle[:2], force[:2], IMU_PERIOD_S, every, estimates)      # compiled by now
+            align(state.copy(), constants, angle[:2], force[:2], IMU_PERIOD_S, every, estimates)      # compiles
             begun = time.perf_counter()
             align(state, constants, angle, force, IMU_PERIOD_S, every, estimates)
             wall_time = time.perf_counter() - begun
@@ -293,20 +304,19 @@ def align_batch(batch):
 
 
 def limit():
-    """(azimuth, level) 1 sigma (n,) [rad] of the information limit: the Riccati covariance and the biases."""
+    """Return (azimuth, level) 1 sigma (n,) [rad] of the information limit: the Riccati covariance and the biases."""
     constants = navigator.constants(INS_PARAMETERS, 'riccati_eso', 'none', math.radians(SHIP_PARAMETERS.latitude_deg))
     state, n = navigator.initial_state(constants, (0.0, 0.0, 0.0, 1.0)), round(RUN_DURATION_S / IMU_PERIOD_S)
     estimates, still = np.zeros(round(RUN_DURATION_S / EVALUATION_PERIOD_S), ALIGNMENT_ESTIMATE), np.zeros((n, 3))
     k = constants[0]['conditions']
     still_force = np.tile((0.0, 0.0, float(k['gravity']) * IMU_PERIOD_S), (n, 1))
     align(state, constants, still + k['earth_rate'] * IMU_PERIOD_S, still_force, IMU_PERIOD_S,
-          round(EVALUATION_PERIOD_S / IMU_PERIOD_S),
-          estimates)
+          round(EVALUATION_PERIOD_S / IMU_PERIOD_S), estimates)
     return estimates['azimuth_sigma'], estimates['level_sigma']
 
 
 def settling_time(rms):
-    """Last time [s] at which an rms (n,) [arcmin] is above SETTLED_AZIMUTH_ARCMIN; NaN when it ends above."""
+    """Return the last time [s] at which an rms (n,) [arcmin] is above SETTLED_AZIMUTH_ARCMIN; NaN if it ends above."""
     above = np.flatnonzero(rms > SETTLED_AZIMUTH_ARCMIN)
     if len(above) and above[-1] == len(rms) - 1:
         return math.nan
@@ -314,7 +324,7 @@ def settling_time(rms):
 
 
 def value_at(values, t):
-    """The value of a series (n,), one every EVALUATION_PERIOD_S, at t [s]."""
+    """Return the value at t [s] of a series (n,) with a value every EVALUATION_PERIOD_S."""
     return values[round(t / EVALUATION_PERIOD_S) - 1]
 
 
@@ -325,25 +335,25 @@ METRIC_TARGETS = {
         ('azimuth_rms_arcmin_300s', '<= 6.5'))},
     ('oba/swell', f'azimuth_rms_arcmin_{SWELL_EVALUATION_TIME_S}s'): '<= 10',
     **{(f'{case}/swell', f'azimuth_error_over_sigma_{SWELL_EVALUATION_TIME_S}s'): '<= 1.3' for case in CASE_METHODS}}
+"""{(case, metric): target}."""
 PAPER_VALUES = {('classical', 'time_to_12arcmin_rms_s'): 420, ('adrc', 'time_to_12arcmin_rms_s'): 250}
 
 
-KIND_METRICS = {
+KIND_METRICS: dict[str, dict[str, tuple]] = {
     '': {'time_to_12arcmin_rms_s': ('s', lambda a: settling_time(a.azimuth)),
          **{f'azimuth_rms_arcmin_{t}s': ('arcmin', lambda a, t=t: value_at(a.azimuth, t)) for t in EVALUATION_TIMES_S},
          'level_rms_arcmin': ('arcmin', lambda a: a.level),
          'azimuth_error_over_sigma_300s': ('-', lambda a: value_at(a.ratio, 300))},
-    'swell': {f'azimuth_rms_arcmin_{SWELL_EVALUATION_TIME_S}s': ('arcmin', lambda a: value_at(a.azimuth,
-                                                                                              SWELL_EVALUATION_TIME_S)),
-              f'azimuth_error_over_sigma_{SWELL_EVALUATION_TIME_S}s': ('-',
-                                                                       lambda a: value_at(a.ratio,
-                                                                                          SWELL_EVALUATION_TIME_S))},
+    'swell': {f'azimuth_rms_arcmin_{SWELL_EVALUATION_TIME_S}s': (
+                  'arcmin', lambda a: value_at(a.azimuth, SWELL_EVALUATION_TIME_S)),
+              f'azimuth_error_over_sigma_{SWELL_EVALUATION_TIME_S}s': (
+                  '-', lambda a: value_at(a.ratio, SWELL_EVALUATION_TIME_S))},
     'quadrant': {'azimuth_rms_arcmin_300s': ('arcmin', lambda a: value_at(a.azimuth, 300))}}
-"""{kind of runs: {metric: (unit, its value of an Accuracy)}}."""
+"""{kind of runs: {metric: (unit, function Accuracy -> value)}}."""
 
 
 def rows(accuracy, bound):
-    """The rows of accuracy {kind: {case: Accuracy}}; bound: as of `limit`."""
+    """Return the rows of accuracy {kind: {case: Accuracy}}; bound: as of `limit`."""
     table = []
     for kind, cases in accuracy.items():
         for method, a in cases.items():
@@ -360,14 +370,16 @@ def rows(accuracy, bound):
 
 
 def remarks(runs):
-    """Sentences that the rows need, after this number of runs."""
+    """Return the sentences that explain the rows, after this number of runs."""
     return [
-        f'{runs} runs; every number is one of all of them, such as an rms, its interval by the jackknife over {JACKKNIFE_PARTS} '
-        'parts of them. The last crossing of 12 arcmin is known to tens of seconds only where the rms flattens out '
-        'just below. What kicks the classical loop off 180 deg turns it by more than a turn, so its time hangs on '
-        'details: bandwidths of 0.024 to 0.028 rad/s give 414 to 494 s in no order, the other signs of the tilts at '
-        'the start 425 to 542 s.',
-        'level_rms_arcmin is over 300 to 600 s; step_us is one step of 0.02 s with its two of the strapdown.']
+        f'{runs} runs. Every number is a statistic over all runs, such as an rms. Its interval comes from the '
+        f'jackknife over {JACKKNIFE_PARTS} parts of the runs. If the rms levels off just below 12 arcmin, its last '
+        'crossing of 12 arcmin is known only to tens of seconds.',
+        'The classical loop leaves the error of 180 deg with a motion of more than a turn, so its time depends on '
+        'details. Bandwidths of 0.024 to 0.028 rad/s give 414 to 494 s in no order. The other signs of the initial '
+        'tilts give 425 to 542 s.',
+        'level_rms_arcmin is over 300 to 600 s. step_us is the time of one step of 0.02 s with two steps of the '
+        'strapdown.']
 
 
 def run(progress, runs=DEFAULT_RUNS, pool=None) -> Result:
@@ -389,7 +401,7 @@ def run(progress, runs=DEFAULT_RUNS, pool=None) -> Result:
 
 
 def figures(accuracy, bound):
-    """{name: function that draws it}; arguments as of `rows`."""
+    """Return {name: function that draws it}; arguments as of `rows`."""
     return {'azimuth': lambda: azimuth_figure(accuracy[''], bound), 'level': lambda: level_figure(accuracy[''], bound),
             'swell': lambda: swell_figure(accuracy['swell'], bound)}
 
@@ -398,7 +410,7 @@ RMS_LABEL = 'rms of the error [arcmin]'
 
 
 def azimuth_figure(accuracy, bound):
-    """Figures 3 and 4 of the paper for azimuth, one run; then the rms over all runs, {case: Accuracy}."""
+    """Draw figures 3 and 4 of the paper for azimuth, one run; then the rms over all runs, {case: Accuracy}."""
     figure, axes = new_panels(3, height=9.0, y=('azimuth error [deg]', 'azimuth error [arcmin]', RMS_LABEL))
     t = EVALUATION_PERIOD_S * np.arange(1, len(bound[0]) + 1)
     for case, a in accuracy.items():
@@ -422,7 +434,7 @@ def finish_panel(axes, bound, title):
 
 
 def level_figure(accuracy, bound):
-    """Figure 4 of the paper for level: one run after 100 s; then the rms over all."""
+    """Draw figure 4 of the paper for level: one run after 100 s; then the rms over all runs."""
     figure, axes = new_panels(2, height=6.4, y=('level error [arcmin]', RMS_LABEL))
     t = EVALUATION_PERIOD_S * np.arange(1, len(bound[1]) + 1)
     for case, a in accuracy.items():
@@ -436,7 +448,7 @@ def level_figure(accuracy, bound):
 
 
 def swell_figure(accuracy, bound):
-    """Rms of the azimuth on swell, {case: Accuracy}, beside the limit."""
+    """Draw the rms of the azimuth on swell, {case: Accuracy}, beside the limit."""
     figure, axes = new_panels(1, height=3.8, y=RMS_LABEL)
     for case, a in accuracy.items():
         axes[0, 0].plot(EVALUATION_PERIOD_S * np.arange(1, len(a.rms) + 1), a.rms[:, 2], color=CASE_COLOURS[case],

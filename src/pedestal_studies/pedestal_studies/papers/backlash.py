@@ -1,8 +1,8 @@
-"""Backlash: standstill, reversal and fast moves under the bias schedules, two speed loops against one.
+"""Backlash: standstill, reversal and fast moves under the bias schedules, and two speed loops beside one.
 
-With the paper's controller (the scenarios as they are): bias-off, bias-on (5 Nm, fading, as in paper 000),
-hold-fade. With the controller `best` of the study servo: every schedule, sine and fast step. Every case is
-`pedestal run servo_step|servo_sine --param ...` too (Case.command).
+Three cases have the controller of paper 000, as in the scenarios: bias-off, bias-on (5 Nm, fading, as in the paper)
+and hold-fade. With the controller `best` of the study servo, the sine and the fast step are run with every schedule.
+`pedestal run servo_step|servo_sine --param ...` runs every case too (Case.command).
 """
 import math
 
@@ -18,60 +18,67 @@ from pedestal_studies.rigs import drawing, metrics
 from pedestal_studies.rigs.rows import Result
 
 STANDSTILL_START_S = 2.0
-"""Standstill is evaluated from this time on after a step [s]."""
+"""Time after a step from which the standstill is evaluated [s]."""
 
 REVERSAL_AMPLITUDE_RAD = 0.05
-"""Sine of the reversals [rad]."""
+"""Amplitude of the sine of the reversals [rad]."""
 
 REVERSAL_FREQUENCIES_RAD_S = {'reversal': 0.2, 'fast_reversal': 4.0}
-"""Its angular frequency [rad/s]: slow, so that only lash is left; 0.2 rad/s at its peak, where friction joins in."""
+"""Angular frequencies of the sine of the reversals [rad/s].
+
+The slow sine shows the lash alone. The fast sine has a peak rate of 0.2 rad/s, at which friction adds to the error.
+"""
 
 
 def bias(schedule, torque=12.0, hold=14.0, out=45.0):
-    """Parameters of a bias schedule, torques per motor [Nm]."""
+    """Return the parameters of a bias schedule, torques per motor [Nm]."""
     return {'adu.azimuth.bias.schedule': schedule, 'adu.azimuth.bias.torque': torque,
             'adu.azimuth.bias.hold': hold, 'adu.azimuth.bias.out': out}
 
 
 PAPER_CASES = {'bias-off': bias('off'), 'bias-on': {}, 'hold-fade': bias('hold_fade')}
+"""{case with the controller of the paper: parameters}."""
 
 BIAS_SCHEDULES = {
     'off': bias('off'), 'constant-5': bias('constant', 5.0), 'constant-12': bias('constant', 12.0),
     'fade-5': bias('fade', 5.0, 0.0, 30.0), 'fade-12': bias('fade', 12.0, 0.0, 30.0), 'hold-fade': bias('hold_fade')}
+"""{schedule: parameters}."""
 
 SPEED_LOOP_STRUCTURES = {
     'mean-speed': {'adu.azimuth.speed_loop.structure': 'mean'},
     'independent-loops': {'adu.azimuth.speed_loop.structure': 'independent'}}
+"""{case: parameters} of one speed loop on the mean speed, and of one speed loop for each motor."""
 
 METRIC_TARGETS = {
     ('bias-off', 'standstill_peak_to_peak_rad'): '> 5e-4', ('bias-on', 'standstill_peak_to_peak_rad'): '< 2e-6',
     ('hold-fade', 'standstill_peak_to_peak_rad'): '< 2e-6', ('bias-on', 'reversal_ratio_off_to_on'): '> 30',
     ('hold-fade', 'reversal_ratio_off_to_on'): '> 30',
     ('hold-fade', 'sine_residual_rad'): '<= 1e-4', ('hold-fade', 'step_overshoot_percent'): '<= 2.5'}
+"""{(case, metric): target}."""
 
 
 def reversal_case(kind, name):
-    """The Case of three periods of a sine of REVERSAL_FREQUENCIES_RAD_S."""
+    """Return the Case of three periods of a sine of REVERSAL_FREQUENCIES_RAD_S."""
     return cases.sine_case(Case(name, 'servo_sine', {
         **PAPER_CASES[name], 'tracking_receiver.target.angle.azimuth_amplitude': REVERSAL_AMPLITUDE_RAD}),
         REVERSAL_FREQUENCIES_RAD_S[kind], 3)
 
 
 FAST_STEP_PARAMETERS = {**servo.FULL_TORQUE_PARAMETERS, 'acu.azimuth.shaper.acceleration': 40.0}
-"""The controller of a step at 40 rad/s2, which needs all torque."""
+"""Controller of a step at 40 rad/s2, which needs the full torque."""
 
 MOVE_DURATION_S = 0.5
-"""The step of the two structures is over by then [s]."""
+"""Time at which the step of the cases SPEED_LOOP_STRUCTURES is over [s]."""
 
 
 def standstill(record):
-    """(times [s], load angle [rad]) from STANDSTILL_START_S on."""
+    """Return (times [s], load angle [rad]) from STANDSTILL_START_S on."""
     late = record.t >= STANDSTILL_START_S
     return record.t[late], record['adu/truth']['position'][late, 0]
 
 
 def steady_residual(record, amplitude, w):
-    """(times [s], error without its fundamental w [rad/s], (n,) [rad]) over the whole periods after the first."""
+    """Return (times [s], error without its fundamental w [rad/s], (n,) [rad]) over whole periods after the first."""
     t, period = record.t, 2.0 * math.pi / w
     error = amplitude * np.sin(w * t) - record['adu/truth']['position'][:, 0]
     steady = metrics.whole_periods(t, period, period)
@@ -79,31 +86,34 @@ def steady_residual(record, amplitude, w):
 
 
 def opposing_torque(record):
-    """Torque (n,) [Nm] with which the motors oppose each other beyond the commanded bias."""
+    """Return the torque (n,) [Nm] with which the motors oppose each other beyond the commanded bias."""
     motors = record['adu/motor_states']['effort'][:, :2]
     return 0.5 * (motors[:, 0] - motors[:, 1]) - record.truth['bias'][:, 0]
 
 
 def synchronism_error(record):
-    """Measured speed of motor 1 less that of motor 2 (n,) [rad/s]."""
+    """Return the measured speed of motor 1 minus that of motor 2 (n,) [rad/s]."""
     return record['adu/motor_states']['velocity'][:, 0] - record['adu/motor_states']['velocity'][:, 1]
 
 
 CASES = {('standstill', name): Case(name, 'servo_step', changed, STANDSTILL_START_S + 1.0)
          for name, changed in PAPER_CASES.items()}
 CASES |= {(kind, name): reversal_case(kind, name) for kind in REVERSAL_FREQUENCIES_RAD_S for name in PAPER_CASES}
-CASES |= {('sine', name): Case(name, 'servo_sine', {**servo.BEST_PARAMETERS, **changed}) for name,
-          changed in BIAS_SCHEDULES.items()}
-CASES |= {('step', name): Case(name, 'servo_step', {**FAST_STEP_PARAMETERS, **changed}) for name,
-          changed in BIAS_SCHEDULES.items()}
-CASES |= {('structure', name): Case(name, 'servo_step', changed, STANDSTILL_START_S) for name,
-          changed in SPEED_LOOP_STRUCTURES.items()}
-"""{(kind, case): a step and the standstill after it; reversals; the sine of 0.4 Hz and the fast step with every
-schedule; a step with one speed loop, or one for each motor}."""
+CASES |= {('sine', name): Case(name, 'servo_sine', {**servo.BEST_PARAMETERS, **changed})
+          for name, changed in BIAS_SCHEDULES.items()}
+CASES |= {('step', name): Case(name, 'servo_step', {**FAST_STEP_PARAMETERS, **changed})
+          for name, changed in BIAS_SCHEDULES.items()}
+CASES |= {('structure', name): Case(name, 'servo_step', changed, STANDSTILL_START_S)
+          for name, changed in SPEED_LOOP_STRUCTURES.items()}
+"""{(kind of run, case): Case}.
+
+The kinds are a step and the standstill after it, reversals, the sine of 0.4 Hz and the fast step with every schedule,
+and a step with each of SPEED_LOOP_STRUCTURES.
+"""
 
 
 def measured(kind, name, record):
-    """{metric: (value, unit)} of one record."""
+    """Return {metric: (value, unit)} of one record."""
     if kind == 'standstill':
         return {'standstill_peak_to_peak_rad': (np.ptp(standstill(record)[1]), 'rad')}
     if kind in REVERSAL_FREQUENCIES_RAD_S:
@@ -123,7 +133,7 @@ def measured(kind, name, record):
 
 
 def rows(done):
-    """The rows of records {(kind, case): closed_loop.Run}, all or some."""
+    """Return the rows of records {(kind, case): closed_loop.Run}, all or some."""
     table = []
     for (kind, name), record in done.items():
         values = measured(kind, name, record)
@@ -146,30 +156,32 @@ def run(progress) -> Result:
 
 
 def remarks(table):
-    """Sentences that the rows need; table: those rows."""
+    """Return the sentences that explain the rows; table: those rows."""
     values = {(row['case'], row['metric']): row['value'] for row in table}
+    slow, fast = REVERSAL_FREQUENCIES_RAD_S.values()
     return [
-        f'reversal is the sine {REVERSAL_AMPLITUDE_RAD:g} rad sin({REVERSAL_FREQUENCIES_RAD_S["reversal"]:g} t); fast_reversal goes '
-        f'through it at up to {REVERSAL_AMPLITUDE_RAD * REVERSAL_FREQUENCIES_RAD_S["fast_reversal"]:g} rad/s. What bias leaves of the fast '
-        'one is the friction that changes its sign, no lash: its ratio is '
-        f'{values["bias-on", "fast_reversal_ratio_off_to_on"]:.0f}, not '
+        f'reversal is the sine {REVERSAL_AMPLITUDE_RAD:g} rad sin({slow:g} t). fast_reversal has the same amplitude '
+        f'and up to {REVERSAL_AMPLITUDE_RAD * fast:g} rad/s. With bias the remaining error of fast_reversal comes '
+        'from the friction that changes its sign, not from lash. Its ratio is therefore '
+        f'{values["bias-on", "fast_reversal_ratio_off_to_on"]:.0f}, and that of reversal is '
         f'{values["bias-on", "reversal_ratio_off_to_on"]:.0f}.',
-        'The overshoot of the fast step hardly depends on the schedule: the shaper ends the move gently. A constant '
-        'bias costs what it takes from the peak torque, which a sharper move would show.',
-        f'Two speed loops keep the motors closer together in the move (move_*, the first {MOVE_DURATION_S:g} s). Then their '
-        'integrals take the bias that comes back for an error and remove it: the lash opens and they fight on.',
+        'The overshoot of the fast step hardly depends on the schedule, because the shaper ends the move gently. A '
+        'constant bias lowers the available peak torque, which would show in a sharper move.',
+        'Two speed loops keep the motors closer together during the move (move_*, the first '
+        f'{MOVE_DURATION_S:g} s). After the move their integrals treat the returning bias as an error and remove it. '
+        'The lash then opens, and the motors continue to oppose each other.',
     ]
 
 
 def figures(done):
-    """{name: function that draws it} of the records of all cases."""
+    """Return {name: function that draws it} of the records of all cases."""
     return {'standstill': lambda: standstill_figure(done), 'reversal': lambda: reversal_figure(done),
             'torques': lambda: torques_figure(done), 'schedules': lambda: schedules_figure(done),
             'structures': lambda: structures_figure(done)}
 
 
 def standstill_figure(done):
-    """Limit cycle of the load at rest and the torque of both motors, without and with bias."""
+    """Draw the limit cycle of the load at rest and the torque of both motors, without and with bias."""
     figure, axes = new_panels(2, 2, height=4.6, y=('azimuth [\N{MICRO SIGN}rad]', 'torque [Nm]'), sharex=True,
                               sharey='row')
     for column, name in enumerate(('bias-off', 'bias-on')):
@@ -184,7 +196,7 @@ def standstill_figure(done):
 
 
 def reversal_figure(done):
-    """What lash leaves of a slow sine: reference and load, then the error without its fundamental."""
+    """Draw the effect of lash on a slow sine: reference and load, then the error without its fundamental."""
     error = 'error [\N{MICRO SIGN}rad]'
     figure, axes = new_panels(3, height=5.6, y=('reference [rad]', error, error), sharex=True,
                               height_ratios=(1, 1.2, 1.2))
@@ -200,13 +212,13 @@ def reversal_figure(done):
 
 
 def reversal_window():
-    """(begin, end) [s] of the 3 s about the first reversal in the second period of the slow sine."""
+    """Return (begin, end) [s] of the 3 s about the first reversal in the second period of the slow sine."""
     at = 1.25 * 2.0 * math.pi / REVERSAL_FREQUENCIES_RAD_S['reversal']
     return at - 1.0, at + 2.0
 
 
 def torques_figure(done):
-    """Torque of both motors over the reversal, without and with bias."""
+    """Draw the torque of both motors over the reversal, without and with bias."""
     figure, axes = new_panels(3, height=5.6, y='torque [Nm]', sharex=True, sharey=True)
     for panel, name in zip(axes[:, 0], PAPER_CASES):
         record = done['reversal', name]
@@ -217,13 +229,14 @@ def torques_figure(done):
 
 
 def schedules_figure(done):
-    """Every schedule twice: what it leaves of the sine, and what it costs the fast step."""
+    """Draw for every schedule the residual of the sine and the overshoot of the fast step."""
     names = list(BIAS_SCHEDULES)
     sine = [1e6 * measured('sine', name, done['sine', name])['sine_residual_rad'][0] for name in names]
     step = [measured('step', name, done['step', name])['step_overshoot_percent'][0] for name in names]
     figure, axes = new_panels(1, 2, height=3.2, sharey=True)
-    for panel, values, bound, label in ((axes[0, 0], sine, 100.0, 'left of the 0.4 Hz sine [\N{MICRO SIGN}rad]'),
-                                        (axes[0, 1], step, 2.5, 'overshoot of the fast step [%]')):
+    for panel, values, bound, label in (
+            (axes[0, 0], sine, 100.0, 'residual of the 0.4 Hz sine [\N{MICRO SIGN}rad]'),
+            (axes[0, 1], step, 2.5, 'overshoot of the fast step [%]')):
         bars = panel.barh(names, values, color=[FILTERED_COLOUR if name == 'hold-fade' else RAW_COLOUR
                                                 for name in names])
         panel.bar_label(bars, [f'{value:.0f}' if value >= 100.0 else f'{value:.3g}' for value in values], padding=3,
@@ -237,8 +250,8 @@ def schedules_figure(done):
 
 
 def structures_figure(done):
-    """One speed loop on the mean speed against one for each motor, over the step of the paper."""
-    figure, axes = new_panels(2, 2, height=4.6, y=('torque [Nm]', 'fight torque [Nm]'), sharex=True, sharey='row')
+    """Draw one speed loop on the mean speed beside a speed loop for each motor, over the step of the paper."""
+    figure, axes = new_panels(2, 2, height=4.6, y=('torque [Nm]', 'opposing torque [Nm]'), sharex=True, sharey='row')
     for column, name in enumerate(SPEED_LOOP_STRUCTURES):
         record = done['structure', name]
         drawing.draw_torques(axes[0, column], record)

@@ -1,12 +1,12 @@
-"""Feed-forward of estimated rate and acceleration (paper 003): a conventional Kalman filter against the IMM.
+"""Feed-forward of estimated rate and acceleration (paper 003): a conventional Kalman filter beside the IMM.
 
-The loop is `feedforward_loop`: 20 deg to and fro at 3.5 deg/s, a miss every 10 ms that is 40 ms old. `imm` feeds
-forward rate and acceleration at the time of the miss, `imm-predicted` those predicted for the middle of the interval
-in which the command is in force, d + T / 2 later. `perfect-state` feeds forward the truth of that instant. All filters
-get the same noise.
+The loop is `feedforward_loop`: 20 deg to and fro at 3.5 deg/s, with a miss every 10 ms that is 40 ms old. `imm` feeds
+forward rate and acceleration at the time of the miss. `imm-predicted` feeds forward their prediction for the middle of
+the interval in which the command is in force, d + T / 2 later. `perfect-state` feeds forward the truth of that
+instant. All filters get the same noise.
 
-`drive-...` goes through the product: receiver with that latency, control unit, motors and gears. Its target
-makes one reversal after the other, which is a sine.
+`drive-...` uses the product: receiver with that latency, control unit, motors and gears. Its target makes reversals
+without a pause, which is a sine.
 """
 import dataclasses
 import math
@@ -49,33 +49,34 @@ DEFAULT_RUNS = 50
 """Runs of each case, with independent noise."""
 
 DRIVE_DURATION_S, DRIVE_EVALUATION_START_S, DRIVE_ELEVATION_RAD = 36.0, 6.0, 0.5
-"""Of the runs through the product: duration, what of it is left to the hand-over to autotrack [s], where [rad]."""
+"""Duration of a run through the product [s], start of its evaluation in autotrack [s], and elevation [rad]."""
 
 CV_NOISES = (0.1, 0.2, 0.3, 0.5, 4.0)
 """Process noises of the conventional filter [deg/s2/sqrt(Hz)]."""
 
 PAPER_CV_NOISES = {'azimuth': 0.1, 'elevation': 0.3}
-"""The process noise of `kalman-cv`: the nearest to the paper's results, which prints none."""
+"""Process noise of `kalman-cv` that comes nearest to the paper's results; the paper prints none."""
 
 FEEDFORWARD_SOURCES = {
     'imm': imm(40.0, False), 'imm-predicted': imm(40.0, True), 'perfect-state': Source(None, True),
     'imm-b-predicted': imm(5.0, True), 'kalman-ca-0.1': ca(0.1), 'kalman-ca-40': ca(40.0),
     'kalman-ca-40-predicted': dataclasses.replace(ca(40.0), predicted=True)}
+"""{name: Source} of rate and acceleration."""
 
 
 def cv_name(axis, q):
-    """Name of the case of a conventional filter, q [deg/s2/sqrt(Hz)]."""
+    """Return the name of the case of a conventional filter, q [deg/s2/sqrt(Hz)]."""
     return f'{axis}/kalman-cv' if q == PAPER_CV_NOISES[axis] else f'{axis}/kalman-cv-{q:g}'
 
 
 CASES = {f'{axis}/kalman-cv': (axis, cv(q)) for axis, q in PAPER_CV_NOISES.items()}
-CASES |= {f'{axis}/{name}': (axis, source) for axis in REVERSAL_S_BY_AXIS for name,
-          source in FEEDFORWARD_SOURCES.items()}
+CASES |= {f'{axis}/{name}': (axis, source) for axis in REVERSAL_S_BY_AXIS
+          for name, source in FEEDFORWARD_SOURCES.items()}
 CASES |= {cv_name(axis, q): (axis, cv(q)) for axis in REVERSAL_S_BY_AXIS for q in CV_NOISES}
 
 
 def drive_case(axis, tuned):
-    """A Case of reversals without a pause on an axis, tracked with a filter (FilterParameters)."""
+    """Return a Case of reversals without a pause on an axis, tracked with a filter (FilterParameters)."""
     w = math.pi / REVERSAL_S_BY_AXIS[axis]
     amplitudes = {f'tracking_receiver.target.angle.{name}_amplitude':
                   profiles.S_MOTION_RATE_RAD_S / w if name == axis else 0.0 for name in REVERSAL_S_BY_AXIS}
@@ -93,12 +94,14 @@ DRIVE_CASES = {
     f'{axis}/drive-{name}': drive_case(axis, tuned) for axis in REVERSAL_S_BY_AXIS for name, tuned in {
         'kalman-cv': cv(PAPER_CV_NOISES[axis]).filter, 'imm': FEEDFORWARD_SOURCES['imm'].filter,
         'imm-default': filter_of('imm')}.items()}
+"""{name: Case} of the product."""
 
 
 def drive_error(item):
-    """(times [s], true error of the axis [rad]), each (n,), from DRIVE_EVALUATION_START_S on, of an item (name of
-    DRIVE_CASES,
-    seed); errors NaN if autotrack was left."""
+    """Return (times [s], true error of the axis [rad]), each (n,), from DRIVE_EVALUATION_START_S on, of an item.
+
+    An item is (name of DRIVE_CASES, seed). The errors are NaN if the run left autotrack.
+    """
     name, seed = item
     record = DRIVE_CASES[name].with_seed(seed).run()
     record = record.where(record.t >= DRIVE_EVALUATION_START_S)
@@ -107,7 +110,7 @@ def drive_error(item):
 
 
 def drive_misses(item):
-    """(rms, largest) miss [deg] of an item as of `driven`."""
+    """Return (rms, largest) miss [deg] of an item as of `drive_error`."""
     _, error = drive_error(item)
     return math.degrees(tracking.rms(error)), math.degrees(metrics.peak(error))
 
@@ -115,35 +118,42 @@ def drive_misses(item):
 MISS_TARGETS_DEG = {
     'azimuth/kalman-cv': '0.16 to 0.17', 'azimuth/imm': '<= 0.036', 'azimuth/imm-predicted': '<= 0.025',
     'elevation/kalman-cv': '0.085 to 0.095', 'elevation/imm': '<= 0.028', 'elevation/imm-predicted': '<= 0.018'}
-"""Of miss_rms_deg."""
+"""Targets of miss_rms_deg."""
 
 PAPER_MISSES_DEG = {'azimuth/kalman-cv': 0.17, 'azimuth/imm': 0.035, 'elevation/kalman-cv': 0.1, 'elevation/imm': 0.03}
-"""Miss rms of the paper [deg]: what it calls its largest."""
+"""Rms of the miss in the paper [deg], which the paper names the largest miss."""
 
-MAIN_CASES = {f'{axis}/{name}' for axis in REVERSAL_S_BY_AXIS for name in ('kalman-cv', 'imm', 'imm-predicted',
-                                                                           'perfect-state')}
-"""The cases that get all rows."""
+MAIN_CASES = {f'{axis}/{name}' for axis in REVERSAL_S_BY_AXIS
+              for name in ('kalman-cv', 'imm', 'imm-predicted', 'perfect-state')}
+"""Cases that have all rows."""
 
 MISS_RATIO_TARGETS = {'azimuth/imm': ('>= 4', None), 'azimuth/imm-predicted': ('>= 6', None),
                       'elevation/imm': ('>= 3', 3.0), 'elevation/imm-predicted': ('>= 5', None)}
-"""Target and paper of how often the miss of kalman-cv is that of a case; of the azimuth the paper prints 4 to 5."""
+"""{case: (target, value of the paper)} of the miss of kalman-cv over the miss of the case; for azimuth the paper
+prints 4 to 5."""
 
 
 def conventional_curve(misses, axis):
-    """(rate noise [deg/s], miss [deg]) of the conventional filter, an array (2, n, runs) over CV."""
+    """Return (rate noise [deg/s], miss [deg]) of the conventional filter, an array (2, n, runs) over CV_NOISES."""
     return np.array([[misses[cv_name(axis, q)].of(metric) for q in CV_NOISES]
                      for metric in ('rate_noise_deg_s', 'miss_rms_deg')])
 
 
 def at_rate_noise(misses, axis, rate_noise):
-    """Miss (runs,) [deg] of a conventional filter tuned to a rate noise (runs,) [deg/s] in each run, between those of
-    CV (log-log), and that of the quietest where even that is louder, which misses by less than it should."""
+    """Return the miss (runs,) [deg] of a conventional filter tuned to a rate noise (runs,) [deg/s] in each run.
+
+    It is interpolated between the filters of CV_NOISES (log-log). If even the quietest of them is noisier, its miss is
+    returned, which is too small.
+    """
     noises, curve = np.log(conventional_curve(misses, axis))
     return np.exp([np.interp(*run) for run in zip(np.log(rate_noise), noises.T, curve.T)])
 
 
 def rows(misses):
-    """The rows of {case: MissStatistics} of all cases; a ratio is one of two filters under the noise of one run."""
+    """Return the rows of {case: MissStatistics} of all cases.
+
+    A ratio is that of two filters under the noise of one run.
+    """
     table = []
     for name, case in misses.items():
         axis, miss = case.axis, case.of('miss_rms_deg')
@@ -161,42 +171,45 @@ def rows(misses):
 
 
 def drive_rows(of_drive):
-    """The rows of {name of DRIVE_CASES: (rms, largest) miss [deg] of every run, an array (runs, 2)}."""
+    """Return the rows of {name of DRIVE_CASES: (rms, largest) miss [deg] of every run, an array (runs, 2)}."""
     table = []
     for name, values in of_drive.items():
         table += [row(name, 'miss_rms_deg', values[:, 0], 'deg'), row(name, 'miss_peak_deg', values[:, 1], 'deg')]
-        usual = f'{name.partition("/")[0]}/drive-kalman-cv'
-        if name != usual:
-            table.append(row(name, 'miss_ratio_to_kalman_cv', of_drive[usual][:, 0] / values[:, 0], '', None, '>= 3'))
+        conventional = f'{name.partition("/")[0]}/drive-kalman-cv'
+        if name != conventional:
+            table.append(row(name, 'miss_ratio_to_kalman_cv', of_drive[conventional][:, 0] / values[:, 0], '',
+                             target='>= 3'))
     return table
 
 
 def remarks(misses):
-    """Sentences that the rows need."""
+    """Return the sentences that explain the rows."""
     value = {(name, metric): case.mean(metric) for name, case in misses.items() for metric in METRIC_UNITS}
     late = (feedforward_loop.MISS_DELAY_STEPS + 0.5) * T
     steepest = math.pi * math.degrees(profiles.S_MOTION_RATE_RAD_S) / REVERSAL_S_BY_AXIS['azimuth']
     return [
-        'Not printed in the paper and chosen here: the time of a reversal, sample time, noise '
-        f'({math.degrees(MISS_SIGMA_RAD):g} deg), delay, rate loop, K_p and every constant of the filters. Its "largest miss '
-        '(RMS)" is read as the rms over the whole motion; miss_worst_second_deg is the rms of the worst second.',
-        f'What is fed forward {1e3 * late:g} ms late (d + T / 2) misses by a (d + T / 2) / K_p in a long turn, '
-        f'{steepest * late / feedforward_loop.K_P:.3f} deg at the {steepest:.1f} deg/s2 of the azimuth: '
-        'imm-predicted is without that. The rate of kalman-cv is the same predicted or not.',
-        'perfect-state is what noise of the miss and jerk in the rate loop leave: the limit of this servo.',
+        'The paper does not print the duration of a reversal, sample time, noise '
+        f'({math.degrees(MISS_SIGMA_RAD):g} deg), delay, rate loop, K_p and the constants of the filters; they are '
+        'ours. Its "largest miss (RMS)" is read as the rms over the whole motion. miss_worst_second_deg is the rms of '
+        'the worst second.',
+        f'A feed-forward that is {1e3 * late:g} ms late (d + T / 2) causes a miss of a (d + T / 2) / K_p in a long '
+        f'turn. It is {steepest * late / feedforward_loop.K_P:.3f} deg at the {steepest:.1f} deg/s2 of the azimuth. '
+        'imm-predicted has no such miss. The rate of kalman-cv is the same with and without prediction.',
+        'perfect-state is the limit of this servo: its miss comes from the noise of the miss and the jerk in the rate '
+        'loop.',
         f'The elevation of the paper (0.1 deg) needs a conventional filter of {PAPER_CV_NOISES["elevation"]:g} '
-        f'deg/s2/sqrt(Hz); with the {PAPER_CV_NOISES["azimuth"]:g} of its azimuth it misses by '
+        f'deg/s2/sqrt(Hz). With the {PAPER_CV_NOISES["azimuth"]:g} deg/s2/sqrt(Hz) of the azimuth the miss is '
         f'{value["elevation/kalman-cv-0.1", "miss_rms_deg"]:.3f} deg.',
-        'The miss alone can be had from any filter by more noise: a conventional one of 4 deg/s2/sqrt(Hz) misses by '
-        f'{value["azimuth/kalman-cv-4", "miss_rms_deg"]:.3f} deg, a ca of 40 deg/s3/sqrt(Hz), predicted, by '
+        'Any filter can have a small miss if its rate is noisy. A conventional filter of 4 deg/s2/sqrt(Hz) has '
+        f'{value["azimuth/kalman-cv-4", "miss_rms_deg"]:.3f} deg. A predicted ca of 40 deg/s3/sqrt(Hz) has '
         f'{value["azimuth/kalman-ca-40-predicted", "miss_rms_deg"]:.3f} deg, with '
-        f'{value["azimuth/kalman-ca-40-predicted", "rate_noise_deg_s"]:.2f} deg/s of noise on the rate where the IMM '
-        f'has {value["azimuth/imm-predicted", "rate_noise_deg_s"]:.3f}. Hence miss_ratio_at_equal_rate_noise: against '
-        'the conventional filter that is tuned to the same noise. The IMM was tuned on the azimuth and left so.',
+        f'{value["azimuth/kalman-ca-40-predicted", "rate_noise_deg_s"]:.2f} deg/s of noise on the rate; the IMM has '
+        f'{value["azimuth/imm-predicted", "rate_noise_deg_s"]:.3f} deg/s. miss_ratio_at_equal_rate_noise therefore '
+        'compares with a conventional filter that is tuned to the same noise. The IMM was tuned on the azimuth only.',
         'drive: the control unit predicts over the known latency and commands the estimated angle, so the miss is the '
-        "filter's error. imm-default is the IMM as the product comes. The azimuth's kalman-cv is so far off in every "
-        'turn that the gate refuses its errors and starts it anew, which helps it: it misses more without a gate '
-        '(acu.tracker.gate). Through the nodes: '
+        'error of the filter. imm-default is the IMM with the default parameters of the product. In azimuth the error '
+        'of kalman-cv is so large in every turn that the gate refuses the measurements and restarts the filter. '
+        'Without a gate (acu.tracker.gate) the miss is larger. Command for the nodes: '
         f'{DRIVE_CASES["azimuth/drive-imm-default"].command()}',
     ]
 
@@ -206,7 +219,7 @@ SOURCE_COLOURS = {'kalman-cv': TRUTH_COLOUR, 'imm': MOTOR_1_COLOUR, 'imm-predict
 
 
 def figures(misses):
-    """{name: function that draws it} of {case: MissStatistics}."""
+    """Return {name: function that draws it} of {case: MissStatistics}."""
     return {'azimuth': lambda: miss_figure('azimuth', 'figures 8 and 9', misses),
             'elevation': lambda: miss_figure('elevation', 'figures 10 and 11', misses),
             'feedforward': feedforward_figure, 'probabilities': probability_figure,
@@ -214,14 +227,14 @@ def figures(misses):
 
 
 def from_first_reversal(axis):
-    """(times (m,) [s] since the first step that counts, mask (n,) of those steps, the target (n, 3))."""
+    """Return (times (m,) [s] since the first evaluated step, mask (n,) of the evaluated steps, the target (n, 3))."""
     t, target, period = feedforward_loop.motion(axis)
     counts = t >= 0.5 * period
     return t[counts] - 0.5 * period, counts, target
 
 
-def miss_figure(axis, those, misses):
-    """The miss (`those` figures of the paper), one run of each and the mean over the runs."""
+def miss_figure(axis, figures_of_paper, misses):
+    """Draw the miss: one run of each case and the mean over the runs."""
     names = ('kalman-cv', 'imm', 'imm-predicted')
     figure, axes = new_panels(len(names), height=6.4, y='miss [deg]', sharex=True, sharey=True)
     t, counts, _ = from_first_reversal(axis)
@@ -232,12 +245,12 @@ def miss_figure(axis, those, misses):
         panel.plot(t, np.degrees(misses[case].miss_mean[counts]), color=FILTERED_COLOUR, linewidth=1.4,
                    label='mean of the runs')
         panel.set_title(f'{name}: {misses[case].mean("miss_rms_deg"):.3f} deg rms')
-    axes[0, 0].set_title(f'{axis}, {those} of the paper. {axes[0, 0].get_title(loc="left")}')
+    axes[0, 0].set_title(f'{axis}, {figures_of_paper} of the paper. {axes[0, 0].get_title(loc="left")}')
     return drawing.legend(figure)
 
 
 def feedforward_figure():
-    """Rate and acceleration fed forward through one reversal, one run, beside the truth."""
+    """Draw rate and acceleration fed forward through one reversal, one run, beside the truth."""
     figure, axes = new_panels(2, height=5.4, y=('rate [deg/s]', 'acceleration [deg/s2]'), sharex=True)
     t, counts, target = from_first_reversal('azimuth')
     for panel, field, column in ((axes[0, 0], 'rate', 1), (axes[1, 0], 'acceleration', 2)):
@@ -252,7 +265,7 @@ def feedforward_figure():
 
 
 def probability_figure():
-    """Model probabilities of the IMM through reversals, mean of one BATCH."""
+    """Draw the model probabilities of the IMM through reversals, mean over BATCH_RUNS runs."""
     figure, axes = new_panels(2, height=4.6, y=('acceleration\n[deg/s2]', 'probability'), sharex=True,
                               height_ratios=(1, 1.6))
     t, counts, target = from_first_reversal('azimuth')
@@ -266,7 +279,7 @@ def probability_figure():
 
 
 def tuning_figure(misses):
-    """Miss against noise of the rate fed forward, over the tunings."""
+    """Draw the miss over the noise of the rate fed forward, for the tunings."""
     figure, axes = new_panels(1, 2, height=3.8, x='noise of the rate fed forward [deg/s]', y='miss rms [deg]',
                               sharex=True, sharey=True)
     for axis, panel in zip(REVERSAL_S_BY_AXIS, axes[0]):
@@ -284,14 +297,14 @@ def tuning_figure(misses):
 
 
 def drive_figure():
-    """Miss of the product in reversals without a pause, one run of each filter."""
+    """Draw the miss of the product in reversals without a pause, one run of each filter."""
     figure, axes = new_panels(2, height=4.8, y='miss [deg]', sharex=True)
     for axis, panel in zip(REVERSAL_S_BY_AXIS, axes[:, 0]):
         for name, colour in (('kalman-cv', TRUTH_COLOUR), ('imm', MOTOR_1_COLOUR), ('imm-default', FILTERED_COLOUR)):
             t, miss = drive_error((f'{axis}/drive-{name}', NOISE_SEED))
             panel.plot(t, np.degrees(miss), color=colour, label=name)
         panel.set_xlim(DRIVE_EVALUATION_START_S, DRIVE_EVALUATION_START_S + 8.0)
-        panel.set_title(f'{axis}: control unit, motors and gears, target in reversals of {REVERSAL_S_BY_AXIS[axis]:g} s')
+        panel.set_title(f'{axis}: control unit, motors and gears, reversals of {REVERSAL_S_BY_AXIS[axis]:g} s')
     return drawing.legend(figure)
 
 

@@ -1,8 +1,8 @@
-"""Manoeuvre: rate and acceleration of filters through ever sharper reversals (paper 003, figures 3 and 4).
+"""Rate and acceleration of filters through ever sharper reversals (paper 003, figures 3 and 4).
 
-A target moves to and fro through 20 deg at 3.5 deg/s with reversals of half a cosine that last 4, 2, 1, 0.5 and
-0.35 s, one after the other; it is measured at 100 Hz with 0.02 deg. Cases reversal-<s>/<filter>: rms of a run
-inside the reversal. cv and ca are conventional filters, imm-a and imm-b those of the study imm-feedforward.
+A target moves to and fro through 20 deg at 3.5 deg/s. Its reversals are half a cosine and last 4, 2, 1, 0.5 and 0.35
+s, one after the other. It is measured at 100 Hz with 0.02 deg. Cases are reversal-<s>/<filter>, with the rms of a run
+inside the reversal. `cv` and `ca` are conventional filters, `imm-a` and `imm-b` those of the study imm-feedforward.
 """
 import math
 
@@ -22,29 +22,32 @@ from pedestal_studies.rigs import drawing, ensemble, feedforward_loop, profiles
 from pedestal_studies.rigs.rows import Result
 
 DEFAULT_RUNS = 200
-"""Of the motion; the paper has 50."""
+"""Runs of the motion; the paper has 50."""
 
 BATCH_RUNS, NOISE_SEED = 25, 1
+"""Runs of one batch; seed of their noise."""
 
 REVERSAL_DURATIONS_S = (4.0, 2.0, 1.0, 0.5, 0.35)
-"""Duration of each [s]: 2.7 to 31 deg/s2 at its peak."""
+"""Durations of the reversals [s], with peaks of 2.7 to 31 deg/s2."""
 
 LEAD_TIME_S = 5.0
-"""Uniform motion before it all begins [s]."""
+"""Duration of the uniform motion before the first reversal [s]."""
 
 MEASUREMENT_NOISE = ensemble.Noise(feedforward_loop.MISS_SIGMA_RAD)
+"""Noise of the measured angle."""
 
 FILTERS = {'cv': feedforward_loop.cv(0.1).filter, 'ca': feedforward_loop.ca(10.0).filter,
            'imm-a': feedforward_loop.imm(40.0, False).filter, 'imm-b': feedforward_loop.imm(5.0, False).filter}
+"""{filter: FilterParameters}."""
 
 FILTER_COLOURS = {'cv': TRUTH_COLOUR, 'ca': RAW_COLOUR, 'imm-a': MOTOR_1_COLOUR, 'imm-b': FILTERED_COLOUR}
 
 RATE_RATIO_TARGET = '>= 3'
-"""Of the rate error of cv over that of imm-b."""
+"""Target of the rate error of cv over the rate error of imm-b."""
 
 
 def motion():
-    """(times (n,) [s], truth (angle, rate, acceleration), each (n,), {reversal: mask (n,) of it}) of all reversals."""
+    """Return (times (n,) [s], truth (angle, rate, acceleration) (n,), {reversal: mask (n,)}) of all reversals."""
     stroke, rate = profiles.S_MOTION_STROKE_RAD, profiles.S_MOTION_RATE_RAD_S
     begin, legs, starts = LEAD_TIME_S, [], {}
     for reversal in REVERSAL_DURATIONS_S:
@@ -61,9 +64,11 @@ def motion():
 
 
 def batch(item):
-    """(MOMENTS (n,) over the runs, rms (count, len(REVERSAL_DURATIONS_S), 2) of rate [deg/s] and acceleration
-    [deg/s2] of every
-    run inside the reversals) of an item (filter, first run, number of runs)."""
+    """Return (MOMENTS (n,) over the runs, rms (count, len(REVERSAL_DURATIONS_S), 2)) of an item.
+
+    An item is (filter, first run, number of runs). The rms are those of rate [deg/s] and acceleration [deg/s2] of
+    every run inside the reversals.
+    """
     name, first, count = item
     t, truth, reversals = motion()
     sums = ensemble.moments(FILTERS[name], t, truth, MEASUREMENT_NOISE, ensemble.records(truth, MEASUREMENT_NOISE,
@@ -77,7 +82,8 @@ def run(progress, runs=DEFAULT_RUNS, pool=None) -> Result:
     """Filter `runs` noisy records with each of FILTERS; pool: monte_carlo.Pool, None for this process."""
     pool = pool or monte_carlo.Pool(1)
     items = [(name, first, count) for name in FILTERS for first, count in monte_carlo.batches(runs, BATCH_RUNS)]
-    sums_of, errors = {}, {}
+    sums_of: dict[str, np.ndarray] = {}
+    errors: dict[str, list] = {}
     for (name, *_), (sums, rms) in zip(items, pool.map(batch, items, progress)):
         sums_of[name] = ensemble.sum_of_moments(sums_of[name], sums) if name in sums_of else sums
         errors.setdefault(name, []).append(rms)
@@ -89,14 +95,16 @@ def run(progress, runs=DEFAULT_RUNS, pool=None) -> Result:
 
 
 def measured(errors):
-    """{(reversal, filter): rms (2, runs) of rate [deg/s] and acceleration [deg/s2]}; errors {filter: (runs,
-    len(REVERSAL_DURATIONS_S), 2)}."""
-    return {(reversal, name): rms[:, i].T for i, reversal in enumerate(REVERSAL_DURATIONS_S) for name,
-            rms in errors.items()}
+    """Return {(reversal, filter): rms (2, runs) of rate [deg/s] and acceleration [deg/s2]}.
+
+    errors: {filter: (runs, len(REVERSAL_DURATIONS_S), 2)}.
+    """
+    return {(reversal, name): rms[:, i].T for i, reversal in enumerate(REVERSAL_DURATIONS_S)
+            for name, rms in errors.items()}
 
 
 def rows(values):
-    """The rows of values as of `measured`."""
+    """Return the rows of values as of `measured`."""
     table = []
     for (reversal, name), (rate, acceleration) in values.items():
         case = f'reversal-{reversal:g}s/{name}'
@@ -104,32 +112,34 @@ def rows(values):
                   row(case, 'acceleration_rms_deg_s2', acceleration, 'deg/s2')]
         if name != 'cv':
             cv = values[reversal, 'cv']
-            table += [row(case, 'rate_ratio_of_cv', cv[0] / rate, '', None, RATE_RATIO_TARGET
-                          if name == 'imm-b' else None),
+            table += [row(case, 'rate_ratio_of_cv', cv[0] / rate, '',
+                          target=RATE_RATIO_TARGET if name == 'imm-b' else None),
                       row(case, 'acceleration_ratio_of_cv', cv[1] / acceleration, '')]
     return table
 
 
 def peak_acceleration(reversal):
-    """Peak acceleration [deg/s2] of a reversal of this duration [s]."""
+    """Return the peak acceleration [deg/s2] of a reversal of this duration [s]."""
     return math.pi * math.degrees(profiles.S_MOTION_RATE_RAD_S) / reversal
 
 
 def remarks(values):
-    """Sentences that the rows need; values as of `measured`."""
+    """Return the sentences that explain the rows; values as of `measured`."""
     worse = [f'{peak_acceleration(reversal):.1f}' for reversal in REVERSAL_DURATIONS_S
              if values[reversal, 'imm-a'][1].mean() > values[reversal, 'cv'][1].mean()]
-    lines = ['_ratio_of_cv: how many times the error of cv is that of the filter. cv has no acceleration: its error '
-             'is the acceleration itself.']
+    lines = ['_ratio_of_cv is the error of cv over the error of the filter. cv estimates no acceleration, so its '
+             'error is the acceleration itself.']
     if worse:
-        lines.append(f'The acceleration of imm-a, tuned for the miss, is worse than the zero of cv in reversals of '
-                     f'{", ".join(worse)} deg/s2: it is no estimate of the acceleration there.')
+        lines.append(f'imm-a is tuned for the miss. In reversals of {", ".join(worse)} deg/s2 its acceleration has '
+                     'a larger error than an estimate of zero.')
     return lines
 
 
 def moments_figure(sums_of, what, label):
-    """Truth and mean estimates through the reversals above, mean errors +-1 sigma below (paper 003, figures 3 and 4);
-    sums_of: {filter: MOMENTS (n,)}; what: 'rate' or 'acceleration'."""
+    """Draw truth and mean estimates above, mean errors +-1 sigma below (paper 003, figures 3 and 4).
+
+    sums_of: {filter: MOMENTS (n,)}; what: 'rate' or 'acceleration'.
+    """
     t, truth, _ = motion()
     figure, axes = new_panels(2, height=5.4, y=(label, f'error of the {label}'), sharex=True)
     of = truth[('angle', 'rate', 'acceleration').index(what)]
@@ -141,14 +151,13 @@ def moments_figure(sums_of, what, label):
         axes[0, 0].plot(t, np.degrees(of + mean), color=FILTER_COLOURS[name], label=name)
         axes[1, 0].plot(t, np.degrees(mean), color=FILTER_COLOURS[name])
         axes[1, 0].fill_between(t, np.degrees(mean - sigma), np.degrees(mean + sigma), color=FILTER_COLOURS[name],
-                                alpha=0.25,
-                                linewidth=0.0)
+                                alpha=0.25, linewidth=0.0)
     axes[1, 0].set_xlim(LEAD_TIME_S - 1.0, t[-1])
     return drawing.legend(figure)
 
 
 def sharpness_figure(values):
-    """Errors of rate and acceleration against the sharpness of the reversal."""
+    """Draw the errors of rate and acceleration over the peak acceleration of the reversal."""
     figure, axes = new_panels(1, 2, height=3.6, x='peak acceleration of the reversal [deg/s2]', sharex=True)
     x = [peak_acceleration(reversal) for reversal in REVERSAL_DURATIONS_S]
     for i, (panel, label) in enumerate(zip(axes[0], ('rate rms [deg/s]', 'acceleration rms [deg/s2]'))):

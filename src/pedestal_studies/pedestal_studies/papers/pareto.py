@@ -1,8 +1,9 @@
-"""Pareto: miss against rate noise over the tunings of every filter, the fair comparison of paper 003's feed-forward.
+"""Miss over rate noise for all tunings of every filter: a fair comparison of paper 003's feed-forward.
 
-The loop of the study imm-feedforward, azimuth, prediction over the delay for all. Any filter has a small miss if its
-rate may be noisy; so each is tuned from low to high bandwidth, and the curves are compared. Cases <filter>: the miss
-where the curve has the rate noise of imm, and the rate noise where it has the miss of imm.
+The loop is that of the study imm-feedforward, azimuth, with prediction over the delay for all filters. Any filter has
+a small miss if its rate may be noisy. Each filter is therefore tuned from low to high bandwidth, and the curves are
+compared. Cases <filter> are the miss at the point of the curve with the rate noise of imm, and the rate noise at the
+point with the miss of imm.
 """
 import dataclasses
 import math
@@ -25,38 +26,40 @@ from pedestal_studies.rigs.feedforward_loop import Source
 from pedestal_studies.rigs.rows import Result
 
 DEFAULT_RUNS = 50
-"""Of each tuning, as many as in the paper."""
+"""Runs of each tuning, as many as in the paper."""
 
 LOOP_AXIS = 'azimuth'
 
 REFERENCE_SOURCE = feedforward_loop.imm(40.0, True)
-"""imm-predicted of the study imm-feedforward: the point that the rows compare with."""
+"""Case imm-predicted of the study imm-feedforward, with which the rows compare."""
 
 
-def _cs(a_max):
+def _current_statistical(a_max):
+    """Return the Source of a 'current' statistical filter; a_max [deg/s2]."""
     return Source(feedforward_loop.filter_of('current_statistical', current_statistical={
         'alpha': 0.5, 'a_max': math.radians(a_max)}))
 
 
 def _logarithmic(low, high, points):
+    """Return `points` values from low to high at equal ratios, rounded to three digits."""
     return [float(f'{value:.3g}') for value in np.geomspace(low, high, points)]
 
 
 FILTER_TUNINGS = {
     'cv': ('q [deg/s2/sqrt(Hz)]', _logarithmic(0.05, 50.0, 13), feedforward_loop.cv),
     'ca': ('q [deg/s3/sqrt(Hz)]', _logarithmic(0.05, 500.0, 13), feedforward_loop.ca),
-    'current_statistical': ('a_max [deg/s2], alpha 0.5 1/s', _logarithmic(0.5, 1000.0, 13), _cs),
+    'current_statistical': ('a_max [deg/s2], alpha 0.5 1/s', _logarithmic(0.5, 1000.0, 13), _current_statistical),
     'imm': ('q of its ca [deg/s3/sqrt(Hz)]', _logarithmic(0.5, 500.0, 10), lambda q: feedforward_loop.imm(q, True))}
-"""{filter: (what is tuned, its values, the Source of a value)}."""
+"""{filter: (name of the tuned parameter, its values, function value -> Source)}."""
 
 FILTER_COLOURS = {'cv': TRUTH_COLOUR, 'ca': RAW_COLOUR, 'current_statistical': MOTOR_2_COLOUR, 'imm': FILTERED_COLOUR}
 
 MISS_RATIO_TARGET = '>= 5'
-"""Of the miss of cv at the rate noise of the imm over that of the imm (reference: 7 to 9)."""
+"""Target of the miss of cv at the rate noise of the imm, over the miss of the imm (reference: 7 to 9)."""
 
 
 def cases():
-    """{(filter, value): (axis, Source)}, and the reference."""
+    """Return {(filter, value): (axis, Source)} of all tunings and of the reference."""
     tunings = {(name, value): (LOOP_AXIS, dataclasses.replace(source(value), predicted=True))
              for name, (_, values, source) in FILTER_TUNINGS.items() for value in values}
     return tunings | {('reference', 0.0): (LOOP_AXIS, REFERENCE_SOURCE)}
@@ -71,17 +74,17 @@ def run(progress, runs=DEFAULT_RUNS, pool=None) -> Result:
 
 
 def measured(statistics):
-    """(noise of a uniform rate [deg/s], miss rms [deg]) of every run of a MissStatistics, an array (2, runs)."""
+    """Return (noise of a uniform rate [deg/s], miss rms [deg]) of every run of MissStatistics, an array (2, runs)."""
     return np.array([statistics.of(metric) for metric in ('rate_noise_deg_s', 'miss_rms_deg')])
 
 
 def curve(points, name):
-    """(rate noise [deg/s], miss [deg]) of a filter over its tunings, an array (2, n)."""
+    """Return (rate noise [deg/s], miss [deg]) of a filter over its tunings, an array (2, n)."""
     return np.array([points[name, value] for value in FILTER_TUNINGS[name][1]]).T
 
 
 def frontier(points, name):
-    """The Pareto frontier of the curve, (2, n) by rising noise: less miss for more rate noise."""
+    """Return the Pareto frontier of the curve, (2, n) by rising noise: less miss for more rate noise."""
     kept = []
     for noise, miss in sorted(map(tuple, curve(points, name).T)):
         if not kept or miss < kept[-1][1]:
@@ -90,21 +93,21 @@ def frontier(points, name):
 
 
 def miss_at(front, noise):
-    """Miss [deg] on a frontier at a rate noise [deg/s] inside it, log-log between its points."""
+    """Return the miss [deg] on a frontier at a rate noise [deg/s] inside it, log-log between its points."""
     return math.exp(np.interp(math.log(noise), *np.log(front)))
 
 
 def noise_at(front, miss):
-    """Rate noise [deg/s] on a frontier at a miss [deg] inside it, log-log between its points."""
+    """Return the rate noise [deg/s] on a frontier at a miss [deg] inside it, log-log between its points."""
     noises, misses = np.log(front)
     return math.exp(np.interp(math.log(miss), misses[::-1], noises[::-1]))
 
 
 def rows(points):
-    """The rows of points {(filter, value): (rate noise [deg/s], miss [deg]) of every run, an array (2, runs)}.
+    """Return the rows of points {(filter, value): (rate noise [deg/s], miss [deg]) of every run, an array (2, runs)}.
 
-    The curves are read run by run, as all filters have the same noise in a run; a number that is not on the curve of
-    every run has no row.
+    The curves are read run by run, because all filters have the same noise in a run. A number that is not on the curve
+    of every run has no row.
     """
     noise, miss = points['reference', 0.0]
     table = [row('imm-predicted', 'miss_rms_deg', miss, 'deg'),
@@ -125,24 +128,27 @@ def rows(points):
 
 
 def remarks(points):
-    """Sentences that the rows need; points {(filter, value): (rate noise [deg/s], miss [deg])}: means of the runs."""
+    """Return the sentences that explain the rows.
+
+    points: {(filter, value): (rate noise [deg/s], miss [deg])}, means of the runs.
+    """
     tuned = '; '.join(f'{name}: {what} {values[0]:g} to {values[-1]:g}'
                       for name, (what, values, _) in FILTER_TUNINGS.items())
     noise, miss = points['reference', 0.0]
     loud = [name for name in FILTER_TUNINGS if frontier(points, name)[0, 0] > noise]
     never = [name for name in FILTER_TUNINGS if frontier(points, name)[1, -1] > miss]
-    lines = [f'Every filter is predicted to the instant of its command; tuned are {tuned}. The rows read the curves '
-             'at the rate noise and the miss of imm-predicted (study imm-feedforward), straight between two tunings '
-             'on logarithmic scales.']
+    lines = [f'Every filter is predicted to the instant of its command. The tunings are {tuned}. The rows give the '
+             'points of the curves at the rate noise and at the miss of imm-predicted (study imm-feedforward). A '
+             'curve is straight between two tunings on logarithmic scales.']
     if loud:
         lines.append(f'No tuning of {", ".join(loud)} has as little rate noise as imm-predicted.')
     if never:
-        lines.append(f'No tuning of {", ".join(never)} misses as little as imm-predicted, whatever its rate noise.')
+        lines.append(f'No tuning of {", ".join(never)} has as small a miss as imm-predicted, at any rate noise.')
     return lines
 
 
 def miss_figure(points):
-    """Miss against rate noise, a curve for every filter; points as of `remarks`."""
+    """Draw miss over rate noise, a curve for every filter; points as of `remarks`."""
     figure, axes = new_panels(1, height=4.8, x='noise of the rate fed forward, uniform part [deg/s]',
                               y='miss rms [deg]')
     panel = axes[0, 0]

@@ -1,9 +1,10 @@
-"""Paper 002's angle loop of a phased array: figures 3 to 7 and 9, where it becomes unstable or is lost, a better loop.
+"""Paper 002's angle loop of a phased array: figures 3 to 7 and 9, limits of stability and of lock, a better loop.
 
-Cases run the kernels of `angle_loop`, except graph/..., which are the scenario phased_array_sway in the closed loop.
-S0, S1, S2: without smoothing, with the paper's recursion, with a moving average, n = 20 at 1 kHz; a case that names
-none has S1. lag_deg is the largest error the receiver reads (the paper's figures), true_lag_deg the largest true error
-of the beam. Noise: 0.05 deg in each millisecond; max_error_deg is without it, jitter_rms_deg is caused by it.
+Cases run the kernels of `angle_loop`. Cases graph/... are the scenario phased_array_sway in the closed loop. S0, S1,
+S2: without smoothing, with the paper's recursion, with a moving average, with n = 20 at 1 kHz. A case without S0, S1
+or S2 in its name has S1. `lag_deg` is the largest error that the receiver measures (the paper's figures).
+`true_lag_deg` is the largest true error of the beam. The noise is 0.05 deg in each millisecond. `max_error_deg` is the
+error without noise, `jitter_rms_deg` the effect of the noise.
 """
 import dataclasses
 import functools
@@ -31,58 +32,65 @@ from tracking_receiver_sim import receiver
 from tracking_receiver_sim.params import ReceiverParameters
 
 DEFAULT_RUNS, FIRST_SEED = 40, 1
-"""Runs of each case with noise; seed of the first."""
+"""Runs of each case with noise; seed of the first run."""
 
 STEP_SIZE_RAD = math.radians(1.0)
-(ALPHA_GAINS, LOOP_PERIODS_MS, LOOP_DELAYS_MS, SLOPE_RATIOS) = (0.05, 0.1, 0.2, 0.3), (10, 5), (0, 20, 50, 80), (0.5, 0.7, 1.0, 1.5, 2.0)
+ALPHA_GAINS, LOOP_PERIODS_MS, LOOP_DELAYS_MS = (0.05, 0.1, 0.2, 0.3), (10, 5), (0, 20, 50, 80)
+"""Gains alpha [-], periods and delays of the loop [ms] in figures 3 to 5 and in the limits of stability."""
+SLOPE_RATIOS = 0.5, 0.7, 1.0, 1.5, 2.0
+"""True slope over assumed slope of the receiver [-]."""
 RAMP_RATES_DEG_S = (10, 20, 30, 40)
-"""Of figure 6 [deg/s]."""
+"""Rates of figure 6 [deg/s]."""
 
 SINE_RATE_DEG_S, SINE_ACCELERATION_DEG_S2 = 30.0, 10.0
-"""Of figure 7 [deg/s, deg/s2]."""
+"""Largest rate [deg/s] and acceleration [deg/s2] of figure 7."""
 
 SWAY_AMPLITUDE_RAD, SWAY_PERIOD_S = math.radians(10.0), 8.0
-"""Of figure 9 [rad, s]."""
+"""Amplitude [rad] and period [s] of figure 9."""
 
 RATE_COMPENSATIONS = (0.0, 0.85, 1.0)
+"""Shares delta of the ship's rate that are compensated [-]."""
 LOOP_DELAY_MS = 20
 """Delay of figure 7 and of all loops of COMPARED_LOOPS [ms]."""
 
-(RECEIVER_NOISE_RAD, INS_ANGLE_NOISE_RAD, INS_RATE_NOISE_RAD_S) = (math.radians(0.05), math.radians(0.005),
-                                                                   math.radians(0.01))
-"""1-sigma of one millisecond: the receiver's, the INS's attitude and rate [rad, rad/s]."""
+RECEIVER_NOISE_RAD, INS_ANGLE_NOISE_RAD, INS_RATE_NOISE_RAD_S = map(math.radians, (0.05, 0.005, 0.01))
+"""1-sigma of one millisecond: of the receiver [rad], of the INS's attitude [rad] and rate [rad/s]."""
 
 INS_STAMP_ERROR_MS = 5
-"""Stamp error of the INS [ms]."""
+"""Error of the INS's stamps [ms]."""
 
 RECORD_DURATION_S, EVALUATION_START_S = 60.0, 30.0
-"""Length of a record of a moving target, and the time from which it is evaluated [s]."""
+"""Duration of a record of a moving target, and start of its evaluation [s]."""
 
 BEAMWIDTH_RAD = math.radians(1.0)
-"""Of the array where the loop is lost."""
+"""Beamwidth of the array in the cases loss/... [rad]."""
 
 
 def jerk(q):
-    """Noise of the filter [rad/s3/sqrt(Hz)] of a spectral density of the jerk in deg2/s5."""
+    """Return the noise of the filter [rad/s3/sqrt(Hz)] for a spectral density of the jerk in deg2/s5."""
     return math.radians(math.sqrt(q))
 
 
 COMPARED_LOOPS = {
     'paper': PaperLoop(delay=LOOP_DELAY_MS), 'paper-delta': PaperLoop(delay=LOOP_DELAY_MS, delta=0.85),
-    'type-2': PaperLoop(delay=LOOP_DELAY_MS, form='type_2'), 'type-2-delta': PaperLoop(delay=LOOP_DELAY_MS,
-                                                                                       form='type_2', delta=0.85),
-    'tracked-10ms': FilterLoop(jerk(1.0), RECEIVER_NOISE_RAD, hold=10), 'best': FilterLoop(jerk(0.1),
-                                                                                           RECEIVER_NOISE_RAD),
+    'type-2': PaperLoop(delay=LOOP_DELAY_MS, form='type_2'),
+    'type-2-delta': PaperLoop(delay=LOOP_DELAY_MS, form='type_2', delta=0.85),
+    'tracked-10ms': FilterLoop(jerk(1.0), RECEIVER_NOISE_RAD, hold=10),
+    'best': FilterLoop(jerk(0.1), RECEIVER_NOISE_RAD),
     'fast': FilterLoop(jerk(1.0), RECEIVER_NOISE_RAD), 'faster': FilterLoop(jerk(10.0), RECEIVER_NOISE_RAD),
     'best-delay-150ms': FilterLoop(jerk(0.1), RECEIVER_NOISE_RAD, delay=150),
     'best-told-10ms-less': FilterLoop(jerk(0.1), RECEIVER_NOISE_RAD, known=LOOP_DELAY_MS - 10)}
-"""Loops on one plant. The paper's filter with the ship's rate; its type-2 form; constant-acceleration filters on
-beam in force + error, predicted to the middle of the interval, steered every 1 ms (tracked-10ms: every 10 ms)."""
+"""Loops on one plant: the paper's loop with the ship's rate, its type-2 form, and constant-acceleration filters.
+
+The input of the filters is beam in force + error. The command is their prediction for the middle of the interval,
+every 1 ms (tracked-10ms: every 10 ms). In `best-told-10ms-less` the loop assumes a delay that is 10 ms too short.
+"""
 
 INS_LOOPS = {
     'best/sway-ins': FilterLoop(jerk(1e-3), RECEIVER_NOISE_RAD, ins=True, late=INS_STAMP_ERROR_MS),
     'best/sway-ins/exact-stamps': FilterLoop(jerk(1e-3), RECEIVER_NOISE_RAD, ins=True),
     'best/sway-ins/rate-only': FilterLoop(jerk(1e-3), RECEIVER_NOISE_RAD, ins=True, tau=0.0)}
+"""Loops with a filter in the earth frame: with an error of the stamps, with exact stamps, without acceleration."""
 
 METRIC_TARGETS = {
     ('step/alpha=0.1/T=10ms/S0', 'overshoot_percent'): '19.7 +- 0.5',
@@ -96,76 +104,79 @@ METRIC_TARGETS = {
     ('best/ramp', 'max_error_deg'): '<= 0.01', ('best/sine', 'max_error_deg'): '<= 0.025',
     ('best/sine', 'jitter_rms_deg'): '<= 0.006', ('best/sway', 'isolation_db'): '>= 48',
     ('best/sway-ins', 'isolation_db'): '>= 60', ('best/sway-ins/exact-stamps', 'isolation_db'): '>= 90'}
+"""{(case, metric): target}."""
 
 PAPER_VALUES = {
     ('step/alpha=0.1/T=10ms/S0', 'overshoot_percent'): 20.0, ('step/alpha=0.1/T=10ms/S1', 'overshoot_percent'): 20.0,
     ('step/alpha=0.1/T=10ms/S2', 'overshoot_percent'): 20.0,
     ('ramp/30deg_s/T=10ms', 'lag_deg'): 0.3, ('ramp/30deg_s/T=5ms', 'lag_deg'): 0.15, ('sine', 'lag_deg'): 0.3}
-"""What is printed."""
+"""{(case, metric): number that the paper prints}."""
 
 STUDY_REMARKS = [
-    'sine: the paper prints 0.30 deg, the v T of its largest rate alone. The reading is '
-    'sqrt((v T)^2 + (a T^2 / beta)^2): the acceleration needs an innovation too, 0.30 and 0.19 deg a quarter of a '
-    'period apart.',
-    'The reading of the receiver is v T whatever delay and smoothing are; the beam itself is further off where the '
-    'error is smoothed (true_lag_deg): a smoothed error is an old one.',
-    'Not stated by the paper: its alphas, whether the smoothing is on, the delays of figure 5, where an error is '
-    'read. About 20 % in figure 3 fits S0 and S2; the growth of figure 4 needs S1 or S2: without smoothing T changes '
-    'nothing.',
-    'A wrong belief about the delay costs the better loop rate x difference (best-told-10ms-less): it is told the '
-    'beam in force, so that no second mistake hides the first.',
-    'graph/... is the larger of the errors at both ends of the intervals in which the beam stands: rate x T / 2 of it '
-    'is the hold.',
-    'Every other true error is read in the middle of each millisecond, where a beam that is steered every millisecond '
-    'has no error of its hold by construction. ends_max_error_deg and ends_isolation_db are read at both ends of each '
-    'millisecond: up to rate x 0.5 ms more, 0.015 deg at 30 deg/s, and never more than 68 dB of the sway.']
+    'sine: the paper prints 0.30 deg, the v T of the largest rate only. The measured error is '
+    'sqrt((v T)^2 + (a T^2 / beta)^2), because the acceleration needs an innovation too. The two shares are 0.30 and '
+    '0.19 deg, a quarter of a period apart.',
+    'The error that the receiver measures is v T with any delay and smoothing. With smoothing the true error of the '
+    'beam (true_lag_deg) is larger, because a smoothed error is old.',
+    'The paper does not state its alphas, the use of the smoothing, the delays of figure 5, and the place at which an '
+    'error is read. The 20 % of figure 3 fit S0 and S2. The growth in figure 4 needs S1 or S2, because without '
+    'smoothing T has no effect.',
+    'A wrong delay in the loop with a filter costs rate x difference of the delays (`best-told-10ms-less`). This loop '
+    'receives the true beam in force, so that a second error does not compensate the first.',
+    'graph/... is the larger of the errors at both ends of the intervals in which the beam stands. The hold causes '
+    'rate x T / 2 of the error.',
+    'Every other true error is read in the middle of each millisecond. There the hold of a beam that is steered every '
+    'millisecond causes no error, by construction. ends_max_error_deg and ends_isolation_db are read at both ends of '
+    'each millisecond. There the error is larger by up to rate x 0.5 ms, 0.015 deg at 30 deg/s, and the isolation '
+    'from the sway is never above 68 dB.']
+"""Sentences that explain the rows."""
 
 
 def instants(seconds):
-    """Middles of the milliseconds of a record (n,) [s]."""
+    """Return the middles of the milliseconds of a record (n,) [s]."""
     return (np.arange(round(seconds / GRID_STEP_S)) - 0.5) * GRID_STEP_S
 
 
 def sine(t, amplitude, w):
-    """(angle, rate), each (n,), of a sine at times t (n,) [s]; w [rad/s]."""
+    """Return (angle, rate), each (n,), of a sine at times t (n,) [s]; w [rad/s]."""
     return amplitude * np.sin(w * t), amplitude * w * np.cos(w * t)
 
 
 def ramp_target(rate):
-    """Angle (n,) [rad] of figure 6's ramp; rate [deg/s]."""
+    """Return the angle (n,) [rad] of figure 6's ramp; rate [deg/s]."""
     return math.radians(rate) * instants(RECORD_DURATION_S)
 
 
 def sine_target(rate=SINE_RATE_DEG_S):
-    """Angle (n,) [rad] of figure 7's sine, of any largest rate [deg/s] at its frequency."""
+    """Return the angle (n,) [rad] of figure 7's sine, with any largest rate [deg/s] at its frequency."""
     w = SINE_ACCELERATION_DEG_S2 / SINE_RATE_DEG_S
     return sine(instants(RECORD_DURATION_S), math.radians(rate) / w, w)[0]
 
 
 def sway_target():
-    """(angle [rad], rate [rad/s]), each (n,), of the line of sight on the swaying deck."""
+    """Return (angle [rad], rate [rad/s]), each (n,), of the line of sight on the swaying deck."""
     return sine(instants(RECORD_DURATION_S), SWAY_AMPLITUDE_RAD, 2.0 * math.pi / SWAY_PERIOD_S)
 
 
 def settled(x):
-    """The part of a record (n,) that is evaluated."""
+    """Return the evaluated part of a record (n,)."""
     return x[round(EVALUATION_START_S / GRID_STEP_S):]
 
 
 def isolation(error):
-    """Isolation [dB] from the ship's sway with a remaining error [rad]."""
+    """Return the isolation [dB] from the ship's sway with a remaining error [rad]."""
     return -20.0 * math.log10(error / SWAY_AMPLITUDE_RAD)
 
 
 def name(loop):
-    """The name of a Paper in the names of cases."""
+    """Return the name of a PaperLoop in the names of cases."""
     parts = [f'alpha={loop.alpha:g}', f'T={loop.period}ms', loop.smoothing]
     parts += [f'slope={loop.slope:g}'] * (loop.slope != 1.0) + [f'delay={loop.delay}ms'] * (loop.delay > 0)
     return '/'.join(parts)
 
 
 def steps():
-    """{Paper: step response (n,) of the beam, over the size of the step} from rest; the step is at sample 0."""
+    """Return {PaperLoop: step response (n,) of the beam from rest, over the size of the step at sample 0}."""
     loops = [PaperLoop(alpha, T, smoothing=S) for alpha in ALPHA_GAINS for T in LOOP_PERIODS_MS
              for S in SMOOTHING_CODES]
     loops += [PaperLoop(delay=delay, smoothing=S) for delay in LOOP_DELAYS_MS[1:] for S in SMOOTHING_CODES]
@@ -176,7 +187,7 @@ def steps():
 
 
 def step_rows(done):
-    """Rows (case, metric, value, unit) of step responses {Paper: (n,)}."""
+    """Return the rows (case, metric, value, unit) of step responses {PaperLoop: (n,)}."""
     rows = []
     for loop, y in done.items():
         case = f'step/{name(loop)}'
@@ -188,7 +199,10 @@ def step_rows(done):
 
 
 def eigenvalue_limit(loop, near):
-    """Largest delay [ms] with all eigenvalues of a Paper inside the unit circle; the search starts at `near` [ms]."""
+    """Return the largest delay [ms] with all eigenvalues of a PaperLoop inside the unit circle.
+
+    near: start of the search [ms].
+    """
     def inside(delay):
         return spectral_radius(dataclasses.replace(loop, delay=delay)) < 1.0
 
@@ -200,7 +214,7 @@ def eigenvalue_limit(loop, near):
 
 
 def limits():
-    """{Paper: (largest stable delay by bisection, by eigenvalues) [ms]}."""
+    """Return {PaperLoop: (largest stable delay by bisection, by eigenvalues) [ms]}."""
     loops = [PaperLoop(alpha, T, smoothing=S) for alpha in ALPHA_GAINS for T in LOOP_PERIODS_MS
              for S in SMOOTHING_CODES]
     loops += [PaperLoop(slope=slope) for slope in SLOPE_RATIOS if slope != 1.0] + [PaperLoop(form='type_2')]
@@ -212,7 +226,7 @@ def limits():
 
 
 def limit_rows(delays):
-    """Rows (case, metric, value, unit) of `limits`."""
+    """Return the rows (case, metric, value, unit) of `limits`."""
     rows = []
     for loop, (bisected, by_eigenvalues) in delays.items():
         case = f'delay-limit/{name(loop)}' + ('/type-2' if loop.form == 'type_2' else '')
@@ -221,8 +235,10 @@ def limit_rows(delays):
 
 
 def lag_rows(case, loop, target, rate=None):
-    """Rows of the error the receiver reads, and of the beam's true error with each smoothing; arguments of
-    Paper.run."""
+    """Return the rows of the error that the receiver measures, and of the true error of the beam with each smoothing.
+
+    Arguments as of PaperLoop.run.
+    """
     rows = [(case, 'lag_deg', math.degrees(peak(settled(loop.run(target, rate)[1]))), 'deg')]
     for S in SMOOTHING_CODES:
         beam, _ = dataclasses.replace(loop, smoothing=S).run(target, rate)
@@ -231,7 +247,7 @@ def lag_rows(case, loop, target, rate=None):
 
 
 def moving_rows():
-    """Rows of figures 6, 7 and 9."""
+    """Return the rows of figures 6, 7 and 9."""
     rows = []
     for T, rates in zip(LOOP_PERIODS_MS, (RAMP_RATES_DEG_S, (30,))):
         for rate in rates:
@@ -247,31 +263,32 @@ def moving_rows():
 
 
 def noises(run):
-    """Noise of the receiver [rad], of the INS's attitude [rad] and rate [rad/s], each (n,), of one run."""
+    """Return the noise of the receiver [rad], of the INS's attitude [rad] and rate [rad/s], each (n,), of one run."""
     rng = np.random.default_rng(FIRST_SEED + run)
-    return [sigma * rng.standard_normal(round(RECORD_DURATION_S / GRID_STEP_S)) for sigma in (RECEIVER_NOISE_RAD,
-                                                                                              INS_ANGLE_NOISE_RAD,
-                                                                                              INS_RATE_NOISE_RAD_S)]
+    return [sigma * rng.standard_normal(round(RECORD_DURATION_S / GRID_STEP_S))
+            for sigma in (RECEIVER_NOISE_RAD, INS_ANGLE_NOISE_RAD, INS_RATE_NOISE_RAD_S)]
 
 
 def compared_targets():
-    """{name: angle (n,) [rad]} of the targets of COMPARED_LOOPS."""
+    """Return {name: angle (n,) [rad]} of the targets of COMPARED_LOOPS."""
     return {'ramp': ramp_target(30.0), 'sine': sine_target(), 'sway': sway_target()[0]}
 
 
 def max_error_at_ends(error, target):
-    """Largest error [rad] at the ends of the milliseconds, from the error (n,) in their middles: by then the target
-    (n,) has moved half-way to its neighbours."""
+    """Return the largest error [rad] at the ends of the milliseconds, from the error (n,) in their middles.
+
+    At the ends the target (n,) has moved half-way to its neighbours.
+    """
     half = 0.5 * np.diff(target)
     return max(peak(settled(error[:-1] + half)), peak(settled(error[1:] - half)))
 
 
 COMPARED_CASES = (*(f'{loop}/{target}' for loop in COMPARED_LOOPS for target in ('ramp', 'sine', 'sway')), *INS_LOOPS)
-"""The cases of COMPARED_LOOPS on all targets and INS_LOOPS."""
+"""Cases of COMPARED_LOOPS on all targets, and INS_LOOPS."""
 
 
 def beam(case, run=None):
-    """Beam (n,) [rad] of one of COMPARED_CASES; run: which noise, None for none."""
+    """Return the beam (n,) [rad] of one of COMPARED_CASES; run: number of the noise, None for no noise."""
     sway, rate = sway_target()
     noise, ins_angle, ins_rate = 3 * (np.zeros(len(sway)),) if run is None else noises(run)
     if case in INS_LOOPS:
@@ -283,8 +300,10 @@ def beam(case, run=None):
 
 
 def jitter(item):
-    """Rms [deg] that noise moves the beam by in every run of an item (one of COMPARED_CASES or GRAPH_CASES, how many
-    runs)."""
+    """Return the rms [deg] of the beam's motion due to noise, for every run of an item.
+
+    An item is (one of COMPARED_CASES or GRAPH_CASES, number of runs).
+    """
     case, runs = item
     if case in GRAPH_CASES:
         quiet = graph_error(case, quiet=True)
@@ -294,18 +313,18 @@ def jitter(item):
 
 
 def compared_errors():
-    """{case: true error without noise (n,) [rad]} of COMPARED_CASES."""
+    """Return {case: true error without noise (n,) [rad]} of COMPARED_CASES."""
     targets = compared_targets()
     return {case: targets[target_of(case)] - beam(case) for case in COMPARED_CASES}
 
 
 def target_of(case):
-    """The name of the target of one of COMPARED_CASES."""
+    """Return the name of the target of one of COMPARED_CASES."""
     return case.split('/')[1].removesuffix('-ins')
 
 
 def compared_rows(done, jitters):
-    """Rows (case, metric, value, unit) of `compared`; jitters {case: rms of every run [deg]}."""
+    """Return the rows (case, metric, value, unit) of `compared_errors`; jitters {case: rms of every run [deg]}."""
     rows, targets = [], compared_targets()
     for case, error in done.items():
         worst, at_the_ends = peak(settled(error)), max_error_at_ends(error, targets[target_of(case)])
@@ -321,28 +340,28 @@ def compared_rows(done, jitters):
 RECEIVER_LOSS_POWERS = {
     'half-beamwidth': 0.5,
     'pattern': 10.0**(0.1 * (ReceiverParameters().lose_level_dbhz - ReceiverParameters().cn0_dbhz))}
-"""Power, over that on axis, at which a receiver loses the signal: at half a beamwidth; at ours with its defaults."""
+"""Power over the power on axis at which the signal is lost: at half a beamwidth, and at our receiver's default."""
 
 
 def signal_loss_loop(kind, form):
-    """The Paper of a form with a kind of RECEIVER_LOSS_POWERS."""
+    """Return the PaperLoop of a form with a kind of RECEIVER_LOSS_POWERS."""
     return PaperLoop(delay=LOOP_DELAY_MS, form=form, beamwidth=BEAMWIDTH_RAD, lost=RECEIVER_LOSS_POWERS[kind])
 
 
 def sine_from_rest(rate):
-    """Angle (n,) [rad] of the sine target of a largest rate [deg/s], starting at rest from one of its ends."""
+    """Return the angle (n,) [rad] of the sine target of a largest rate [deg/s], from rest at one of its ends."""
     w = SINE_ACCELERATION_DEG_S2 / SINE_RATE_DEG_S
     return math.radians(rate) / w * (1.0 - np.cos(w * np.maximum(instants(RECORD_DURATION_S), 0.0)))
 
 
 def kept(loop, rate):
-    """Whether a Paper keeps the sine of this largest rate [deg/s] in its beam to the end."""
+    """Return True if a PaperLoop keeps the sine of this largest rate [deg/s] in its beam to the end."""
     target = sine_from_rest(rate)
     return peak(settled(target - loop.run(target)[0])) < BEAMWIDTH_RAD
 
 
 def max_kept_rate(loop):
-    """The largest rate [deg/s] of the sine that a Paper keeps, by bisection."""
+    """Return the largest rate [deg/s] of the sine that a PaperLoop keeps, by bisection."""
     low, high = 1.0, 400.0
     while high - low > 0.05:
         middle = 0.5 * (low + high)
@@ -351,7 +370,7 @@ def max_kept_rate(loop):
 
 
 def loss_rows():
-    """Rows of the largest rate of the sine that a loop keeps, and of the error with a linear receiver at that rate."""
+    """Return the rows of the largest rate of the sine that a loop keeps, and of the linear receiver's error at it."""
     rows = []
     for form in ('type_1', 'type_2'):
         for kind in RECEIVER_LOSS_POWERS:
@@ -369,15 +388,17 @@ PAPER_LOOP_PARAMETERS = {f'acu.{axis}.beam.{key}': value for axis in ('azimuth',
 
 GRAPH_CASES = {'graph/T=10ms': {}, 'graph/T=1ms': {'adu.period': 0.001},
                'graph/T=10ms/paper-delta': PAPER_LOOP_PARAMETERS}
-"""{case: parameters of the scenario phased_array_sway}: its own, steered every 1 ms, and the paper's loop."""
+"""{case: parameters of the scenario phased_array_sway}: unchanged, steered every 1 ms, and with the paper's loop."""
 
 NOISELESS_PARAMETERS = {'tracking_receiver.receiver.cn0_dbhz': 110.0, 'ins.tilt_noise': 0.0, 'ins.heading_noise': 0.0,
                         'ins.rate_noise': 0.0}
 
 
 def graph_case(case, quiet=False):
-    """The Case of one of GRAPH_CASES; quiet: without noise in receiver and INS, but with the gains of the noisy
-    case."""
+    """Return the Case of one of GRAPH_CASES.
+
+    quiet: True for a case without noise in receiver and INS, with the gains of the noisy case.
+    """
     noisy = Case(case, 'phased_array_sway', GRAPH_CASES[case])
     if not quiet:
         return noisy
@@ -388,20 +409,23 @@ def graph_case(case, quiet=False):
 
 
 GRAPH_EVALUATION_START_S = 10.0
-"""The time from which the runs of GRAPH_CASES are evaluated [s]."""
+"""Start of the evaluation of the runs of GRAPH_CASES [s]."""
 
 
 def graph_error(case, quiet=False, seed=None):
-    """True error (n, 2) [rad] of one of GRAPH_CASES once settled, at the ends of the intervals; arguments as of
-    `graph_case`."""
+    """Return the true error (n, 2) [rad] of one of GRAPH_CASES at the ends of the evaluated intervals.
+
+    Arguments as of `graph_case`.
+    """
     run = graph_case(case, quiet).with_seed(seed).run()
     return run.truth['error'][run.t >= GRAPH_EVALUATION_START_S]
 
 
 def graph_rows(jitters):
-    """Rows of GRAPH_CASES: cross-elevation and elevation together, at both ends of the intervals; jitters {case: rms
-    of
-    every run [deg]}, in elevation."""
+    """Return the rows of GRAPH_CASES: cross-elevation and elevation together, at both ends of the intervals.
+
+    jitters: {case: rms of every run [deg]}, in elevation.
+    """
     rows = []
     for case in GRAPH_CASES:
         quiet = graph_case(case, quiet=True).run()
@@ -414,7 +438,7 @@ def graph_rows(jitters):
 
 
 def readings(loops, target, rate=None):
-    """{label: {S: (error the receiver reads, true error), each (n,) [rad]}} of loops {label: Paper}."""
+    """Return {label: {S: (error that the receiver measures, true error), each (n,) [rad]}} of {label: PaperLoop}."""
     errors = {}
     for label, loop in loops.items():
         errors[label] = {}
@@ -425,7 +449,7 @@ def readings(loops, target, rate=None):
 
 
 def drawings(done, limit, errors):
-    """{file name: function that draws it}; arguments as of `steps`, `limits` and `compared`."""
+    """Return {file name: function that draws it}; arguments as of `steps`, `limits` and `compared_errors`."""
     def of(**fixed):
         return {loop: y for loop, y in done.items() if loop.slope == 1.0
                 and all(getattr(loop, field) == value for field, value in fixed.items())}
@@ -442,7 +466,7 @@ def drawings(done, limit, errors):
         'figure-3': draw(figures.steps, of(period=10, delay=0), lambda loop: f'alpha {loop.alpha:g}',
                          'figure 3: alpha, T = 10 ms', 1.2),
         'figure-4': draw(figures.steps, of(alpha=0.1, delay=0), lambda loop: f'T = {loop.period} ms',
-                         'figure 4: closed-loop period, alpha 0.1', 1.0),
+                         'figure 4: period of the loop, alpha 0.1', 1.0),
         'figure-5': draw(figures.steps, of(alpha=0.1, period=10), lambda loop: f'delay {loop.delay} ms',
                          'figure 5: delay, alpha 0.1, T = 10 ms', 2.0),
         'figure-6-left': draw(figures.lags, {**ramps[10], **ramps[5]}, 'figure 6, left: 30 deg/s', (0.0, 1.5)),

@@ -1,13 +1,13 @@
-"""What an independent measurement of the rate does for the filter (paper 004): bandwidth and dynamic error.
+"""Effect of an independent measurement of the rate on the filter (paper 004): bandwidth and dynamic error.
 
-The 'current' statistical filter with constant sigma_a and noises settles to constant gains: X+ = A X + B (y, y'),
-identified on the compiled filter itself, one unit state and one unit measurement at a time. A sine y = e^jwt, y' = jw
-y then gives
+The 'current' statistical filter with constant sigma_a and noises settles to constant gains: X+ = A X + B (y, y'). A
+and B are identified on the compiled filter itself, with one unit state and one unit measurement at a time. A sine y =
+e^jwt, y' = jw y then gives
 
     G(jw) = (1 - A e^-jwT)^-1 B (1, jw)',        angle: G_1,  rate: G_2 / jw,  dynamic error: |1 - G_1|.
 
-The bandwidth of the rate is where |G_2 / jw| first falls below -3 dB. With enough weight on the measured rate |G_1|
-never does: the two measurements make a complementary filter.
+The bandwidth of the rate is the frequency at which |G_2 / jw| first falls below -3 dB. With enough weight on the
+measured rate |G_1| never does, because the two measurements make a complementary filter.
 """
 import dataclasses
 import math
@@ -34,25 +34,25 @@ from pedestal_studies.rigs.ensemble import MEASUREMENT_PERIOD_S as T
 from pedestal_studies.rigs.rows import Result
 
 DEFAULT_RUNS = 40
-"""Flybys."""
+"""Number of flybys."""
 
 ANGLE_SIGMA_RAD = math.radians(0.03)
-"""Of a measured angle [rad]."""
+"""Noise of a measured angle [rad]."""
 
 ALPHA = 0.5
 """Manoeuvre frequency [1/s]."""
 
 ACCELERATION_SIGMAS_DEG_S2 = (0.05, 0.5, 3.0)
-"""Standard deviation of the acceleration [deg/s2]."""
+"""Standard deviations of the acceleration [deg/s2]."""
 
 RATE_SIGMAS_DEG_S = {'position': math.nan, 'position-rate': 0.1, 'position-rate-0.02': 0.02}
-"""Of a measured rate [deg/s]; NaN: none."""
+"""{case: noise of a measured rate [deg/s]}, NaN without a measured rate."""
 
 MAIN_SIGMA_DEG_S2 = 0.5
-"""The sigma_a [deg/s2] of the rows that are named after RATE_SIGMAS_DEG_S alone."""
+"""sigma_a of the rows whose name is one of RATE_SIGMAS_DEG_S alone [deg/s2]."""
 
 DYNAMIC_ERROR_FREQUENCY_HZ = 0.2
-"""Of the dynamic error [Hz]."""
+"""Frequency of the dynamic error [Hz]."""
 
 RESPONSE_FREQUENCIES_HZ = np.geomspace(0.01, 0.5 / T, 2000)
 """Frequencies of the responses [Hz]."""
@@ -63,27 +63,27 @@ SETTLING_STEPS = 20000
 FLYBY_PROFILE = 'flyby-60m'
 
 MAX_ACCELERATION_RATIO, MIN_SIGMA_RATIO = 1.2, 0.3
-"""Of the filter of a flight: a_max over its largest acceleration, and the least sigma_a over that."""
+"""Filter of a flight: a_max over the largest acceleration of the flight, and least sigma_a over a_max."""
 
 SETTLING_TIME_S = 5.0
-"""Of the flyby, for the filter to settle [s]."""
+"""Time of the flyby from which the errors are evaluated [s]."""
 
 DIFFERENCED_RATES = {'differenced-1': 1, 'differenced-20': 20}
-"""Rates from differences of the measured angles, over this many T."""
+"""{case: steps of T over which the measured angles are differenced to a rate}."""
 
 BATCH_RUNS, NOISE_SEED = 25, 1
-"""Flybys of one piece of work, and of their noise."""
+"""Flybys of one batch; seed of their noise."""
 
 
 def filter_of(a_max, floor):
-    """A 'current' statistical filter (FilterParameters) that takes the measured rate; a_max in rad/s2."""
+    """Return a 'current' statistical filter (FilterParameters) that takes the measured rate; a_max in rad/s2."""
     model = dataclasses.replace(FilterParameters().current_statistical, alpha=ALPHA, a_max=a_max, floor=floor)
     return FilterParameters(kind='current_statistical', rate_measurement=True, current_statistical=model)
 
 
 @compiled
 def _settle(f, c, rate, R_rate, steps):
-    """Run the filter for `steps` on a target at rest; rate: 0 where it is measured, else NaN."""
+    """Run the filter for `steps` on a target at rest; rate: 0 if it is measured, else NaN."""
     axis_filter.start(f[0], c[0], 0.0, ANGLE_SIGMA_RAD * ANGLE_SIGMA_RAD, 1.0)
     for _ in range(steps):
         axis_filter.predict(f[0], c[0], T)
@@ -92,12 +92,13 @@ def _settle(f, c, rate, R_rate, steps):
 
 @compiled
 def _step(f, c, y, y_rate, R_rate):
+    """Run one step of the filter with a measured angle [rad] and rate [rad/s]."""
     axis_filter.predict(f[0], c[0], T)
     axis_filter.correct(f[0], c[0], AxisMeasurement(y, ANGLE_SIGMA_RAD * ANGLE_SIGMA_RAD, y_rate, R_rate))
 
 
 def steady_state_matrices(sigma_a, rate_sigma):
-    """(A (3, 3), B (3, 2)) of X+ = A X + B (y, y') once the gains are constant; sigma_a [deg/s2], rate_sigma [deg/s].
+    """Return (A (3, 3), B (3, 2)) of X+ = A X + B (y, y') with constant gains; sigma_a [deg/s2], rate_sigma [deg/s].
 
     B has a column of zeros for a rate that is not measured (NaN).
     """
@@ -119,26 +120,25 @@ def steady_state_matrices(sigma_a, rate_sigma):
 
 
 def responses(A, B, frequency):
-    """(G_1, G_2 / jw) of X+ = A X + B (y, y') at frequencies (n,) [Hz]: estimated over true angle and rate."""
+    """Return (G_1, G_2 / jw) of X+ = A X + B (y, y') at frequencies (n,) [Hz]: estimated over true angle and rate."""
     jw = 2j * math.pi * frequency
     X = np.linalg.solve(np.eye(3) - A * np.exp(-jw * T)[:, None, None], (B[:, 0] + jw[:, None] * B[:, 1])[..., None])
     return X[:, 0, 0], X[:, 1, 0] / jw
 
 
 def bandwidth(G):
-    """Frequency [Hz] at which |G| (n,) over RESPONSE_FREQUENCIES_HZ first falls below -3 dB; NaN if it never does."""
+    """Return the frequency [Hz] at which |G| (n,) over RESPONSE_FREQUENCIES_HZ first falls below -3 dB, or NaN."""
     gain = np.log(np.abs(G)) - 0.5 * math.log(0.5)
     below = np.flatnonzero(gain < 0.0)
     if below.size == 0:
         return math.nan
     i = below[0]
-    return float(RESPONSE_FREQUENCIES_HZ[i - 1] * (RESPONSE_FREQUENCIES_HZ[i]
-                                                   / RESPONSE_FREQUENCIES_HZ[i - 1]) ** (gain[i - 1]
-                                                                                         / (gain[i - 1] - gain[i])))
+    f = RESPONSE_FREQUENCIES_HZ
+    return float(f[i - 1] * (f[i] / f[i - 1]) ** (gain[i - 1] / (gain[i - 1] - gain[i])))
 
 
 def measures(sigma_a, rate_sigma):
-    """{metric: (value, unit)} of the filter with constant gains."""
+    """Return {metric: (value, unit)} of the filter with constant gains."""
     A, B = steady_state_matrices(sigma_a, rate_sigma)
     angle, rate = responses(A, B, RESPONSE_FREQUENCIES_HZ)
     error = 1.0 - responses(A, B, np.array([DYNAMIC_ERROR_FREQUENCY_HZ]))[0][0]
@@ -147,21 +147,26 @@ def measures(sigma_a, rate_sigma):
 
 
 CASES = {name if sigma_a == MAIN_SIGMA_DEG_S2 else f'{name}/sigma_a-{sigma_a:g}': (sigma_a, rate_sigma)
-         for sigma_a in (MAIN_SIGMA_DEG_S2, *ACCELERATION_SIGMAS_DEG_S2) for name,
-         rate_sigma in RATE_SIGMAS_DEG_S.items()}
+         for sigma_a in (MAIN_SIGMA_DEG_S2, *ACCELERATION_SIGMAS_DEG_S2)
+         for name, rate_sigma in RATE_SIGMAS_DEG_S.items()}
+"""{case: (sigma_a [deg/s2], noise of the rate [deg/s])}."""
 
 
 def differenced_rate(y, steps):
-    """(rate (n,) [rad/s], its variance) from differences of angles y (n,) [rad] over `steps` T; NaN in the first
-    steps."""
+    """Return (rate (n,) [rad/s], its variance) from differences of angles y (n,) [rad] over `steps` T.
+
+    The first `steps` rates are NaN.
+    """
     rate = np.full(len(y), math.nan)
     rate[steps:] = (y[steps:] - y[:-steps]) / (steps * T)
     return rate, 2.0 * (ANGLE_SIGMA_RAD / (steps * T)) ** 2
 
 
 def filtered(t, target, y, y_rate, R_rate):
-    """ESTIMATE (n,) of the filter for a target (n, 3) of angles and rates (n,) measured at times (n,) [s]; R_rate: the
-    variance of the rates [rad2/s2]."""
+    """Return the ESTIMATE (n,) of the filter for a target (n, 3), from measured angles and rates (n,).
+
+    t: times (n,) [s]. R_rate: variance of the rates [rad2/s2].
+    """
     c = axis_filter.constants(filter_of(MAX_ACCELERATION_RATIO * np.abs(target[:, 2]).max(), MIN_SIGMA_RATIO))
     out = np.zeros(len(t), axis_filter.ESTIMATE_DTYPE)
     axis_filter.estimates(c, t, y, np.full(len(t), ANGLE_SIGMA_RAD * ANGLE_SIGMA_RAD), y_rate, np.full(len(t), R_rate),
@@ -170,15 +175,16 @@ def filtered(t, target, y, y_rate, R_rate):
 
 
 def flyby():
-    """(times (n,) [s], angle, rate and acceleration (n, 3)) of FLYBY_PROFILE."""
+    """Return (times (n,) [s], angle, rate and acceleration (n, 3)) of FLYBY_PROFILE."""
     t = T * np.arange(round(profiles.RECORD_DURATION_S / T))
     return t, np.column_stack(profiles.truth(FLYBY_PROFILE, t))
 
 
 def flyby_record(name, run):
-    """(measured angle [rad], measured rate [rad/s], ESTIMATE), each (n,), of one flyby; name: of FLYBY_CASES; the
-    noise
-    depends on `run` alone."""
+    """Return (measured angle [rad], measured rate [rad/s], ESTIMATE), each (n,), of one flyby.
+
+    name: one of FLYBY_CASES. The noise depends only on `run`.
+    """
     t, target = flyby()
     normals = ensemble.normal_draws(NOISE_SEED, run, 1, len(t))[:, 0]
     y = target[:, 0] + ANGLE_SIGMA_RAD * normals[0]
@@ -191,8 +197,10 @@ def flyby_record(name, run):
 
 
 def batch(item):
-    """Rms errors (count, 2) of the angle [deg] and of the rate [deg/s] of every run; item: (name, first run, number of
-    runs)."""
+    """Return the rms errors (count, 2) of the angle [deg] and of the rate [deg/s] of every run of an item.
+
+    An item is (name, first run, number of runs).
+    """
     name, first, count = item
     t, target = flyby()
     counts = t >= SETTLING_TIME_S
@@ -207,7 +215,10 @@ METRIC_TARGETS = {('position-rate', 'rate_bandwidth_ratio'): '>= 1.5',
 
 
 def rows(measured, errors):
-    """The rows of measured {case: as of `measures`} and errors {name of FLYBY_CASES: rms (runs, 2) [deg, deg/s]}."""
+    """Return the rows of measured {case: as of `measures`} and errors {name of FLYBY_CASES: rms (runs, 2)}.
+
+    The rms are in [deg, deg/s].
+    """
     table = []
     for name, values in measured.items():
         table += [row(name, metric, value, unit, target='< 1' if metric == 'largest_eigenvalue' else None)
@@ -227,20 +238,22 @@ def rows(measured, errors):
 
 
 def remarks(measured, errors):
-    """Sentences that the rows need; arguments as of `rows`."""
+    """Return the sentences that explain the rows; arguments as of `rows`."""
     one, twenty, without = (errors[name][:, 0].mean() for name in (*DIFFERENCED_RATES, 'position'))
     largest, slowest = max((measured[name]['largest_eigenvalue'][0], name) for name in measured)
     return [
-        f'Paper 004 prints neither its noises nor its sigma_a: here {math.degrees(ANGLE_SIGMA_RAD):g} deg, sigma_a '
-        f'{", ".join(f"{sigma_a:g}" for sigma_a in ACCELERATION_SIGMAS_DEG_S2)} deg/s2 and a rate to 0.1 and 0.02 deg/s; rows without '
-        f'sigma_a in their name have {MAIN_SIGMA_DEG_S2:g} deg/s2. It claims a wider band and a smaller dynamic error, without a '
-        'number: true, and by how much depends on these.',
-        'An angle_bandwidth_hz without a number: the angle never falls by 3 dB, a measured rate carries it beyond.',
-        f'Stable in every case: the largest eigenvalue is {largest:.4f} ({slowest}).',
-        f'Only an independent rate helps. The rate of the same angles, differenced over {T:g} s, leaves the error on '
-        f'{FLYBY_PROFILE} where it was ({one:.4f} deg, {without:.4f} without); over {DIFFERENCED_RATES["differenced-20"] * T:g} s '
-        f'and believed to be white it harms ({twenty:.4f} deg): it is half that time late, and its errors are those '
-        'of the angles.',
+        f'Paper 004 prints neither its noises nor its sigma_a. Ours are {math.degrees(ANGLE_SIGMA_RAD):g} deg for the '
+        'angle, 0.1 and 0.02 deg/s for the rate, and sigma_a '
+        f'{", ".join(f"{sigma_a:g}" for sigma_a in ACCELERATION_SIGMAS_DEG_S2)} deg/s2. Rows without sigma_a in their '
+        f'name have {MAIN_SIGMA_DEG_S2:g} deg/s2. The paper claims a wider band and a smaller dynamic error, without '
+        'a number. The claim is true; the amount depends on the noises and sigma_a.',
+        'An angle_bandwidth_hz without a number means that the gain of the angle never falls by 3 dB, because of the '
+        'measured rate.',
+        f'The filter is stable in every case: the largest eigenvalue is {largest:.4f} ({slowest}).',
+        f'Only an independent rate helps. A rate differenced from the same angles over {T:g} s does not change the '
+        f'error on {FLYBY_PROFILE} ({one:.4f} deg, {without:.4f} deg without). A rate differenced over '
+        f'{DIFFERENCED_RATES["differenced-20"] * T:g} s, with noise that the filter assumes white, increases the '
+        f'error ({twenty:.4f} deg). This rate is late by half that time, and its errors are those of the angles.',
     ]
 
 
@@ -248,17 +261,17 @@ CASE_COLOURS = {'position': TRUTH_COLOUR, 'position-rate': FILTERED_COLOUR, 'pos
 
 
 def figures():
-    """{name: function that draws it}."""
+    """Return {name: function that draws it}."""
     return {'bode': bode_figure, 'sigma_a': sigma_a_figure, 'flyby': flyby_figure}
 
 
 def bode_figure():
-    """Responses of angle and rate with and without a measured rate, and their dynamic errors."""
+    """Draw the responses of angle and rate with and without a measured rate, and their dynamic errors."""
     figure, axes = new_panels(2, 2, height=5.6, x='frequency [Hz]', y=('gain [dB]', 'dynamic error |1 - G|'),
                               sharex=True)
     for name, colour in CASE_COLOURS.items():
-        (angle, rate) = responses(*steady_state_matrices(MAIN_SIGMA_DEG_S2, RATE_SIGMAS_DEG_S[name]),
-                                  RESPONSE_FREQUENCIES_HZ)
+        angle, rate = responses(*steady_state_matrices(MAIN_SIGMA_DEG_S2, RATE_SIGMAS_DEG_S[name]),
+                                RESPONSE_FREQUENCIES_HZ)
         for column, G in enumerate((angle, rate)):
             axes[0, column].semilogx(RESPONSE_FREQUENCIES_HZ, 20.0 * np.log10(np.abs(G)), color=colour, label=name)
             axes[1, column].loglog(RESPONSE_FREQUENCIES_HZ, np.abs(1.0 - G), color=colour, label=name)
@@ -272,7 +285,7 @@ def bode_figure():
 
 
 def sigma_a_figure():
-    """Bandwidth of the rate and dynamic error of the angle over sigma_a, with and without a measured rate."""
+    """Draw bandwidth of the rate and dynamic error of the angle over sigma_a, with and without a measured rate."""
     figure, axes = new_panels(1, 2, height=3.4, x='sigma_a [deg/s2]', y='bandwidth of the rate [Hz]', sharex=True)
     sigma_a = np.geomspace(ACCELERATION_SIGMAS_DEG_S2[0], ACCELERATION_SIGMAS_DEG_S2[-1], 13)
     for name, colour in CASE_COLOURS.items():
@@ -284,7 +297,7 @@ def sigma_a_figure():
 
 
 def flyby_figure():
-    """The paper's figures 1 to 8 on the flyby: rate, error of angle and rate, acceleration."""
+    """Draw the quantities of the paper's figures 1 to 8 on the flyby: rate, error of angle and rate, acceleration."""
     labels = ('rate [deg/s]', 'error of the angle [deg]', 'error of the rate [deg/s]', 'acceleration [deg/s2]')
     figure, axes = new_panels(4, height=8.6, y=labels, sharex=True)
     t, target = flyby()

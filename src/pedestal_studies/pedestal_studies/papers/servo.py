@@ -1,9 +1,10 @@
 """Paper 000's step and sine (figures 5, 6), then a better controller on the same plant.
 
-Cases: paper-r1 and paper-r2, the two readings of the paper's sine, with gains for each; paper-all, one controller for
-every number that is printed with figures 5 and 6, the sine read as 0.4 Hz; best, the feed-forward controller;
-best-inertia-plus and -minus, the same with 20 % more and less load; best-full-torque, without a reserve for such a
-load; adrc. Every case is `pedestal run servo_step|servo_sine --param ...` too (Case.command).
+The cases paper-r1 and paper-r2 are the two readings of the paper's sine, with gains for each. `paper-all` is one
+controller for every number that is printed with figures 5 and 6, with the sine read as 0.4 Hz. `best` is the
+feed-forward controller. `best-inertia-plus` and `-minus` have the controller `best` with 20 % more and less load.
+`best-full-torque` has no reserve for such a load. `adrc` is the ADRC. `pedestal run servo_step|servo_sine --param ...`
+runs every case too (Case.command).
 """
 import functools
 import math
@@ -27,64 +28,67 @@ from pedestal_studies.rigs import drawing, metrics
 from pedestal_studies.rigs.rows import Result
 
 STEP_SIZE_RAD = 0.174
-"""Of figure 5 [rad]."""
+"""Step of figure 5 [rad]."""
 
 SINE_AMPLITUDE_RAD = 0.87
-"""Of figure 6 [rad]."""
+"""Amplitude of figure 6 [rad]."""
 
 SINE_FREQUENCIES_RAD_S = {'0p4hz': 0.8 * math.pi, '0p4rads': 0.4}
-"""The two readings of the paper's sine [rad/s]."""
+"""Two readings of the paper's sine [rad/s]."""
 
 SINE_READINGS = {'0p4hz': '0.4 Hz', '0p4rads': '0.4 rad/s'}
 
 SINE_PERIODS = 4
-"""Of each sine; the first belongs to the transient."""
+"""Periods of each sine, of which the first belongs to the transient."""
 
 GUST_TORQUE_NM, GUST_START_S = 1000.0, 0.2
-"""Step of wind torque on the azimuth [Nm], when [s]."""
+"""Step of wind torque on the azimuth [Nm] and its start [s]."""
 
 SETTLING_BAND = 0.02
-"""Of the settling time."""
+"""Band of the settling time, over the step."""
 
-PAPER_R1_PARAMETERS = {}
-"""The scenarios as they are."""
+PAPER_R1_PARAMETERS: dict[str, float] = {}
+"""Parameters of the scenarios, unchanged."""
 
 PAPER_R2_PARAMETERS = {'acu.azimuth.pid.bandwidth': 8.75, 'acu.azimuth.pid.derivative': 0.0}
 
 PAPER_ALL_PARAMETERS = {'acu.azimuth.pid.bandwidth': 54.0, 'acu.azimuth.pid.derivative': 0.45,
                         'adu.azimuth.speed_loop.proportional': 1.5, 'adu.azimuth.speed_loop.integral': 7.0}
-"""Found by a search, as the paper prints no gain. A position loop K e + D e' before a rate loop of type 1 falls short
-of the amplitude by (1 + 2 D) (w / K)^2 / 2, 0.2 % with R1; a slow rate loop, tau = J / K_p, gives tau w^2 / K of
-that back."""
+"""Gains that a search found, because the paper prints none.
+
+A position loop K e + D e' before a rate loop of type 1 falls short of the amplitude. The shortfall is (1 + 2 D) (w /
+K)^2 / 2, which is 0.2 % with paper-r1. A slow rate loop, tau = J / K_p, returns tau w^2 / K of this shortfall.
+"""
 
 DRIVE_PARAMETERS = {
     'adu.azimuth.speed_loop.proportional': 8.0, 'adu.azimuth.speed_loop.integral': 50.0,
     'adu.azimuth.bias.schedule': 'hold_fade', 'adu.azimuth.bias.torque': 12.0, 'adu.azimuth.bias.hold': 14.0,
     'adu.azimuth.bias.out': 45.0}
-"""Speed loop and bias of the cases that are ours."""
+"""Speed loop and bias of our cases."""
 
 SHAPER_PARAMETERS = {
     'acu.azimuth.shaper.rate': 2.42, 'acu.azimuth.shaper.acceleration': 31.0, 'acu.azimuth.shaper.jerk': 8000.0,
     'acu.azimuth.shaper.h0': 0.006}
-"""A quarter of the torque is reserved for a load heavier than assumed."""
+"""Shaper that reserves a quarter of the torque for a load heavier than assumed."""
 
 BEST_PARAMETERS = {
     **DRIVE_PARAMETERS, **SHAPER_PARAMETERS, 'adu.azimuth.speed_loop.disturbance_observer': 400.0,
     'acu.azimuth.controller': 'feedforward', 'acu.azimuth.feedforward.bandwidth': 30.0,
     'acu.azimuth.feedforward.integral': 0.2}
-"""Each gain bears 1.3 times its value when a knock opens the lash. Beyond that (a bandwidth of 45 rad/s) closing the
-lash takes so much torque that the bias stays faded, and the lash opens again: a limit cycle of some mrad. A faster
-observer (600 rad/s) takes 6 % off the gust and lets the load ring on the gear for 0.2 s."""
+"""Controller of the case best.
+
+After a knock that opens the lash, each gain tolerates 1.3 times its value. Beyond that (a bandwidth of 45 rad/s)
+closing the lash takes so much torque that the bias stays faded. The lash then opens again, in a limit cycle of some
+mrad. A faster observer (600 rad/s) reduces the effect of the gust by 6 % and lets the load ring on the gear for 0.2 s.
+"""
 
 FULL_TORQUE_PARAMETERS = {**BEST_PARAMETERS, 'acu.azimuth.shaper.acceleration': 38.0,
-                          'acu.azimuth.shaper.jerk': 4000.0,
-                          'acu.azimuth.shaper.h0': 0.01}
-"""Hardly a reserve, so a gentler end of the move."""
+                          'acu.azimuth.shaper.jerk': 4000.0, 'acu.azimuth.shaper.h0': 0.01}
+"""Controller with hardly any reserve of torque, and therefore with a gentler end of the move."""
 
 ADRC_PARAMETERS = {**DRIVE_PARAMETERS, **SHAPER_PARAMETERS, 'adu.azimuth.speed_loop.proportional': 6.0,
-                   'adu.azimuth.speed_loop.integral': 200.0,
-                   'acu.azimuth.controller': 'adrc'}
-"""With its own observer in place of the drive's, and the speed loop it was designed for."""
+                   'adu.azimuth.speed_loop.integral': 200.0, 'acu.azimuth.controller': 'adrc'}
+"""ADRC with its own observer in place of the drive's, and the speed loop for which it was designed."""
 
 CASE_PARAMETERS = {
     'paper-r1': PAPER_R1_PARAMETERS, 'paper-r2': PAPER_R2_PARAMETERS, 'paper-all': PAPER_ALL_PARAMETERS,
@@ -92,6 +96,7 @@ CASE_PARAMETERS = {
     'best-inertia-plus': {**BEST_PARAMETERS, 'adu.azimuth.load.inertia': 252.0},
     'best-inertia-minus': {**BEST_PARAMETERS, 'adu.azimuth.load.inertia': 168.0},
     'best-full-torque': FULL_TORQUE_PARAMETERS, 'adrc': ADRC_PARAMETERS}
+"""{case: parameters}."""
 
 METRIC_TARGETS = {
     **{name: {'step_overshoot_percent': '12 +- 1.5', 'step_settling_2percent_s': '0.20 +- 0.03',
@@ -108,31 +113,34 @@ METRIC_TARGETS = {
     'best-inertia-plus': {'step_overshoot_percent': '<= 0.5', 'step_settling_2percent_s': '<= 0.15'},
     'best-inertia-minus': {'step_overshoot_percent': '<= 0.5', 'step_settling_2percent_s': '<= 0.15'},
 }
+"""{case: {metric: target}}."""
 PAPER_VALUES = {'step_overshoot_percent': 12.0, 'step_settling_2percent_s': 0.2, 'max_error_rad': 0.04,
                 'rms_error_rad': 0.0281, 'amplitude_rad': 0.869, 'peak_error_percent': 0.12, 'max_error_percent': 4.6}
+"""{metric without the prefix of the sine: number that the paper prints}."""
 SUFFIX_UNITS = {'percent': '%', 's': 's', 'rad': 'rad', 'crossings': ''}
+"""{last word of a metric: unit}."""
 
 
 def step_case(name):
-    """The Case of the step of figure 5 with the parameters of CASE_PARAMETERS[name]."""
+    """Return the Case of the step of figure 5 with the parameters of CASE_PARAMETERS[name]."""
     return Case(name, 'servo_step', CASE_PARAMETERS[name])
 
 
 def sine_case(name, reading):
-    """The Case of SINE_PERIODS of one of SINE_READINGS of the paper's sine."""
+    """Return the Case of SINE_PERIODS of one of SINE_READINGS of the paper's sine."""
     return cases.sine_case(Case(name, 'servo_sine', CASE_PARAMETERS[name]), SINE_FREQUENCIES_RAD_S[reading],
                            SINE_PERIODS)
 
 
 def gust_case(name, **more):
-    """The Case of an axis at rest with a step of wind torque; more: further parameters."""
+    """Return the Case of an axis at rest with a step of wind torque; more: further parameters."""
     return Case(name, 'servo_step', {**CASE_PARAMETERS[name], 'acu.azimuth.preset': 0.0, 'adu.wind.gust.kind': 'step',
                                      'adu.wind.gust.azimuth': GUST_TORQUE_NM, 'adu.wind.gust.start': GUST_START_S,
                                      **more})
 
 
 def step_metrics(record):
-    """{metric: value} of a closed_loop.Run of a step."""
+    """Return {metric: value} of a closed_loop.Run of a step."""
     t, y = record.t, record['adu/truth']['position'][:, 0]
     return {'step_overshoot_percent': metrics.overshoot_percent(y, STEP_SIZE_RAD),
             'step_settling_2percent_s': metrics.settling_time(t, y, STEP_SIZE_RAD, SETTLING_BAND),
@@ -140,12 +148,12 @@ def step_metrics(record):
 
 
 def sine_error(record, w):
-    """The sine of figure 6 at w [rad/s] less the true load angle (n,) [rad]."""
+    """Return the sine of figure 6 at w [rad/s] minus the true load angle (n,) [rad]."""
     return SINE_AMPLITUDE_RAD * np.sin(w * record.t) - record['adu/truth']['position'][:, 0]
 
 
 def sine_metrics(record, reading):
-    """{metric: value} of a closed_loop.Run of one of SINE_READINGS of the sine."""
+    """Return {metric: value} of a closed_loop.Run of one of SINE_READINGS of the sine."""
     w = SINE_FREQUENCIES_RAD_S[reading]
     t, error, period = record.t, sine_error(record, w), 2.0 * math.pi / w
     steady = metrics.whole_periods(t, period, period)
@@ -160,7 +168,7 @@ def sine_metrics(record, reading):
 
 
 def gust_metrics(record):
-    """{metric: value} of a closed_loop.Run of a gust."""
+    """Return {metric: value} of a closed_loop.Run of a gust."""
     t, y = record.t, record['adu/truth']['position'][:, 0]
     return {'gust_1000nm_peak_rad': metrics.peak(y[t >= GUST_START_S] - y[t < GUST_START_S][-1])}
 
@@ -172,11 +180,11 @@ CASE_RUNS = {
     'best-inertia-minus': ('step',), 'best-full-torque': ('step',),
     'adrc': ('step', '0p4rads', '0p4hz', 'gust'),
 }
-"""The runs of each case."""
+"""Kinds of run of each case."""
 
 
 def records(cases, progress):
-    """{(case, kind of run): closed_loop.Run} of the cases named."""
+    """Return {(case, kind of run): closed_loop.Run} of the named cases."""
     wanted = [(name, kind) for name in cases for kind in CASE_RUNS[name]]
     done = {}
     for i, (name, kind) in enumerate(wanted):
@@ -191,7 +199,7 @@ RUN_METRICS = {'step': step_metrics, 'gust': gust_metrics,
 
 
 def rows(done):
-    """The rows of records as of `records`."""
+    """Return the rows of records as of `records`."""
     return [row(name, metric, value, SUFFIX_UNITS[metric.rpartition('_')[2]],
                 PAPER_VALUES.get(metric.removeprefix(f'sine_{kind}_')),
                 METRIC_TARGETS.get(name, {}).get(metric))
@@ -199,8 +207,11 @@ def rows(done):
 
 
 def bang_bang(step, adu):
-    """(time of the whole move, time to its 2 % band) [s] of the fastest rest-to-rest move of `step` [rad] of the
-    azimuth axis: full torque forwards, then backwards, Coulomb friction against it and then with it."""
+    """Return (time of the whole move, time to its 2 % band) [s] of the fastest rest-to-rest move of the azimuth axis.
+
+    step: [rad]. The motors have full torque forwards, then backwards. Coulomb friction opposes the acceleration and
+    supports the deceleration.
+    """
     p = adu.azimuth
     N = p.gear_train.ratio
     J = p.load.inertia + N * N * (p.motor_1.inertia + p.motor_2.inertia)
@@ -212,7 +223,7 @@ def bang_bang(step, adu):
 
 
 def remarks(done):
-    """Sentences that the rows need, with the limits of the plant."""
+    """Return the sentences that explain the rows, with the limits of the plant."""
     slow = step_metrics(done['paper-r2', 'step'])['step_settling_2percent_s']
     adu = step_case('best').loaded().node_parameters('adu')
     whole, settled = bang_bang(STEP_SIZE_RAD, adu)
@@ -221,37 +232,37 @@ def remarks(done):
     zeta = 0.5 * damping / math.sqrt(stiffness * adu.azimuth.load.inertia)
     swing = GUST_TORQUE_NM / stiffness * (1.0 + math.exp(-math.pi * zeta / math.sqrt(1.0 - zeta * zeta)))
     return [
-        "One controller cannot do both of the paper's figures if its sine is 0.4 rad/s: an error of 0.04 rad is that "
-        f'of a gain of {SINE_AMPLITUDE_RAD * 0.4 / 0.04:.2g} 1/s (paper-r2), whose step takes '
-        f'{slow:.3f} s, not 0.2 s. If it is 0.4 Hz, paper-all does all that is printed, the peak of the sine to '
-        '0.12 % too; paper-r1, the gains of servo_step and servo_sine, misses that.',
-        'peak_error_percent is the shortfall of the amplitude (0.869 of 0.87 rad), max_error_percent the largest '
-        'error of the steady sine over the amplitude. The mean square error of 2.81 % is read as 0.0281 rad rms.',
-        f'The 0.4 Hz sine starts from rest with {SINE_AMPLITUDE_RAD * SINE_FREQUENCIES_RAD_S["0p4hz"]:.2f} rad/s: the error of its start '
-        'is v2/(2 a), set by the torque, and no controller removes it.',
+        "If the paper's sine is 0.4 rad/s, one controller cannot give the numbers of both figures. An error of "
+        f'0.04 rad needs a gain of {SINE_AMPLITUDE_RAD * 0.4 / 0.04:.2g} 1/s (paper-r2), with which the step takes '
+        f'{slow:.3f} s instead of 0.2 s. If the sine is 0.4 Hz, paper-all gives all printed numbers, also the peak of '
+        'the sine to 0.12 %. paper-r1, with the gains of servo_step and servo_sine, misses the peak.',
+        'peak_error_percent is the shortfall of the amplitude (0.869 of 0.87 rad). max_error_percent is the largest '
+        'error after the first period over the amplitude. The mean square error of 2.81 % is read as 0.0281 rad rms.',
+        f'The 0.4 Hz sine starts with {SINE_AMPLITUDE_RAD * SINE_FREQUENCIES_RAD_S["0p4hz"]:.2f} rad/s, the load from '
+        'rest. The torque determines the error v^2 / (2 a) of this start, which no controller removes.',
         f'Limit of the step: torque. Full torque forwards and back takes {whole:.3f} s, {settled:.3f} s to the 2 % '
-        'band. best keeps a quarter of it for a load heavier than known, best-full-torque does not.',
-        f'Limit of the gust: the gear. {GUST_TORQUE_NM:g} Nm bend the two meshes by {GUST_TORQUE_NM / stiffness:.1e} rad, and the load '
-        f'swings to {swing:.1e} rad on them when the motors stand perfectly still. The aim of 2e-4 rad is not '
-        'reached: a quicker observer (600 rad/s) comes to 2.1e-4 and rings.',
+        'band. best keeps a quarter of the torque for a load heavier than assumed, best-full-torque does not.',
+        f'Limit of the gust: the gear. {GUST_TORQUE_NM:g} Nm bend the two meshes by '
+        f'{GUST_TORQUE_NM / stiffness:.1e} rad. The load swings to {swing:.1e} rad on the meshes with motors that do '
+        'not move at all. The aim of 2e-4 rad is not reached. A faster observer (600 rad/s) reaches 2.1e-4 rad and '
+        'rings.',
         f'Limit of the sine: the encoder step, {2.0 * math.pi / 2**bits:.1e} rad, and, where the rate changes its '
-        'sign, the friction that differs from the one fed forward.',
+        'sign, the difference between the friction and the friction fed forward.',
     ]
 
 
 CASE_COLOURS = {'paper-r1': TRUTH_COLOUR, 'paper-r2': RAW_COLOUR, 'best': FILTERED_COLOUR, 'adrc': MOTOR_2_COLOUR,
-                'best-inertia-plus': TRUTH_COLOUR,
-                'best-inertia-minus': MOTOR_1_COLOUR}
+                'best-inertia-plus': TRUTH_COLOUR, 'best-inertia-minus': MOTOR_1_COLOUR}
 
 
 def figures(done):
-    """{name: function that draws it} of the records of all cases."""
+    """Return {name: function that draws it} of the records of all cases."""
     return {'step': lambda: step_figure(done), 'sine': lambda: sine_figure(done), 'gust': lambda: gust_figure(done),
             'inertia': lambda: inertia_figure(done)}
 
 
 def step_figure(done):
-    """Figure 5: the load's angle, and the torque of both motors below."""
+    """Draw figure 5: the load's angle, and the torque of both motors below."""
     names = ('paper-r1', 'paper-r2', 'best')
     figure, axes = new_panels(4, height=8.0, y=('azimuth [rad]', *3 * ['torque [Nm]']), sharex=True,
                               height_ratios=(2.2, 1, 1, 1))
@@ -270,15 +281,14 @@ def step_figure(done):
 
 
 def sine_figure(done):
-    """Figure 6: reference and load, errors of both readings, the error of best on its own scale."""
+    """Draw figure 6: reference and load, errors of both readings, the error of best on its own scale."""
     figure, axes = new_panels(3, height=7.0, x='time [periods of the sine]', sharex=True, height_ratios=(1.4, 1.2, 1),
                               y=('azimuth [rad]', 'error [mrad]', 'error [\N{MICRO SIGN}rad]'))
     period = 2.0 * math.pi / SINE_FREQUENCIES_RAD_S['0p4hz']
     record = done['paper-r1', '0p4hz']
     t = record.t / period
     axes[0, 0].plot(t, SINE_AMPLITUDE_RAD * np.sin(SINE_FREQUENCIES_RAD_S['0p4hz'] * record.t), color=INK_COLOUR,
-                    linestyle='--',
-                    label='reference')
+                    linestyle='--', label='reference')
     axes[0, 0].plot(t, record['adu/truth']['position'][:, 0], color=TRUTH_COLOUR, linewidth=1.4,
                     label='paper-r1, 0.4 Hz')
     axes[0, 0].set_title('sine of 0.87 rad (figure 6 of the paper)')
@@ -288,15 +298,15 @@ def sine_figure(done):
         record, w = done[name, reading], SINE_FREQUENCIES_RAD_S[reading]
         axes[panel, 0].plot(record.t * w / (2.0 * math.pi), scale * sine_error(record, w), style, color=colour,
                             label=f'{name}, {SINE_READINGS[reading]}')
-    axes[2, 0].set_title('best, its start beyond the scale')
+    axes[2, 0].set_title('best, with its start outside the scale')
     axes[2, 0].set_ylim(-100.0, 100.0)
     axes[2, 0].set_xlim(0.0, SINE_PERIODS)
     return drawing.legend(figure)
 
 
 def gust_figure(done):
-    """Deflection of the load by the gust."""
-    figure, axes = new_panels(1, height=3.4, y='azimuth off its place [\N{MICRO SIGN}rad]')
+    """Draw the deflection of the load by the gust."""
+    figure, axes = new_panels(1, height=3.4, y='deflection of the azimuth [\N{MICRO SIGN}rad]')
     axes = axes[0, 0]
     for name in ('paper-r1', 'adrc', 'best'):
         record = done[name, 'gust']
@@ -305,21 +315,20 @@ def gust_figure(done):
                   label=name)
     stiffness = 2.0 * step_case('best').loaded().node_parameters('adu').azimuth.gear_train.stiffness
     axes.axhline(1e6 * GUST_TORQUE_NM / stiffness, color=INK_COLOUR, linewidth=0.8, linestyle='--',
-                 label='the gear bent by the gust')
+                 label='deflection of the gear by the gust torque')
     axes.set_xlim(GUST_START_S - 0.05, GUST_START_S + 0.5)
     axes.set_title(f'gust: a step of {GUST_TORQUE_NM:g} Nm at {GUST_START_S:g} s')
     return drawing.legend(figure)
 
 
 def inertia_figure(done):
-    """The step of best with 20 % more and less load, around its end, and the torque it takes."""
-    figure, axes = new_panels(2, height=5.2, y=('azimuth less 0.174 rad [mrad]', 'torque [Nm]'), sharex=True)
-    for name, label in (('best-inertia-minus', 'load 20 % lighter'), ('best', 'load as known'),
+    """Draw the end of the step of best with 20 % more and less load, and its torque."""
+    figure, axes = new_panels(2, height=5.2, y=('azimuth - 0.174 rad [mrad]', 'torque [Nm]'), sharex=True)
+    for name, label in (('best-inertia-minus', 'load 20 % lighter'), ('best', 'load as assumed'),
                         ('best-inertia-plus', 'load 20 % heavier')):
         record = done[name, 'step']
         axes[0, 0].plot(record.t, 1e3 * (record['adu/truth']['position'][:, 0] - STEP_SIZE_RAD),
-                        color=CASE_COLOURS[name],
-                        label=label)
+                        color=CASE_COLOURS[name], label=label)
         torque = record['adu/motor_states']['effort'][:, :2].mean(axis=1)
         axes[1, 0].plot(record.t, torque, color=CASE_COLOURS[name], label=label)
     for side in (-SETTLING_BAND, SETTLING_BAND):

@@ -1,18 +1,17 @@
-"""Paper 004's filter on a flight of its kind (figures 1 to 8), and the matrices from which its stability follows.
+"""Paper 004's filter on a flight of the same kind (figures 1 to 8), and the matrices of its proof of stability.
 
-The paper prints T = 0.01 s, the windows of its figures and that the filter begins with the first measured angle and
-rate; flight, noises and parameters of the filter are chosen here. A target flies straight past the antenna and is
-nearest at CULMINATION_TIME_S, inside the paper's figures 2 and 6. Cases <axis>/filtered, the 'current' statistical
-filter on
-angle and rate; <axis>/measured, both as they are measured, and the acceleration as the difference of the measured rate
-over DIFFERENCE_STEPS steps.
+The paper prints T = 0.01 s and the windows of its figures, and that the filter begins with the first measured angle
+and rate. The flight, the noises and the parameters of the filter are ours. A target flies straight past the antenna
+and is nearest at CULMINATION_TIME_S, inside the paper's figures 2 and 6. Cases <axis>/filtered are the 'current'
+statistical filter on angle and rate. Cases <axis>/measured are the measured angle and rate, and the acceleration as
+the difference of the measured rate over DIFFERENCE_STEPS steps.
 
 With x = (angle, rate, acceleration), x+ = Phi x + U abar and the mean acceleration abar as its input, y = H x:
 
     controllability (U, Phi U, Phi^2 U),        observability (H', (H Phi)', (H Phi^2)')'.
 
-`condition` is theirs in the unit T of time, in which the entries are of one size; in seconds they differ by up to
-1 / T^2, and condition_in_seconds tells no more than that.
+`condition` is the condition of these matrices with T as the unit of time, in which the entries are of one size. In
+seconds the entries differ by up to 1 / T^2, and `condition_in_seconds` shows only this.
 """
 import math
 
@@ -36,19 +35,19 @@ BATCH_RUNS = 5
 """Flights that one worker makes at a time."""
 
 TARGET_SPEED_M_S, MIN_GROUND_DISTANCE_M, TARGET_HEIGHT_M, CULMINATION_TIME_S = 300.0, 3000.0, 2500.0, 42.0
-"""Of the target [m/s]; its least distance over ground [m]; its height [m]; when it is nearest [s]."""
+"""Speed [m/s], least distance over ground [m] and height [m] of the target; time of its least distance [s]."""
 
 FLIGHT_START_S, FLIGHT_END_S = 20.0, 100.0
-"""The times of the paper's figures [s]; the filter begins at the first."""
+"""Times of the paper's figures [s]; the filter begins at the first."""
 
 SETTLING_TIME_S = 5.0
-"""What of it is left out of the rows [s]."""
+"""Time after FLIGHT_START_S from which the rows are evaluated [s]."""
 
 ZOOM_WINDOWS_S = {'azimuth': (39.0, 43.5), 'elevation': (41.5, 45.0)}
-"""Of figures 2 and 6 [s]."""
+"""Windows of figures 2 and 6 [s]."""
 
 RATE_SIGMA_RAD_S = math.radians(0.1)
-"""Of a measured rate [rad/s]."""
+"""Noise of a measured rate [rad/s]."""
 
 DIFFERENCE_STEPS = 20
 """Steps over which the measured rate is differenced."""
@@ -57,7 +56,7 @@ QUANTITY_UNITS = {'angle': 'deg', 'rate': 'deg/s', 'acceleration': 'deg/s2'}
 
 
 def flight():
-    """(times (n,) [s], {axis: angle, rate, acceleration (n, 3) [rad, rad/s, rad/s2]}) of the target.
+    """Return (times (n,) [s], {axis: angle, rate, acceleration (n, 3) [rad, rad/s, rad/s2]}) of the target.
 
     With x = v (t - t_0) along the track, d abeam and h up, rho^2 = x^2 + d^2 and r^2 = rho^2 + h^2,
 
@@ -76,8 +75,10 @@ def flight():
 
 
 def flight_record(axis, run):
-    """(measured, filtered) angle, rate and acceleration, each (n, 3), of one flight; the noise depends on axis and run
-    alone."""
+    """Return (measured, filtered) angle, rate and acceleration, each (n, 3), of one flight.
+
+    The noise depends only on the axis and the run.
+    """
     t, target = flight()
     truth = target[axis]
     nu, nu_rate = ensemble.normal_draws(NOISE_SEED + AXES.index(axis), run, 1, len(t))[:, 0]
@@ -88,8 +89,10 @@ def flight_record(axis, run):
 
 
 def batch(item):
-    """Rms errors (count, 2, 3) [deg, deg/s, deg/s2] of what is measured and filtered; item: (axis, first run, number
-    of runs)."""
+    """Return the rms errors (count, 2, 3) [deg, deg/s, deg/s2], measured and filtered, of an item.
+
+    An item is (axis, first run, number of runs).
+    """
     axis, first, count = item
     t, target = flight()
     counts = t >= FLIGHT_START_S + SETTLING_TIME_S
@@ -98,7 +101,7 @@ def batch(item):
 
 
 def model(T):
-    """(Phi (3, 3), U (3,)) of the 'current' statistical model over T (paper 004, equations 5 and 6)."""
+    """Return (Phi (3, 3), U (3,)) of the 'current' statistical model over T (paper 004, equations 5 and 6)."""
     angle, rate, kept = motion_models.fading(ALPHA, T)
     return (np.array([[1.0, T, angle], [0.0, 1.0, rate], [0.0, 0.0, kept]]),
             np.array([0.5 * T * T - angle, T - rate, 1.0 - kept]))
@@ -109,17 +112,17 @@ MEASUREMENT_MATRICES = {'angle': np.eye(3)[:1], 'angle-rate': np.eye(3)[:2]}
 
 
 def controllability(Phi, U):
-    """(U, Phi U, Phi^2 U), (3, 3)."""
+    """Return (U, Phi U, Phi^2 U), (3, 3)."""
     return np.column_stack([np.linalg.matrix_power(Phi, i) @ U for i in range(3)])
 
 
 def observability(Phi, H):
-    """H, H Phi, H Phi^2 one below the other."""
+    """Return H, H Phi, H Phi^2 stacked vertically."""
     return np.vstack([H @ np.linalg.matrix_power(Phi, i) for i in range(3)])
 
 
 def matrices():
-    """{case: (matrix in seconds, the same in the unit T of time)}."""
+    """Return {case: (matrix in seconds, matrix with T as the unit of time)}."""
     Phi, U = model(T)
     unit = np.diag([1.0, T, T * T])         # (angle, rate T, acceleration T^2) of (angle, rate, acceleration)
     back = np.linalg.inv(unit)
@@ -129,7 +132,7 @@ def matrices():
 
 
 def rows(errors):
-    """The rows of errors {axis: as of `batch`, of all runs}, and of the matrices."""
+    """Return the rows of errors {axis: as of `batch`, of all runs}, and of the matrices."""
     table = []
     for axis, of_runs in errors.items():
         for name, column in zip(('measured', 'filtered'), of_runs.transpose(1, 2, 0)):
@@ -145,22 +148,24 @@ def rows(errors):
 
 
 def remarks():
-    """Sentences that the rows need, with the matrices in seconds."""
+    """Return the sentences that explain the rows, with the matrices in seconds."""
     lines = ['Without the filter the acceleration is the difference of the measured rate over '
-             f'{DIFFERENCE_STEPS * T:g} s. The paper prints no error: "smooth" and "does not diverge" are its claims.']
+             f'{DIFFERENCE_STEPS * T:g} s. The paper prints no error; it claims "smooth" and "does not diverge".']
     for name, (matrix, _) in matrices().items():
         lines += [f'{name}, in seconds:', *('    ' + '  '.join(f'{value:11.4g}' for value in line) for line in matrix)]
     return lines
 
 
 def figures():
-    """{name: function that draws it}: the paper's figures 1 to 4 and 5 to 8."""
+    """Return {name: function that draws it}: the paper's figures 1 to 4 and 5 to 8."""
     return {'figures-1-to-4': lambda: axis_figure('azimuth', 1), 'figures-5-to-8': lambda: axis_figure('elevation', 5)}
 
 
 def axis_figure(axis, first):
-    """Angle, a part of it, rate and acceleration of one flight, measured, filtered and true; first: the number of the
-    first of the paper's four figures."""
+    """Draw angle, a part of it, rate and acceleration of one flight, measured, filtered and true.
+
+    first: number of the first of the paper's four figures.
+    """
     figure, axes = new_panels(4, height=9.0)
     t, target = flight()
     measured, filtered = flight_record(axis, 0)

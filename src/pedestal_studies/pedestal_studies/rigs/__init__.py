@@ -1,1 +1,1 @@
-"""Test rigs of the studies: one law or one small loop, many times, without the rest of the antenna."""
+"""Test rigs of the studies: one law or one small loop, run many times, without the rest of the antenna."""

@@ -1,10 +1,10 @@
-"""The angle loop of a phased array on one axis, on a grid of 1 ms: paper 002's loop, and one on a target filter.
+"""The angle loop of a phased array on one axis, on a grid of 1 ms: paper 002's loop, and a loop with a target filter.
 
-Each is one compiled kernel of the laws the nodes run: the receiver's smoothing and pattern, the loop of the beam or a
-target filter, the electronic beam. Sample i of the grid is measured over the millisecond that ends at its stamp
-i GRID_STEP_S, against the beam in force in it; a target is given at the middles of these milliseconds. A command
-stamped
-i GRID_STEP_S is in force from the millisecond after i GRID_STEP_S + delay on.
+Each loop is one compiled kernel of the laws that the nodes run: the smoothing and the pattern of the receiver, the
+loop of the beam or a target filter, and the electronic beam. Sample i of the grid is measured over the millisecond
+that ends at its stamp i GRID_STEP_S, against the beam in force in this millisecond. A target is given at the middles
+of the milliseconds. A command with the stamp i GRID_STEP_S is in force from the millisecond after i GRID_STEP_S +
+delay on.
 """
 import dataclasses
 import math
@@ -23,43 +23,60 @@ from tracking_receiver_sim import monopulse, smoothing
 from tracking_receiver_sim.params import AntennaParameters, ReceiverParameters
 
 GRID_STEP_S = 1e-3
+"""Step of the grid [s]."""
 GRID_STEP_NS = round(GRID_STEP_S * 1e9)
 
 SMOOTHING_CODES = {'S0': smoothing.SMOOTHING_NONE, 'S1': smoothing.SMOOTHING_RECURSION,
                    'S2': smoothing.SMOOTHING_MOVING_AVERAGE}
-"""S0: the last sample, S1: paper 002's eq. (1), S2: the moving average it is called."""
+"""Codes of S0, the last sample, of S1, paper 002's eq. (1), and of S2, the moving average whose name eq. (1) has."""
 
 SMOOTHING_SAMPLES = 20
-"""n of the smoothing in samples: the paper's example."""
+"""Samples n of the smoothing, as in the paper's example."""
 
 FULL_SCALE_BEAMWIDTHS, K_M = ReceiverParameters().full_scale, AntennaParameters().slope
+"""Full scale of the receiver [beamwidths] and slope of its antenna."""
 
 SMOOTHER_RECORD = np.dtype([('error', smoothing.SMOOTHER_DTYPE)], align=True)
 
 Target = namedtuple('Target', 'angle attitude rate noise')
-"""Target and carrier on the grid, each (n,): true angle [rad]; the part of it that the carrier's attitude causes [rad]
-and its rate [rad/s], as measured for the loop; noise of the samples [rad]."""
+"""Target and carrier on the grid, each (n,).
+
+`angle`: true angle [rad]. `attitude`, `rate`: share of the angle that the attitude of the carrier causes [rad] and its
+rate [rad/s], as measured for the loop. `noise`: noise of the samples [rad].
+"""
 
 Beam = namedtuple('Beam', 'state constants inputs outputs')
 """Records (1,) of an electronic beam without elevation."""
 
 Receiver = namedtuple('Receiver', 'slope beamwidth lost')
-"""slope: true over assumed [-]; beamwidth [rad], 0 for a linear receiver; lost: power over that on axis below which
-the signal is lost [-]."""
+"""Constants of a receiver.
+
+`slope`: true slope over assumed slope [-]. `beamwidth`: [rad], 0 for a linear receiver. `lost`: power over the power
+on axis below which the signal is lost [-].
+"""
 
 PaperLoopConstants = namedtuple('PaperLoopConstants', 'form alpha period delta smoothing')
-"""The constants of a Paper: code of beam_loop.FORMS, gain [-], period in samples, share of the carrier's rate that is
-compensated [-], code of smoothing.SMOOTHINGS."""
+"""Constants of a PaperLoop.
+
+`form`: code of beam_loop.LOOP_FORMS. `alpha`: gain [-]. `period`: in samples. `delta`: share of the carrier's rate
+that is compensated [-]. `smoothing`: code of SMOOTHING_CODES.
+"""
 
 FilterLoopConstants = namedtuple('FilterLoopConstants', 'filter variance period hold delay tau')
-"""The constants of a Better: those (1,) of its filter, variance of a measurement [rad2], period and hold in samples,
-delay and low-pass of the acceleration [s]."""
+"""Constants of a FilterLoop.
+
+`filter`: constants (1,) of its filter. `variance`: of a measurement [rad2]. `period`, `hold`: in samples. `delay`,
+`tau`: delay and low-pass of the acceleration [s].
+"""
 
 
 @dataclasses.dataclass(frozen=True)
 class PaperLoop:
-    """Paper 002's loop. period, delay: in samples of the grid; slope, beamwidth, lost: as in Receiver; delta: share of
-    the carrier's rate that is compensated."""
+    """Loop of paper 002.
+
+    `period`, `delay`: in samples of the grid. `slope`, `beamwidth`, `lost`: as in Receiver. `delta`: share of the
+    carrier's rate that is compensated.
+    """
     alpha: float = 0.1
     period: int = 10
     delay: int = 0
@@ -71,27 +88,31 @@ class PaperLoop:
     lost: float = 0.0
 
     def run(self, target, rate=None, noise=None):
-        """(beam, smoothed error in the loop), each (n,) [rad], of a target (n,) [rad]; rate (n,) [rad/s]: of its
-        motion by the carrier; noise (n,) [rad] of the samples. None for zeros."""
+        """Return (beam, smoothed error in the loop), each (n,) [rad], of a target (n,) [rad].
+
+        rate (n,) [rad/s]: rate of the target due to the carrier. noise (n,) [rad]: noise of the samples. None for
+        zeros.
+        """
         zeros, beam, errors = np.zeros(len(target)), np.zeros(len(target)), np.zeros(len(target))
         constants = PaperLoopConstants(beam_loop.LOOP_FORMS.index(self.form), self.alpha, self.period, self.delta,
                                        SMOOTHING_CODES[self.smoothing])
         _paper_loop(constants, Receiver(self.slope, self.beamwidth, self.lost),
-                    Target(np.asarray(target), zeros, zeros if rate is None else rate, zeros if noise is None
-                           else noise),
+                    Target(np.asarray(target), zeros, zeros if rate is None else rate,
+                           zeros if noise is None else noise),
                     np.zeros(1, SMOOTHER_RECORD), _beam(self.delay, self.period), beam, errors)
         return beam, errors
 
 
 @dataclasses.dataclass(frozen=True)
 class FilterLoop:
-    """A loop in which beam in force + error goes into a target filter; the command is the filter's prediction for the
-    middle of the interval in which it will be in force.
+    """Loop in which beam in force + error is the input of a target filter.
 
-    period: samples averaged to one measurement; hold: samples between two commands; delay: true delay, known: the
-    delay that the loop assumes (None: the true one), all in samples. jerk: noise of the constant-acceleration filter
-    [rad/s3/sqrt(Hz)]; sigma: of one sample [rad]. ins: the filter works in the earth frame; late: error of the INS's
-    stamps in samples; tau: low-pass of its acceleration [s], 0 without the acceleration.
+    The command is the prediction of the filter for the middle of the interval in which the command will be in force.
+    `period`: samples averaged to one measurement. `hold`: samples between two commands. `delay`: true delay in
+    samples. `known`: delay that the loop assumes, in samples, None for the true delay. `jerk`: noise of the
+    constant-acceleration filter [rad/s3/sqrt(Hz)]. `sigma`: noise of one sample [rad]. `ins`: True if the filter works
+    in the earth frame. `late`: error of the INS's stamps in samples. `tau`: low-pass of its acceleration [s], 0
+    without the acceleration.
     """
     jerk: float
     sigma: float
@@ -104,8 +125,11 @@ class FilterLoop:
     tau: float = 0.05
 
     def run(self, target, noise=None, attitude=None, rate=None):
-        """(beam, innovation of the filter), each (n,) [rad], of a target (n,) [rad]; noise (n,) [rad] of the samples;
-        attitude, rate (n,) [rad, rad/s]: rotation of the target by the carrier, as the INS measures it."""
+        """Return (beam, innovation of the filter), each (n,) [rad], of a target (n,) [rad].
+
+        noise (n,) [rad]: noise of the samples. attitude, rate (n,) [rad, rad/s]: rotation of the target by the
+        carrier, as the INS measures it.
+        """
         n = len(target)
         zeros, beam, errors = np.zeros(n), np.zeros(n), np.zeros(n)
         late = np.maximum(np.arange(n) - self.late, 0)
@@ -120,7 +144,7 @@ class FilterLoop:
 
 
 def _beam(delay, hold):
-    """A Beam at rest at 0; delay, hold: in samples of the grid."""
+    """Return a Beam at rest at 0; delay, hold: in samples of the grid."""
     return Beam(electronic_beam.initial_state(0.0, 0.0),
                 electronic_beam.constants(GRID_STEP_S, delay * GRID_STEP_S, 2 * hold * GRID_STEP_S),
                 np.zeros(1, electronic_beam.INPUTS_DTYPE),
@@ -129,8 +153,11 @@ def _beam(delay, hold):
 
 @compiled
 def receiver_reading(offset, receiver):
-    """The error [rad] that a Receiver measures for an offset [rad] of the target from the beam: linear without a
-    beamwidth, else by its monopulse pattern within full scale; NaN where the signal is lost."""
+    """Return the error [rad] that a Receiver measures for an offset [rad] of the target from the beam.
+
+    The error is linear without a beamwidth, otherwise it follows the monopulse pattern within full scale. It is NaN if
+    the signal is lost.
+    """
     slope, beamwidth, lost = receiver
     if beamwidth == 0.0:
         return slope * offset
@@ -142,8 +169,10 @@ def receiver_reading(offset, receiver):
 
 @compiled
 def command(u, stamp, due, beam):
-    """Put a command, beam [rad] at sample `stamp` of the grid, into the inputs u of the electronic beam; due: whether
-    it is a new one."""
+    """Put a command, beam [rad] at sample `stamp` of the grid, into the inputs u of the electronic beam.
+
+    due: True for a new command.
+    """
     u.stamp_ns = u.command_stamp_ns = stamp * GRID_STEP_NS
     u.due = 1 if due else 0
     u.position[0] = beam
@@ -151,7 +180,7 @@ def command(u, stamp, due, beam):
 
 @compiled
 def _paper_loop(constants, receiver, target, smoothers, plant, beam, errors):
-    """Paper 002's loop over a Target into beam and errors (n,) [rad]; plant: the Beam."""
+    """Run paper 002's loop over a Target into beam and errors (n,) [rad]; plant: the Beam."""
     form, alpha, period, delta, kind = constants
     s, beta, T = smoothers[0].error, constant_gain.benedict_bordner(alpha), period * GRID_STEP_S
     R = v = error = 0.0
@@ -171,7 +200,7 @@ def _paper_loop(constants, receiver, target, smoothers, plant, beam, errors):
 
 @compiled
 def _filter_loop(constants, target, smoothers, filters, plant, beam, errors):
-    """The loop on a target filter over a Target into beam and innovations `errors` (n,) [rad]; plant: the Beam."""
+    """Run the loop with a target filter over a Target into beam and innovations (n,) [rad]; plant: the Beam."""
     s, f, c = smoothers[0].error, filters[0], constants.filter[0]
     period, hold, rate = constants.period, constants.hold, target.rate
     running, aimed, acceleration = False, 0.0, 0.0
@@ -179,7 +208,7 @@ def _filter_loop(constants, target, smoothers, filters, plant, beam, errors):
         beam[i] = plant.outputs[0].position[0]
         if i % period == 0:
             smoothing.begin(s)
-        # Less the rotation by the carrier it is the angle in the earth frame.
+        # The angle of the target minus the rotation of the carrier is the angle in the earth frame.
         smoothing.put(s, beam[i] + (target.angle[i] - beam[i] + target.noise[i]) - target.attitude[i], 0.0)
         if i > 0 and constants.tau > 0.0:
             acceleration = attitudes.smoothed_acceleration(acceleration, rate[i], rate[i - 1], GRID_STEP_S,
@@ -196,17 +225,17 @@ def _filter_loop(constants, target, smoothers, filters, plant, beam, errors):
             running = True
             block = i
         if running and i % hold == 0:
-            # From the stamp to the middle of the interval in force.
+            # The prediction goes from the stamp to the middle of the interval in which the command is in force.
             lead = constants.delay + 0.5 * hold * GRID_STEP_S
             earth = axis_filter.outlook(f, c, (i - block + 0.5 * period) * GRID_STEP_S + lead).angle
-            aimed = (earth + target.attitude[i] + attitudes.rotation_angle(rate[i], acceleration, 0.5 * GRID_STEP_S
-                                                                           + lead))
+            aimed = (earth + target.attitude[i]
+                     + attitudes.rotation_angle(rate[i], acceleration, 0.5 * GRID_STEP_S + lead))
         command(plant.inputs[0], i, running and i % hold == 0, aimed)
         electronic_beam.step(plant.state[0], plant.constants[0], plant.inputs[0], plant.outputs[0])
 
 
 def is_stable(loop, size=1e-9, seconds=20.0):
-    """Whether the paper's loop (Paper) settles after a step of `size` [rad]: its error keeps falling."""
+    """Return True if the error of a PaperLoop keeps falling after a step of `size` [rad]."""
     n = round(seconds / GRID_STEP_S)
     error = np.abs(size - loop.run(np.full(n, size))[0])
     middle, last = error[n // 3:2 * n // 3].max(), error[2 * n // 3:].max()
@@ -214,8 +243,7 @@ def is_stable(loop, size=1e-9, seconds=20.0):
 
 
 def delay_limit(loop, highest=400):
-    """Largest delay, in samples of the grid up to `highest`, at which the paper's loop (Paper) is stable; by
-    bisection."""
+    """Return the largest delay at which a PaperLoop is stable, in samples up to `highest`, by bisection."""
     low, high = 0, highest
     while high - low > 1:
         middle = (low + high) // 2
@@ -227,11 +255,11 @@ def delay_limit(loop, highest=400):
 
 
 def spectral_radius(loop):
-    """Largest modulus of the eigenvalues of the paper's linear loop over one period.
+    """Return the largest modulus of the eigenvalues of a PaperLoop, linear, over one period.
 
-    loop: Paper. State: v T, the smoothing's output, and the commands k, k - 1, ... that are in force in the samples of
-    the next period (and of the moving average before it). In sample j = 1 ... period after the update k the command
-    k + floor((j - 1 - delay) / period) is in force.
+    The state is v T, the output of the smoothing, and a list of commands k, k - 1, ... The list holds the commands in
+    force in the samples of the next period (and of the moving average before it). In sample j = 1 ... period after the
+    update k the command k + floor((j - 1 - delay) / period) is in force.
     """
     M, beta, n = loop.period, constant_gain.benedict_bordner(loop.alpha), SMOOTHING_SAMPLES
     first = {'S0': M, 'S1': 1, 'S2': M - n + 1}[loop.smoothing]

@@ -1,11 +1,11 @@
-"""Figures of the studies: sheets of panels in one style, saved as PNG, and as a vector file where one is asked for."""
+"""Figures of the studies: sheets of panels in one style, saved as PNG and, on request, as a vector file."""
 import matplotlib
 
 from pedestal_analysis.report import figures
 
 
 def legend(figure):
-    """The figure, with one legend below all panels, where it covers no curve: every label once."""
+    """Return the figure with one legend below all panels, where it covers no curve; every label occurs once."""
     handles = {}
     for axes in figure.axes:
         for handle, label in zip(*axes.get_legend_handles_labels()):
@@ -23,7 +23,7 @@ def draw_torques(axes, record):
 
 
 def save(draw, *paths):
-    """Draw a figure once into files; the same bytes every time."""
+    """Draw a figure once into files, with the same bytes every time."""
     with matplotlib.rc_context({**figures.MATPLOTLIB_STYLE, 'svg.hashsalt': paths[0].stem}):
         figure = draw()
         figures.tidy(figure)

@@ -1,7 +1,7 @@
 """A filter of acu_tracker over many noisy records of one motion, reduced to the moments of its errors.
 
-The noise of a run depends on a seed and the number of the run alone, so that every filter, profile and noise gets the
-same draws, however the runs are cut into batches.
+The noise of a run depends only on a seed and the number of the run. Every filter, profile and noise therefore has the
+same draws, for any division of the runs into batches.
 """
 import dataclasses
 import math
@@ -17,7 +17,7 @@ from acu_tracker.geometry.motion import AxisMotion, Motion
 from pedestal_common.compiled import compiled
 
 MEASUREMENT_PERIOD_S = 0.01
-"""Between measurements [s], in all studies of filters."""
+"""Time between measurements in all studies of filters [s]."""
 
 INITIAL_RATE_SIGMA_RAD_S = TrackerParameters().initial_rate
 """Standard deviation of the rate at the start [rad/s]."""
@@ -25,24 +25,29 @@ INITIAL_RATE_SIGMA_RAD_S = TrackerParameters().initial_rate
 MOMENTS = np.dtype([('runs', 'f8'), ('angle', 'f8'), ('angle2', 'f8'), ('rate', 'f8'), ('rate2', 'f8'),
                     ('acceleration', 'f8'), ('acceleration2', 'f8'), ('raw2', 'f8'), ('variance', 'f8'),
                     ('rate_variance', 'f8'), ('nis', 'f8'), ('nees', 'f8'), ('mu', 'f8', (axis_filter.BANK_SIZE,))])
-"""Sums over runs at one time: errors of angle, rate, acceleration and of the raw angle, their squares, the filter's
-own variances, normalised innovations squared, normalised errors squared of angle and rate, mode probabilities."""
+"""Sums over runs at one time: errors of angle, rate, acceleration and of the raw angle, and their squares.
+
+Further sums are the filter's own variances, normalised innovations squared, normalised errors squared of angle and
+rate, and mode probabilities.
+"""
 
 Series = namedtuple('Series', 't y R y_rate R_rate')
-"""What a filter measures of one axis: times (n,) [s], angles (runs, n) [rad], their variance (n,), rates (runs, n)
-[rad/s], their variance (n,)."""
+"""Measurements of one axis for a filter.
+
+`t`: times (n,) [s]. `y`, `R`: angles (runs, n) [rad] and their variance (n,). `y_rate`, `R_rate`: rates (runs, n)
+[rad/s] and their variance (n,).
+"""
 
 RangedSeries = namedtuple('RangedSeries', 'azimuth elevation R ranges R_range')
-"""What the Cartesian filter measures: angles (runs, n) [rad] of variance R, ranges (runs, n) [m] of variance
-R_range."""
+"""Measurements for the Cartesian filter: angles (runs, n) [rad] and ranges (runs, n) [m] with their variances."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Noise:
     """Noise of the measured angle: rms sigma [rad]; bandwidth of a first-order lag [Hz], None for white noise.
 
-    rate_sigma: of an independent, white rate measurement [rad/s], None without one. expected: whether the filter knows
-    the bandwidth.
+    `rate_sigma`: noise of an independent, white rate measurement [rad/s], None without such a measurement. `expected`:
+    True if the filter knows the bandwidth.
     """
     sigma: float
     bandwidth: float | None = None
@@ -51,21 +56,23 @@ class Noise:
 
 
 def normal_draws(seed, first, count, n, sensors=2):
-    """Standard normal noise (sensors, count, n) of the runs from `first` on; the first sensor is the angle."""
+    """Return standard normal noise (sensors, count, n) of the runs from `first` on; the first sensor is the angle."""
     runs = [np.random.default_rng((seed, first + i)).standard_normal((sensors, n)) for i in range(count)]
     return np.stack(runs, axis=1)
 
 
 def coloured_noise(white, bandwidth):
-    """White noise (runs, n) of variance 1 through a first-order lag of -3 dB bandwidth [Hz]; variance 1 again."""
+    """Return white noise (runs, n) of variance 1 after a first-order lag of -3 dB bandwidth [Hz], with variance 1."""
     rho = math.exp(-2.0 * math.pi * bandwidth * MEASUREMENT_PERIOD_S)
     rest, _ = lfilter([math.sqrt(1.0 - rho * rho)], [1.0, -rho], white[:, 1:], zi=rho * white[:, :1])
     return np.hstack((white[:, :1], rest))
 
 
 def records(truth, noise, seed, first, count):
-    """Measured angles [rad] and rates [rad/s], each (count, n), of a truth (angle, rate, acceleration), each (n,); the
-    rates are NaN without a sensor."""
+    """Return measured angles [rad] and rates [rad/s], each (count, n), of a truth (angle, rate, acceleration).
+
+    The rates are NaN without a sensor.
+    """
     angle, rate, _ = truth
     nu, nu_rate = normal_draws(seed, first, count, len(angle))
     if noise.bandwidth is not None:
@@ -75,9 +82,9 @@ def records(truth, noise, seed, first, count):
 
 
 def moments(params, t, truth, noise, measured):
-    """MOMENTS (runs, n) of a filter (FilterParameters) at times t (n,) [s], of measured records as of `records`.
+    """Return MOMENTS (runs, n) of a filter (FilterParameters) at times t (n,) [s], for measured `records`.
 
-    The filter knows sigma and rate_sigma, and takes noise whose bandwidth it does not know for white.
+    The filter knows sigma and rate_sigma. It assumes white noise if it does not know the bandwidth.
     """
     y, y_rate = measured
     c = axis_filter.constants(dataclasses.replace(params, rate_measurement=noise.rate_sigma is not None),
@@ -121,11 +128,10 @@ def _add(s, o, truth, k, y):
 
 
 def unscented_moments(params, truth, distance, noise, range_sigma, runs):
-    """MOMENTS (runs, n) of the azimuth of the IMM of unscented filters (params: UkfParameters); runs: (seed, first,
-    count).
+    """Return MOMENTS (runs, n) of the azimuth of the IMM of unscented filters (params: UkfParameters).
 
-    The target is at elevation 0 and at `distance` (n,) [m], measured with white noise of range_sigma [m]; both angles
-    have the Noise `noise`, the azimuth with the draws of `records`.
+    runs: (seed, first, count). The target is at elevation 0 and at `distance` (n,) [m], measured with white noise of
+    range_sigma [m]. Both angles have the Noise `noise`, the azimuth with the draws of `records`.
     """
     seed, first, count = runs
     nu, _, nu_elevation, nu_range = normal_draws(seed, first, count, len(distance), 4)
@@ -141,8 +147,7 @@ def unscented_moments(params, truth, distance, noise, range_sigma, runs):
 
 @compiled
 def _add_unscented_runs(c, T, truth, measured, rate_variance, sums):
-    """Add the errors in azimuth over RangedSeries, every T [s], to MOMENTS (runs, n); truth: AxisMotion of arrays
-    (n,)."""
+    """Add the errors in azimuth over RangedSeries, every T [s], to MOMENTS (runs, n); truth: AxisMotion of arrays."""
     R, R_range = measured.R, measured.R_range
     out = np.zeros(1, axis_filter.ESTIMATE_DTYPE)
     o = out[0]
@@ -171,25 +176,29 @@ def _add_unscented_runs(c, T, truth, measured, rate_variance, sums):
 
 
 def sum_of_moments(sums, more):
-    """Sum of two arrays (n,) of MOMENTS, element by element."""
+    """Return the sum of two arrays (n,) of MOMENTS, element by element."""
     return (sums.view('f8') + more.view('f8')).view(MOMENTS)
 
 
 def over_runs(sums):
-    """Sum (n,) of MOMENTS (runs, n) over the runs."""
+    """Return the sum (n,) of MOMENTS (runs, n) over the runs."""
     return _summed(sums, 0)
 
 
 def over_time(sums):
-    """Sum (runs,) of MOMENTS (runs, n) over the times: the moments of every run."""
+    """Return the sum (runs,) of MOMENTS (runs, n) over the times, which holds the moments of every run."""
     return _summed(sums, 1)
 
 
 def _summed(sums, axis):
+    """Return the sum of MOMENTS (runs, n) over an axis."""
     numbers = np.ascontiguousarray(sums).view('f8').reshape(*sums.shape, -1)
     return numbers.sum(axis=axis).view(MOMENTS)[:, 0]
 
 
 def rms(sums, name):
-    """Rms error [rad, rad/s, rad/s2] of MOMENTS (n,), name: 'angle', 'rate', 'acceleration' or 'raw'; (n,)."""
+    """Return the rms error (n,) of MOMENTS (n,) [rad, rad/s, rad/s2].
+
+    name: 'angle', 'rate', 'acceleration' or 'raw'.
+    """
     return np.sqrt(sums[f'{name}2'] / sums['runs'])

@@ -1,42 +1,53 @@
-"""What an operator expects of every fault in every mode: written from what the antenna is for, not from what it does.
+"""Expectations of an operator for every fault in every mode, derived from the purpose of the antenna.
 
-Half a beamwidth (0.5 deg) off the target the link is 3 dB down and the error signal still leads back; a tenth of it
-(0.1 deg) costs 0.12 dB and counts as on target. In standby nobody points: the antenna is to stand where it stood,
-within half a beamwidth. A drive that trips, or is not fed, has to say so within 0.1 s; what takes a motion to find,
+The expectations were written without regard to the behaviour of the product. Half a beamwidth (0.5 deg) off the target
+the link is 3 dB down, and the error signal still leads back to the target. A tenth of the beamwidth (0.1 deg) costs
+0.12 dB and counts as on target. In standby the antenna stays where it stood, within half a beamwidth. A step is 5 ms.
+The drive must report a trip or missing commands within 0.1 s. A fault that shows only in motion must be reported
 within 1 s. Nothing moves by itself after a fault that ended in standby.
 
-The modes that go by the level are under way to autotrack, and are judged by where their beam may be: within the area
-that is searched, the look-around, or half a beamwidth. They point by the attitude as program does, so that what holds
-for that holds for them; only the receiver matters to them as it does to autotrack.
+The modes that use the signal level (search, acquire, steptrack) lead to autotrack. They are judged by the permitted
+places of their beam: the searched area, the look-around, or half a beamwidth. They point by the attitude as program
+does, so the expectations of program hold for them. Only the faults of the receiver affect them as they affect
+autotrack.
 """
 import typing
 
 from pedestal_common.graph.modes import MODE_ROWS
 
 TENTH_BEAMWIDTH_DEG, HALF_BEAMWIDTH_DEG = 0.1, 0.5
-"""Of the beamwidth of the antenna of the study [deg]."""
+"""Tenth and half of the beamwidth of the antenna in the study [deg]."""
 
 HALF_PITCH_DEG = 1.32
-"""Play of a pinion of 17 teeth and ratio 8 where one is missing: pi / (17 * 8) [deg]."""
+"""Play of a pinion with 17 teeth and ratio 8 at a missing tooth: pi / (17 * 8) [deg]."""
 
-SAME_MODE = ()
-STANDBY_MODE = ('standby',)
+SAME_MODE, STANDBY_MODE = (), ('standby',)
+"""Values of `Expectation.end`: the mode at the onset; standby."""
+
 
 
 class Expectation(typing.NamedTuple):
-    """told: steps within which somebody says something of it, None where nobody has to; end: modes of which the run
-    ends in one 5 s after the fault, SAME_MODE: the mode it began in; error: largest one while the mode is kept [deg],
-    None
-    where the antenna cannot help it."""
-    told: int | None
+    """Expectation for a fault in a mode.
+
+    `report_steps`: latest report by any node, in steps after the onset; None if no report is required. `end`:
+    permitted modes 5 s after the fault; SAME_MODE for the mode at the onset. `error`: largest permitted error while
+    the mode is kept [deg]; None if the antenna cannot limit the error.
+    """
+    report_steps: int | None
     end: tuple
     error: float | None
 
+    def texts(self, mode):
+        """Return (report, error, permitted modes at the end) in words, for a mode at the onset."""
+        kept = not self.end or mode in self.end and self.end != STANDBY_MODE
+        ends = ['the same mode'] * kept + [name for name in dict.fromkeys(self.end) if not (kept and name == mode)]
+        return ('not required' if self.report_steps is None else f'within {self.report_steps} steps',
+                'not limited' if self.error is None else f'at most {self.error:g} deg',
+                ' or '.join(filter(None, (', '.join(ends[:-1]), ends[-1]))))
+
     def sentence(self, mode):
-        """The expectation in words."""
-        told = 'need not be told' if self.told is None else f'told within {self.told} steps'
-        error = '' if self.error is None else f', at most {self.error:g} deg'
-        return f'{told}, ends in {" or ".join(self.end or (mode,))}{error}'
+        """Return the expectation as a sentence, for a mode at the onset."""
+        return 'report {}, error {}, ends in {}'.format(*self.texts(mode))
 
 
 EXPECT_NO_EFFECT = Expectation(None, SAME_MODE, TENTH_BEAMWIDTH_DEG)
@@ -44,81 +55,99 @@ EXPECT_IN_BEAM = Expectation(None, SAME_MODE, HALF_BEAMWIDTH_DEG)
 EXPECT_TRIP = Expectation(4, STANDBY_MODE, HALF_BEAMWIDTH_DEG)
 
 MOVING_MODES = ('rate',)
+"""Mode that moves the axes on the deck."""
 FOLLOWING_MODES = tuple(row.name for row in MODE_ROWS if row.follows and not row.by_level)
+"""Modes that follow a direction in earth angles, for which the attitude is needed."""
 STILL_MODES = tuple(row.name for row in MODE_ROWS if not row.follows and row.name not in MOVING_MODES)
+"""Modes in which the axes end at rest on the deck."""
 LEVEL_INDEPENDENT_MODES = (*STILL_MODES, *MOVING_MODES, *FOLLOWING_MODES)
-"""Still and moving on the deck; following what lies in earth angles, which takes the attitude."""
+"""Modes that do not use the signal level."""
 
 
 def _in_every_mode(expected):
-    """The same in every mode, but that in standby nobody points."""
+    """Return one expectation for every mode.
+
+    In standby the antenna does not point, so at least half a beamwidth is permitted.
+    """
     resting = expected._replace(error=max(expected.error or HALF_BEAMWIDTH_DEG, HALF_BEAMWIDTH_DEG))
     return {**dict.fromkeys(LEVEL_INDEPENDENT_MODES, expected), 'standby': resting}
 
 
 def _when_moving(expected, still=EXPECT_NO_EFFECT):
-    """Where it matters only when the axes move."""
+    """Return an expectation for the modes that move the axes, and another for the modes at rest."""
     return {**_in_every_mode(still), **dict.fromkeys((*MOVING_MODES, *FOLLOWING_MODES), expected)}
 
 
-def _in_autotrack(told, error, *end):
-    """Where it matters only when the receiver closes the loop."""
-    return {**_in_every_mode(EXPECT_NO_EFFECT), 'autotrack': Expectation(told, end, error)}
+def _in_autotrack(report_steps, error, *end):
+    """Return an expectation for autotrack, where the receiver closes the loop; no other mode is affected."""
+    return {**_in_every_mode(EXPECT_NO_EFFECT), 'autotrack': Expectation(report_steps, end, error)}
 
 
 _STANDBY_OR_SAME_MODE = {mode: ('standby', mode) for mode in LEVEL_INDEPENDENT_MODES}
 
 
-def _attitude_fault(told, error, still=None):
-    """Where the attitude is wrong or gone: without it no target can be followed, so that standby is right; to bridge
-    it is right as well."""
-    return {**_in_every_mode(Expectation(still, SAME_MODE, TENTH_BEAMWIDTH_DEG)),
-            **{mode: Expectation(told, _STANDBY_OR_SAME_MODE[mode], error) for mode in FOLLOWING_MODES}}
+def _attitude_fault(report_steps, error, still_report_steps=None):
+    """Return the expectations for a wrong or missing attitude.
+
+    Without attitude no target can be followed, so a mode may end in standby. A mode that bridges the fault is right as
+    well.
+    """
+    return {**_in_every_mode(Expectation(still_report_steps, SAME_MODE, TENTH_BEAMWIDTH_DEG)),
+            **{mode: Expectation(report_steps, _STANDBY_OR_SAME_MODE[mode], error) for mode in FOLLOWING_MODES}}
 
 
 def _heading_fault():
-    """Where the attitude is off by more than half a beamwidth: only autotrack can point better than it is known."""
+    """Return the expectations for an attitude that is wrong by more than half a beamwidth.
+
+    Only autotrack can point better than the attitude is known.
+    """
     return {**_in_every_mode(EXPECT_NO_EFFECT),
             **{mode: Expectation(200, (mode, 'standby'), None) for mode in FOLLOWING_MODES},
             'autotrack': Expectation(200, ('autotrack', 'program'), HALF_BEAMWIDTH_DEG)}
 
 
 LEVEL_MODE_ERRORS_DEG = {'search': 10.0, 'acquire': 2.0, 'steptrack': HALF_BEAMWIDTH_DEG}
-"""Largest way from the target to the beam of a mode that goes by the level [deg]: across the area of five beamwidths
-about the expected place; a look-around of 1.2 beamwidths about a peak within 0.7; in the beam. A fade takes the level
-itself: step track has to search for it then and to look around, so that the reach of acquire is its own."""
+"""Largest permitted distance of the beam from the target, for each mode that uses the signal level [deg].
+
+search: across the area of five beamwidths about the expected place. acquire: a look-around of 1.2 beamwidths about a
+peak within 0.7 beamwidths. steptrack: within the beam. A fade removes the level itself, so steptrack has to search and
+look around; it then has the limit of acquire.
+"""
 
 MODES_TO_AUTOTRACK = ('search', 'acquire', 'autotrack')
 
 SIGNAL_LOSS_FAULTS, WRONG_ERROR_FAULTS = ('drop', 'freeze', 'nan', 'clock_step'), ('wrong_slope', 'phase_180')
-"""Faults of the receiver without which, and with which no target is found."""
+"""Faults of the receiver that remove its signal, or give its errors a wrong sign; no target is found with them."""
 
 
-def _signal_level_modes(node, fault, of_modes):
-    """{mode: Expected} of the modes that go by the level, by those of the others."""
-    program, reaches = of_modes['program'], LEVEL_MODE_ERRORS_DEG
-    told, error, end = program.told, program.error, program.end
+def _signal_level_modes(of_modes, node, fault):
+    """Return {mode: Expectation} of the modes that use the signal level, derived from the other modes."""
+    (report_steps, end, error), permitted_errors = of_modes['program'], LEVEL_MODE_ERRORS_DEG
     if node == 'tracking_receiver' and fault == 'fade':
-        (told, end, reaches) = (None, ('program',),
-                                {**LEVEL_MODE_ERRORS_DEG, 'steptrack': LEVEL_MODE_ERRORS_DEG['acquire']})
+        report_steps, end = None, ('program',)
+        permitted_errors = {**LEVEL_MODE_ERRORS_DEG, 'steptrack': LEVEL_MODE_ERRORS_DEG['acquire']}
     elif node == 'tracking_receiver' and fault in SIGNAL_LOSS_FAULTS:
-        told, end = 200, ('program',)
+        report_steps, end = 200, ('program',)
     elif node == 'tracking_receiver' and fault in WRONG_ERROR_FAULTS:
         end = ('program', 'standby')
-    return {mode: Expectation(told, end if end == STANDBY_MODE
+    return {mode: Expectation(report_steps, end if end == STANDBY_MODE
                               else tuple(dict.fromkeys((mode, *MODES_TO_AUTOTRACK, *end))),
-                              None if error is None else max(error, reach)) for mode, reach in reaches.items()}
+                              None if error is None else max(error, permitted))
+            for mode, permitted in permitted_errors.items()}
 
 
 def _unstow_expectation(fault, of_modes):
-    """Return what holds in unstow: the antenna stands as in standby, on its brakes, where a trip may not end it."""
+    """Return the expectation in unstow, where the antenna stands on its brakes as in standby.
+
+    A trip need not end the mode.
+    """
     expected = of_modes['standby']
     expected = expected._replace(end=expected.end and _STANDBY_OR_SAME_MODE['unstow'])
-    # An inverter that is off is missed when torque is asked for.
-    return expected._replace(told=None) if fault == 'adu.motor_loss' else expected
+    # An inverter that is off has no effect until the drive commands torque.
+    return expected._replace(report_steps=None) if fault == 'adu.motor_loss' else expected
 
 
-_BASE_EXPECTATIONS = {
+_LEVEL_INDEPENDENT_EXPECTATIONS = {
     'adu.motor_loss': _in_every_mode(Expectation(200, SAME_MODE, TENTH_BEAMWIDTH_DEG)),
     'adu.encoder_jump': _in_every_mode(EXPECT_TRIP),
     'adu.encoder_stuck': _when_moving(Expectation(200, STANDBY_MODE, HALF_BEAMWIDTH_DEG)),
@@ -127,13 +156,15 @@ _BASE_EXPECTATIONS = {
                                              TENTH_BEAMWIDTH_DEG) for mode in (*MOVING_MODES, *FOLLOWING_MODES)}},
     'adu.lost_tooth': {mode: Expectation(None, end, HALF_PITCH_DEG) for mode, end in _STANDBY_OR_SAME_MODE.items()},
     'adu.gust': _in_every_mode(EXPECT_NO_EFFECT),
-    'adu.pin_stuck': _in_every_mode(EXPECT_NO_EFFECT),                      # the antenna of the study has no stow pins
+    # Only unstow has stow pins; their timeout is longer than the run.
+    'adu.pin_stuck': _in_every_mode(EXPECT_NO_EFFECT),
     'adu.drop': _when_moving(Expectation(20, SAME_MODE, None), Expectation(20, SAME_MODE, TENTH_BEAMWIDTH_DEG)),
     'adu.delay': _when_moving(EXPECT_IN_BEAM),
     'adu.freeze': _when_moving(Expectation(100, STANDBY_MODE, HALF_BEAMWIDTH_DEG)),
     'adu.bias': {mode: Expectation(200, end, HALF_BEAMWIDTH_DEG) for mode, end in _STANDBY_OR_SAME_MODE.items()},
     'adu.nan': {**_in_every_mode(EXPECT_TRIP),
-                'rate': EXPECT_TRIP._replace(end=('standby', 'rate'))},     # who jogs goes on asking
+                # The rate commands continue, so mode rate may begin again.
+                'rate': EXPECT_TRIP._replace(end=('standby', 'rate'))},
     'adu.noise': _in_every_mode(EXPECT_IN_BEAM),
     'tracking_receiver.drop': _in_autotrack(100, HALF_BEAMWIDTH_DEG),
     'tracking_receiver.delay': _in_autotrack(None, TENTH_BEAMWIDTH_DEG),
@@ -159,8 +190,9 @@ _BASE_EXPECTATIONS = {
     'ins.ins_jump': _heading_fault(),
     'ins.clock_step': _attitude_fault(60, HALF_BEAMWIDTH_DEG),
 }
-FAULT_EXPECTATIONS = {name: {**of_modes, **_signal_level_modes(*name.split('.'), of_modes),
+"""{'NODE.FAULT': {mode: Expectation}} of LEVEL_INDEPENDENT_MODES; the other modes and unstow are derived from them."""
+FAULT_EXPECTATIONS = {name: {**of_modes, **_signal_level_modes(of_modes, *name.split('.')),
                              'unstow': _unstow_expectation(name, of_modes)}
-                      for name, of_modes in _BASE_EXPECTATIONS.items()}
-"""{'NODE.FAULT': {mode: Expected}}, of every fault with its defaults that lasts 5 s."""
+                      for name, of_modes in _LEVEL_INDEPENDENT_EXPECTATIONS.items()}
+"""{'NODE.FAULT': {mode: Expectation}} of every fault with its defaults and a duration of 5 s."""
 

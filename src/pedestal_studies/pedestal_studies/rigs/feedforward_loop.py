@@ -1,8 +1,8 @@
 """The loop of paper 003: a rate loop whose command is a measured miss with rate and acceleration fed forward.
 
 The target moves to and fro; in a reversal its rate is half a cosine. Every T the tracker measures the miss of the
-antenna, d ago, with noise. The encoder angle of that instant plus the miss is the line of sight, y; a filter of
-`acu_tracker.estimation.filters.axis_filter` estimates its rate v and acceleration a, and the command of the rate loop
+antenna, with noise and the delay d. The encoder angle of that instant plus the miss is the line of sight, y. A filter
+of `acu_tracker.estimation.filters.axis_filter` estimates its rate v and acceleration a. The command of the rate loop
 is
 
     u = K_p miss(t - d) + k_v v + k_a a,        W(s) = w^2 / (s^2 + 2 zeta w s + w^2),
@@ -27,37 +27,40 @@ from pedestal_studies.rigs.ensemble import MEASUREMENT_PERIOD_S as T
 from pedestal_studies.rigs.profiles import S_MOTION_RATE_RAD_S, S_MOTION_STROKE_RAD
 
 MISS_DELAY_STEPS = 4
-"""Age of a miss when it arrives, in T."""
+"""Delay d of a miss, in T."""
 
 MISS_SIGMA_RAD = math.radians(0.02)
-"""Of a miss [rad]."""
+"""Noise of a miss [rad]."""
 
 K_P = 5.0
-"""Of the miss [1/s]."""
+"""Gain of the miss [1/s]."""
 
 RATE_LOOP_CONSTANTS = (2.0 * math.pi * 8.0, 0.7)
-"""w [rad/s], zeta."""
+"""Bandwidth w [rad/s] and damping zeta of the rate loop."""
 
 REVERSAL_S_BY_AXIS = {'azimuth': 1.0, 'elevation': 1.6}
-"""Duration of a reversal [s]: 11 and 6.9 deg/s2 at its peak. The paper does not print it."""
+"""{axis: duration of a reversal [s]}, which the paper does not print; the peaks are 11 and 6.9 deg/s2."""
 
 EVALUATED_PERIODS = 2
-"""Periods of the motion that count, after half of one to settle."""
+"""Periods of the motion that are evaluated, after half a period to settle."""
 
 UNIFORM_RATE_DELAY_S = 2.0
-"""After a reversal the rate is called uniform from then on [s]."""
+"""Time after a reversal from which the rate counts as uniform [s]."""
 
 BATCH_RUNS, NOISE_SEED = 25, 1
-"""Runs of one piece of work, and of their noise."""
+"""Runs of one batch; seed of their noise."""
 
 
 def feedforward_gains(w, zeta):
-    """(k_v [-], k_a [s]) of 1 / W(s) = 1 + 2 zeta s / w + s^2 / w^2: paper 003's c1, c2, corrected, for this W."""
+    """Return (k_v [-], k_a [s]) of 1 / W(s) = 1 + 2 zeta s / w + s^2 / w^2.
+
+    They are paper 003's c1, c2, corrected, for this W.
+    """
     return 1.0, 2.0 * zeta / w
 
 
 def rate_loop_step(w, zeta):
-    """M (3, 4) of (theta, omega, omega') T later = M (theta, omega, omega', u), u constant: exact."""
+    """Return M (3, 4) of (theta, omega, omega') T later = M (theta, omega, omega', u), exact for a constant u."""
     A = np.zeros((4, 4))
     A[0, 1] = A[1, 2] = 1.0
     A[2, 1:] = -w * w, -2.0 * zeta * w, w * w
@@ -68,14 +71,15 @@ K_V, K_A = feedforward_gains(*RATE_LOOP_CONSTANTS)
 
 STEP_RECORD = np.dtype([('miss', 'f8'), ('rate', 'f8'), ('acceleration', 'f8'), ('mu', 'f8', axis_filter.BANK_SIZE)],
                        align=True)
-"""True angle less antenna [rad]; rate [rad/s] and acceleration [rad/s2] fed forward; probability of each model."""
+"""True angle minus antenna [rad]; rate [rad/s] and acceleration [rad/s2] fed forward; probability of each model."""
 
 
 @compiled
 def _follow(target, known, f, c, lead, M, normals, out):
     """Run the loop: target (n, 3), normals (runs, n) into STEP_RECORD records out (runs, n); M as of `rate_loop_step`.
 
-    known (n, 2): rate and acceleration to feed forward; (0, 2): those of the filter f, c, `lead` [s] after its miss.
+    known (n, 2): rate and acceleration to feed forward. If known is (0, 2), they are the estimates of the filter f, c,
+    `lead` [s] after its miss.
     """
     R = MISS_SIGMA_RAD * MISS_SIGMA_RAD
     encoder = np.empty(len(target))
@@ -108,31 +112,35 @@ def _follow(target, known, f, c, lead, M, normals, out):
 
 @dataclasses.dataclass(frozen=True)
 class Source:
-    """Where rate and acceleration come from: a filter, or None for the truth; `predicted` to the instant of the
-    command, or as they were when the miss was measured."""
+    """Source of rate and acceleration: a filter, or None for the truth.
+
+    `predicted`: True for values predicted to the instant of the command, False for values at the time of the miss.
+    """
     filter: FilterParameters | None
     predicted: bool = False
 
 
 def filter_of(kind, **groups):
-    """FilterParameters of a kind with groups of its parameters changed: cv=dict(noise=...)."""
+    """Return the FilterParameters of a kind with groups of its parameters changed: cv=dict(noise=...)."""
     return FilterParameters(kind=kind, **{name: dataclasses.replace(getattr(FilterParameters(), name), **values)
-                                for name, values in groups.items()})
+                                          for name, values in groups.items()})
 
 
 def cv(q):
-    """The Source of a constant-rate filter; q [deg/s2/sqrt(Hz)]."""
+    """Return the Source of a constant-rate filter; q [deg/s2/sqrt(Hz)]."""
     return Source(filter_of('cv', cv={'noise': math.radians(q)}))
 
 
 def ca(q):
-    """The Source of a constant-acceleration filter; q [deg/s3/sqrt(Hz)]."""
+    """Return the Source of a constant-acceleration filter; q [deg/s3/sqrt(Hz)]."""
     return Source(filter_of('ca', ca={'noise': math.radians(q)}))
 
 
 def imm(q_ca, predicted):
-    """The Source of an IMM: cv of low noise, ca of q_ca [deg/s3/sqrt(Hz)], current_statistical of high acceleration;
-    dwell 5 s."""
+    """Return the Source of an IMM of cv, ca and current_statistical with a dwell of 5 s.
+
+    cv has low noise, ca has q_ca [deg/s3/sqrt(Hz)], current_statistical has a high acceleration.
+    """
     default = FilterParameters().imm
     bank = {
         'models': 'cv ca current_statistical', 'dwell': 5.0,
@@ -144,8 +152,7 @@ def imm(q_ca, predicted):
 
 
 def motion(axis):
-    """(t (n,) [s], target (n, 3), its period [s]): the S motion of an axis, half a period and EVALUATED_PERIODS
-    more."""
+    """Return (t (n,) [s], target (n, 3), period [s]) of an axis, over half a period and EVALUATED_PERIODS."""
     reversal = REVERSAL_S_BY_AXIS[axis]
     period = 2.0 * (S_MOTION_STROKE_RAD / S_MOTION_RATE_RAD_S + reversal * (1.0 - 2.0 / math.pi))
     t = T * np.arange(round((0.5 + EVALUATED_PERIODS) * period / T))
@@ -153,8 +160,10 @@ def motion(axis):
 
 
 def steps_of(axis, source, first, count):
-    """STEP_RECORD records (count, n) of runs first ... first + count - 1 of a Source on an axis; run i has the noise
-    of i."""
+    """Return STEP_RECORD records (count, n) of runs first ... first + count - 1 of a Source on an axis.
+
+    The noise of run i depends only on i.
+    """
     t, target, _ = motion(axis)
     lead = (MISS_DELAY_STEPS + 0.5) * T if source.predicted else 0.0
     known = np.zeros((0, 2))
@@ -172,26 +181,27 @@ def steps_of(axis, source, first, count):
 
 METRIC_UNITS = {'miss_rms_deg': 'deg', 'miss_worst_second_deg': 'deg', 'miss_peak_deg': 'deg',
                 'rate_noise_deg_s': 'deg/s'}
-"""{metric: unit} of a run: the miss over all, in its worst second, its largest; noise of a uniform rate."""
+"""{metric of a run: unit}: rms, rms of the worst second and peak of the miss; noise of a uniform rate."""
 
 
 def measures(axis, steps):
-    """METRIC_UNITS of every run, an array (runs, 4), of STEP_RECORD records (runs, n) on an axis."""
+    """Return METRIC_UNITS of every run, an array (runs, 4), of STEP_RECORD records (runs, n) on an axis."""
     t, target, period = motion(axis)
     counts = t >= 0.5 * period
     second = round(1.0 / T)
     reversing = np.convolve(np.abs(target[:, 1]) < 0.999 * S_MOTION_RATE_RAD_S,
                             np.ones(round(UNIFORM_RATE_DELAY_S / T)))[:len(t)] > 0.5
     miss, noise = steps['miss'][:, counts], (steps['rate'] - target[:, 1])[:, counts & ~reversing]
-    values = [(tracking.rms(one), math.sqrt(np.convolve(one * one, np.full(second, 1.0 / second), 'valid').max()),
-               metrics.peak(one), tracking.rms(other)) for one, other in zip(miss, noise)]
+    values = [(tracking.rms(m), math.sqrt(np.convolve(m * m, np.full(second, 1.0 / second), 'valid').max()),
+               metrics.peak(m), tracking.rms(rate_error)) for m, rate_error in zip(miss, noise)]
     return np.degrees(values)
 
 
 def batch(item):
-    """(sum over the runs of the miss (n,) [rad], METRIC_UNITS of every run (count, 4)) of an item (axis, source,
-    first run,
-    how many)."""
+    """Return (sum over the runs of the miss (n,) [rad], METRIC_UNITS of every run (count, 4)) of an item.
+
+    An item is (axis, source, first run, number of runs).
+    """
     axis, source, first, count = item
     steps = steps_of(axis, source, first, count)
     return steps['miss'].sum(axis=0), measures(axis, steps)
@@ -199,23 +209,25 @@ def batch(item):
 
 @dataclasses.dataclass(frozen=True)
 class MissStatistics:
-    """Statistics of the runs of a Source on an axis: miss_mean (n,) [rad], at each step the mean over the runs; values
-    (runs, 4), METRIC_UNITS of every run."""
+    """Statistics of the runs of a Source on an axis.
+
+    `miss_mean` (n,) [rad]: mean over the runs at each step. `values` (runs, 4): METRIC_UNITS of every run.
+    """
     axis: str
     miss_mean: np.ndarray
     values: np.ndarray
 
     def of(self, metric):
-        """The values (runs,) of one of METRIC_UNITS."""
+        """Return the values (runs,) of one of METRIC_UNITS."""
         return self.values[:, list(METRIC_UNITS).index(metric)]
 
     def mean(self, metric):
-        """The mean over the runs of one of METRIC_UNITS."""
+        """Return the mean over the runs of one of METRIC_UNITS."""
         return float(self.of(metric).mean())
 
 
 def statistics(cases, count, pool, progress=lambda share, text: None):
-    """{name: MissStatistics} of `count` runs of each of cases {name: (axis, Source)}; pool: monte_carlo.Pool."""
+    """Return {name: MissStatistics} of `count` runs of each of {name: (axis, Source)}; pool: monte_carlo.Pool."""
     pieces = monte_carlo.batches(count, BATCH_RUNS)
     items = [(axis, source, *piece) for axis, source in cases.values() for piece in pieces]
     done = pool.map(batch, items, progress)

@@ -1,8 +1,8 @@
 """Metrics of steps and sines. Angles [rad], times [s], arrays (n,) on one even grid of time.
 
-Not by libraries, which give other numbers: control.step_info takes a settling time from the grid, not between its
-points; scipy.optimize.curve_fit gives amplitude and period of a sine that differ by 7e-13 from those of the published
-rows.
+Libraries give other numbers, so they are not used. `control.step_info` takes a settling time from the grid, not
+between its points. `scipy.optimize.curve_fit` gives amplitude and period of a sine that differ by 7e-13 from the
+published rows.
 """
 import math
 
@@ -10,12 +10,12 @@ import numpy as np
 
 
 def overshoot_percent(y, size):
-    """Overshoot [%] of a step response y (n,) from 0 to size."""
+    """Return the overshoot [%] of a step response y (n,) from 0 to size."""
     return 100.0 * max(float(np.max(y / size)) - 1.0, 0.0)
 
 
 def settling_time(t, y, size, band=0.02):
-    """Time after which y stays within +-band * size of size; NaN if it never does. Linear between samples."""
+    """Return the time after which y stays within +-band * size of size, linear between samples, or NaN."""
     excess = np.abs(y / size - 1.0) - band
     outside = np.flatnonzero(excess > 0.0)
     if outside.size == 0:
@@ -27,13 +27,16 @@ def settling_time(t, y, size, band=0.02):
 
 
 def crossings(y, size, band=0.005):
-    """How often y crosses its final value `size`; motion within +-band * size of it does not count."""
+    """Return the number of crossings of y through its final value `size`; motion within +-band * size is ignored."""
     side = np.sign(y - size)[np.abs(y - size) > band * abs(size)]
     return int(np.sum(side[1:] != side[:-1]))
 
 
 def whole_periods(t, period, skip):
-    """Mask (n,) of the whole periods of a record from `skip` [s] after its start on; raises ValueError for none."""
+    """Return the mask (n,) of the whole periods of a record, from `skip` [s] after its start on.
+
+    Raises ValueError for a record without a whole period.
+    """
     t = t - t[0]
     whole = math.floor((t[-1] - skip) / period + 1e-6)
     if whole < 1:
@@ -42,13 +45,13 @@ def whole_periods(t, period, skip):
 
 
 def harmonic_fit(t, y, w):
-    """(offset, a, b) of the least-squares fit y = offset + a sin(w t) + b cos(w t)."""
+    """Return (offset, a, b) of the least-squares fit y = offset + a sin(w t) + b cos(w t)."""
     basis = np.column_stack((np.ones_like(t), np.sin(w * t), np.cos(w * t)))
     return np.linalg.lstsq(basis, y, rcond=None)[0]
 
 
 def amplitude_and_period(t, y, period):
-    """Amplitude and period of a sine fitted to y by least squares (Gauss-Newton), `period` being near it."""
+    """Return amplitude and period of a sine fitted to y by least squares (Gauss-Newton); period: first guess."""
     w = 2.0 * math.pi / period
     middle = 0.5 * (t[0] + t[-1])
     t = t - middle
@@ -65,12 +68,12 @@ def amplitude_and_period(t, y, period):
 
 
 def residual(t, y, period):
-    """y without offset and fundamental: y - offset - a sin - b cos, (n,)."""
+    """Return y without offset and fundamental: y - offset - a sin - b cos, (n,)."""
     w = 2.0 * math.pi / period
     offset, a, b = harmonic_fit(t, y, w)
     return y - offset - a * np.sin(w * t) - b * np.cos(w * t)
 
 
 def peak(y):
-    """Largest absolute value of y (any shape), a float in its unit."""
+    """Return the largest absolute value of y (any shape), a float in its unit."""
     return float(np.max(np.abs(y)))

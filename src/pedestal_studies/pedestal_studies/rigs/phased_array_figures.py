@@ -1,4 +1,4 @@
-"""Figures of the study phased-array: those of paper 002 with S0, S1 and S2 side by side, and of the better loop."""
+"""Figures of the study phased-array: those of paper 002 with S0, S1 and S2 side by side, and loops with a filter."""
 import numpy as np
 
 from pedestal_analysis.report.figures import (
@@ -18,7 +18,7 @@ SMOOTHING_TITLES = {'S0': 'S0, no smoothing', 'S1': 'S1, recursion', 'S2': 'S2, 
 
 
 def side_by_side(rows, **options):
-    """(figure, axes (rows, 3)) with a column for each smoothing."""
+    """Return (figure, axes (rows, 3)) with a column for each smoothing."""
     figure, axes = new_panels(rows, 3, height=1.2 + 2.4 * rows, width=9.6, sharey='row', sharex=True, **options)
     for column, title in zip(axes.T, SMOOTHING_TITLES.values()):
         column[0].set_title(title, fontsize=10)
@@ -26,7 +26,7 @@ def side_by_side(rows, **options):
 
 
 def steps(done, label, title, seconds):
-    """Step responses {Paper: y (n,)} with a column for each smoothing; label(loop) names a line."""
+    """Draw step responses {PaperLoop: y (n,)} with a column for each smoothing; label(loop) names a line."""
     figure, axes = side_by_side(1, y='beam over step')
     for panel, S in zip(axes[0], SMOOTHING_TITLES):
         loops = [loop for loop in done if loop.smoothing == S]
@@ -41,8 +41,8 @@ def steps(done, label, title, seconds):
 
 
 def lags(done, title, seconds):
-    """Errors {label: {S: (as the receiver reads it, true error (n,)) [rad]}}: above the reading, below the truth."""
-    figure, axes = side_by_side(2, y=('receiver reads [deg]', 'true error [deg]'))
+    """Draw errors {label: {S: (measured error, true error (n,)) [rad]}}: above the measured, below the true error."""
+    figure, axes = side_by_side(2, y=('measured error [deg]', 'true error [deg]'))
     for (label, by_smoothing), colour in zip(done.items(), LINE_COLOURS):
         for column, S in zip(axes.T, SMOOTHING_TITLES):
             for panel, error in zip(column, by_smoothing[S]):
@@ -54,7 +54,7 @@ def lags(done, title, seconds):
 
 
 def stability(limits):
-    """Largest stable delays {Paper: (bisected, by eigenvalues) [ms]} over alpha and over the slope."""
+    """Draw the largest stable delays {PaperLoop: (by bisection, by eigenvalues) [ms]} over alpha and over slope."""
     figure, axes = new_panels(1, 3, height=3.6, width=9.6, x=('alpha', 'alpha', 'true slope over assumed'),
                               y='largest stable delay [ms]')
     for panel, T in zip(axes[0], (10, 5)):
@@ -72,13 +72,13 @@ def stability(limits):
     axes[0, 2].plot(order, [by_slope[slope][1] for slope in order], 'o', color=TRUTH_COLOUR, markersize=4)
     axes[0, 2].set_title('alpha 0.1, T = 10 ms, S1')
     axes[0, 2].set_ylim(0.0, 220.0)
-    figure.suptitle('delay until the loop is unstable: bisection (lines) and eigenvalues (dots)')
+    figure.suptitle('largest stable delay: bisection (lines) and eigenvalues (dots)')
     return drawing.legend(figure)
 
 
 def filter_loop_errors(errors, seconds):
-    """True errors {case: (n,) [rad]} without noise of the paper's loop and of better ones."""
-    figure, axes = new_panels(3, height=7.6, y='off by up to [deg]', sharex=True)
+    """Draw true errors {case: (n,) [rad]} without noise, of the paper's loop and of loops with a filter."""
+    figure, axes = new_panels(3, height=7.6, y='largest error [deg]', sharex=True)
     lines = {'paper': RAW_COLOUR, 'paper-delta': INK_COLOUR, 'type-2': MOTOR_2_COLOUR, 'tracked-10ms': MOTOR_1_COLOUR,
              'best': FILTERED_COLOUR}
     first = slice(*(round(t / GRID_STEP_S) for t in seconds))
@@ -92,19 +92,18 @@ def filter_loop_errors(errors, seconds):
         panel.set_title(title, fontsize=10)
         panel.set_ylim(1e-5, 1.0)
     axes[2, 0].semilogy(t, envelope(np.degrees(np.abs(errors['best/sway-ins'][first]))), color=TRUTH_COLOUR,
-                        linewidth=1.1,
-                        label='best with INS, 5 ms late')
-    figure.suptitle('true error without noise, 20 ms of delay (best on the ramp: none)')
+                        linewidth=1.1, label='best with INS, 5 ms late')
+    figure.suptitle('true error without noise, delay 20 ms (best has no error on the ramp)')
     return drawing.legend(figure)
 
 
 def envelope(x, width=10):
-    """Largest of every `width` samples, each as often."""
+    """Return the largest of every `width` samples, repeated `width` times."""
     return np.repeat(np.maximum(x.reshape(-1, width).max(axis=1), 1e-9), width)
 
 
 def loss(records, seconds):
-    """True errors {label: (n,) in beamwidths} of a loop just before and after it loses the target."""
+    """Draw true errors {label: (n,) in beamwidths} of a loop that keeps the target and of a loop that loses it."""
     figure, axes = new_panels(1, height=3.6, y='true error [beamwidths]')
     panel, first = axes[0, 0], slice(*(round(t / GRID_STEP_S) for t in seconds))
     for (label, error), colour in zip(records.items(), LINE_COLOURS):

@@ -4,10 +4,9 @@ import dataclasses
 
 @dataclasses.dataclass
 class Result:
-    """The result of a study: rows as of intervals.row, figures {name: function that draws a Figure}, remarks in
-    sentences.
+    """Result of a study: rows as of intervals.row, figures {name: function that draws a Figure}, remarks in sentences.
 
-    shown: the rows that are printed, where they are too many for a terminal; None: all.
+    `shown`: the printed rows, if all rows are too many for a terminal; None for all rows.
     """
     rows: list
     figures: dict

@@ -1,10 +1,10 @@
-"""Acquisition: how long it takes to track a target, from power-up or after a loss, and whether a search finds it.
+"""Acquisition: time to track a target, from power-up or after a loss, and share of searches that find the target.
 
-Cases <scenario>: the closed loop of a scenario under other seeds, of late_tle with the satellite 1 to 3 s late.
-tracked_after_s is the time from the start, or from the loss of the signal, until the antenna is in autotrack with the
-receiver locked and stays so. Cases search-<pattern>: a target that stands still, anywhere in the searched area with
-equal chance; one round. found_percent is the share of the runs that end in autotrack with the target in the beam,
-found_percent_low the lower end of its 95 % interval (Clopper and Pearson 1934).
+Cases <scenario> are the closed loop of a scenario under other seeds; in late_tle the satellite is 1 to 3 s late.
+`tracked_after_s` is the time from the start, or from the loss of the signal, until the antenna remains in autotrack
+with the receiver locked. Cases search-<pattern> have one round of a search. Their target stands still anywhere in the
+searched area, with equal probability. `found_percent` is the share of the runs that end in autotrack with the target
+in the beam. `found_percent_low` is the lower limit of its 95 % interval (Clopper and Pearson 1934).
 """
 import math
 
@@ -21,6 +21,7 @@ from pedestal_analysis.trials.cases import Case
 from pedestal_studies.rigs.rows import Result
 
 DEFAULT_RUNS, FIRST_SEED = 100, 1
+"""Runs of each case; seed of the first run."""
 
 BATCH_RUNS = 5
 """Runs that one worker makes at a time."""
@@ -28,17 +29,19 @@ BATCH_RUNS = 5
 ERROR_TOPIC, MODE_TOPIC = 'tracking_receiver/angle_error', 'acu/mode'
 
 POWER_UP_CASES = ('late_tle', 'sidelobe')
+"""Cases whose time begins at the start."""
 SIGNAL_LOSS_CASES = ('fade', 'blockage', 'manoeuvre_in_coast')
+"""Cases whose time begins at the loss of the signal."""
 
 TARGET_ELEVATION_RAD = 0.6
-"""Of the target of the search cases [rad]."""
+"""Elevation of the target of the search cases [rad]."""
 
 SEARCH_PARAMETERS = {'acu.commands': '3 search', 'acu.search.rounds': 1, 'acu.acquisition.expected_dbhz': 0.0,
                      'tracking_receiver.receiver.cn0_dbhz': 46.4}
-"""What makes of the scenario sidelobe one of a search."""
+"""Parameters that make a search case of the scenario sidelobe."""
 
 SEARCH_DURATIONS_S = {'spiral': 85.0, 'raster': 55.0, 'square': 115.0, 'sector': 55.0}
-"""One round and what follows [s]."""
+"""{pattern: duration of a run with one round and the acquisition after it [s]}."""
 
 FOUND_PERCENT_TARGET = '>= 99'
 """Target of found_percent."""
@@ -46,14 +49,14 @@ FOUND_PERCENT_TARGET = '>= 99'
 CASE_NAMES = (*POWER_UP_CASES, *SIGNAL_LOSS_CASES, 'steptrack_geo', *(f'search-{name}' for name in SEARCH_PATTERNS))
 
 MAX_FOUND_ERROR_BEAMWIDTHS = 0.2
-"""Largest true error of a target that is found [beamwidths]."""
+"""Largest true error of a target that is in the beam [beamwidths]."""
 
 STEPTRACK_SETTLING_TIME_S = 90.0
-"""Time [s] after which step track is on its target."""
+"""Time after which step track is on its target [s]."""
 
 
 def case_of(name, seed):
-    """The Case of a run."""
+    """Return the Case of a run."""
     rng = np.random.default_rng(seed)
     if name == 'late_tle':
         return Case(name, name, {'scenario.program.time_offset': -rng.uniform(1.0, 3.0)}, seed=seed)
@@ -68,7 +71,7 @@ def case_of(name, seed):
 
 
 def offset(pattern, rng, beamwidth=0.0175):
-    """(cross-elevation, elevation) [rad] of a place in the full area of a pattern."""
+    """Return (cross-elevation, elevation) [rad] of a random place in the full area of a pattern."""
     p = SearchParameters()
     while True:
         x, e = rng.uniform(-1.0, 1.0, 2) * p.full * beamwidth
@@ -79,8 +82,10 @@ def offset(pattern, rng, beamwidth=0.0175):
 
 
 def tracked_after(run, from_loss):
-    """Time [s] from the start, or from the first loss of the signal in autotrack, until the target is tracked for
-    good; NaN where it is not at the end."""
+    """Return the time [s] until the target is tracked for the rest of the run; NaN if it is not tracked at the end.
+
+    The time begins at the start, or at the first loss of the signal in autotrack.
+    """
     tracked = (run[MODE_TOPIC] == Mode.AUTOTRACK) & np.isfinite(run[ERROR_TOPIC]['vector'][:, 0])
     if not tracked[-1]:
         return math.nan
@@ -94,13 +99,16 @@ def tracked_after(run, from_loss):
 
 
 def off_axis(run):
-    """True error of the beam (n,) [beamwidths]; NaN where it is not known."""
+    """Return the true error of the beam (n,) [beamwidths]; NaN where it is not known."""
     return np.hypot(*run.truth['error'].T) / run.units['tracking_receiver'].parameters.antenna.beamwidth
 
 
 def batch(item):
-    """Values (count, 2) of an item (case, first run, number of runs): tracked_after_s and whether the target is in the
-    beam at the end; of steptrack_geo the rms of the level lost [dB] and the largest error [beamwidths]."""
+    """Return the values (count, 2) of an item (case, first run, number of runs).
+
+    The values are tracked_after_s and 1 if the target is in the beam at the end. For steptrack_geo they are the rms of
+    the lost level [dB] and the largest error [beamwidths].
+    """
     name, first, count = item
     values = []
     for seed in range(FIRST_SEED + first, FIRST_SEED + first + count):
@@ -116,13 +124,13 @@ def batch(item):
 
 
 def least_share(found, runs):
-    """Lower end of the CONFIDENCE interval of the share of which `found` of so many runs are a sample (Clopper and
-    Pearson, Biometrika 26 (1934) 404)."""
+    """Return the lower limit of the CONFIDENCE_LEVEL interval of a share, from `found` successes in `runs` runs
+    (Clopper and Pearson, Biometrika 26 (1934) 404)."""
     return float(beta.ppf(0.5 * (1.0 - CONFIDENCE_LEVEL), found, runs - found + 1)) if found else 0.0
 
 
 def rows(values):
-    """The rows of values {case: (runs, 2)} as of `batch`."""
+    """Return the rows of values {case: (runs, 2)} as of `batch`."""
     table = []
     for name, of_runs in values.items():
         first, second = of_runs.T
@@ -142,11 +150,12 @@ def run(progress, runs=DEFAULT_RUNS, pool=None) -> Result:
     """Run every case `runs` times; pool: monte_carlo.Pool, None for this process."""
     values = (pool or monte_carlo.Pool(1)).of_cases(batch, CASE_NAMES, runs, BATCH_RUNS, progress)
     return Result(rows(values), {'time': lambda: time_figure(values)},
-                  [f'Seeds {FIRST_SEED} to {FIRST_SEED + runs - 1}. tracked_after_s: of the runs that found their target.'])
+                  [f'Seeds {FIRST_SEED} to {FIRST_SEED + runs - 1}. tracked_after_s is over the runs that found their '
+                   'target.'])
 
 
 def time_figure(values):
-    """The time of every run that found its target."""
+    """Draw the time of every run that found its target."""
     figure, axes = new_panels(1, height=3.8, x='time until the target is tracked [s]')
     for name, of_runs in values.items():
         if name != 'steptrack_geo':

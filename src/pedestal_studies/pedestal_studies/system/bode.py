@@ -1,8 +1,8 @@
 """Frequency response of the current, speed and position loops, measured by multisine on the simulated plant.
 
-The loops are measured by trials/frequency_response. The grey line of a figure is the design of the gains: w_c / s for
-the current, (K_p + K_i / s) / (J s) for the speed of a rigid drive, K_p / s + K_i / s^2 for the position. The
-difference is sampling, delay, elasticity.
+pedestal_analysis/tuning/frequency_response.py measures the loops. The dashed line of a figure is the design of the
+gains. It is w_c / s for the current, (K_p + K_i / s) / (J s) for the speed of a rigid drive, and K_p / s + K_i / s^2
+for the position. Sampling, delay and elasticity cause the difference between the design and the measurement.
 """
 import dataclasses
 import functools
@@ -30,16 +30,18 @@ from pedestal_studies.rigs.rows import Result
 
 
 def controller(name):
-    """The Case of the default position loop with a position controller of this name on both axes."""
+    """Return the Case of the default position loop with a position controller of this name on both axes."""
     return frequency.case(name, 'leo_pass', {f'acu.{axis}.controller': name for axis in AXES})
 
 
 FAST_LOOP_PARAMETERS = {'acu.azimuth.feedforward.bandwidth': 40.0}
+"""Position loop of higher bandwidth."""
 STRUCTURE_PARAMETERS = {**FAST_LOOP_PARAMETERS, 'adu.azimuth.structure.inertia_share': 0.5,
                         'adu.azimuth.structure.frequency': 8.0}
+"""Position loop of higher bandwidth with a flexible load, of which one half swings on the other."""
 NOTCH_PARAMETERS = {**STRUCTURE_PARAMETERS, 'acu.azimuth.notch.frequency': 7.5, 'acu.azimuth.notch.width': 0.5,
                     'acu.azimuth.notch.depth': 0.3}
-"""Half of the load swings on the other half; the notch lies where the loop without it has its resonance."""
+"""Position loop of higher bandwidth with a flexible load and a notch at the resonance of the loop without notch."""
 
 LOOP_CASES = {
     'pid': (controller('pid'), AXES), 'feedforward': (controller('feedforward'), AXES),
@@ -49,21 +51,24 @@ LOOP_CASES = {
     'rigid': (frequency.case('rigid', 'leo_pass', FAST_LOOP_PARAMETERS), AXES[:1]),
     'structure': (frequency.case('structure', 'leo_pass', STRUCTURE_PARAMETERS), AXES[:1]),
     'structure-notch': (frequency.case('structure-notch', 'leo_pass', NOTCH_PARAMETERS), AXES[:1])}
-"""Position loops and the axes they are measured on: the controllers as they come, the paper's, the study servo's; a
-faster one with a rigid load, with a flexible one, and with a notch against that."""
+"""Position loops and the axes on which they are measured.
+
+pid, feedforward, adrc: the controllers with their defaults. paper-r1, best: of the study servo. rigid, structure,
+structure-notch: a faster loop with a rigid load, with a flexible load, and with a notch against its resonance.
+"""
 
 MARGIN_BAND_FACTOR = math.sqrt(10.0)
-"""Band about crossover, in which the margins are read: |L| within this factor of 1, +-10 dB."""
+"""Band about crossover in which the margins are read: |L| within this factor of 1, +-10 dB."""
 
 
 def nonlinearity(measured, smaller):
-    """Largest relative change of L between two excitations, within MARGIN_BAND_FACTOR."""
+    """Return the largest relative change of L between two excitations, within MARGIN_BAND_FACTOR."""
     change = np.abs(smaller.open_loop / measured.open_loop - 1.0)
     return float(change[np.abs(np.log(np.abs(measured.open_loop))) < math.log(MARGIN_BAND_FACTOR)].max())
 
 
 def rows(responses):
-    """The rows of {name: Response}."""
+    """Return the rows of {name: Response}."""
     return [row(name, metric, value, unit) for name, measured in responses.items()
             for metric, (value, unit) in frequency.margins(measured).items()]
 
@@ -75,20 +80,21 @@ def run(progress) -> Result:
              'speed loops': (functools.partial(frequency.speed, drive), frequency.SPEED_SWEEP)}
     parts |= {f'position loop {name}': (functools.partial(frequency.position, case, axes), frequency.POSITION_SWEEP)
               for name, (case, axes) in LOOP_CASES.items()}
-    responses, change = {}, {}
+    responses: dict[str, frequency.Response] = {}
+    change: dict[str, float] = {}
     for i, (text, (measure, sweep)) in enumerate(parts.items()):
         progress(i / len(parts), text)
         measured, smaller = measure(sweep), measure(dataclasses.replace(sweep, peak=0.5 * sweep.peak))
         change |= {name: nonlinearity(measured[name], smaller[name]) for name in measured}
         responses |= measured
-    worst = max(change, key=change.get)
-    remarks = [f'Linear: half the excitation changes no open loop by more than {100.0 * change[worst]:.1f} % within '
-               f'10 dB of |L| = 1 ({worst}).']
+    worst = max(change, key=change.__getitem__)
+    remarks = [f'The loops are linear: with half the excitation no open loop changes by more than '
+               f'{100.0 * change[worst]:.1f} % within 10 dB of |L| = 1 (largest change: {worst}).']
     return Result(rows(responses), drawings(responses, drive), remarks)
 
 
 def drawings(responses, drive):
-    """{name: function that draws a Figure}."""
+    """Return {name: function that draws a Figure}."""
     p, c = drive.azimuth, AcuParameters().azimuth.feedforward
     w_c = 2.0 * math.pi * p.current_loop.bandwidth
     J = p.motor_1.inertia + 0.5 * p.load.inertia / p.gear_train.ratio ** 2
@@ -99,43 +105,44 @@ def drawings(responses, drive):
 
     return {
         'current': chosen('current loops of the azimuth motors',
-                          {'motor 1': ('current/motor_1', MOTOR_1_COLOUR), 'motor 2': ('current/motor_2',
-                                                                                       MOTOR_2_COLOUR)},
+                          {'motor 1': ('current/motor_1', MOTOR_1_COLOUR),
+                           'motor 2': ('current/motor_2', MOTOR_2_COLOUR)},
                           lambda s: w_c / s),
         'speed': chosen('speed loops',
-                        {'azimuth': ('speed/azimuth', FILTERED_COLOUR), 'elevation': ('speed/elevation',
-                                                                                      TRUTH_COLOUR)},
+                        {'azimuth': ('speed/azimuth', FILTERED_COLOUR),
+                         'elevation': ('speed/elevation', TRUTH_COLOUR)},
                         lambda s: (p.speed_loop.proportional + p.speed_loop.integral / s) / (J * s)),
-        'position': chosen('position loops', {'feed-forward (and pid)': ('position/azimuth/feedforward',
-                                                                         FILTERED_COLOUR),
-                            'the same, elevation': ('position/elevation/feedforward', TRUTH_COLOUR),
-                            'adrc': ('position/azimuth/adrc', MOTOR_2_COLOUR)},
+        'position': chosen('position loops',
+                           {'feed-forward (and pid), azimuth': ('position/azimuth/feedforward', FILTERED_COLOUR),
+                            'feed-forward (and pid), elevation': ('position/elevation/feedforward', TRUTH_COLOUR),
+                            'adrc, azimuth': ('position/azimuth/adrc', MOTOR_2_COLOUR)},
                            lambda s: c.bandwidth / s + c.integral * c.bandwidth ** 2 / s ** 2),
         'structure': chosen('position loop, azimuth, with a flexible load',
                             {'rigid': ('position/azimuth/rigid', RAW_COLOUR),
                              'flexible': ('position/azimuth/structure', TRUTH_COLOUR),
                              'flexible, notch': ('position/azimuth/structure-notch', FILTERED_COLOUR)}),
-        'paper': chosen("position loop, azimuth, paper 000's and ours",
-                        {'paper': ('position/azimuth/paper-r1', RAW_COLOUR), 'best': ('position/azimuth/best',
-                                                                                      FILTERED_COLOUR)})}
+        'paper': chosen('position loop, azimuth, of paper 000 and ours',
+                        {'paper': ('position/azimuth/paper-r1', RAW_COLOUR),
+                         'best': ('position/azimuth/best', FILTERED_COLOUR)})}
 
 
 def decibel(x):
-    """Magnitude [dB] of x (n,) complex."""
+    """Return the magnitude [dB] of x (n,) complex."""
     return 20.0 * np.log10(np.abs(x))
 
 
 def degrees(x):
-    """Phase (n,) without jumps, the first in (-360, 0]."""
+    """Return the phase (n,) [deg] without jumps, the first in (-360, 0]."""
     phase = np.degrees(np.unwrap(np.angle(x)))
     return phase - 360.0 * math.ceil(phase[0] / 360.0)
 
 
 def bode_figure(title, curves, design):
-    """Bode diagrams of the open and the closed loop: {label: (Response, colour)}, design(s) the open loop or None.
+    """Draw Bode diagrams of the open and the closed loop.
 
-    Crosses mark the crossover in gain and phase; the margins stand beside the name. The first of two curves that
-    coincide is drawn wide, so that it shows behind the second.
+    curves: {label: (Response, colour)}; design(s): the open loop, or None. Crosses mark the crossover in gain and
+    phase, and the legend gives the margins. The first of two or more curves is drawn wide, so that it remains visible
+    behind a curve that coincides with it.
     """
     figure, axes = new_panels(2, 2, height=5.4, x='frequency [Hz]', y=('gain [dB]', 'phase [deg]'), sharex=True)
     figure.suptitle(title)
@@ -171,7 +178,7 @@ def bode_figure(title, curves, design):
 
 
 def margin_text(measured):
-    """Gain and phase margin of a Response in words, for a legend."""
+    """Return the gain and phase margin of a Response in words, for a legend."""
     gain, phase = (frequency.margins(measured)[name][0] for name in ('gain_margin_db', 'phase_margin_deg'))
     parts = [f'{value:.0f} {unit}' for value, unit in ((gain, 'dB'), (phase, 'deg')) if math.isfinite(value)]
     return f'margins {", ".join(parts)}' if parts else 'no margin in the band'

@@ -1,14 +1,15 @@
-"""The error budget of scenario station_real: each term alone, all of them added up, and the whole run beside it.
+"""The error budget of scenario station_real: each term alone, the sum of all terms, and the run with all terms.
 
-A contribution is the pointing error of a run with one term on less that of a run with none, step by step and under the
-same seed. Systematic contributions are added as signed vectors where the antenna points, random ones as squares:
+A contribution is the pointing error of a run with one term on, minus the error of a run without any term. The two runs
+have the same seed and are subtracted step by step. Systematic contributions are added as signed vectors along the
+pass, random contributions as squares:
 
     combined^2 = mean |servo + sum of systematic|^2 + sum of mean |random|^2
 
-A random term has both: its mean over the seeds, <term>-mean, and what differs between them. servo is what remains
-with every term off (lag, friction, quantisation, the structure under the unbalance of its axis), noise what differs
-then between the seeds of the receiver. Cases <mode>/<term>; <mode>/<time>s: the signed contributions at that time of
-the pass.
+A random term has both: its mean over the seeds, <term>-mean, and its deviation from the mean. `servo` is the error
+with every term off (lag, friction, quantisation, bending of the structure by the unbalance of its axis). `noise` is
+the deviation of that error between the seeds of the receiver. Cases are <mode>/<term>. Cases <mode>/<time>s give the
+signed contributions at that time of the pass.
 """
 import dataclasses
 import functools
@@ -28,23 +29,23 @@ from pedestal_studies.rigs.rows import Result
 
 SCENARIO_NAME = 'station_real'
 DEFAULT_RUNS, FIRST_SEED = 30, 1
-"""Runs of what is random; seed of the first."""
+"""Runs of the random terms; seed of the first run."""
 
 EVALUATION_START_S, EVALUATION_PERIOD_S = 15.0, 0.1
-"""From when on, and how often, the error is taken [s]."""
+"""Start and period of the evaluation of the error [s]."""
 
 TABLE_TIMES_S = (30, 90, 150, 210, 270)
-"""Times of the pass [s] at which contributions are shown with their signs."""
+"""Times of the pass at which contributions are shown with their signs [s]."""
 
 ERROR_COLUMNS = ('cross_elevation', 'elevation')
-"""The two columns of an error."""
+"""Names of the two columns of an error."""
 
 MODE_OVERRIDES = {'program': ('acu.tracker.handover=false',), 'autotrack': ()}
 """{mode: overrides}."""
 
 
 class Term(typing.NamedTuple):
-    """A source of error: its parameters (node.key, a * for both axes or motors); whether it is random; what it is."""
+    """Source of error: its parameters (node.key, * for both axes or motors), True if it is random, its description."""
     name: str
     parameters: tuple
     random: bool
@@ -52,61 +53,68 @@ class Term(typing.NamedTuple):
 
 
 ERROR_TERMS = (
-    Term('encoder-zero', ('adu.*.encoder.error.zero',), False, 'zeros of both encoders'),
+    Term('encoder-zero', ('adu.*.encoder.error.zero',), False, 'zero errors of both encoders'),
     Term('encoder-eccentricity', ('adu.*.encoder.error.eccentricity_sin', 'adu.*.encoder.error.eccentricity_cos'),
-         False, 'discs off their centre, once a turn'),
-    Term('encoder-interpolation', ('adu.*.encoder.error.interpolation',), False, 'once per line of the disc'),
-    Term('tilt', ('adu.mount.tilt_forward', 'adu.mount.tilt_starboard'), False, 'azimuth axis off the vertical'),
-    Term('non-perpendicularity', ('adu.mount.non_perpendicularity',), False, 'of the two axes'),
-    Term('collimation', ('adu.mount.collimation',), False, 'beam off the normal of the elevation axis'),
-    Term('sag', ('adu.mount.sag',), False, 'of the dish and its feed, with cos E'),
+         False, 'eccentric encoder discs, error once per turn'),
+    Term('encoder-interpolation', ('adu.*.encoder.error.interpolation',), False,
+         'interpolation between the lines of the encoder disc'),
+    Term('tilt', ('adu.mount.tilt_forward', 'adu.mount.tilt_starboard'), False, 'tilt of the azimuth axis'),
+    Term('non-perpendicularity', ('adu.mount.non_perpendicularity',), False, 'non-perpendicularity of the two axes'),
+    Term('collimation', ('adu.mount.collimation',), False, 'angle of the beam to the normal of the elevation axis'),
+    Term('sag', ('adu.mount.sag',), False, 'sag of the dish and its feed, with cos E'),
     Term('gear-transmission', ('adu.*.gear_train.runout', 'adu.*.gear_train.tooth_error'), False,
-         'runout and teeth of the pinions'),
-    Term('cogging', ('adu.*.motor_1.cogging', 'adu.*.motor_2.cogging'), False, 'of the motors'),
-    Term('turning-bodies', ('adu.elevating.about_beam',), False, 'inertia with elevation, gyroscopic, cross-axis'),
-    Term('wind', ('adu.wind.field.speed',), True, 'mean and gusts on both axes, structure included'),
+         'runout and tooth errors of the pinions'),
+    Term('cogging', ('adu.*.motor_1.cogging', 'adu.*.motor_2.cogging'), False, 'cogging of the motors'),
+    Term('turning-bodies', ('adu.elevating.about_beam',), False,
+         'inertia that varies with elevation, gyroscopic and cross-axis torques'),
+    Term('wind', ('adu.wind.field.speed',), True, 'mean wind and gusts on both axes and on the structure'),
     Term('refraction', ('tracking_receiver.path.refractivity', 'scenario.program.refractivity'), False,
-         'by the air that the operator did not measure'),
-    Term('ut1', ('tracking_receiver.target.leo_pass.ut1_offset',), False, 'the earth ahead of UTC'),
-    Term('light-time', ('tracking_receiver.path.light_time',), False, 'target seen where it was'),
+         'refractivity that the operator did not measure'),
+    Term('ut1', ('tracking_receiver.target.leo_pass.ut1_offset',), False, 'rotation of the earth ahead of UTC'),
+    Term('light-time', ('tracking_receiver.path.light_time',), False, 'motion of the target during the light time'),
     Term('prediction', ('scenario.program.time_offset',), False, 'satellite ahead of its elements'),
     Term('boresight', ('tracking_receiver.antenna.boresight_cross_elevation',
-                       'tracking_receiver.antenna.boresight_elevation'), False, 'null of the channels off the beam'),
-    Term('multipath', ('tracking_receiver.path.multipath.reflection',), False, 'image in the ground'),
+                       'tracking_receiver.antenna.boresight_elevation'), False,
+         'angle of the null of the difference channels to the beam'),
+    Term('multipath', ('tracking_receiver.path.multipath.reflection',), False, 'image of the target in the ground'),
     Term('scintillation', ('tracking_receiver.path.scintillation.level_db',
-                           'tracking_receiver.path.scintillation.angle'), True, 'turbulent air: level, direction'),
+                           'tracking_receiver.path.scintillation.angle'), True,
+         'turbulent air, in level and direction'),
     Term('polarisation', ('tracking_receiver.target.polarisation.axial_ratio_db',
-                          'tracking_receiver.antenna.polarisation.axial_ratio_db'), False, 'level lost to a mismatch'))
+                          'tracking_receiver.antenna.polarisation.axial_ratio_db'), False,
+         'level lost by polarisation mismatch'))
 TERM_BY_NAME = {term.name: term for term in ERROR_TERMS}
 NO_TERMS, ALL_TERMS = 'none', 'whole'
+"""Values of `on` in place of the name of a term: no term, every term."""
 
 RECEIVER_TERMS = ('boresight', 'multipath', 'scintillation', 'polarisation')
-"""Terms of the receiver, which program track does not follow."""
+"""Terms of the receiver, which do not affect program track."""
 
 
 def active_terms(mode):
-    """The ERROR_TERMS that reach the antenna in a mode."""
+    """Return the ERROR_TERMS that affect the antenna in a mode."""
     return [term for term in ERROR_TERMS if not (mode == 'program' and term.name in RECEIVER_TERMS)]
 
 
 def documented(mode, random):
-    """{name: what it is} of the systematic or of the random contributions in a mode."""
+    """Return {name: description} of the systematic or of the random contributions in a mode."""
     if random:
-        noise = {'noise': 'of the receiver'} if mode == 'autotrack' else {}
-        return noise | {term.name: f'{term.doc}: off its mean' for term in active_terms(mode) if term.random}
-    return {'servo': 'lag, friction, quantisation, structure under the unbalance',
+        noise = {'noise': 'noise of the receiver'} if mode == 'autotrack' else {}
+        return noise | {term.name: f'{term.doc}: deviation from the mean' for term in active_terms(mode)
+                        if term.random}
+    return {'servo': 'lag, friction, quantisation, bending of the structure by the unbalance',
             **{term.name: term.doc for term in active_terms(mode) if not term.random},
-            **{f'{term.name}-mean': f'{term.doc}: mean of the seeds' for term in active_terms(mode) if term.random}}
+            **{f'{term.name}-mean': f'{term.doc}: mean over the seeds' for term in active_terms(mode) if term.random}}
 
 
 def parameters_of(term):
-    """The parameters node.key of a Term, each axis' own."""
+    """Return the parameters node.key of a Term, separately for each axis."""
     return [key.replace('*', axis) for key in term.parameters
             for axis in (topics.AXES if '*' in key else topics.AXES[:1])]
 
 
 def switched_off(term):
-    """Overrides that give the parameters of a Term their defaults."""
+    """Return overrides that give the parameters of a Term their defaults."""
     texts = []
     for key in parameters_of(term):
         node, _, name = key.partition('.')
@@ -115,20 +123,21 @@ def switched_off(term):
 
 
 def overrides(mode, on):
-    """Overrides of a mode with one term on (a name), or NO_TERMS, or ALL_TERMS."""
+    """Return the overrides of a mode with one term on (a name), or NO_TERMS, or ALL_TERMS."""
     off = [] if on == ALL_TERMS else [text for term in ERROR_TERMS if term.name != on for text in switched_off(term)]
     return [*MODE_OVERRIDES[mode], *off]
 
 
 @dataclasses.dataclass(frozen=True)
 class Pass:
-    """Where the antenna points, deg: azimuth and elevation (n,) at the times (n,) [s] of an error."""
+    """Direction of the antenna: azimuth and elevation (n,) [deg] at the times (n,) [s] of an error."""
     times: np.ndarray
     azimuth: np.ndarray
     elevation: np.ndarray
 
 
 def _run(mode, on, seed, duration):
+    """Return the run of a mode with one term on, every EVALUATION_PERIOD_S from EVALUATION_START_S on."""
     chosen = scenario.load(SCENARIO_NAME, [*overrides(mode, on), f'adu.wind.field.seed={seed}'], seed=seed,
                            duration=duration)
     run = closed_loop.Loop(chosen).run()
@@ -137,66 +146,70 @@ def _run(mode, on, seed, duration):
 
 
 def pass_angles(duration):
-    """The Pass of the scenario."""
+    """Return the Pass of the scenario."""
     run = _run('program', NO_TERMS, FIRST_SEED, duration)
     azimuth, elevation = np.degrees(run['joint_states']['position'].T)
     return Pass(run.t, azimuth, elevation)
 
 
 def batch(item, duration=None):
-    """Errors (count, n, 2) [deg], cross-elevation and elevation, of an item ((mode, on), first run, count)."""
+    """Return errors (count, n, 2) [deg], cross-elevation and elevation, of an item ((mode, on), first run, count)."""
     (mode, on), first, count = item
-    return np.array([np.degrees(_run(mode, on, FIRST_SEED + first + i,
-                                     duration).truth['error']) for i in range(count)])
+    return np.array([np.degrees(_run(mode, on, FIRST_SEED + first + i, duration).truth['error'])
+                     for i in range(count)])
 
 
 def rms(errors):
-    """Root mean square of the length of errors (..., n, 2): (...,)."""
+    """Return the root mean square (...,) of the length of errors (..., n, 2)."""
     return np.sqrt(np.mean(np.sum(errors ** 2, axis=-1), axis=-1))
 
 
 @dataclasses.dataclass(frozen=True)
 class Budget:
-    """The budget of a mode [deg]: base (runs, n, 2) with every term off, one run where no noise reaches the antenna;
-    once {term: (n, 2)} and seeded {term: (runs, n, 2)}, contributions; whole (runs, n, 2)."""
+    """Budget of a mode [deg].
+
+    `base` (runs, n, 2): errors with every term off; a single run if no noise reaches the antenna. `once` {term: (n,
+    2)} and `seeded` {term: (runs, n, 2)}: contributions of systematic and of random terms. `whole` (runs, n, 2):
+    errors with every term on.
+    """
     base: np.ndarray
     once: dict
     seeded: dict
     whole: np.ndarray
 
     def of(self, seeds):
-        """The Budget from some of its runs, a list of indices."""
+        """Return the Budget of some of its runs, a list of indices."""
         return Budget(self.base[seeds] if len(self.base) > 1 else self.base, self.once,
                       {name: e[seeds] for name, e in self.seeded.items()}, self.whole[seeds])
 
     @property
     def systematic(self):
-        """{name: (n, 2)}."""
+        """Systematic contributions {name: (n, 2)}."""
         return {'servo': self.base.mean(axis=0), **self.once,
                 **{f'{name}-mean': e.mean(axis=0) for name, e in self.seeded.items()}}
 
     @property
     def random(self):
-        """{name: (runs, n, 2)}: off their mean, of the size that they have off the true one."""
+        """Random contributions {name: (runs, n, 2)}: deviations from their mean, with the size about the true mean."""
         off = {'noise': self.base} if len(self.base) > 1 else {}
         return {name: (e - e.mean(axis=0)) * np.sqrt(len(e) / (len(e) - 1.0))
                 for name, e in (off | self.seeded).items()}
 
     @property
     def combined(self):
-        """All contributions in one number, rms."""
+        """Rms of all contributions together [deg]."""
         square = sum(np.mean(rms(e) ** 2) for e in self.random.values())
-        # The mean of n runs still holds one n-th of what is random.
+        # The mean of n runs still contains one n-th of the random variance.
         return float(np.sqrt(rms(sum(self.systematic.values())) ** 2 + square * (1.0 - 1.0 / len(self.whole))))
 
     @property
     def to_whole(self):
-        """The same over the rms of all whole runs."""
+        """`combined` over the rms of all runs with every term on."""
         return self.combined / float(np.sqrt(np.mean(rms(self.whole) ** 2)))
 
 
 def budget(mode, runs, duration, pool, progress):
-    """The Budget of a mode from so many runs of what is random."""
+    """Return the Budget of a mode, with `runs` runs of the random terms."""
     of_batch = functools.partial(batch, duration=duration)
     seeded, once = ([term.name for term in active_terms(mode) if term.random == kind] for kind in (True, False))
     noisy = mode == 'autotrack'
@@ -211,14 +224,14 @@ def budget(mode, runs, duration, pool, progress):
 
 
 def _sizes(case, e):
-    """Rows of an error (n, 2), or of one of several runs (runs, n, 2)."""
+    """Return the rows of an error (n, 2), or of the error of several runs (runs, n, 2)."""
     return [row(case, 'rms_deg', rms(e), 'deg'),
             *(row(case, f'{axis}_rms_deg', tracking.rms(e[..., i], axis=-1), 'deg')
               for i, axis in enumerate(ERROR_COLUMNS))]
 
 
 def rows(mode, made, place):
-    """The rows of a Budget of a mode on a Pass."""
+    """Return the rows of a Budget of a mode on a Pass."""
     systematic = {**made.systematic, 'systematic': sum(made.systematic.values())}
     table = []
     for name, e in (*systematic.items(), *made.random.items(), ('whole', made.whole)):
@@ -239,22 +252,27 @@ def rows(mode, made, place):
 
 
 def run(progress, runs=DEFAULT_RUNS, pool=None, duration=None) -> Result:
-    """The budget of every mode; pool: monte_carlo.Pool, None for this process; duration [s]: of the pass, None for the
-    scenario's."""
+    """Measure the budget of every mode.
+
+    pool: monte_carlo.Pool, None for this process. duration: length of the pass [s], None for the length of the
+    scenario.
+    """
     if runs < 3:
-        raise ValueError(f'--runs {runs}: must be at least 3, to tell what is random from what is not')
+        raise ValueError(f'--runs {runs}: must be at least 3, because random and systematic errors are separated by '
+                         'their spread over the runs')
     pool, place, made = pool or monte_carlo.Pool(1), pass_angles(duration), {}
     for i, mode in enumerate(MODE_OVERRIDES):
         made[mode] = budget(mode, runs, duration, pool,
                             lambda share, text, i=i: progress((i + share) / len(MODE_OVERRIDES), text))
     table = [line for mode, of_mode in made.items() for line in rows(mode, of_mode, place)]
     return Result(table, {'budget': functools.partial(figure, made, place)},
-                  [f'Seeds {FIRST_SEED} to {FIRST_SEED + runs - 1}; pedestal run {SCENARIO_NAME} is the whole of autotrack.'],
+                  [f'Seeds {FIRST_SEED} to {FIRST_SEED + runs - 1}. `pedestal run {SCENARIO_NAME}` is a run of case '
+                   'autotrack/whole.'],
                   [line for line in table if not line['case'].endswith('s')])
 
 
 def figure(made, place):
-    """Contributions of every mode, rms, and the systematic sum over the pass beside the whole."""
+    """Draw the contributions of every mode, rms, and the systematic sum beside the run with every term."""
     drawn, axes = new_panels(len(made), 2, height=7.0, x='')
     for (left, right), (mode, of_mode) in zip(axes, made.items()):
         sizes = {name: np.mean(rms(e)) for name, e in (*of_mode.systematic.items(), *of_mode.random.items())}

@@ -1,9 +1,11 @@
-"""Faults: every fault that can be injected, in every mode, against what an operator expects of it.
+"""Every fault that can be injected, in every mode, against the expectation of an operator.
 
-A case NODE.FAULT/MODE is the closed loop of ship_pass in a mode; at 10 s a fault with its defaults is injected for
-5 s, and 5 s later the run ends. Measured: how many steps after the onset an alarm is told, or a node says in its
-diagnostics what it does not say without the fault; whether the mode at the end is one of those expected; the largest
-error against truth while the mode is kept: off the target, or off where the axes stood on the deck.
+A case NODE.FAULT/MODE is the closed loop of ship_pass in a mode. At 10 s a fault with its defaults is injected for 5
+s, and the run ends 5 s after the fault. The study measures three numbers of each case. `told_after_steps` is the
+number of steps from the onset to the first report. A report is an alarm, or a diagnostic text that the node does not
+publish without the fault. `ends_as_expected` is 1 if the mode at the end is one of the expected modes.
+`largest_error_deg` is the largest error against truth while the mode is kept: off the target, or off the place where
+the axes stood on the deck.
 """
 import typing
 
@@ -24,18 +26,19 @@ from pedestal_studies.rigs.rows import Result
 from tracking_receiver_sim.params import LeoPassParameters
 
 SCENARIO_NAME, FAULT_ONSET_S, FAULT_DURATION_S, RUN_DURATION_S = 'ship_pass', 10.0, 5.0, 20.0
+"""Scenario of all cases; onset and duration of the fault, and duration of a run [s]."""
 BASELINE_START_S = 5.0
-"""From here on [s] nodes say what they always say."""
+"""Time after which the reports of the nodes without a fault are settled [s]."""
 
 AZIMUTH_RATE_RAD_S, SLAVE_DIRECTION_RAD = 0.02, (0.5, 0.6)
-"""Of mode rate, in azimuth [rad/s]; of mode slave, azimuth and elevation [rad]."""
+"""Commanded azimuth rate in mode rate [rad/s]; azimuth and elevation in mode slave [rad]."""
 
-RATE_COMMANDS = '; '.join(f'{t:g} rate azimuth={AZIMUTH_RATE_RAD_S}' for t in np.arange(BASELINE_START_S,
-                                                                                        RUN_DURATION_S + 0.5, 0.25))
-"""Commands of mode rate, whose dead man is 0.5 s."""
+RATE_COMMANDS = '; '.join(f'{t:g} rate azimuth={AZIMUTH_RATE_RAD_S}'
+                          for t in np.arange(BASELINE_START_S, RUN_DURATION_S + 0.5, 0.25))
+"""Commands of mode rate, repeated because a rate command is valid for 0.5 s."""
 
 PROGRAM_OFFSET_RAD = 0.05
-"""By which the program is off in mode search [rad], so that the target is found late."""
+"""Elevation error of the program in mode search [rad], so that the search takes some time to find the target."""
 
 START_TIME_PARAMETER = 'tracking_receiver.target.leo_pass.start_time'
 
@@ -55,28 +58,33 @@ _SPECIAL_MODE_PARAMETERS = {
                f'scenario.program.elevation_offset={PROGRAM_OFFSET_RAD}'],
     'acquire': ['acu.initial_mode=program', 'acu.commands=9 acquire'],
     'steptrack': ['acu.initial_mode=program', 'acu.commands=5 steptrack']}
-"""Where it takes more than the initial mode; tle has the pass of the other modes, sun a time at which it is up."""
+"""Parameters of the modes that need more than the initial mode. tle has the pass of the other modes, sun a time at
+which the sun is up."""
 
 MODE_PARAMETERS = {mode: _SPECIAL_MODE_PARAMETERS.get(mode, [f'acu.initial_mode={mode}']) for mode in MODES}
 """Parameters with which a run is in a mode at the onset."""
 
 ALARM_SOURCE = 'alarm'
+"""Source of a report that is an alarm, in place of the name of a node."""
 
 ON_TARGET_MODES = ('program', 'tle', 'autotrack')
-"""Modes that follow the target; which of them does counts as one."""
+"""Modes that follow the target; a change between them does not count as leaving the mode."""
 
 TOWARDS_TARGET_MODES = ('search', 'acquire', 'steptrack', *ON_TARGET_MODES)
-"""Modes that go by the level, and those they lead to; as one as well."""
+"""Modes that use the signal level, and the modes to which they lead; a change between them does not count either."""
 
 FINE_CHECK_STEPS = 200
-"""Steps after the onset in which every single one is looked at; before and later it is one of 20."""
+"""Steps after the onset in which the reports are read in every step; before and later they are read every 20 steps."""
 
 
 class FaultOutcome(typing.NamedTuple):
-    """What a run shows. told: steps from the onset to the first thing said, None: nothing; text: that; alarms: names
-    of those that were told, in their order; end: the mode at the end; error: largest one after the onset [deg];
-    errors (n,): of every step, NaN where none is counted."""
-    told: int | None
+    """Outcome of a run with a fault.
+
+    `report_steps`: steps from the onset to the first report, None without a report. `text`: the text of that report.
+    `alarms`: names of the raised alarms, in their order. `end`: mode at the end. `error`: largest error after the
+    onset [deg]. `errors` (n,): error of every step, NaN while no error is counted.
+    """
+    report_steps: int | None
     text: str
     alarms: tuple
     end: str
@@ -85,26 +93,30 @@ class FaultOutcome(typing.NamedTuple):
 
 
 def run_of(mode, inject=''):
-    """(Run, said [(step, who, level, text)]) of a mode with a text NODE.inject=...; said: the alarms that are told,
-    and the diagnosis of every node, whenever they are looked at."""
+    """Return (Run, reports [(step, source, level, text)]) of a mode with a text NODE.inject=...
+
+    The reports are the active alarms and the diagnosis of every node, at each step at which they are read.
+    """
     chosen = scenario.load(SCENARIO_NAME, [*MODE_PARAMETERS[mode], 'scenario.program.time_offset=0',
                                            *filter(None, [inject])],
                            duration=RUN_DURATION_S, pacing='realtime')
     loop = closed_loop.Loop(chosen)
-    onset, said = round(FAULT_ONSET_S * 1e9 / loop.period_ns), []
+    onset, reports = round(FAULT_ONSET_S * 1e9 / loop.period_ns), []
 
     def watch(made):
         if made:
             alarms = loop.units['acu'].alarms
-            said.extend((made - 1, ALARM_SOURCE, 0, ALARM_NAMES[i]) for i in report.order(alarms))
-            said.extend((made - 1, name, *unit.diagnose()[:2]) for name, unit in loop.units.items())
+            reports.extend((made - 1, ALARM_SOURCE, 0, ALARM_NAMES[i]) for i in report.order(alarms))
+            reports.extend((made - 1, name, *unit.diagnose()[:2]) for name, unit in loop.units.items())
         return 1 if onset <= made < onset + FINE_CHECK_STEPS else min(20, onset - made) if made < onset else 20
-    return loop.run(watch=watch), said
+    return loop.run(watch=watch), reports
 
 
 def errors(run, mode):
-    """(n,) [deg] of every step from the onset on until the mode is left; NaN before and after. Of those that are
-    ON_TARGET_MODES one may follow another."""
+    """Return the error (n,) [deg] of every step from the onset until the mode is left; NaN before and after.
+
+    A change within ON_TARGET_MODES or TOWARDS_TARGET_MODES does not leave the mode.
+    """
     first = int(np.searchsorted(run.t, FAULT_ONSET_S - 1e-9))
     same = next((alike for alike in (ON_TARGET_MODES, TOWARDS_TARGET_MODES) if mode in alike), (mode,))
     at = run['adu/truth']['position']
@@ -112,8 +124,8 @@ def errors(run, mode):
         off = np.hypot(*run.truth['error'].T)
     elif mode in ('slave', 'sun'):
         beam = Rotation.from_quat(run['ship/truth']['orientation']).apply(pointing(*at.T))
-        cosine = (beam @ enu(*SLAVE_DIRECTION_RAD)[0] if mode == 'slave' else (beam
-                                                                               * enu(*sun_angles(run.t))).sum(axis=1))
+        cosine = (beam @ enu(*SLAVE_DIRECTION_RAD)[0] if mode == 'slave'
+                  else (beam * enu(*sun_angles(run.t))).sum(axis=1))
         off = np.arccos(np.clip(cosine, -1.0, 1.0))
     else:
         turned = AZIMUTH_RATE_RAD_S * (run.t - run.t[first - 1]) if mode == 'rate' else 0.0
@@ -125,7 +137,7 @@ def errors(run, mode):
 
 
 def pointing(azimuth, elevation):
-    """FLU unit vectors (n, 3) of deck angles (n,) [rad], azimuth clockwise from the bow."""
+    """Return FLU unit vectors (n, 3) of deck angles (n,) [rad], azimuth clockwise from the bow."""
     return np.column_stack((np.cos(elevation) * np.cos(azimuth), -np.cos(elevation) * np.sin(azimuth),
                             np.sin(elevation)))
 
@@ -138,30 +150,31 @@ def enu(azimuth, elevation):
 
 def sun_angles(t):
     """Return azimuth and elevation (2, n) [rad] of the sun in the runs of mode sun, at stamps (n,) [s]."""
-    track = Predictor(scenario.load(SCENARIO_NAME,
-                                    MODE_PARAMETERS['sun']).node_parameters('acu').prediction).sun(0.0).track
+    acu = scenario.load(SCENARIO_NAME, MODE_PARAMETERS['sun']).node_parameters('acu')
+    track = Predictor(acu.prediction).sun(0.0).track
     return [np.interp(t, track.times, angles) for angles in track.angles.T]
 
 
 def baseline_reports(mode):
-    """{(who, level, text)} of what is said without a fault, once it has settled."""
-    run, said = run_of(mode)
-    return {(who, level, text) for step, who, level, text in said if run.t[step] >= BASELINE_START_S}
+    """Return {(source, level, text)} of the reports without a fault, from BASELINE_START_S on."""
+    run, reports = run_of(mode)
+    return {(source, level, text) for step, source, level, text in reports if run.t[step] >= BASELINE_START_S}
 
 
-def fault_outcome(mode, inject, known):
-    """Seen of a fault; known: what is `usual`."""
-    run, said = run_of(mode, inject)
+def fault_outcome(mode, inject, baseline):
+    """Return the FaultOutcome of a fault; baseline: as of `baseline_reports`."""
+    run, reports = run_of(mode, inject)
     onset = int(np.searchsorted(run.t, FAULT_ONSET_S - 1e-9))
-    news = [(step, who, text) for step, who, level, text in said if step >= onset and (who, level, text) not in known]
-    alarms = tuple(dict.fromkeys(text for _, who, text in news if who == ALARM_SOURCE))
+    new = [(step, source, text) for step, source, level, text in reports
+           if step >= onset and (source, level, text) not in baseline]
+    alarms = tuple(dict.fromkeys(text for _, source, text in new if source == ALARM_SOURCE))
     off = errors(run, mode)
-    return FaultOutcome(news[0][0] - onset if news else None, '{}: {}'.format(*news[0][1:]) if news else '', alarms,
+    return FaultOutcome(new[0][0] - onset if new else None, '{}: {}'.format(*new[0][1:]) if new else '', alarms,
                         MODES[run['acu/mode'][-1]], float(np.nanmax(off)) if np.isfinite(off).any() else 0.0, off)
 
 
 def cases():
-    """[(case, mode, text NODE.inject=..., Expected)] of every fault in every mode."""
+    """Return [(case, mode, text NODE.inject=..., Expectation)] of every fault in every mode."""
     return [(f'{node}.{fault.name}/{mode}', mode,
              f'{node}.inject={FAULT_ONSET_S:g} {fault.name} duration={FAULT_DURATION_S:g}',
              FAULT_EXPECTATIONS[f'{node}.{fault.name}'][mode])
@@ -169,32 +182,34 @@ def cases():
 
 
 def rows(case, found, mode, expected):
-    """The rows of a case: what was told when, the mode at the end, the error."""
-    within = None if expected.told is None else f'<= {expected.told}'
-    told = row(case, 'told_after_steps', np.nan if found.told is None else found.told, 'steps', target=within)
+    """Return the rows of a case: time of the first report, mode at the end, largest error."""
+    within = None if expected.report_steps is None else f'<= {expected.report_steps}'
+    report_steps = row(case, 'told_after_steps', np.nan if found.report_steps is None else found.report_steps,
+                       'steps', target=within)
     end = row(case, 'ends_as_expected', float(found.end in (expected.end or (mode,))), '', target='>= 1')
     largest = row(case, 'largest_error_deg', found.error, 'deg',
                   target=None if expected.error is None else f'<= {expected.error:g}')
-    return [{**told, 'text': found.text, 'alarms': list(found.alarms)}, {**end, 'text': found.end}, largest]
+    return [{**report_steps, 'text': found.text, 'alarms': list(found.alarms)}, {**end, 'text': found.end}, largest]
 
 
 def line(case, found, mode, expected, of_case):
-    """A case in one line: what came, what is expected."""
-    told = 'nothing is told' if found.told is None else f'after {found.told} steps "{found.text}"'
+    """Return a case in one line: outcome and expectation."""
+    report_text = 'no report' if found.report_steps is None else (
+        f'report after {found.report_steps} steps "{found.text}"')
     if found.alarms:
-        told += f', alarms {", ".join(found.alarms)}'
+        report_text += f', alarms {", ".join(found.alarms)}'
     verdict = '  MISSED' if any(map(missed, of_case)) else ''
-    return (f'{case}: {told}, ends in {found.end}, {found.error:.3g} deg'
+    return (f'{case}: {report_text}, error {found.error:.3g} deg, ends in {found.end}'
             f' (expected: {expected.sentence(mode)}){verdict}')
 
 
 def run(progress) -> Result:
-    """Run every case; figure: the errors of a few over time."""
-    known = {mode: baseline_reports(mode) for mode in MODE_PARAMETERS}
+    """Run every case; the figure shows the errors of a few cases over time."""
+    baselines = {mode: baseline_reports(mode) for mode in MODE_PARAMETERS}
     all_cases, table_rows, lines, drawn = cases(), [], [], {}
     for i, (case, mode, inject, expected) in enumerate(all_cases):
         progress(i / len(all_cases), case)
-        found = fault_outcome(mode, inject, known[mode])
+        found = fault_outcome(mode, inject, baselines[mode])
         of_case = rows(case, found, mode, expected)
         table_rows += of_case
         lines.append(line(case, found, mode, expected, of_case))
@@ -205,10 +220,11 @@ def run(progress) -> Result:
 
 DRAWN_FAULTS = ('adu.gust', 'adu.motor_loss', 'adu.drop', 'tracking_receiver.fade', 'tracking_receiver.wrong_slope',
                 'ins.drop')
+"""Faults of the figure."""
 
 
 def figure(of_cases):
-    """Error over time of DRAWN_FAULTS in autotrack, and where half a beamwidth is."""
+    """Draw the error of DRAWN_FAULTS in autotrack over time, with a line at half a beamwidth."""
     made, axes = new_panels(len(DRAWN_FAULTS), height=9.0, x='time from the onset [s]', y='[deg]', sharex=True)
     for panel, fault in zip(axes[:, 0], DRAWN_FAULTS):
         off = of_cases[f'{fault}/autotrack']

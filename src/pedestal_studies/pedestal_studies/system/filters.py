@@ -1,11 +1,10 @@
 """Filters compared: angle and rate noise of every filter on four target motions, white and coloured noise.
 
-Cases <profile>/<filter>/<noise>, measurements at 100 Hz. Every filter but those of UNTUNED_FILTERS is tuned for each
-profile and
-noise by the procedure of `tuning` for the least angle rms over TUNING_RUNS records of other seeds; imm has its default
-parameters, imm-manoeuvre those of one that expects a manoeuvre any time. `-rate-X`: with an independent rate
-measurement of X deg/s rms. `-expecting`: knows the bandwidth of coloured noise, and has no case with white noise.
-Every run has its own rms and means, after SETTLING_TIME_S.
+Cases are <profile>/<filter>/<noise>, with measurements at 100 Hz. Every filter except UNTUNED_FILTERS is tuned for
+each profile and noise by pedestal_analysis/tuning/parameter_search.py. The tuning minimises the angle rms over
+TUNING_RUNS records of other seeds. `imm` has its default parameters, `imm-manoeuvre` those of an IMM that expects a
+manoeuvre at any time. `-rate-X` has an independent rate measurement of X deg/s rms. `-expecting` knows the bandwidth
+of coloured noise and has no case with white noise. Every run has its own rms and means, after SETTLING_TIME_S.
 """
 import dataclasses
 import math
@@ -33,44 +32,48 @@ from pedestal_studies.rigs.ensemble import Noise
 from pedestal_studies.rigs.rows import Result
 
 DEFAULT_RUNS = 200
-"""Of each case."""
+"""Runs of each case."""
 
 BATCH_RUNS = 25
 """Runs that one worker makes at a time."""
 
 NOISE_SEED, TUNING_SEED, TUNING_RUNS = 1, 2, 4
+"""Seeds of the noise and of the noise for the tuning; records of a tuning."""
 
 SETTLING_TIME_S = 3.0
-"""Moments are taken from here on [s]."""
+"""Start of the evaluation [s]."""
 
 NOISE_CASES = {f'{colour}-{sigma}': Noise(math.radians(sigma), bandwidth)
                for sigma in (0.03, 0.1) for colour, bandwidth in (('white', None), ('coloured', 5.0))}
-"""rms [deg]; coloured: through a first-order lag of 5 Hz."""
+"""{name: Noise} with the rms [deg]; coloured noise passes a first-order lag of 5 Hz."""
 
 RATE_SIGMAS_RAD_S = {f'current_statistical-rate-{sigma}': math.radians(sigma) for sigma in (0.5, 0.1, 0.02)}
-"""Filters with a rate measurement: standard deviation of that [rad/s]."""
+"""{filter with a rate measurement: standard deviation of the measured rate [rad/s]}."""
 
 MANOEUVRE_PARAMETERS = {'imm.models': 'cv ca current_statistical', 'imm.dwell': 5.0,
-                        'imm.cv.noise': math.radians(0.003),
-                        'imm.ca.noise': math.radians(0.1)}
+                        'imm.cv.noise': math.radians(0.003), 'imm.ca.noise': math.radians(0.1)}
+"""Parameters of the filter imm-manoeuvre."""
 
 NOISE_AWARE_FILTERS = ('ca-expecting', 'imm-expecting')
+"""Filters that know the bandwidth of the noise."""
 
 FILTERS = {**{kind: FilterParameters(kind=kind) for kind in FILTER_KINDS if kind != 'imm_ukf'},
            'imm-manoeuvre': build(FilterParameters, {'kind': 'imm', **MANOEUVRE_PARAMETERS}),
-           **{name: FilterParameters(kind=name.partition('-')[0]) for name in (*RATE_SIGMAS_RAD_S,
-                                                                               *NOISE_AWARE_FILTERS)}}
+           **{name: FilterParameters(kind=name.partition('-')[0])
+              for name in (*RATE_SIGMAS_RAD_S, *NOISE_AWARE_FILTERS)}}
+"""{filter: FilterParameters}."""
 
 UNTUNED_FILTERS = ('imm', 'imm-manoeuvre', 'imm-expecting', 'imm_ukf')
 """Filters that are not tuned."""
 
 RANGED_CASE = ('flyby-60m', 1.0)
-"""Where imm_ukf is shown, and the standard deviation of the range it measures [m]."""
+"""Profile on which imm_ukf is shown, and standard deviation of its measured range [m]."""
 
 SHOWN_FILTERS = (*FILTERS, 'imm_ukf')
+"""Filters of the figures and tables."""
 
 SHOWN_NOISE = 'white-0.03'
-"""The noise of the figures and of the table of remarks."""
+"""Noise of the figures and of the printed table."""
 
 METRIC_TARGETS = {
     ('flyby-500m', 'current_statistical', 'reduction'): '>= 6.5',
@@ -82,42 +85,43 @@ METRIC_TARGETS = {
         ('s-20deg', '<= 0.0097'))},
     ('flyby-500m', 'imm', 'angle_rms_deg'): '<= 0.0048', ('flyby-60m', 'imm', 'angle_rms_deg'): '<= 0.0102',
     ('s-turn-500m', 'imm', 'angle_rms_deg'): '<= 0.0089', ('s-20deg', 'imm', 'angle_rms_deg'): '<= 0.0155'}
-"""Of the noise white-0.03; of imm: 1.15 times the best tuned filter of one model."""
+"""{(profile, filter, metric): target} for the noise white-0.03. The targets of imm are 1.15 times the best tuned
+filter of one model."""
 
 CONSISTENCY_LIMITS = (0.8, 1.25)
 """Range of mean NIS per degree of freedom, and of rms error over the filter's own sigma, of a consistent filter."""
 
 
 def degrees_of_freedom(name):
-    """Degrees of freedom of the innovation of a filter."""
+    """Return the degrees of freedom of the innovation of a filter."""
     return 1 + (name in RATE_SIGMAS_RAD_S)
 
 
 def times():
-    """Instants of the measurements of a record (n,) [s]."""
+    """Return the instants of the measurements of a record (n,) [s]."""
     return ensemble.MEASUREMENT_PERIOD_S * np.arange(round(profiles.RECORD_DURATION_S / ensemble.MEASUREMENT_PERIOD_S))
 
 
 def noise_of(noise, name):
-    """The Noise of a name of NOISE_CASES, as the filter of a name of FILTERS gets it."""
+    """Return the Noise of a name of NOISE_CASES, as the filter of a name of FILTERS receives it."""
     return dataclasses.replace(NOISE_CASES[noise], rate_sigma=RATE_SIGMAS_RAD_S.get(name),
                                expected=name in NOISE_AWARE_FILTERS)
 
 
 def measured(params, profile, noise, seed, first, count):
-    """MOMENTS (count, n) of one filter (FilterParameters) with a Noise, runs first ... first + count - 1."""
+    """Return MOMENTS (count, n) of one filter (FilterParameters) with a Noise, runs first ... first + count - 1."""
     t = times()
     truth = profiles.truth(profile, t)
     return ensemble.moments(params, t, truth, noise, ensemble.records(truth, noise, seed, first, count))
 
 
 def settled(sums):
-    """Sum (runs,) of MOMENTS (runs, n) over the time once the filter has settled."""
+    """Return the sum (runs,) of MOMENTS (runs, n) over the time after SETTLING_TIME_S."""
     return ensemble.over_time(sums[:, round(SETTLING_TIME_S / ensemble.MEASUREMENT_PERIOD_S):])
 
 
 def tune(item):
-    """FilterParameters of an item (profile, noise, filter), tuned on the records of TUNING_SEED."""
+    """Return the FilterParameters of an item (profile, noise, filter), tuned on the records of TUNING_SEED."""
     profile, noise, name = item
     t = times()
     noise_known = noise_of(noise, name)
@@ -136,8 +140,10 @@ THINNING_STEPS = 10
 
 
 def batch(item):
-    """{filter: (MOMENTS (count,) of every run, MOMENTS over the runs at thinned times)} of an item (profile, noise,
-    {filter: parameters}, first, count)."""
+    """Return {filter: (MOMENTS (count,) of every run, MOMENTS over the runs at thinned times)} of an item.
+
+    An item is (profile, noise, {filter: parameters}, first run, number of runs).
+    """
     profile, noise, filters, first, count = item
     sums_of = {}
     for name, params in filters.items():
@@ -152,19 +158,20 @@ def batch(item):
 
 
 def run(progress, runs=DEFAULT_RUNS, pool=None, on=profiles.PROFILES, noises=tuple(NOISE_CASES)) -> Result:
-    """on: the profiles, noises: names of NOISE_CASES; fewer than all for a quick look."""
+    """Compare all filters; on: names of profiles, noises: names of NOISE_CASES, fewer for a quick look."""
     pool = pool or monte_carlo.Pool(1)
-    able = {noise: [name for name in FILTERS if NOISE_CASES[noise].bandwidth
-                    or name not in NOISE_AWARE_FILTERS] for noise in noises}
-    wanted = [(profile, noise, name) for profile in on for noise in noises for name in able[noise]
+    applicable = {noise: [name for name in FILTERS if NOISE_CASES[noise].bandwidth
+                          or name not in NOISE_AWARE_FILTERS] for noise in noises}
+    wanted = [(profile, noise, name) for profile in on for noise in noises for name in applicable[noise]
               if name not in UNTUNED_FILTERS]
-    tuned = {(profile, noise): {name: FILTERS[name] for name in able[noise] if name in UNTUNED_FILTERS}
+    tuned = {(profile, noise): {name: FILTERS[name] for name in applicable[noise] if name in UNTUNED_FILTERS}
              for profile in on for noise in noises}
     for (profile, noise, name), params in zip(wanted, pool.map(
             tune, wanted, lambda share, text: progress(0.5 * share, f'tuning, {text}'))):
         tuned[profile, noise][name] = params
-    items = [(*key, tuned[key], first, count) for key in tuned for first, count in monte_carlo.batches(runs, BATCH_RUNS)]
-    of_runs, over_time = {}, {}
+    items = [(*key, tuned[key], *part) for key in tuned for part in monte_carlo.batches(runs, BATCH_RUNS)]
+    of_runs: dict[tuple, list] = {}
+    over_time: dict[tuple, np.ndarray] = {}
     for (profile, noise, *_), sums_of in zip(items, pool.map(
             batch, items, lambda share, text: progress(0.5 + 0.5 * share, f'{runs} runs of each case, {text}'))):
         for name, (sums, thinned) in sums_of.items():
@@ -179,8 +186,11 @@ def run(progress, runs=DEFAULT_RUNS, pool=None, on=profiles.PROFILES, noises=tup
 
 
 def metrics(sums):
-    """{metric: (values (runs,), unit)} of MOMENTS (runs,); a consistent filter has a nis_mean of its freedom, a
-    nees_mean (angle and rate, per degree of freedom) and both _over_sigma of 1."""
+    """Return {metric: (values (runs,), unit)} of MOMENTS (runs,).
+
+    A consistent filter has a nis_mean equal to its degrees of freedom. Its nees_mean (angle and rate, per degree of
+    freedom) and both _over_sigma are 1.
+    """
     angle, rate, raw = (ensemble.rms(sums, name) for name in ('angle', 'rate', 'raw'))
     n = sums['runs']
     return {'angle_rms_deg': (np.degrees(angle), 'deg'), 'rate_rms_deg_s': (np.degrees(rate), 'deg/s'),
@@ -191,18 +201,19 @@ def metrics(sums):
 
 
 def rows(values):
-    """A row for every metric of every case (profile, filter, noise)."""
+    """Return a row for every metric of every case (profile, filter, noise)."""
     return [row('/'.join(case), metric, value, unit,
                 target=METRIC_TARGETS.get((*case[:2], metric)) if case[2] == SHOWN_NOISE else None)
             for case, measured in values.items() for metric, (value, unit) in measured.items()]
 
 
 def shown(table):
-    """The rows that are printed, those with a target: all are too many for a terminal."""
+    """Return the rows that are printed: the rows with a target, because all rows are too many for a terminal."""
     return [row for row in table if row['target']]
 
 
 def _cell(measured):
+    """Return a cell of the printed table, 34 characters."""
     if measured is None:
         return 34 * ' '
     return (f'{measured["angle_rms_deg"]:.4f} ({measured["reduction"]:.1f})  {measured["rate_rms_deg_s"]:.4f}  '
@@ -210,9 +221,12 @@ def _cell(measured):
 
 
 def remarks(values, tuned, runs):
-    """Sentences that the rows need, with a table of the profiles; values {case: {metric: mean over the runs}}."""
-    lines = [f'{runs} runs of each case. Angle rms [deg] (reduction), rate rms [deg/s], error over own sigma of angle '
-             f'and rate, noise {SHOWN_NOISE} deg; every case is in the rows of --json.']
+    """Return the sentences that explain the rows, with a table of the profiles.
+
+    values: {case: {metric: mean over the runs}}.
+    """
+    lines = [f'{runs} runs of each case. The columns are angle rms [deg] (reduction), rate rms [deg/s], and the error '
+             f'over own sigma of angle and rate, for the noise {SHOWN_NOISE} deg. --json gives the rows of all cases.']
     on = [profile for profile, noise in tuned if noise == SHOWN_NOISE]
     if on:
         lines.append(f'{"":30}' + ''.join(f'{profile:34}' for profile in on).rstrip())
@@ -231,22 +245,24 @@ def remarks(values, tuned, runs):
                   + ', '.join(f'{what} {min(outside):.2f} to {max(outside):.2f}' for what, outside in ranges.items())
                   for name, ranges in inconsistent.items()]
         if listed:
-            lines += [f'Not honest under {colour} noise, NIS per degree of freedom or error over own sigma outside '
-                      f'{CONSISTENCY_LIMITS[0]:g} to {CONSISTENCY_LIMITS[1]:g} in some case:', *listed]
+            lines += [f'Inconsistent filters under {colour} noise, with NIS per degree of freedom or error over own '
+                      f'sigma outside {CONSISTENCY_LIMITS[0]:g} to {CONSISTENCY_LIMITS[1]:g} in at least one case:',
+                      *listed]
     pairs = [(values[profile, name, noise]['reduction'],
               values[profile, name, noise.replace('white', 'coloured')]['reduction'])
              for profile, name, noise in values if noise == SHOWN_NOISE
              and (profile, name, noise.replace('white', 'coloured')) in values and name == 'current_statistical']
     if pairs:
-        lines.append('A reduction is one of white noise at 100 Hz: at the same rms within 5 Hz current_statistical '
-                     f'comes down from {", ".join(f"{white:.1f}" for white, _ in pairs)} to '
-                     f'{", ".join(f"{colour:.1f}" for _, colour in pairs)}. Only `-expecting` filters do not '
-                     'take it for white.')
+        lines.append('The reductions above are for white noise at 100 Hz. For noise of the same rms within 5 Hz the '
+                     'reduction of current_statistical falls from '
+                     f'{", ".join(f"{white:.1f}" for white, _ in pairs)} to '
+                     f'{", ".join(f"{colour:.1f}" for _, colour in pairs)}. Only the `-expecting` filters know the '
+                     'bandwidth of the noise; all others assume white noise.')
     return lines
 
 
 def figures(values, over_time):
-    """{name: function that draws it} of the cases with the noise SHOWN_NOISE; values as of `remarks`."""
+    """Return {name: function that draws it} of the cases with the noise SHOWN_NOISE; values as of `remarks`."""
     on = list(dict.fromkeys(profile for profile, _, noise in values if noise == SHOWN_NOISE))
     if not on:
         return {}
@@ -258,11 +274,11 @@ def figures(values, over_time):
 
 FILTER_COLOURS = {'current_statistical': RAW_COLOUR, 'current_statistical-rate-0.1': FILTERED_COLOUR,
                   'imm': TRUTH_COLOUR}
-"""Filters of the error figures, with their colours."""
+"""{filter of the error figures: its colour}."""
 
 
 def errors_figure(over_time, on, what='angle'):
-    """Ensemble of the error over time, mean +-1 sigma, and dashed the filter's own sigma."""
+    """Draw the error over time: mean +-1 sigma over the runs, and dashed the filter's own sigma."""
     unit = 'deg' if what == 'angle' else 'deg/s'
     figure, axes = new_panels(len(on), len(FILTER_COLOURS), height=1.0 + 1.4 * len(on),
                               y=[f'{profile}\n[{unit}]' for profile in on], sharex=True, sharey='row')
@@ -285,7 +301,7 @@ def errors_figure(over_time, on, what='angle'):
 
 
 def profile_panels(on):
-    """(figure, panels (n,)) with a panel for each profile, two in a row, and room for a line for each filter."""
+    """Return (figure, panels (n,)) with a panel for each profile, two in a row, with a line for each filter."""
     rows = (len(on) + 1) // 2
     figure, axes = new_panels(rows, 2, x='', height=0.8 + rows * (0.5 + 0.2 * len(SHOWN_FILTERS)), sharey=True)
     for panel in axes.flat[len(on):]:
@@ -294,7 +310,10 @@ def profile_panels(on):
 
 
 def bars(values, on, metric, label, colour, text):
-    """(figure, panels (n,)), a panel of bars for each profile; metric, text(filter, metrics), colour(filter)."""
+    """Return (figure, panels (n,)) with a panel of bars for each profile.
+
+    metric, text: functions of filter and metrics; colour: function of a filter.
+    """
     figure, panels = profile_panels(on)
     for panel, profile in zip(panels, on):
         measured = {name: values.get((profile, name, SHOWN_NOISE)) for name in SHOWN_FILTERS}
@@ -311,17 +330,18 @@ def bars(values, on, metric, label, colour, text):
 
 
 def _colour(name):
+    """Return the colour of a filter in a figure."""
     return TRUTH_COLOUR if name in UNTUNED_FILTERS else FILTERED_COLOUR if name in RATE_SIGMAS_RAD_S else RAW_COLOUR
 
 
 def rms_figure(values, on):
-    """Angle rms of every filter; the number on a bar is the reduction."""
+    """Draw the angle rms of every filter; the number on a bar is the reduction."""
     return bars(values, on, lambda name, at: at['angle_rms_deg'], 'angle rms [deg]', _colour,
                 lambda name, at: f'{at["reduction"]:.1f}')[0]
 
 
 def nis_figure(values, on):
-    """Mean NIS per degree of freedom of every filter; 1 for a consistent one."""
+    """Draw the mean NIS per degree of freedom of every filter; a consistent filter has 1."""
     def nis(name, at):
         return at['nis_mean'] / degrees_of_freedom(name)
 
@@ -334,12 +354,12 @@ def nis_figure(values, on):
 
 
 def probabilities_figure(over_time, on):
-    """Mode probabilities of the imm, mean over the runs."""
+    """Draw the mode probabilities of the imm, mean over the runs."""
     figure, axes = new_panels(len(on), height=1.0 + 1.2 * len(on), sharex=True, sharey=True)
     for panel, profile in zip(axes[:, 0], on):
         sums = over_time[profile, 'imm', SHOWN_NOISE]
-        for j, (name, colour) in enumerate(zip(MODEL_NAMES, (MOTOR_1_COLOUR, MOTOR_2_COLOUR, RAW_COLOUR,
-                                                             TRUTH_COLOUR))):
+        colours = MOTOR_1_COLOUR, MOTOR_2_COLOUR, RAW_COLOUR, TRUTH_COLOUR
+        for j, (name, colour) in enumerate(zip(MODEL_NAMES, colours)):
             mu = sums['mu'][:, j] / sums['runs']
             if np.isfinite(mu).any():
                 panel.plot(times()[::THINNING_STEPS], mu, color=colour, label=name)
@@ -349,7 +369,7 @@ def probabilities_figure(over_time, on):
 
 
 def noise_figure(values, on):
-    """Reduction of every filter under each noise: its dependence on the bandwidth of the receiver."""
+    """Draw the reduction of every filter under each noise: its dependence on the bandwidth of the receiver."""
     figure, panels = profile_panels(on)
     for panel, profile in zip(panels, on):
         for noise, colour, marker in zip(NOISE_CASES, (RAW_COLOUR, RAW_COLOUR, FILTERED_COLOUR, FILTERED_COLOUR),

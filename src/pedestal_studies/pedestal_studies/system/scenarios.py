@@ -1,8 +1,8 @@
-"""Scenarios over many seeds: the results that `pedestal run` prints for one, with their intervals.
+"""Scenarios over many seeds: the results that `pedestal run` prints for one seed, with their intervals.
 
-Every run is the closed loop without ROS of the scenario with another seed, measured as its recording would be. Cases
-<scenario>[-<variant>]; CASES says which parameters a variant changes. A ratio to another case is one of the two under
-the same seed.
+Every run is the closed loop of the scenario without ROS, with another seed. It is measured as its recording would be.
+Cases are <scenario>[-<variant>]; CASES gives the parameters that a variant changes. A ratio to another case is the
+ratio of two runs with the same seed.
 """
 import math
 
@@ -18,26 +18,29 @@ from pedestal_studies.rigs import drawing
 from pedestal_studies.rigs.rows import Result
 
 DEFAULT_RUNS, FIRST_SEED = 40, 1
-"""Runs of each case; seed of the first."""
+"""Runs of each case; seed of the first run."""
 
 BATCH_RUNS = 5
 """Runs that one worker makes at a time."""
 
 NEAR_FLYBY_PARAMETERS = {'tracking_receiver.target.flyby.closest_distance': 60.0,
                          'tracking_receiver.target.flyby.height': 20.0}
+"""Parameters of a flyby at 60 m."""
 
 NOISELESS_PARAMETERS = {'tracking_receiver.receiver.cn0_dbhz': 120.0, 'acu.tracker.receiver.sigma_floor': 5e-4,
                         **{f'ins.{name}': 0.0 for name in ('tilt_noise', 'heading_noise', 'rate_noise', 'tilt_wander',
                                                            'heading_wander')}}
-"""Receiver and INS without noise; the filter is told of 5e-4 rad, or it would follow every quirk."""
+"""Parameters of a receiver and an INS without noise. The filter assumes noise of 5e-4 rad; with less it would
+follow the smallest model error."""
 
 CASES = {case.name: case for case in (
     Case('leo_pass', 'leo_pass'), Case('ship_pass', 'ship_pass'),
-    Case('ship_pass-late', 'ship_pass', {'ins.latency': 0.02}), Case('ship_pass-quiet', 'ship_pass',
-                                                                     NOISELESS_PARAMETERS),
+    Case('ship_pass-late', 'ship_pass', {'ins.latency': 0.02}),
+    Case('ship_pass-quiet', 'ship_pass', NOISELESS_PARAMETERS),
     Case('ship_pass_ss6', 'ship_pass_ss6'), Case('ship_overhead', 'ship_overhead'),
     Case('ship_align_and_track', 'ship_align_and_track'), Case('uav_flyby', 'uav_flyby'),
     Case('uav_flyby-60m', 'uav_flyby', NEAR_FLYBY_PARAMETERS))}
+"""{name: Case}."""
 
 TRACKING_METRICS = ('pointing_rms_deg', 'pointing_max_deg', 'single_sample_noise_deg', 'pointing_to_noise', 'loss_s')
 ISOLATION_METRICS = ('isolation_db', 'isolation_limit_db')
@@ -51,10 +54,10 @@ CASE_METRICS = {
     'ship_overhead': ('loss_s', 'keyhole_loss_predicted_s', 'loss_to_predicted'),
     'ship_align_and_track': (*ALIGNMENT_METRICS, *TRACKING_METRICS), 'uav_flyby': (*TRACKING_METRICS, *NOISE_METRICS),
     'uav_flyby-60m': (*TRACKING_METRICS, *NOISE_METRICS)}
-"""{case: names of its results}, of analysis/results.py or of `more_results`."""
+"""{case: names of its results}, of pedestal_analysis/results/results.py or of `extra_results`."""
 
 SHIP_CASES = ('ship_pass', 'ship_pass-late', 'ship_pass_ss6')
-"""Cases whose pointing is compared with that of leo_pass."""
+"""Cases whose pointing is compared with the pointing of leo_pass."""
 
 METRIC_TARGETS = {
     **{(case, 'pointing_to_noise'): '<= 0.4' for case in ('leo_pass', 'ship_pass', 'ship_pass-late')},
@@ -65,12 +68,14 @@ METRIC_TARGETS = {
     ('ship_overhead', 'loss_to_predicted'): '0.8 to 1.2',
     **{('uav_flyby', metric): '>= 7' for metric in NOISE_METRICS},
     **{('uav_flyby-60m', metric): '>= 3' for metric in NOISE_METRICS}}
+"""{(case, metric): target}."""
 
 EXTRA_METRIC_UNITS = {'loss_to_predicted': '', 'keyhole_loss_predicted_s': 's', 'autotrack_after_alignment_s': 's'}
+"""{metric of `extra_results`: unit}."""
 
 
 def extra_results(values, run):
-    """{name: value} of what no recording is asked for: of a slew through a keyhole, of the time after alignment."""
+    """Return {name: value} of results that a recording does not give: slew through a keyhole, time after alignment."""
     more = {}
     slew = run.units['acu'].parts['state']['guidance']['lookahead']['slew']
     if slew['loss'] > 0.0:
@@ -79,36 +84,37 @@ def extra_results(values, run):
     if 'aligned_s' in values:
         modes = run.table('acu/mode')
         automatic = modes['t'][np.array(modes['data']) == 'autotrack']
-        more['autotrack_after_alignment_s'] = (float(automatic[0]) if automatic.size else math.nan) - values[
-            'aligned_s']
+        first = float(automatic[0]) if automatic.size else math.nan
+        more['autotrack_after_alignment_s'] = first - values['aligned_s']
     return more
 
 
 def measured(case):
-    """{name: value} of one run of a Case."""
+    """Return {name: value} of one run of a Case."""
     scenario, run = case.loaded(), case.run()
-    values = {name: value for name,
-              (value, _) in results.measured(results.of_bag(MemoryRecording(scenario, run))).items()}
+    found = results.measured(results.of_bag(MemoryRecording(scenario, run)))
+    values = {name: value for name, (value, _) in found.items()}
     return {**values, **extra_results(values, run)}
 
 
 def batch(item):
-    """Values (count, len(CASE_METRICS[case])) of an item (case, first run, number of runs)."""
+    """Return the values (count, len(CASE_METRICS[case])) of an item (case, first run, number of runs)."""
     name, first, count = item
     runs = [measured(CASES[name].with_seed(FIRST_SEED + first + i)) for i in range(count)]
     return np.array([[values[metric] for metric in CASE_METRICS[name]] for values in runs])
 
 
 def rows(values):
-    """The rows of values {case: (runs, len(CASE_METRICS[case]))}."""
+    """Return the rows of values {case: (runs, len(CASE_METRICS[case]))}."""
     table = []
     for name, of_runs in values.items():
         for metric, column in zip(CASE_METRICS[name], of_runs.T):
             unit = EXTRA_METRIC_UNITS[metric] if metric in EXTRA_METRIC_UNITS else results.RESULT_BY_NAME[metric].unit
             table.append(row(name, metric, column, unit, target=METRIC_TARGETS.get((name, metric))))
         if name in SHIP_CASES:
-            (here, there) = (values[case][:, CASE_METRICS[case].index('pointing_rms_deg')] for case in (name, 'leo_pass'))
-            table.append(row(name, 'pointing_to_leo_pass', here / there, '',
+            pointing, of_leo_pass = (values[case][:, CASE_METRICS[case].index('pointing_rms_deg')]
+                                     for case in (name, 'leo_pass'))
+            table.append(row(name, 'pointing_to_leo_pass', pointing / of_leo_pass, '',
                              target=METRIC_TARGETS.get((name, 'pointing_to_leo_pass'))))
     return table
 
@@ -117,12 +123,12 @@ def run(progress, runs=DEFAULT_RUNS, pool=None) -> Result:
     """Run every case `runs` times; pool: monte_carlo.Pool, None for this process."""
     values = (pool or monte_carlo.Pool(1)).of_cases(batch, CASES, runs, BATCH_RUNS, progress)
     return Result(rows(values), {'pointing': lambda: pointing_figure(values), 'uav-flyby': flyby_figure},
-                  [f'Seeds {FIRST_SEED} to {FIRST_SEED + runs - 1}. ship_pass-late: {CASES["ship_pass-late"].command()}',
-                   f'uav_flyby-60m: {CASES["uav_flyby-60m"].command()}'])
+                  [f'Seeds {FIRST_SEED} to {FIRST_SEED + runs - 1}.',
+                   *(f'{name}: {CASES[name].command()}' for name in ('ship_pass-late', 'uav_flyby-60m'))])
 
 
 def flyby_figure():
-    """Paper 000's figures 7 to 11 on uav_flyby: error and angle before and after the filter, and the azimuth flown."""
+    """Draw paper 000's figures 7 to 11 for uav_flyby: error and angle before and after the filter, azimuth flown."""
     figure, axes = new_panels(3, height=7.2, y=('error [deg]', 'elevation [deg]', 'azimuth [deg]'))
     case = CASES['uav_flyby'].with_seed(FIRST_SEED)
     flown = tracking.read(MemoryRecording(case.loaded(), case.run()))
@@ -144,7 +150,7 @@ def flyby_figure():
 
 
 def pointing_figure(values):
-    """Pointing error of every seed, rms to the left and largest to the right; values as of `rows`."""
+    """Draw the pointing error of every seed, rms to the left and largest to the right; values as of `rows`."""
     figure, axes = new_panels(1, 2, height=3.8, x=('pointing error, rms [deg]', 'pointing error, largest [deg]'),
                               sharey=True)
     for panel, metric in zip(axes[0], ('pointing_rms_deg', 'pointing_max_deg')):

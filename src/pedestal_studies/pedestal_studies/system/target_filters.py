@@ -1,8 +1,9 @@
 """The default target filter beside filters tuned for one target each: pointing in the closed loop.
 
-Cases <target>/<filter>: default; tuned, a filter of one model with the noise that points best at this target;
-manoeuvre, an IMM that expects a manoeuvre any time; current-statistical, paper 000's with the default a_max. A ratio
-is one to tuned under the same seed. A satellite on a ship is that of leo or geo from the deck of ship_pass.
+Cases are <target>/<filter>. The filter `default` has its default parameters. `tuned` is a filter of one model with the
+noise that points best at this target. `manoeuvre` is an IMM that expects a manoeuvre at any time.
+`current-statistical` is the filter of paper 000 with the default a_max. A ratio is the ratio to `tuned` under the same
+seed. A satellite seen from a ship is the satellite of leo or geo, seen from the deck of ship_pass.
 """
 import math
 
@@ -18,7 +19,7 @@ from pedestal_studies.rigs.rows import Result
 from pedestal_studies.system.filters import MANOEUVRE_PARAMETERS
 
 DEFAULT_RUNS, FIRST_SEED = 30, 1
-"""Runs of each case; seed of the first."""
+"""Runs of each case; seed of the first run."""
 
 BATCH_RUNS = 5
 """Runs that one worker makes at a time."""
@@ -26,9 +27,9 @@ BATCH_RUNS = 5
 FLYBY_PREFIX, ANGLE_PREFIX = 'tracking_receiver.target.flyby', 'tracking_receiver.target.angle'
 FIXED_TARGET_PARAMETERS = {'tracking_receiver.target.kind': 'step', f'{ANGLE_PREFIX}.azimuth_amplitude': 0.0,
                            f'{ANGLE_PREFIX}.elevation_amplitude': 0.0, f'{ANGLE_PREFIX}.range': 5e5}
-"""A target that stands still, of the C/N0 of a satellite."""
+"""Parameters of a target that stands still, with the C/N0 of a satellite."""
 
-TARGET_SCENARIOS = {
+TARGET_SCENARIOS: dict[str, tuple[str, dict]] = {
     'uav-60m': ('uav_flyby', {f'{FLYBY_PREFIX}.closest_distance': 60.0, f'{FLYBY_PREFIX}.height': 20.0}),
     'uav-150m': ('uav_flyby', {f'{FLYBY_PREFIX}.closest_distance': 150.0, f'{FLYBY_PREFIX}.height': 40.0}),
     'uav-500m': ('uav_flyby', {}), 'leo': ('leo_pass', {}), 'geo': ('leo_pass', FIXED_TARGET_PARAMETERS),
@@ -39,16 +40,20 @@ TARGET_SCENARIOS = {
 TUNED_FILTERS = {'uav-60m': ('ca', 6.3e-3, 2.3e-3), 'uav-150m': ('ca', 1.1e-3, 3.5e-4), 'uav-500m': ('ca', 6e-5, 2e-5),
                  'leo': ('ca', 1.15e-4, 3.7e-5), 'geo': ('cv', 1e-9, 1e-9), 'leo-ship': ('ca', 1.15e-4, 3.7e-5),
                  'leo-ship-ss6': ('ca', 1.15e-4, 3.7e-5), 'geo-ship': ('cv', 1e-9, 1e-9)}
-"""{target: (kind, its noise in azimuth and in elevation)}: the best of cv and ca on the seeds 101 to 103, from a grid
-of noise and, of uav-60m and leo, by `tuning`; on a ship that of leo stays."""
+"""{target: (kind, its noise in azimuth and in elevation)}.
+
+The filter is the better of cv and ca on the seeds 101 to 103. The noise is the best of a grid; for uav-60m and leo
+parameter_search found it. A target seen from a ship has the filter of leo.
+"""
 
 
 def _both(**changes):
+    """Return parameters of the filters of both axes."""
     return {f'{axis}.filter.{name}': value for axis in ('azimuth', 'elevation') for name, value in changes.items()}
 
 
 def filters(target):
-    """{filter: parameters of the control unit} for a target of TARGET_SCENARIOS."""
+    """Return {filter: parameters of the control unit} for a target of TARGET_SCENARIOS."""
     kind, azimuth, elevation = TUNED_FILTERS[target]
     return {'default': {},
             'tuned': {**_both(kind=kind), f'azimuth.filter.{kind}.noise': azimuth,
@@ -60,13 +65,14 @@ def filters(target):
 CASES = {f'{target}/{name}': Case(f'{target}/{name}', at, {
     **parameters, **{f'acu.{key}': value for key, value in changes.items()}})
     for target, (at, parameters) in TARGET_SCENARIOS.items() for name, changes in filters(target).items()}
+"""{name: Case}."""
 
 MAX_POINTING_RATIO = 1.15
-"""Largest ratio of the default's pointing to that of the tuned filter."""
+"""Largest permitted ratio of the pointing with the default filter to the pointing with the tuned filter."""
 
 
 def pointing(case):
-    """Rms of the true pointing error [deg] of one run of a Case, both axes; NaN if autotrack was left."""
+    """Return the rms of the true pointing error [deg] of one run of a Case, both axes; NaN if it left autotrack."""
     flown = tracking.read(memory_recording.record(case.loaded()))
     begun = np.flatnonzero(flown.mode == 'autotrack')
     if not begun.size or np.any(flown.mode[begun[0]:] != 'autotrack'):
@@ -75,13 +81,13 @@ def pointing(case):
 
 
 def batch(item):
-    """Pointing (count,) of an item (case, first run, number of runs)."""
+    """Return the pointing (count,) [deg] of an item (case, first run, number of runs)."""
     name, first, count = item
     return np.array([pointing(CASES[name].with_seed(FIRST_SEED + first + i)) for i in range(count)])
 
 
 def rows(values):
-    """The rows of values {case: (runs,)}."""
+    """Return the rows of values {case: (runs,)}."""
     table = []
     for name, of_runs in values.items():
         target, _, filter_name = name.partition('/')
@@ -100,7 +106,7 @@ def run(progress, runs=DEFAULT_RUNS, pool=None) -> Result:
 
 
 def figure(values):
-    """Pointing error of every seed, over the mean of the filter tuned for the target; values as of `rows`."""
+    """Draw the pointing error of every seed over the mean of the tuned filter; values as of `rows`."""
     drawn, axes = new_panels(1, height=5.4, x='pointing error over that of the tuned filter')
     for name, of_runs in values.items():
         relative = of_runs / values[f'{name.partition("/")[0]}/tuned'].mean()

@@ -1,35 +1,31 @@
 """Tables of directions: sat-nms program.txt, and CSV of time, azimuth and elevation.
 
 program.txt has lines of Julian date, azimuth and elevation [deg]; further words are passed over. The columns of a CSV
-are found by the first words of their names. If the first line consists of numbers, the file has exactly three columns.
-All times are UTC as ISO 8601, or all are seconds from any origin.
+are found by their whole names with their units. If the first line consists of numbers, the file has exactly three
+columns: time, azimuth, elevation [deg]. All times are UTC, or all are numbers from any origin. A row that repeats the
+row before is passed over and counted.
 """
 import array
-import csv
-import io
-import re
 import typing
 
 import numpy as np
 
-from pedestal_common.text_files import csv_table
+from pedestal_common.text_files import columns, csv_table
 from tracking_receiver_sim.ephemeris import lines, states
-from tracking_receiver_sim.track import instant
+from tracking_receiver_sim.track import tables, times
 
-COLUMN_NAMES = {'time': ('time', 'utc', 'epoch', 'timestamp', 't'), 'azimuth': ('azimuth', 'az'),
-                'elevation': ('elevation', 'el')}
-"""{quantity: first words of the names of its column}."""
+AZIMUTH = columns.Quantity('azimuth', dict.fromkeys(('azimuth', 'azi', 'az'), 'deg'), 'deg')
+ELEVATION = columns.Quantity('elevation', dict.fromkeys(('elevation', 'elev', 'el'), 'deg'), 'deg')
+ELEVATION_LENGTH = columns.Quantity('elevation', {'elevation': ''}, 'm')
+"""Directions, and an elevation that is a height."""
+BARE_NAMES = 'time', 'azimuth', 'elevation'
+"""Names of the columns of a table without names."""
 ANGLE_LIMITS_DEG = {'azimuth': (-720.0, 720.0), 'elevation': (-90.0, 90.0)}
 """{angle: (lowest, highest)} [deg]."""
-JULIAN_DATE_LIMITS = 2_400_000.5, 2_536_000.0
-"""Range of Julian dates: until 2231."""
-UNIX_EPOCH_JULIAN_DATE = 2_440_587.5
-"""Julian date of 1970-01-01T00:00 UTC."""
 MIN_ROWS = 4
 """Least number of rows of a table."""
 MAX_STEP_DEG = 20.0
 """Largest angle between two rows [deg], because the path between distant rows is not known."""
-NAME_WORD_PATTERN = re.compile(r'[a-z]+|\d+')
 
 
 class Directions(typing.NamedTuple):
@@ -38,7 +34,7 @@ class Directions(typing.NamedTuple):
         line                (n,) line in the file
         t                   (n,) [s] after midnight, growing
         azimuth, elevation  (n,) [rad]
-        midnight            UTC since 1970 [s] of t = 0, None if the file has no date
+        midnight            instant (see track.instant) of t = 0, None if the file has no date
         description         format and number of rows
     """
     path: str
@@ -51,86 +47,73 @@ class Directions(typing.NamedTuple):
 
 
 def is_program(beginning):
-    """Return True if the first lines of a file (bytes) are those of a program.txt."""
-    for text in beginning.decode('ascii', 'replace').splitlines():
+    """Return True if the first lines of a text are those of a program.txt."""
+    for text in beginning.splitlines():
         words = text.split('#', 1)[0].split()
         if words:
             return len(words) >= 3 and all(map(lines.NUMBER_PATTERN.fullmatch, words[:3])) and (
-                JULIAN_DATE_LIMITS[0] <= float(words[0]) <= JULIAN_DATE_LIMITS[1])
+                times.JULIAN_DATE_LIMITS[0] <= float(words[0]) <= times.JULIAN_DATE_LIMITS[1])
     return False
 
 
 def is_table(beginning):
-    """Return True if the first line of a file (bytes) is the head, or a row, of a table of directions as CSV."""
-    first = next(iter(beginning.decode('utf-8', 'replace').splitlines()), '').removeprefix('\ufeff')
-    cells = first.split(',')
-    return _columns(cells) is not None or _is_row(cells)
+    """Return True if a text begins with the names, or a row, of a table of directions as CSV."""
+    try:
+        names = csv_table.Table('', beginning, BARE_NAMES).fieldnames
+    except csv_table.READ_ERRORS:
+        return False
+    return columns.named(names, AZIMUTH) and columns.named(names, ELEVATION) and not _is_flight(names)
+
+
+def _is_flight(names):
+    """Return True if an elevation beside latitude and longitude is a height in a length unit."""
+    if not (columns.named(names, tables.LATITUDE) and columns.named(names, tables.LONGITUDE)):
+        return False
+    try:
+        return bool(columns.find(names, ELEVATION_LENGTH))
+    except columns.ColumnError:
+        return False
 
 
 def read_program(path, _wanted='') -> Directions:
     """Return the Directions of a program.txt. Raises TableError."""
-    rows, limits = array.array('d'), {'Julian date': JULIAN_DATE_LIMITS, **ANGLE_LIMITS_DEG}
+    rows, limits = array.array('d'), {'Julian date': times.JULIAN_DATE_LIMITS, **ANGLE_LIMITS_DEG}
     for line, text in lines.read(path):
         text = text.split('#', 1)[0].rstrip()
         if text:
             _, azimuth, elevation = lines.numbers(path, line, text, limits)
-            day, _, fraction = text.split()[0].partition('.')
-            t = 86400.0 * (float(day) - UNIX_EPOCH_JULIAN_DATE) + 86400.0 * float(f'0.{fraction or 0}')
-            rows.extend((line, t, azimuth, elevation))
+            rows.extend((line, times.julian(path, line, 'Julian date', text.split()[0]), azimuth, elevation))
     return _directions(path, rows, True, 'sat-nms program')
 
 
 def read_table(path, _wanted='') -> Directions:
     """Return the Directions of a CSV file. Raises TableError."""
-    rows, dated = array.array('d'), None
-    with csv_table.stream(path) as stream:
-        try:
-            reader = csv.reader(io.TextIOWrapper(stream, newline='', encoding='utf-8-sig'))
-            columns = None
-            for cells in reader:
-                line = reader.line_num
-                if columns is None:
-                    columns = _columns(cells) or (0, 1, 2)
-                    heads = [f'column {column + 1}' if _is_row(cells) else cells[column].strip()[:40]
-                             for column in columns]
-                    if not _is_row(cells):
-                        continue
-                if not any(map(str.strip, cells)):
-                    continue
-                time, azimuth, elevation = (cells[column] if column < len(cells) else None for column in columns)
-                iso = bool(instant.ISO_TIME_PATTERN.fullmatch((time or '').strip()))
-                if dated is not None and iso != dated:
-                    raise csv_table.TableError(f'{path}: line {line}: {heads[0]} = {time!r:.60}: must be '
-                                               f'{"UTC as ISO 8601" if dated else "seconds"} as in the lines above')
-                dated = iso
-                t = (instant.seconds(path, line, heads[0], time) if iso else
-                     csv_table.number(path, line, heads[0], time, -1e12, 1e12))
-                rows.extend((line, t, csv_table.number(path, line, heads[1], azimuth, *ANGLE_LIMITS_DEG['azimuth']),
-                             csv_table.number(path, line, heads[2], elevation, *ANGLE_LIMITS_DEG['elevation'])))
-                if len(rows) > 4 * csv_table.MAX_CSV_ROWS:
-                    raise csv_table.too_long(path, line)
-        except (UnicodeDecodeError, csv.Error) as error:
-            raise csv_table.TableError(f'{path}: not a CSV text file: {error}') from None
-    return _directions(path, rows, bool(dated), 'table of azimuth and elevation')
-
-
-def _columns(cells):
-    """Return the indices of time, azimuth and elevation by the names of the columns; None if one is missing."""
-    words = [NAME_WORD_PATTERN.findall(cell.lower()) or [''] for cell in cells]
-    places = [next((i for i, name in enumerate(words) if name[0] in names and 'rad' not in name), None)
-              for names in COLUMN_NAMES.values()]
-    return None if None in places else places
-
-
-def _is_row(cells):
-    return len(cells) == 3 and all(lines.NUMBER_PATTERN.fullmatch(cell.strip()) for cell in cells[1:3]) and bool(
-        lines.NUMBER_PATTERN.fullmatch(cells[0].strip()) or instant.ISO_TIME_PATTERN.fullmatch(cells[0].strip()))
+    rows = array.array('d')
+    with csv_table.opened(path, BARE_NAMES) as table:
+        time, azimuth, elevation = map(table.column, (times.TIME, AZIMUTH, ELEVATION))
+        if all(columns.named(table.fieldnames, place) for place in (tables.LATITUDE, tables.LONGITUDE)) and not (
+                columns.names_unit(elevation.name, ELEVATION)):
+            raise csv_table.TableError(
+                f'{path}: line {table.head_line}: column {elevation.name!r:.60} beside latitude and longitude: must '
+                f'name its unit, as in elevation_deg for a direction or elevation_m for a height')
+        clock = times.Times(table, time)
+        for row in table:
+            rows.extend((table.line_num, clock.seconds(row),
+                         table.number(azimuth, row[azimuth.name], *ANGLE_LIMITS_DEG['azimuth']),
+                         table.number(elevation, row[elevation.name], *ANGLE_LIMITS_DEG['elevation'])))
+            if len(rows) > 4 * csv_table.MAX_CSV_ROWS:
+                raise csv_table.too_long(path, table.line_num)
+        clock.check()
+    described = f'{clock.described()}, {azimuth.described()}, {elevation.described()}'
+    return _directions(path, rows, bool(clock.dated), f'table of azimuth and elevation, columns {described}')
 
 
 def _directions(path, rows, dated, form):
-    if len(rows) < 4 * MIN_ROWS:
-        raise csv_table.TableError(f'{path}: {len(rows) // 4} rows, must be at least {MIN_ROWS}')
-    line, t, azimuth, elevation = np.array(rows).reshape(-1, 4).T
+    table = np.array(rows).reshape(-1, 4)
+    fresh = np.append(True, (np.diff(table[:, 1:], axis=0) != 0.0).any(axis=1))[:len(table)]
+    line, t, azimuth, elevation = table[fresh].T
+    if len(line) < MIN_ROWS:
+        raise csv_table.TableError(f'{path}: {len(line)} rows, must be at least {MIN_ROWS}')
     line = line.astype(int)
     midnight = 86400.0 * np.floor(t[0] / 86400.0) if dated else 0.0
     t = t - midnight
@@ -153,4 +136,5 @@ def _directions(path, rows, dated, form):
         raise csv_table.TableError(f'{path}: line {line[i]}: {apart[i - 1]:.3g} deg from the row above: must be at '
                                    f'most {MAX_STEP_DEG:g} deg')
     return Directions(path, line, t, azimuth, elevation, float(midnight) if dated else None,
-                      f'{form}: {len(t)} rows')
+                      f'{form}: {len(t)} rows' + (f', passed over {(~fresh).sum()} x row that repeats the row before'
+                                                   if not fresh.all() else ''))

@@ -3,9 +3,11 @@ keep every file from blocking the process or filling its memory."""
 import contextlib
 import datetime
 import functools
+import io
 import re
 
 from pedestal_common.text_files import csv_table
+from tracking_receiver_sim.track import instant as instants
 
 MAX_LINE_CHARS = 1024
 """Largest number of characters of a line; the CCSDS books allow 254."""
@@ -22,24 +24,19 @@ def wrong(path, line, column, problem):
     return csv_table.TableError(f'{path}: line {line}, column {column}: {problem}')
 
 
-def read(path, encoding='ASCII'):
-    """Yield (number, text) of each line of a file that is not empty. Raises TableError for a line that is too long or
-    in another encoding."""
-    with csv_table.stream(path) as stream:
-        number = 0
-        while line := stream.readline(MAX_LINE_CHARS + 1):
-            number += 1
-            if len(line) > MAX_LINE_CHARS and not line.endswith(b'\n'):
-                raise csv_table.TableError(f'{path}: line {number}: longer than {MAX_LINE_CHARS} characters')
-            if number > csv_table.MAX_CSV_ROWS:
-                raise csv_table.too_long(path, number)
-            try:
-                text = line.decode(encoding).rstrip()
-            except UnicodeDecodeError as error:
-                raise wrong(path, number, error.start + 1,
-                            f'byte {line[error.start]:#04x}: must be {encoding}') from None
-            if text:
-                yield number, text
+def read(path):
+    """Yield (number, text) of each line of a text file that is not empty, see csv_table.text. Raises TableError, also
+    for a line that is too long."""
+    stream = io.StringIO(csv_table.text(path))
+    number = 0
+    while line := stream.readline(MAX_LINE_CHARS + 1):
+        number += 1
+        if len(line) > MAX_LINE_CHARS and not line.endswith('\n'):
+            raise csv_table.TableError(f'{path}: line {number}: longer than {MAX_LINE_CHARS} characters')
+        if number > csv_table.MAX_CSV_ROWS:
+            raise csv_table.too_long(path, number)
+        if text := line.rstrip():
+            yield number, text
 
 
 def numbers(path, line, text, limits):
@@ -71,14 +68,12 @@ def instant(path, line, column, name, text):
     match = CCSDS_TIME_PATTERN.fullmatch(text)
     try:
         date, hours, minutes, seconds, fraction = match.groups() if match else [''] * 5
-        clock = int(hours), int(minutes), int(seconds)
-        if clock[0] > 23 or clock[1] > 59 or clock[2] > 60:
-            raise ValueError
+        second = instants.second_of_day(int(hours), int(minutes), int(seconds))
         days = _days(date)
     except ValueError:
         raise wrong(path, line, column, f'{name} = {text!r:.60}: must be a time such as 2026-11-22T05:00:00.5 or '
                     f'2026-326T05:00:00.5, from {YEAR_LIMITS[0]} to {YEAR_LIMITS[1]}') from None
-    return days, 3600.0 * clock[0] + 60.0 * clock[1] + clock[2] + float(f'0.{fraction or 0}')
+    return days, second + float(f'0.{fraction or 0}')
 
 
 @functools.lru_cache(64)

@@ -6,9 +6,10 @@ import numpy as np
 
 from pedestal_common.text_files import csv_table
 from tracking_receiver_sim.ephemeris import frames, lines, states
+from tracking_receiver_sim.track import instant
 
 ENTRY_PATTERN = re.compile(r'([A-Z0-9_]+)( *= *)(.*)', re.ASCII)
-FILE_SIGNATURE = b'CCSDS_OEM_VERS'
+FILE_SIGNATURE = 'CCSDS_OEM_VERS'
 STATE_LIMITS = {**dict.fromkeys('xyz', (-2e6, 2e6)), **dict.fromkeys(('vx', 'vy', 'vz'), (-100.0, 100.0))}
 """{number in a line of data: (lowest, highest)} [km], [km/s]."""
 MAX_SEGMENTS = 1000
@@ -30,11 +31,12 @@ def read(path, wanted='') -> states.Ephemeris:
 
     wanted: name or international designator of the object; it may be empty for a file of one object.
     """
-    objects, midnight = {}, None
+    objects: dict[tuple, list] = {}
+    midnight = 0.0
     for meta, rows in _blocks(path):
         names = meta['OBJECT_NAME'].upper(), meta['OBJECT_ID'].upper()
-        if midnight is None:
-            midnight = int(rows[0, 1]) if len(rows) else 0
+        if not objects:
+            midnight = instant.of_day(int(rows[0, 1]), 0.0) if len(rows) else 0.0
         objects.setdefault(names, []).append((meta, rows))
     if not objects:
         raise csv_table.TableError(f'{path}: META_START is missing')
@@ -51,7 +53,7 @@ def read(path, wanted='') -> states.Ephemeris:
             raise lines.wrong(path, place.line, place.column, 'the segment begins before the end of the one above')
     first = of_object[0][0]
     count = sum(len(segment.t) for segment in segments)
-    return states.Ephemeris(path, 86400.0 * midnight, segments,
+    return states.Ephemeris(path, midnight, segments,
                             f'CCSDS OEM of {first["OBJECT_NAME"]:.40} ({first["OBJECT_ID"]:.40}): {count} states in '
                             f'{first["REF_FRAME"]}, {segments[0].method} of degree {segments[0].degree}')
 
@@ -114,15 +116,23 @@ def _segment(path, meta, rows, midnight):
         raise lines.wrong(path, entry.line, entry.column, 'REF_FRAME_EPOCH: must be absent, because only frames of '
                           'date are supported')
     _one_of(path, meta, 'TIME_SYSTEM', tuple(frames.TIME_SYSTEM_OFFSETS_S))
-    ahead = frames.ahead_of_utc(system, midnight)
 
-    def seconds(day, second):
-        return 86400.0 * (day - midnight) + second - ahead
+    def seconds(line, column, days, of_day):
+        try:
+            return frames.instants(system, days, of_day) - midnight
+        except ValueError as error:
+            [i] = error.args
+            raise lines.wrong(path, int(line[i]), column, f'second 60: TIME_SYSTEM {system} has no leap second at the '
+                              'end of this minute') from None
 
-    span = [seconds(*lines.instant(path, meta[name].line, meta[name].column, name, meta[name]))
-            if name in meta else None for name in ('USEABLE_START_TIME', 'USEABLE_STOP_TIME')]
+    def bound(name):
+        entry = meta[name]
+        day, second = lines.instant(path, entry.line, entry.column, name, entry)
+        return seconds([entry.line], entry.column, np.array([day]), np.array([second]))[0]
+
+    span = [bound(name) if name in meta else None for name in ('USEABLE_START_TIME', 'USEABLE_STOP_TIME')]
     method, degree = _interpolation(path, meta)
-    table = np.column_stack((rows[:, 0], seconds(rows[:, 1], rows[:, 2]), 1e3 * rows[:, 3:]))
+    table = np.column_stack((rows[:, 0], seconds(rows[:, 0], 1, rows[:, 1], rows[:, 2]), 1e3 * rows[:, 3:]))
     return states.segment(path, meta['line'], table, frame, method, degree, *span)
 
 

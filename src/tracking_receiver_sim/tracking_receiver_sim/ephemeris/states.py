@@ -52,8 +52,8 @@ class Segment(typing.NamedTuple):
 
 
 class Ephemeris(typing.NamedTuple):
-    """The orbit of one object. midnight: UTC since 1970 [s] of t = 0; segments: in order of time; description: format,
-    number of states, frame and interpolation."""
+    """The orbit of one object. midnight: instant (see track.instant) of t = 0; segments: in order of time;
+    description: format, number of states, frame and interpolation."""
     path: str
     midnight: float
     segments: tuple

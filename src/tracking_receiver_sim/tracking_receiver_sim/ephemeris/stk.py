@@ -11,8 +11,9 @@ import numpy as np
 
 from pedestal_common.text_files import csv_table
 from tracking_receiver_sim.ephemeris import lines, states
+from tracking_receiver_sim.track import dates, instant
 
-FILE_SIGNATURE_PATTERN = re.compile(rb'stk\.v\.\d+', re.IGNORECASE)
+FILE_SIGNATURE_PATTERN = re.compile(r'stk\.v\.\d+', re.IGNORECASE)
 FRAME_NAMES = {'fixed': 'ITRF', 'j2000': 'EME2000', 'icrf': 'ICRF', 'temeofdate': 'TEME', 'trueofdate': 'TOD'}
 """{CoordinateSystem: frame of frames.earth_fixed}."""
 METRES_PER_UNIT = {'meters': 1.0, 'kilometers': 1000.0}
@@ -29,13 +30,13 @@ READ_KEYWORDS = ('numberofephemerispoints', 'scenarioepoch', 'interpolationmetho
 IGNORED_KEYWORDS = ('blockingfactor', 'coordinatesystemepoch', 'messagelevel', 'timeformat')
 MAX_SEGMENTS = 1000
 """Largest number of segments of a file."""
-MONTH_NAMES = 'jan feb mar apr may jun jul aug sep oct nov dec'.split()
 EPOCH_PATTERN = re.compile(r'(\d{1,2}) ([a-z]{3})[a-z]* (\d{4}) (\d{1,2}):(\d\d):(\d\d(?:\.\d*)?)', re.ASCII)
 
 
 def read(path, _wanted='') -> states.Ephemeris:
     """Return the Ephemeris of an STK ephemeris file. Raises TableError."""
-    head, limits, rows, skipped = {}, None, array.array('d'), ''
+    head: dict[str, tuple] = {}
+    limits, rows, skipped = None, array.array('d'), ''
     for line, text in lines.read(path):
         text = text.split('#', 1)[0].rstrip()
         words = text.lower().split(None, 2)
@@ -102,18 +103,20 @@ def _ephemeris(path, head, table):
 
 
 def _epoch(path, line, column, text):
-    """Return (midnight since 1970 [s], seconds of the day) of a time in the form of STK."""
+    """Return (instant of midnight, seconds of the day) of a time in the form of STK."""
     match = EPOCH_PATTERN.fullmatch(' '.join(text.lower().split()))
     try:
         day, month, year, hours, minutes, seconds = match.groups()
-        date = datetime.date(int(year), MONTH_NAMES.index(month) + 1, int(day))
-        if not lines.YEAR_LIMITS[0] <= date.year <= lines.YEAR_LIMITS[1] or int(hours) > 23 or int(minutes) > 59:
+        date = datetime.date(int(year), dates.MONTH_NAMES.index(month) + 1, int(day))
+        if not lines.YEAR_LIMITS[0] <= date.year <= lines.YEAR_LIMITS[1]:
             raise ValueError
+        days, second = ((date - datetime.date(1970, 1, 1)).days,
+                        instant.second_of_day(int(hours), int(minutes), float(seconds)))
+        instant.of_day(days, second)
     except (AttributeError, ValueError):
         raise lines.wrong(path, line, column, f'ScenarioEpoch = {text!r:.60}: must be UTC such as 1 Jun 2026 '
                           '12:00:00.0') from None
-    midnight = 86400.0 * (date - datetime.date(1970, 1, 1)).days
-    return midnight, 3600.0 * int(hours) + 60.0 * int(minutes) + float(seconds)
+    return instant.of_day(days, 0.0), second
 
 
 def _choice(path, head, name, choices, default):

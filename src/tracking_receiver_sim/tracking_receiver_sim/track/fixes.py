@@ -24,21 +24,23 @@ class Log:
 
         form            name of the format
         time_name       name of the time in the file
-        dated, offset   True if the time plus `offset` [s] is UTC since 1970
+        dated           True if the time is an instant (see track.instant)
         remarks         sentences about the numbers
         passed_over     {kind of row or sentence: its number}
+        nothing         reason if the file has no fix
     """
 
     def __init__(self):
-        self.form, self.time_name, self.dated, self.offset = '', '', False, 0.0
+        self.form, self.time_name, self.dated, self.nothing = '', '', False, ''
         self.remarks, self.passed_over = [], collections.Counter()
 
 
 class Fixes(typing.NamedTuple):
     """The fixes of one aircraft, n of them.
 
-    line: (n,) in the file; time: (n,) [s], growing, UTC since 1970 if `dated`; latitude, longitude: (n,) WGS84 [deg];
-    altitude: (n,) above the ellipsoid [m]; description: format, remarks and the number of rows passed over.
+    line: (n,) in the file; time: (n,) [s], growing, instants (see track.instant) if `dated`; latitude, longitude: (n,)
+    WGS84 [deg]; altitude: (n,) above the ellipsoid [m]; description: format, remarks and the number of rows passed
+    over.
     """
     path: str
     line: np.ndarray
@@ -53,7 +55,8 @@ class Fixes(typing.NamedTuple):
 def read(track, rows) -> Fixes:
     """Return the Fixes of the file of a TrackFileParameters; rows: reader of its format. Raises
     csv_table.TableError."""
-    log, numbers, names = Log(), array.array('d'), {}
+    log, numbers = Log(), array.array('d')
+    names: dict[tuple, tuple[int, set]] = {}
     for line, identities, *fix in rows(track.path, log):
         if len(numbers) >= 6 * csv_table.MAX_CSV_ROWS:
             raise csv_table.too_long(track.path, line)
@@ -64,14 +67,25 @@ def read(track, rows) -> Fixes:
         numbers.extend((line, number, *fix))
     table = np.array(numbers).reshape(-1, 6)
     aircraft, number = _chosen(track, names)
-    line, time, *position = table[table[:, 1] == number][:, (0, 2, 3, 4, 5)].T
+    line, time, latitude, longitude, altitude = _fresh(table[table[:, 1] == number][:, (0, 2, 3, 4, 5)], log).T
     if len(line) < MIN_FIXES:
-        raise csv_table.TableError(f'{track.path}: {len(line)} fixes, must be at least {MIN_FIXES}{_passed_over(log)}')
-    fixes = Fixes(track.path, line.astype(int), time + log.offset, *position, log.dated,
+        reason = f': {log.nothing}' if log.nothing and not len(line) else ''
+        raise csv_table.TableError(f'{track.path}: {len(line)} fixes, must be at least {MIN_FIXES}{reason}'
+                                   f'{_passed_over(log)}')
+    fixes = Fixes(track.path, line.astype(int), time, latitude, longitude, altitude, log.dated,
                   f'{pathlib.Path(track.path).name}: {log.form}{aircraft}'
                   + ''.join(f', {remark}' for remark in log.remarks) + _passed_over(log))
     _check_order(fixes, track, log)
     return fixes
+
+
+def _fresh(table, log):
+    """Return the rows (line, time, place) without those that repeat time and place of the row before, which are
+    counted."""
+    repeated = np.append(False, (np.diff(table[:, 1:], axis=0) == 0.0).all(axis=1))[:len(table)]
+    if repeated.any():
+        log.passed_over['row that repeats time and place'] = int(repeated.sum())
+    return table[~repeated]
 
 
 def _chosen(track, names):

@@ -2,11 +2,13 @@
 
 expat gives the line of a point and keeps no parsed data in memory. The reader stops at a document type declaration.
 This avoids the expansion of entities and access to other files. ele is above mean sea level. The height above the
-ellipsoid is ele + geoidheight; without geoidheight ele is taken instead, with a remark in the log.
+ellipsoid is ele + geoidheight; without geoidheight ele is taken instead, with a remark in the log. The encoding is the
+one of the byte order mark, or of the XML declaration.
 """
+import collections
 from xml.parsers import expat
 
-from pedestal_common.text_files import csv_table
+from pedestal_common.text_files import content, csv_table
 from tracking_receiver_sim.track import instant
 
 PARSE_CHUNK_BYTES = 1 << 20
@@ -17,6 +19,8 @@ MAX_XML_DEPTH, MAX_TEXT_CHARS = 100, 200
 
 OEM_XML_HINT = '; an OEM must be in the notation KEYWORD = value, not XML'
 
+OTHER_POINTS = ('rtept', 'wpt')
+"""Points of a planned route and marks, which are no recorded track."""
 TEXT_ELEMENTS = ('ele', 'time', 'geoidheight', 'name')
 """Elements whose text the reader takes."""
 
@@ -30,13 +34,22 @@ def rows(path, log):
     points = _Points(path, log)
     try:
         with csv_table.stream(path) as stream:
+            points.parse_with(content.xml_parser(stream))
             while piece := stream.read(PARSE_CHUNK_BYTES):
                 points.parser.Parse(piece)
                 yield from points.take()
             points.parser.Parse(b'', True)
     except expat.ExpatError as error:
-        raise csv_table.TableError(f'{path}: line {error.lineno}: not well-formed XML: '
-                                   f'{expat.ErrorString(error.code)}') from None
+        raise csv_table.TableError(f'{path}: line {error.lineno}: not well-formed XML'
+                                   f'{points.encoding()}: {expat.ErrorString(error.code)}') from None
+    except (LookupError, ValueError) as error:
+        if isinstance(error, csv_table.TableError):
+            raise
+        raise csv_table.TableError(f'{path}: line 1: not well-formed XML{points.encoding()}: {error}') from None
+    names = ', '.join(f'{count} {name}' for name, count in sorted(points.others.items()))
+    log.nothing = (f'no trkpt in it{f" ({names})" if names else ""}' if not points.count else
+                   next((f'no point has {article} {name}' for article, name in (('a', 'time'), ('an', 'ele'))
+                         if log.passed_over[f'point without {name}'] == points.count), ''))
     if points.with_ele:
         log.remarks.append('ele taken as height above the ellipsoid')
 
@@ -48,8 +61,13 @@ class _Points:
         self.path, self.log = path, log
         self.path_of_elements, self.texts, self.fixes = [], {}, []
         self.tracks, self.track, self.with_ele = 0, '', False
-        self.parser = expat.ParserCreate('UTF-8')  # The encoding that the file declares does not count.
+        self.count, self.others, self.declared = 0, collections.Counter(), ''
+
+    def parse_with(self, parser):
+        """Receive the elements of an expat parser."""
+        self.parser = parser
         self.parser.buffer_text = True
+        self.parser.XmlDeclHandler = self.declaration
         self.parser.StartDoctypeDeclHandler = self.doctype
         self.parser.StartElementHandler, self.parser.EndElementHandler = self.start, self.end
         self.parser.CharacterDataHandler = self.text
@@ -58,6 +76,13 @@ class _Points:
         """Return the fixes since the last call."""
         fixes, self.fixes = self.fixes, []
         return fixes
+
+    def declaration(self, _version, encoding, _standalone):
+        self.declared = encoding or ''
+
+    def encoding(self):
+        """Return the encoding of the file, as a part of an error."""
+        return f' (encoding {self.declared or "UTF-8":.40})'
 
     def doctype(self, *_):
         raise csv_table.TableError(f'{self.path}: line {self.parser.CurrentLineNumber}: a document type declaration: '
@@ -76,10 +101,13 @@ class _Points:
             self.tracks += 1
             self.track = f'track {self.tracks}'
         elif name == 'trkpt':
+            self.count += 1
             self.texts, self.line, self.place = {}, self.parser.CurrentLineNumber, attributes
+        elif name in OTHER_POINTS:
+            self.others[name] += 1
 
     def text(self, text):
-        *_, parent, name = ('', '', *self.path_of_elements)
+        parent, name = ['', '', *self.path_of_elements][-2:]
         if name in TEXT_ELEMENTS and parent == ('trk' if name == 'name' else 'trkpt'):
             self.texts[name] = (self.texts.get(name, '') + text[:MAX_TEXT_CHARS])[:MAX_TEXT_CHARS]
 
@@ -92,8 +120,9 @@ class _Points:
 
     def point(self):
         path, line, texts = self.path, self.line, self.texts
-        if 'time' not in texts or 'ele' not in texts:
-            self.log.passed_over['point without time or ele'] += 1
+        missing = next((name for name in ('time', 'ele') if not texts.get(name, '').strip()), '')
+        if missing:
+            self.log.passed_over[f'point without {missing}'] += 1
             return
         ele = csv_table.number(path, line, 'ele', texts['ele'], -1000.0, 1e8)
         geoid = csv_table.number(path, line, 'geoidheight', texts.get('geoidheight', '0'), -150.0, 150.0)

@@ -1,35 +1,118 @@
-"""Instants of logs: UTC as ISO 8601, and seconds since 1970."""
+"""Instants of files: seconds since 1970 that count leap seconds. The difference of two instants is the time between
+them.
+
+An instant is TAI - 37 s. From 2017 on it equals the seconds since 1970 of computers, which omit leap seconds. The
+table of leap seconds is that of skyfield.
+"""
 import datetime
+import functools
 import re
 
+import numpy as np
+
+from pedestal_common.graph.steps import SECONDS_PER_DAY
 from pedestal_common.text_files import csv_table
+from tracking_receiver_sim.track import dates
 
 UNIX_TIME_LIMITS_S = (0.0, 4102444800.0)
-"""Range of an instant, in seconds since 1970: until 2100."""
+"""Range of the seconds since 1970 without leap seconds: until 2100."""
+
+TAI_OFFSET_S = 37.0
+"""TAI minus an instant [s]: TAI - UTC since 2017."""
+
+UNIX_EPOCH_JULIAN_DATE = 2_440_587.5
+"""Julian date of 1970-01-01T00:00 UTC."""
 
 ISO_TIME_PATTERN = re.compile(
-    r'(\d{4}-\d\d-\d\d)[T ](\d\d:\d\d:\d\d)(?:[.,](\d{1,9}))?(?: ?(?:Z|UTC|([+-]\d\d):?(\d\d)))?', re.ASCII)
+    r'(\d{4}-\d\d-\d\d)[T ](\d\d):(\d\d):(\d\d)(?:[.,](\d{1,9}))?(?: ?(?:Z|UTC|([+-])(\d\d):?(\d\d)))?', re.ASCII)
+
+
+@functools.cache
+def timescale():
+    """Return the timescale of skyfield."""
+    from skyfield.api import load  # slow to import; a file without a date does not need it
+    return load.timescale(builtin=True)
+
+
+@functools.lru_cache(4096)
+def tai_offset(day):
+    """Return TAI - UTC [s] on a day since 1970."""
+    return float(round((timescale().utc(1970, 1, 1 + day).tai - UNIX_EPOCH_JULIAN_DATE - day) * SECONDS_PER_DAY))
+
+
+def of_day(day, second):
+    """Return the instant of a day since 1970 and seconds of the day, UTC. Raises ValueError for second 86400 of a day
+    without a leap second."""
+    if second >= SECONDS_PER_DAY and second >= SECONDS_PER_DAY + tai_offset(day + 1) - tai_offset(day):
+        raise ValueError('no leap second on this day')
+    return SECONDS_PER_DAY * day + second + tai_offset(day) - TAI_OFFSET_S
+
+
+def of_unix_time(value):
+    """Return the instant of seconds since 1970 that omit leap seconds."""
+    return value + tai_offset(int(value // SECONDS_PER_DAY)) - TAI_OFFSET_S
+
+
+def second_of_day(hours, minutes, seconds):
+    """Return the seconds since midnight of a time of day. Raises ValueError; 23:59:60 is valid."""
+    if hours > 23 or minutes > 59 or seconds >= (61.0 if (hours, minutes) == (23, 59) else 60.0):
+        raise ValueError('no time of day')
+    return 3600.0 * hours + 60.0 * minutes + seconds
 
 
 def seconds(path, line, name, text):
-    """Return UTC seconds since 1970 of a text: ISO 8601 (without a zone: UTC) or the number itself. Raises
-    TableError."""
-    text = (text or '').strip()
+    """Return the instant of a text: a date, see `dates` (without a zone: UTC), or a number of seconds since 1970
+    without leap seconds. Raises TableError."""
+    text = dates.iso(text)
     match = ISO_TIME_PATTERN.fullmatch(text)
     try:
         if not match:
-            value = float(text)
-        else:
-            date, time, fraction, hours, minutes = match.groups()
-            zone = f'{hours}:{minutes}' if hours else '+00:00'
-            value = datetime.datetime.fromisoformat(f'{date}T{time}{zone}').timestamp() + float(f'0.{fraction or 0}')
+            return of_unix_time(csv_table.number(path, line, name, float(text), *UNIX_TIME_LIMITS_S))
+        return _of_iso(*match.groups())
+    except csv_table.TableError:
+        raise
     except ValueError:
         raise csv_table.TableError(f'{path}: line {line}: {name} = {text!r:.60}: must be UTC as ISO 8601, for example '
-                                   '2018-07-23T10:00:00Z, or as seconds since 1970') from None
-    return csv_table.number(path, line, name, value, *UNIX_TIME_LIMITS_S)
+                                   f'{dates.DATE_EXAMPLES}, or as seconds since 1970') from None
+
+
+def _of_iso(date, hours, minutes, second, fraction, sign, zone_hours, zone_minutes):
+    """Return the instant of the groups of ISO_TIME_PATTERN. Raises ValueError."""
+    leap = int(second) == 60
+    zone = f'{sign}{zone_hours}:{zone_minutes}' if sign else '+00:00'
+    utc = datetime.datetime.fromisoformat(f'{date}T{hours}:{minutes}:{59 if leap else second}{zone}').timestamp()
+    if not UNIX_TIME_LIMITS_S[0] <= utc <= UNIX_TIME_LIMITS_S[1]:
+        raise ValueError('outside the range')
+    day, whole = divmod(utc, SECONDS_PER_DAY)
+    if leap and whole != SECONDS_PER_DAY - 1.0:
+        raise ValueError('no leap second at this time')
+    return of_day(int(day), whole + leap + float(f'0.{fraction or 0}'))
 
 
 def iso(value):
-    """Return UTC seconds since 1970 as ISO 8601 to the millisecond."""
-    since_1970 = datetime.timedelta(milliseconds=round(value * 1e3))
-    return (datetime.datetime(1970, 1, 1) + since_1970).isoformat(timespec='milliseconds') + 'Z'
+    """Return an instant as ISO 8601 to the millisecond, UTC."""
+    ms = round(value * 1e3)
+    day = int(ms // (1000 * SECONDS_PER_DAY)) + 1
+    while ms < round(of_day(day, 0.0) * 1e3):
+        day -= 1
+    ms -= round(of_day(day, 0.0) * 1e3)
+    minutes = min(ms // 60_000, 1439)
+    date = datetime.date(1970, 1, 1) + datetime.timedelta(days=day)
+    return f'{date}T{minutes // 60:02}:{minutes % 60:02}:{(ms - 60_000 * minutes) / 1e3:06.3f}Z'
+
+
+def utc_texts(begin, passed):
+    """Return ISO 8601 to the microsecond of times: passed (n,) timedelta64[us], growing, after a datetime64[us] in
+    UTC."""
+    times = begin + passed
+    texts = np.datetime_as_string(times)
+    first, last = (int(time.astype('M8[D]').astype(int)) for time in (begin, times[-1])) if len(times) else (0, 0)
+    for day in range(first + 1, last + 1):
+        if tai_offset(day) > tai_offset(day - 1):
+            after = times >= np.datetime64(day, 'D')
+            times = np.where(after, times - np.timedelta64(1, 's'), times)
+            texts = np.datetime_as_string(times)
+            inside = after & (times < np.datetime64(day, 'D'))
+            texts[inside] = np.char.replace(texts[inside], ':59.', ':60.')
+            break
+    return texts

@@ -1,17 +1,30 @@
 """Logs of NMEA 0183: GGA for time of day, position and height, RMC for the date. Other sentences are passed over.
 
-The height above the ellipsoid is altitude + geoidal separation. Text before the $ of a line, for example the time of
-a logger, is passed over. Sentences with a wrong checksum and GGA without a fix are passed over and counted.
+The height above the ellipsoid is altitude + geoidal separation. Text before the $ of a line and behind the checksum is
+passed over: the time of a logger, a tag block, `NMEA,` and the time of Android. Cut sentences, sentences with a wrong
+checksum, and GGA without fix, time or altitude (2D) are passed over and counted.
 """
+import collections
+import contextlib
 import datetime
+import io
 import re
 
 import pynmea2
 
 from pedestal_common.graph.steps import SECONDS_PER_DAY
-from pedestal_common.text_files import csv_table
+from pedestal_common.text_files import content, csv_table
+from tracking_receiver_sim.track import fixes, instant
 
-SENTENCE_PATTERN = re.compile(r'\$..(?:GGA|RMC),.*', re.ASCII)
+SENTENCE_PATTERN = re.compile(r'\$[A-Z]{2}([A-Z]{3}),[^$*]*(\*[0-9A-Fa-f]{2})?', re.ASCII)
+"""A sentence with its type and its checksum."""
+CUT_SENTENCE_PATTERN = re.compile(r'[^$!]*,[^$!]*\*[0-9A-Fa-f]{2}', re.ASCII)
+"""The end of a sentence whose beginning is missing."""
+TIME_PATTERN = re.compile(r'(\d\d)(\d\d)(\d\d(?:\.\d*)?)', re.ASCII)
+MIN_GGA_FIELDS = 11
+"""Least number of fields of a GGA: up to the geoidal separation."""
+MAX_LISTED_TYPES = 8
+"""Number of types of sentences that an error lists."""
 MAX_LINE_CHARS = 1024
 """Largest number of characters of a line; the standard allows 82."""
 
@@ -19,35 +32,25 @@ MAX_LINE_CHARS = 1024
 def rows(path, log):
     """Yield the fixes (line, (), time [s], latitude, longitude [deg], altitude [m]) of a log.
 
-    log: fixes.Log, which receives the description of the file. The time is since midnight; with the offset in `log`,
-    from the date of an RMC, it becomes UTC since 1970. Raises TableError.
+    log: fixes.Log, which receives the description of the file. The time is an instant if an RMC has a date, otherwise
+    it is since midnight. Raises TableError.
     """
-    log.form, log.time_name, log.dated = 'NMEA', 'time', False
-    days, last, without_separation = 0, None, False
-    for line, text in _lines(path):
-        match = SENTENCE_PATTERN.search(text)
-        if not match:
+    begins = _begin(path)
+    log.form, log.time_name, log.dated = 'NMEA', 'time', begins is not None
+    clock, without_separation = _Clock(begins), False
+    for line, sentence in _sentences(path, log):
+        if sentence.sentence_type == 'RMC':
+            with contextlib.suppress(ValueError):
+                clock.read(_second_of_day(sentence), _day(sentence))
             continue
         try:
-            sentence = pynmea2.parse(match[0])
-        except pynmea2.ParseError:
-            log.passed_over['damaged sentence'] += 1
-            continue
-        if sentence.sentence_type == 'RMC':
-            if sentence.status == 'A' and isinstance(sentence.datestamp, datetime.date) and not log.dated:
-                log.dated, midnight = True, datetime.datetime.combine(sentence.datestamp, datetime.time())
-                log.offset = midnight.replace(tzinfo=datetime.timezone.utc).timestamp() - SECONDS_PER_DAY * days
-            continue
-        if not sentence.gps_qual or not sentence.lat or not sentence.lon:
-            log.passed_over['GGA without a fix'] += 1
-            continue
-        time = _time_of_day(path, line, sentence)
-        if last is not None and time < last - 0.5 * SECONDS_PER_DAY:
-            days += 1
-        last = time
+            time = clock.read(_second_of_day(sentence))
+        except ValueError:
+            raise csv_table.TableError(f'{path}: line {line}: time = {sentence.data[0]!r:.60}: must be hhmmss.ss, '
+                                       '235960 only for a leap second') from None
         without_separation = without_separation or not sentence.geo_sep
         separation = csv_table.number(path, line, 'geoidal separation', sentence.geo_sep or '0', -150.0, 150.0)
-        yield (line, (), time + SECONDS_PER_DAY * days,
+        yield (line, (), time,
                _angle(path, line, 'latitude', sentence.lat, sentence.lat_dir, 'NS', 90.0),
                _angle(path, line, 'longitude', sentence.lon, sentence.lon_dir, 'EW', 180.0),
                separation + csv_table.number(path, line, 'altitude', sentence.altitude, -1000.0, 1e8))
@@ -55,22 +58,117 @@ def rows(path, log):
         log.remarks.append('altitude without geoidal separation taken as height above the ellipsoid')
 
 
+def is_log(beginning):
+    """Return True if a text is the beginning of a log: a sentence first, or GGA and the like after other text."""
+    return beginning.startswith(('$', '!')) or bool(SENTENCE_PATTERN.search(beginning))
+
+
+def _sentences(path, log):
+    """Yield (line, sentence) of each RMC and GGA with a fix; a GGA also has time and altitude. Count the other GGA in
+    a fixes.Log."""
+    types, with_checksum = collections.Counter(), False
+    for line, text in _lines(path):
+        if CUT_SENTENCE_PATTERN.fullmatch(text) and not text.startswith('#'):
+            log.passed_over['damaged sentence'] += 1
+        for match in SENTENCE_PATTERN.finditer(text):
+            types[match[1]] += 1
+            if match[1] not in ('GGA', 'RMC'):
+                continue
+            with_checksum = with_checksum or bool(match[2])
+            try:
+                sentence = pynmea2.parse(match[0])
+            except pynmea2.ParseError:
+                sentence = None
+            if sentence is None or with_checksum and not match[2] or (
+                    match[1] == 'GGA' and len(sentence.data) < MIN_GGA_FIELDS):
+                log.passed_over['damaged sentence'] += 1
+            elif match[1] == 'RMC':
+                if sentence.status == 'A':
+                    yield line, sentence
+            elif missing := _missing(sentence):
+                log.passed_over[f'GGA without {missing}'] += 1
+            else:
+                yield line, sentence
+    if not types['GGA']:
+        listed = ', '.join(f'{count} {name}' for name, count in sorted(types.items())[:MAX_LISTED_TYPES])
+        log.nothing = f'no GGA in it{f" ({listed})" if listed else ""}'
+
+
+def _missing(gga):
+    """Return the part that a GGA lacks, '' if it has all."""
+    there = {'a fix': gga.gps_qual and gga.lat and gga.lon, 'time': gga.data[0], 'altitude': gga.altitude is not None}
+    return next((name for name, value in there.items() if not value), '')
+
+
 def _lines(path):
+    """Yield (number, text) of each line; noise between the sentences becomes replacement characters."""
     with csv_table.stream(path) as stream:
-        number = 0
-        while line := stream.readline(MAX_LINE_CHARS):
+        encoding = content.marked_encoding(stream.read(content.MAX_MARK_BYTES)) or 'ascii'
+        stream.seek(0)
+        number, lines = 0, io.TextIOWrapper(stream, encoding, errors='replace', newline='')
+        while line := lines.readline(MAX_LINE_CHARS):
             number += 1
-            if len(line) == MAX_LINE_CHARS and not line.endswith(b'\n'):
+            if len(line) == MAX_LINE_CHARS and not line.endswith(('\n', '\r')):
                 raise csv_table.TableError(f'{path}: line {number}: longer than {MAX_LINE_CHARS} characters')
-            yield number, line.decode('ascii', 'replace').strip()
+            yield number, line.strip()
 
 
-def _time_of_day(path, line, sentence):
-    """Return the seconds since midnight of a GGA; raises TableError."""
-    time = sentence.timestamp
-    if not isinstance(time, datetime.time):
-        raise csv_table.TableError(f'{path}: line {line}: time = {sentence.data[0]!r:.60}: must be hhmmss.ss')
-    return 3600.0 * time.hour + 60.0 * time.minute + time.second + 1e-6 * time.microsecond
+class _Clock:
+    """Time of consecutive sentences, which hold only the time of day. The midnight between two sentences is the one
+    that makes them less than half a day apart.
+
+        first   day since 1970 of the first sentence, None if it is unknown
+        days    midnights since the first sentence
+        leaps   leap seconds (235960) since the first sentence, for a log without a date
+    """
+
+    def __init__(self, first=None):
+        self.first, self.days, self.leaps, self._last = first, 0, 0, None
+
+    def read(self, second, day=None):
+        """Return the instant of a sentence (see track.instant), without a date the time since midnight [s].
+
+        second: of the day; day: since 1970, if the sentence has a date. A date moves the time only forward. Raises
+        ValueError for a leap second on a day that has none.
+        """
+        if self._last is not None:
+            passed = round((self._last - second) / SECONDS_PER_DAY)
+            self.leaps += passed > 0 and self._last >= SECONDS_PER_DAY
+            self.days += passed
+        self._last = second
+        if self.first is None:
+            return SECONDS_PER_DAY * self.days + second + self.leaps
+        if day is not None:
+            self.days = max(self.days, day - self.first)
+        return instant.of_day(self.first + self.days, second)
+
+
+def _begin(path):
+    """Return the day since 1970 of the first sentence with a fix, None if no RMC has a date.
+
+    The date of an RMC belongs to the time of the same RMC, which may lie on the other side of midnight.
+    """
+    clock = _Clock()
+    for _, sentence in _sentences(path, fixes.Log()):
+        with contextlib.suppress(ValueError):
+            clock.read(_second_of_day(sentence))
+            if sentence.sentence_type == 'RMC' and _day(sentence) is not None:
+                return _day(sentence) - clock.days
+    return None
+
+
+def _day(sentence):
+    """Return the day since 1970 of an RMC, None without a valid date."""
+    date = sentence.datestamp
+    return (date - datetime.date(1970, 1, 1)).days if isinstance(date, datetime.date) else None
+
+
+def _second_of_day(sentence):
+    """Return the seconds since midnight of a sentence. Raises ValueError."""
+    match = TIME_PATTERN.fullmatch(sentence.data[0])
+    if not match:
+        raise ValueError(sentence.data[0])
+    return instant.second_of_day(int(match[1]), int(match[2]), float(match[3]))
 
 
 def _angle(path, line, name, text, side, sides, limit):

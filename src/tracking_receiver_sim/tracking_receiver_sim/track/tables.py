@@ -1,51 +1,78 @@
-"""Flights as CSV. The name of the column of time selects the layout of a file, a row of CSV_LAYOUTS.
+"""Flights as CSV. The names of the columns select the layout of a file, a row of CSV_LAYOUTS.
 
-    native                      time_s, latitude_deg, longitude_deg, altitude_m: every cell is a number
+    Flightradar24               Timestamp, Position ("latitude,longitude"), Altitude: in feet
     traffic (ADS-B)             timestamp, latitude, longitude, geoaltitude or altitude: in feet
     OpenSky state vectors       time, lat, lon, geoaltitude or baroaltitude: in metres
+    CSV                         time, latitude, longitude, altitude: the unit in the name, as in altitude_m
 
 The geometric altitude of ADS-B is above the ellipsoid. If a file has only the barometric altitude, it is taken
 instead, with a remark in the log. Rows of ADS-B logs without a position are passed over and counted.
 """
 import typing
 
-from pedestal_common.text_files import csv_table
-from tracking_receiver_sim.track import instant
+from pedestal_common.text_files import columns, csv_table
+from tracking_receiver_sim.track import times
 
 METRES_PER_FOOT = 0.3048
 """Length of a foot [m]."""
 
-ALTITUDE_LIMITS_FT, ALTITUDE_LIMITS_M = (-3000.0, 500_000.0), (-1000.0, 150_000.0)
-"""Ranges of altitudes of ADS-B [ft], [m]."""
+ALTITUDE_LIMITS_FT_IN_M = -3000.0 * METRES_PER_FOOT, 500_000.0 * METRES_PER_FOOT
+ALTITUDE_LIMITS_M = -1000.0, 150_000.0
+"""Ranges of altitudes of ADS-B, of files in feet and in metres [m]."""
 
 EMPTY_CELL_TEXTS = ('', 'nan', 'none', 'null')
 """Texts of a cell without a value, in lower case."""
+
+IDENTITY_NAMES = ('icao24', 'callsign')
+LATITUDE = columns.Quantity('latitude_deg', dict.fromkeys(('latitude', 'lat'), 'deg'), 'deg')
+LONGITUDE = columns.Quantity('longitude_deg', dict.fromkeys(('longitude', 'lon', 'lng', 'long'), 'deg'), 'deg')
+ALTITUDE = columns.Quantity('altitude_m', dict.fromkeys(('altitude', 'alt', 'height', 'elevation', 'ele',
+                                                         'geoaltitude'), ''), 'm')
+POSITION = columns.Quantity('position', {'position': 'deg'}, 'deg')
+"""Quantities of a flight; an altitude must name its unit."""
+
 
 
 class CsvLayout(typing.NamedTuple):
     """Layout of a CSV file.
 
-        time, latitude, longitude   names of the columns
-        altitudes                   names of the columns of altitude, the best first
-        unit, limits                unit of an altitude [m], and range in this unit
-        adsb                        True: UTC, aircraft with an icao24 or a callsign, possibly empty cells
+        time, latitude, longitude   Quantity of each; latitude and longitude are POSITION if one column holds both
+        altitudes                   Quantities of the altitude, the best first
+        limits                      range of an altitude [m]
+        adsb                        True: UTC, and cells of the needed columns may be empty
+        barometric                  number of the first barometric altitude in `altitudes`
     """
     name: str
-    time: str
-    latitude: str
-    longitude: str
+    time: columns.Quantity
+    latitude: columns.Quantity
+    longitude: columns.Quantity
     altitudes: tuple
-    unit: float
     limits: tuple
     adsb: bool
+    barometric: int
+
+    def matches(self, table):
+        """Return True if a csv_table.Table has a column for each quantity."""
+        names = table.fieldnames
+        if not all(columns.named(names, wanted) for wanted in (self.time, self.latitude, self.longitude)):
+            return False
+        return (any(columns.named(names, altitude) for altitude in self.altitudes)
+                and not (self.adsb and table.column(self.time).unit not in ('s', columns.UTC)))
+
+
+def _named(name, default, unit=''):
+    return columns.Quantity(name, {name: default}, unit or default)
 
 
 CSV_LAYOUTS = (
-    CsvLayout('CSV', 'time_s', 'latitude_deg', 'longitude_deg', ('altitude_m',), 1.0, (-1000.0, 1e8), False),
-    CsvLayout('ADS-B', 'timestamp', 'latitude', 'longitude', ('geoaltitude', 'altitude'), METRES_PER_FOOT,
-              ALTITUDE_LIMITS_FT, True),
-    CsvLayout('ADS-B', 'time', 'lat', 'lon', ('geoaltitude', 'baroaltitude'), 1.0, ALTITUDE_LIMITS_M, True))
-"""Known layouts; the first one is for a file without a known column of time."""
+    CsvLayout('Flightradar24', _named('timestamp', 's'), POSITION, POSITION, (_named('altitude', 'ft', 'm'),),
+              ALTITUDE_LIMITS_FT_IN_M, True, 0),
+    CsvLayout('ADS-B', _named('timestamp', 's'), _named('latitude', 'deg'), _named('longitude', 'deg'),
+              (_named('geoaltitude', 'ft', 'm'), _named('altitude', 'ft', 'm')), ALTITUDE_LIMITS_FT_IN_M, True, 1),
+    CsvLayout('ADS-B', _named('time', 's'), _named('lat', 'deg'), _named('lon', 'deg'),
+              (_named('geoaltitude', 'm'), _named('baroaltitude', 'm')), ALTITUDE_LIMITS_M, True, 1),
+    CsvLayout('CSV', times.TIME._replace(label='time_s'), LATITUDE, LONGITUDE, (ALTITUDE,), (-1000.0, 1e8), False, 1))
+"""Known layouts; the last one is for every other file."""
 
 
 def rows(path, log):
@@ -53,25 +80,46 @@ def rows(path, log):
 
     log: fixes.Log, which receives the description of the file. Raises TableError.
     """
-    with csv_table.opened(path) as reader:
-        header = reader.fieldnames or ()
-        form = next((form for form in CSV_LAYOUTS if form.time in header), CSV_LAYOUTS[0])
-        altitude = next((name for name in form.altitudes if name in header), form.altitudes[0])
-        names = form.time, form.latitude, form.longitude, altitude
-        csv_table.require(path, reader, names)
-        identities = [name for name in ('icao24', 'callsign') if name in header] if form.adsb else []
-        log.form, log.time_name, log.dated = form.name, form.time, form.adsb
-        if form.adsb and altitude != form.altitudes[0]:
+    with csv_table.opened(path) as table:
+        layout = _layout(table)
+        time, latitude, longitude = map(table.column, (layout.time, layout.latitude, layout.longitude))
+        altitudes = [table.column(altitude, required=False) for altitude in layout.altitudes]
+        altitude = next(filter(None, altitudes), None) or table.column(layout.altitudes[0])
+        time = time._replace(unit=columns.UTC) if layout.adsb else time
+        identities = [name for known in IDENTITY_NAMES for name in table.fieldnames if name.lower() == known]
+        log.form, log.time_name = layout.name, time.name
+        if altitude in altitudes[layout.barometric:]:
             log.remarks.append('barometric altitude taken as height above the ellipsoid')
-        for row in reader:
-            line = reader.line_num
-            cells = {name: (row[name] or '').strip() for name in (*names, *identities)} if form.adsb else row
-            if form.adsb and any(cells[name].lower() in EMPTY_CELL_TEXTS for name in (*names, *identities[:1])):
+        needed = [column.name for column in (time, latitude, longitude, altitude)] + identities[:1]
+        clock = times.Times(table, time)
+        for row in table:
+            if layout.adsb and any((row[name] or '').lower() in EMPTY_CELL_TEXTS for name in needed):
                 log.passed_over['row without time, position or aircraft'] += 1
                 continue
-            time = (instant.seconds(path, line, form.time, cells[form.time]) if form.adsb else
-                    csv_table.number(path, line, form.time, cells[form.time], -1e12, 1e12))
-            yield (line, tuple(cells[name] for name in identities), time,
-                   csv_table.number(path, line, form.latitude, cells[form.latitude], -90.0, 90.0),
-                   csv_table.number(path, line, form.longitude, cells[form.longitude], -180.0, 360.0),
-                   form.unit * csv_table.number(path, line, altitude, cells[altitude], *form.limits))
+            t = clock.seconds(row)
+            log.dated = clock.dated
+            north, east = (_position(table, row, latitude) if latitude == longitude else
+                           (row[latitude.name], row[longitude.name]))
+            yield (table.line_num, tuple(row[name] or '' for name in identities), t,
+                   table.number(latitude, north, -90.0, 90.0), table.number(longitude, east, -180.0, 360.0),
+                   table.number(altitude, row[altitude.name], *layout.limits))
+        clock.check()
+        described = (column.described() for column in dict.fromkeys((latitude, longitude, altitude)))
+        log.remarks.insert(0, f'columns {", ".join((clock.described(), *described))}')
+
+
+def _layout(table):
+    """Return the layout of a Table: the first that matches; else the one that its column of time names."""
+    names = [name.lower() for name in table.fieldnames]
+    return next((layout for layout in CSV_LAYOUTS if layout.matches(table)), None) or next(
+        (layout for layout in CSV_LAYOUTS[1:] if layout.adsb and layout.time.label in names), CSV_LAYOUTS[-1])
+
+
+def _position(table, row, column):
+    """Return the texts of latitude and longitude in a cell of both. Raises TableError."""
+    cell = row[column.name] or ''
+    parts = [part.strip() for part in cell.split(',')]
+    if len(parts) != 2:
+        raise csv_table.TableError(f'{table.path}: line {table.line_num}: {column.name} = {cell!r:.60}: must be '
+                                   'latitude,longitude')
+    return parts

@@ -1,1 +1,1 @@
-"""Verbs for an antenna that runs: start it, ask it, command it."""
+"""Verbs for a running antenna: start, observe and command the graph."""

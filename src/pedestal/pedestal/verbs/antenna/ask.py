@@ -1,31 +1,35 @@
-"""ask a running node for anything it can be asked for
+"""send a command to a running node
 
-Asks on acu/command, with --node on the topic of another node, and waits for the reply: exit code 0 where it was
-granted, 1 where it was refused, with the reason.
+Publishes the command and waits for the reply. The topic is acu/command, or the command topic of the node of --node.
+Exit code 0: the node accepted the command. Exit code 1: the node refused it; the reason is printed.
 
-    pedestal ask take                    nobody else is obeyed any more, but who stops
-    pedestal ask fallback mode=memory    what follows the loss of the track
-    pedestal ask offset time=0.5         the program track comes half a second later
+    pedestal ask take                    take control: commands of others are refused, except `stop`
+    pedestal ask fallback mode=memory    select the mode after a loss of the track
+    pedestal ask offset time=0.5         delay the program track by half a second
 """
+import argparse
+from collections.abc import Iterable, Mapping
+
 from pedestal.verbs import arguments
 
 
-def add_arguments(parser):
-    """Verb, arguments, node, who asks."""
-    parser.add_argument('verb')
-    parser.add_argument('given', nargs='*', metavar='NAME=VALUE', help='in SI units')
-    parser.add_argument('--node', default='acu', help='who is asked; default: acu')
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add command, its arguments, node and the options of a client."""
+    parser.add_argument('verb', metavar='COMMAND', help='name of the command; an unknown name is refused with a list '
+                        'of all')
+    parser.add_argument('given', nargs='*', metavar='NAME=VALUE', help='arguments of the command, in SI units')
+    parser.add_argument('--node', default='acu', metavar='NODE', help='node that receives the command; default: acu')
     arguments.add_remote(parser)
 
 
-def main(options):
-    """Ask; the exit code."""
+def main(options: argparse.Namespace) -> int:
+    """Send the command. Return the exit code."""
     return send_command(options, options.verb, pairs(options.given), options.node)
 
 
-def pairs(texts) -> dict:
-    """{name: text} of texts NAME=VALUE. Raises ValueError."""
-    given = {}
+def pairs(texts: Iterable[str]) -> dict[str, str | float]:
+    """Return {name: text} of texts NAME=VALUE. Raises ValueError."""
+    given: dict[str, str | float] = {}
     for text in texts:
         name, equals, value = text.partition('=')
         if not (name and equals and value):
@@ -34,12 +38,12 @@ def pairs(texts) -> dict:
     return given
 
 
-def send_command(options, verb, given, node='acu'):
-    """Ask a node for a verb, say what it replied; the exit code."""
+def send_command(options: argparse.Namespace, verb: str, given: Mapping[str, str | float], node: str = 'acu') -> int:
+    """Send a command to a node and print its reply. Return the exit code."""
     from pedestal_common.graph import nodes
-    able = [row.name for row in nodes.NODES if row.obeys]
-    if node not in able:
-        raise ValueError(f'--node {node}: must be one of {", ".join(able)}')
+    commanded = [row.name for row in nodes.NODES if row.obeys]
+    if node not in commanded:
+        raise ValueError(f'--node {node}: must be one of {", ".join(commanded)}')
     with arguments.remote(options, node) as spun:
         spun.wait_for_node(options.timeout)
         reply = spun.request(verb, given, options.timeout)

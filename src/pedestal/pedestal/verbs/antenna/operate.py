@@ -1,22 +1,23 @@
 """operate a running antenna by hand on this terminal
 
-Shows angles, errors, mode and reason, receiver and alarms; keys ask for modes, arrows jog while they are held. Needs
-a terminal; q ends it, the antenna goes on.
+Shows angles, errors, mode and its reason, receiver and alarms. Letters command modes; an arrow jogs the antenna while
+it is held down. Needs a terminal. q ends the program; the antenna continues.
 """
+import argparse
 import sys
 
 from pedestal.verbs import arguments
 
 
-def add_arguments(parser):
-    """Who asks."""
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the options of a client."""
     arguments.add_remote(parser)
 
 
-def main(options):
-    """Run the console; exit code 0."""
+def main(options: argparse.Namespace) -> int:
+    """Run the console. Return exit code 0."""
     if not (sys.stdin.isatty() and sys.stdout.isatty()):
-        raise ValueError('operate needs a terminal; `pedestal mode` and `pedestal status` do without')
+        raise ValueError('operate needs a terminal; `pedestal mode` and `pedestal status` need none')
     from pedestal_operator import console
     with arguments.remote(options) as spun:
         spun.wait_for_node(options.timeout)

@@ -1,25 +1,26 @@
 """send the program track of a scenario to a running ACU"""
+import argparse
 import datetime
 
 from pedestal.verbs import arguments
 
 START_FROM_FILE = 'file'
-"""--start at the UTC of the target."""
+"""Value of --start for the start time in the file of the target."""
 
 
-def add_arguments(parser):
-    """Scenario, duration, parameters."""
-    parser.add_argument('scenario')
-    parser.add_argument('--duration', type=float, metavar='S', help='of the run it is for')
-    parser.add_argument('--start', type=_utc, metavar='UTC', help='when its time is 0, as 2026-11-22T12:00:00, now, '
-                        'or file: when its file or its TLE says; default: when the graph began, which the ACU is '
-                        'asked for')
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add scenario, duration, start and parameters."""
+    arguments.add_scenario(parser)
+    arguments.add_duration(parser, 'the program track')
+    parser.add_argument('--start', type=_utc, metavar='UTC', help='UTC at the beginning of the track: for example '
+                        '2026-11-22T12:00:00, now, or file (start time in the file or TLE of the target); '
+                        'default: start of the running graph')
     arguments.add_param(parser)
     arguments.add_namespace(parser)
 
 
-def _utc(text):
-    """ISO 8601 in UTC, or `now` -> ns; `file` as it is."""
+def _utc(text: str) -> int | str:
+    """Return a UTC in ISO 8601, or `now`, as a number [ns]; `file` unchanged."""
     if text == START_FROM_FILE:
         return text
     if text == 'now':
@@ -31,8 +32,8 @@ def _utc(text):
     return round(moment.timestamp() * 1e6) * 1000
 
 
-def main(options):
-    """Send the program track; exit code of watch.send_program."""
+def main(options: argparse.Namespace) -> int:
+    """Send the program track. Return the exit code of watch.send_program."""
     from pedestal_bringup.graph import watch
     from pedestal_bringup.scenario import scenario
     from pedestal_bringup.scenario.program import Plan

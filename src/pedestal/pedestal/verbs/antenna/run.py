@@ -1,43 +1,55 @@
 """run a scenario as separate nodes and record it
 
-Exit code 0; 1 where it cannot run, or the recording is not complete; 3 where a realtime run ended before its planned
-end, or its drive lost more than 1 % of its steps outside announced restarts; 130 where it was stopped."""
+Starts a process for each node, records every topic in a new bag, and prints the results.
+
+Exit code 0: the run is complete. 1: the run failed, or the recording is not complete. 3: a realtime run ended early,
+or its drive lost more than 1 % of its steps outside announced restarts. 130: the run was stopped, for example by
+Ctrl-C.
+"""
+import argparse
 import pathlib
 import sys
+import typing
 
 from pedestal import stop
 from pedestal.verbs import arguments
 from pedestal_analysis import console
 
+if typing.TYPE_CHECKING:
+    from pedestal_bringup.scenario.scenario import Scenario
 
-def add_arguments(parser):
-    """Scenario, pacing, duration, seed, bag, parameters."""
-    parser.add_argument('scenario', help='name (see `pedestal scenarios`) or path of a .yaml')
-    parser.add_argument('--pacing', choices=('lockstep', 'realtime'), help='default: what the scenario says')
-    parser.add_argument('--duration', type=float, metavar='S', help="length of the run in the drive's time")
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add scenario, pacing, duration, seed, bag, parameters, satellite and servers."""
+    arguments.add_scenario(parser)
+    parser.add_argument('--pacing', choices=('lockstep', 'realtime'), help='pacing of the steps: as fast as all nodes '
+                        'follow, or by the clock; default: value of the scenario')
+    arguments.add_duration(parser, 'the run')
     parser.add_argument('--seed', type=int, metavar='N', help='seed of every noise stream')
     arguments.add_new_bag(parser)
     console.add_json(parser)
     console.add_explain(parser)
     arguments.add_param(parser)
-    parser.add_argument('--tle', type=pathlib.Path, metavar='FILE', help='track this satellite: TLE, or OMM as KVN, '
-                        'XML, JSON, CSV')
-    parser.add_argument('--satellite', default='', metavar='NAME', help='name or number, where the file has '
+    parser.add_argument('--tle', type=pathlib.Path, metavar='FILE', help='orbit of the satellite to track: TLE, or '
+                        'OMM as KVN, XML, JSON or CSV')
+    parser.add_argument('--satellite', default='', metavar='NAME', help='name or number of the satellite in a file of '
                         'several')
-    parser.add_argument('--station', metavar='LAT,LON,H', help='where the antenna stands: degrees, degrees, metres')
-    parser.add_argument('--pass', dest='which', metavar='WHICH', help='from rise to set: next, the number N or a UTC '
-                        '(2019-12-10T12:35) of a pass; list: print the passes. Default with --tle: next')
+    parser.add_argument('--station', metavar='LAT,LON,H', help='place of the antenna: latitude [deg], longitude '
+                        '[deg], height [m]')
+    parser.add_argument('--pass', dest='which', metavar='WHICH', help='pass to track from rise to set: next, a number '
+                        'of the list, or a UTC such as 2019-12-10T12:35 for the pass at or after that time; list: '
+                        'print the passes; default with --tle: next')
     arguments.add_params_file(parser)
     from pedestal_bringup.graph import operator_servers
     operator_servers.add_arguments(parser)
 
 
 MAX_LOST_STEP_SHARE = 0.01
-"""Share of its steps that a drive in realtime may lose, beside those of an announced restart."""
+"""Largest share of lost steps of a realtime run, outside announced restarts."""
 
 
-def main(options):
-    """Run, record and print the results; the exit code. Raises RuntimeError where the recording is not complete."""
+def main(options: argparse.Namespace) -> int:
+    """Run, record and print the results. Return the exit code. Raises RuntimeError for an incomplete recording."""
     from pedestal_bringup.graph import graph, operator_servers
     from pedestal_bringup.scenario.program import Plan
     from pedestal_common.graph import nodes
@@ -51,12 +63,12 @@ def main(options):
         print(line)
     with operator_servers.servers(options, chosen.header, bag):
         outcome = graph.run(plan, bag, console.progress_of_run(chosen.header.duration))
-    # With scipy, which takes half a second: nobody waits for it before the first step.
+    # Because these modules import scipy, which takes half a second, they are loaded after the run.
     from pedestal_analysis.results import results
     from pedestal_recording.bag import read
     from pedestal_recording.verify import verify
     if outcome.stopped:
-        print(f'pedestal: stopped; what was recorded is in {bag}', file=sys.stderr)
+        print(f'pedestal: stopped; the recorded part is in {bag}', file=sys.stderr)
         if not outcome.recorder.get('messages'):
             return stop.STOP_EXIT_CODE
     recording = read(bag)
@@ -82,21 +94,20 @@ def main(options):
     if not realtime and check.aborted or not (check.complete or outcome.restarts):
         raise RuntimeError('the recording is not complete:\n' + '\n'.join(check.lines()))
     if not check.complete:
-        print('pedestal: the recording has gaps, a node was started again:\n' + '\n'.join(check.problems),
+        print('pedestal: the recording has gaps because a node was restarted:\n' + '\n'.join(check.problems),
               file=sys.stderr)
     planned = chosen.header.duration / chosen.node_parameters(nodes.DRIVE_NODE).period
     disturbed = [check.ending] if check.aborted else []
     if outcome.losses > MAX_LOST_STEP_SHARE * planned:
-        disturbed.append(f'the drive lost {outcome.losses} of {planned:.0f} steps, more than {MAX_LOST_STEP_SHARE:.0%}, '
-                         'outside announced restarts')
+        disturbed.append(f'the drive lost {outcome.losses} of {planned:.0f} steps, more than '
+                         f'{MAX_LOST_STEP_SHARE:.0%}, outside announced restarts')
     for reason in disturbed:
         print(f'pedestal: {reason}', file=sys.stderr)
     return console.EXIT_DISTURBED if disturbed else 0
 
 
-def _chosen(options):
-    """The Scenario that the options name, with their satellite, station and pass; None where the passes were listed
-    instead."""
+def _chosen(options: argparse.Namespace) -> 'Scenario | None':
+    """Return the Scenario with the satellite, station and pass of the options; None after listing the passes."""
     from pedestal_bringup.scenario import scenario
     changes = (scenario.file_overrides(options.params_file) if options.params_file else []) + options.param
     duration = options.duration
@@ -112,11 +123,11 @@ def _chosen(options):
     draft = scenario.draft(options.scenario)
     if options.tle or options.which:
         now = datetime.datetime.now(datetime.timezone.utc).replace(tzinfo=None)
-        sky = satellite.PassSelection(draft.changed(changes), now)
+        selection = satellite.PassSelection(draft.changed(changes), now)
         if options.which == 'list':
-            sky.list()
+            selection.print_passes()
             return None
-        start, length, line = sky.choose(options.which or 'next')
+        start, length, line = selection.choose(options.which or 'next')
         print(line)
         changes, duration = start + changes, duration or length
     return scenario.checked(draft.changed(changes), options.seed, duration, options.pacing)

@@ -1,20 +1,22 @@
-"""the state of a running antenna
+"""print the state of a running antenna
 
-Angles, rates, errors, mode and reason, receiver, drive and what is not well; exit code 0 where all is well, 1 where a
-node says otherwise or none answers.
+Prints angles, rates, errors, mode and its reason, receiver, drive, and the nodes that report a warning or an error.
+Exit code 0: every node reports OK. Exit code 1: a node reports a warning or an error, is silent, or no graph runs.
 """
+import argparse
+
 from pedestal.verbs import arguments
 
 
-def add_arguments(parser):
-    """Where to write it, how long to listen."""
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add file of the rows and the options of a client."""
     from pedestal_analysis import console
     console.add_json(parser)
     arguments.add_remote(parser)
 
 
-def main(options):
-    """Listen for as long as it takes to hear the control unit, then print."""
+def main(options: argparse.Namespace) -> int:
+    """Wait for the state of the control unit and print it. Return the exit code."""
     import json
 
     from pedestal_operator import state

@@ -1,1 +1,1 @@
-"""Verbs for a choice: scenarios, parameters, studies, trials, tuning, benchmarks."""
+"""Verbs for the design of an antenna: scenarios, parameters, studies, trials, tuning, benchmarks."""

@@ -1,19 +1,21 @@
-"""measure this machine: the lockstep ring, the compiled core, bags"""
+"""measure the speed of this machine: lockstep ring, compiled core, recordings"""
+import argparse
 import importlib
+import typing
 
 from pedestal_analysis import console
 from pedestal_studies import bench
 
 
-def add_arguments(parser):
-    """What to measure, --json."""
-    parser.add_argument('what', nargs='?', choices=tuple(bench.BENCH_MODULES), help='default: all')
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the benchmark and the file of the rows."""
+    parser.add_argument('what', nargs='?', choices=tuple(bench.BENCH_MODULES), help='benchmark to run; default: all')
     console.add_json(parser)
 
 
-def main(options):
-    """Run one or all benches and write the rows."""
-    content = {'name': 'bench', 'rows': []}
+def main(options: argparse.Namespace) -> int:
+    """Run one benchmark or all, and write the rows. Return exit code 0."""
+    content: dict[str, typing.Any] = {'name': 'bench', 'rows': []}
     for what in (options.what,) if options.what else bench.BENCH_MODULES:
         content['rows'] += importlib.import_module(f'{bench.__name__}.{bench.BENCH_MODULES[what]}').run()
     console.write_json(options.json, content)

@@ -1,16 +1,18 @@
 """write a scenario of your own antenna from the numbers of its data sheet
 
-What the data sheet does not say is scaled from the antenna that comes with the product; every value is explained in
-the file. `pedestal tune FILE --loops` then finds the loops for it and measures their margins."""
+Values that the data sheet lacks are scaled from the antenna that comes with the product. A comment in the file
+explains each value. `pedestal tune FILE --loops` then tunes the loops and measures their margins.
+"""
+import argparse
 import pathlib
 
 from pedestal_common import parameters
 
 
-def add_arguments(parser):
-    """The file, and the numbers of the data sheet."""
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the file and the numbers of the data sheet."""
     from pedestal_analysis.tuning.data_sheet_format import DataSheet
-    parser.add_argument('file', type=pathlib.Path, metavar='FILE.yaml')
+    parser.add_argument('file', type=pathlib.Path, metavar='FILE.yaml', help='new scenario file')
     for name, field in parameters.flatten(DataSheet):
         unit = field.metadata.get('unit')
         allowed = ', '.join(field.metadata.get('options', ()))
@@ -20,14 +22,14 @@ def add_arguments(parser):
                             help=described.replace('%', '%%'))
 
 
-def main(options):
-    """Write the file. Raises ValueError for what cannot be, FileExistsError where it is there."""
+def main(options: argparse.Namespace) -> int:
+    """Write the file. Return exit code 0. Raises ValueError for a wrong value, FileExistsError for an old file."""
     from pedestal_analysis.tuning import antenna_from_data_sheet
     from pedestal_analysis.tuning.data_sheet_format import DataSheet
     if options.file.suffix not in ('.yaml', '.yml'):
-        raise ValueError(f'{options.file}: must end in .yaml, as every scenario')
+        raise ValueError(f'{options.file}: must end in .yaml or .yml')
     if options.file.exists():
-        raise FileExistsError(f'{options.file} is there already and is not overwritten')
+        raise FileExistsError(f'{options.file} already exists and is not overwritten')
     sheet = DataSheet(**{name: getattr(options, name) for name, _ in parameters.flatten(DataSheet)})
     options.file.write_text(antenna_from_data_sheet.new(sheet, options.file.stem, options.command))
     print(f'written: {options.file}  (pedestal tune {options.file} --loops)')

@@ -1,14 +1,19 @@
 """list the parameters of a node: default, range, unit, meaning"""
+import argparse
+import typing
+from collections.abc import Mapping
+
 from pedestal_analysis import console
 
 
-def add_arguments(parser):
-    """The node."""
-    parser.add_argument('node', help='acu, adu, beam_steering, tracking_receiver, ship_motion, ins, recorder ...')
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the node."""
+    parser.add_argument('node', help='name of the node: acu, adu, beam_steering, tracking_receiver, ship_motion, ins, '
+                        'recorder ...')
 
 
-def main(options):
-    """Print a row for each parameter of the node, and for those of the graph that every node has."""
+def main(options: argparse.Namespace) -> int:
+    """Print a row for each parameter of the node and of the graph. Return exit code 0."""
     from pedestal_bringup.scenario import scenario
     from pedestal_common import parameters
     from pedestal_common.graph.graph_parameters import GraphParameters
@@ -21,7 +26,7 @@ def main(options):
     return 0
 
 
-def _columns(meta, value):
+def _columns(meta: Mapping[str, typing.Any], value: object) -> tuple[str, str, str]:
     allowed = f'{meta["low"]:g} to {meta["high"]:g}' if 'low' in meta else ' | '.join(meta.get('options', ()))
     unit = f' [{meta["unit"]}]' if meta.get('unit') else ''
     return f'{value:g}' if isinstance(value, float) else str(value), allowed, f'{meta["doc"]}{unit}'

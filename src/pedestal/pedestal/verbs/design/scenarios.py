@@ -1,13 +1,15 @@
-"""list the scenarios"""
+"""list the scenarios that come with the product"""
+import argparse
+
 from pedestal_analysis import console
 
 
-def add_arguments(parser):
-    """The verb has none."""
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add nothing: the verb has no arguments."""
 
 
-def main(_options):
-    """Print name and title of every scenario."""
+def main(_options: argparse.Namespace) -> int:
+    """Print name and title of every scenario. Return exit code 0."""
     from pedestal_bringup.scenario import scenario
     console.show_list(scenario.available().items())
     return 0

@@ -1,37 +1,49 @@
-"""measure the compiled closed loop against the papers: rows and figures"""
+"""measure the compiled closed loop against the papers
+
+Prints a table with remarks and draws the figures of the study.
+"""
+import argparse
 import contextlib
 import functools
 import inspect
 import pathlib
 import sys
+import types
+import typing
+from collections.abc import Callable
 
 from pedestal.verbs import arguments
 from pedestal_analysis import console
 from pedestal_common.parameters import did_you_mean
 
 
-def add_arguments(parser):
-    """Name, output folder, runs and who works on them."""
-    parser.add_argument('name', nargs='?', metavar='NAME', help='without one: list the studies')
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add name, output folder, number of runs and their processes."""
+    parser.add_argument('name', nargs='?', metavar='NAME', help='name of the study; default: list the studies')
     console.add_json(parser)
-    parser.add_argument('--output', type=pathlib.Path, metavar='DIR', help='of the figures; default: studies/NAME')
-    parser.add_argument('--runs', type=int, metavar='N', help='of each case; default: what the study says')
+    parser.add_argument('--output', type=pathlib.Path, metavar='DIR', help='output folder of the figures; default: '
+                        'studies/NAME')
+    parser.add_argument('--runs', type=int, metavar='N', help='number of runs of each case; default: number of '
+                        'the study')
     arguments.add_vector(parser)
-    parser.add_argument('--scenario', metavar='SCENARIO', help='servo, backlash, bode: of your own plant, a name or a '
-                        "path of a .yaml, in the place of the paper's")
+    parser.add_argument('--scenario', metavar='SCENARIO', help='scenario (name or .yaml file) whose plant '
+                        'replaces the plant of the paper, for studies servo, backlash and bode')
     arguments.add_workers(parser)
 
 
-def main(options):
-    """Run the study, print its table and remarks, draw its figures; without a name list them; exit code 2 for an
-    unknown one."""
+def main(options: argparse.Namespace) -> int:
+    """Run a study, print its table and remarks, draw its figures; without a name list the studies.
+
+    Return the exit code, 2 for an unknown study.
+    """
     import pedestal_studies
     if not options.name:
         console.show_list(pedestal_studies.descriptions().items())
         return 0
     if options.name not in pedestal_studies.STUDY_NAMES:
-        print(f'pedestal: error: unknown study {options.name!r};{did_you_mean(options.name, pedestal_studies.STUDY_NAMES)} '
-              f'there are {", ".join(pedestal_studies.STUDY_NAMES)}', file=sys.stderr)
+        guess = did_you_mean(options.name, pedestal_studies.STUDY_NAMES)
+        print(f'pedestal: error: unknown study {options.name!r};{guess} there are '
+              f'{", ".join(pedestal_studies.STUDY_NAMES)}', file=sys.stderr)
         return console.EXIT_WRONG_COMMAND
     from pedestal_analysis.results import intervals
     from pedestal_studies.rigs import drawing
@@ -57,27 +69,28 @@ def main(options):
     return 0
 
 
-def _of_scenario(options):
-    """function(progress) of the study for the plant of --scenario."""
+def _of_scenario(options: argparse.Namespace) -> Callable[..., typing.Any]:
+    """Return the function(progress) that runs the study for the plant of --scenario."""
     from pedestal_studies import plant_studies
     if options.name not in plant_studies.PLANT_STUDIES:
-        raise ValueError(f"--scenario: study {options.name} is of the papers' plant; any plant have "
+        raise ValueError(f'--scenario: study {options.name} has the plant of the papers; must be one of '
                          f'{", ".join(plant_studies.PLANT_STUDIES)}')
     for name in ('runs', 'workers', 'scheduler'):
         if getattr(options, name) is not None:
-            raise ValueError(f'--{name}: does not go with --scenario, which is one run of each case')
+            raise ValueError(f'--{name}: does not go with --scenario, which makes one run of each case')
     return functools.partial(plant_studies.PLANT_STUDIES[options.name], options.scenario)
 
 
-def _many_runs(options, study, stack):
-    """Keyword arguments of a study of many runs beside its progress; the pool is closed with the stack."""
-    asked = {name: getattr(options, name) for name in ('runs', 'workers', 'scheduler')}
+def _many_runs(options: argparse.Namespace, study: types.ModuleType,
+               stack: contextlib.ExitStack) -> dict[str, typing.Any]:
+    """Return the keyword arguments of a study of many runs, except its progress. The stack closes the pool."""
+    given = {name: getattr(options, name) for name in ('runs', 'workers', 'scheduler')}
     if 'runs' not in inspect.signature(study.run).parameters:
-        for name, value in asked.items():
+        for name, value in given.items():
             if value is not None:
                 raise ValueError(f'--{name} {value}: study {options.name} has one run of each case')
         return {}
-    if asked['runs'] is not None and asked['runs'] < 1:
+    if given['runs'] is not None and given['runs'] < 1:
         raise ValueError(f'--runs {options.runs}: must be at least 1')
     from pedestal_analysis.trials import monte_carlo
     return {'runs': options.runs or study.DEFAULT_RUNS,

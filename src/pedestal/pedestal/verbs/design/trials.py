@@ -1,46 +1,59 @@
 """run a scenario many times with varied parameters: percentiles, rates, sensitivities, the worst trials
 
-Each trial has a seed of its own and the results of `pedestal run`, from the closed loop without ROS; the commands of
-the worst ones give the same numbers in the graph. --vary NODE.KEY=DISTRIBUTION draws a parameter: uniform(low, high),
-normal(mean, sigma) or choice(a, b, ...), with an x behind it a factor of what the scenario says; or it names a .csv
-whose columns are parameters and whose rows are trials. Rows are written to OUTPUT/trials.csv as they come; after
-Ctrl-C, or worse, the same command goes on. With --against or --against-param the trials of two sides are compared
-pair by pair: the same seeds and draws for both."""
+Each trial has its own seed and the results of `pedestal run`. A trial runs in the closed loop without ROS. The printed
+commands of the worst trials give the same numbers in the graph.
+
+--vary NODE.KEY=DISTRIBUTION draws a parameter from uniform(low, high), normal(mean, sigma) or choice(a, b, ...). An x
+after the distribution multiplies the value of the scenario by the drawn number. --vary FILE.csv reads the trials from
+a file with a column for each parameter and a row for each trial.
+
+Rows are written to OUTPUT/trials.csv as soon as they exist. After Ctrl-C or a crash the same command continues.
+--against and --against-param compare the trials of two sides pair by pair, with the same seeds and draws.
+"""
+import argparse
 import contextlib
 import pathlib
 import sys
+import typing
+from collections.abc import Iterable, Mapping
 
 from pedestal.verbs import arguments
 from pedestal_analysis import console
 
+if typing.TYPE_CHECKING:
+    from pedestal_analysis.trials.plan import Plan
+
 WORST_TRIAL_COUNT = 10
-"""Trials whose commands are printed."""
+"""Number of the worst trials whose commands are printed."""
 
 
-def add_arguments(parser):
-    """Scenario, what is varied, how often, who works, what it is compared with."""
-    parser.add_argument('scenario', help='name (see `pedestal scenarios`) or path of a .yaml')
-    parser.add_argument('--runs', type=int, metavar='N', help='trials; default: 100, or the rows of a .csv')
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add scenario, varied parameters, number and processes of the trials, and the other side of a comparison."""
+    arguments.add_scenario(parser)
+    parser.add_argument('--runs', type=int, metavar='N', help='number of trials; default: 100, or the rows of a .csv')
     parser.add_argument('--vary', action='append', default=[], metavar='NODE.KEY=DISTRIBUTION|FILE.csv',
-                        help="for example 'adu.azimuth.load.inertia=normal(1, 0.1)x'; may be repeated")
+                        help="varied parameter, for example 'adu.azimuth.load.inertia=normal(1, 0.1)x', or file of "
+                        'trials; may be repeated')
     parser.add_argument('--sobol', action='store_true', help='draw the points of a Sobol sequence, which fill the '
                         'ranges evenly')
-    parser.add_argument('--duration', type=float, metavar='S', help='of a trial')
-    parser.add_argument('--seed', type=int, metavar='N', help='of the first trial; default: what the scenario says')
+    arguments.add_duration(parser, 'a trial')
+    parser.add_argument('--seed', type=int, metavar='N', help='seed of the first trial; default: value of the '
+                        'scenario')
     arguments.add_param(parser)
     arguments.add_params_file(parser)
-    parser.add_argument('--against', metavar='SCENARIO', help='compare with another scenario')
+    parser.add_argument('--against', metavar='SCENARIO', help='scenario to compare with')
     parser.add_argument('--against-param', action='append', default=[], metavar='NODE.KEY=VALUE',
-                        help='compare with this change; may be repeated')
-    parser.add_argument('--by', metavar='RESULT', help='the result that ranks the trials and decides a comparison; '
+                        help='parameter and its value on the side to compare with; may be repeated')
+    parser.add_argument('--by', metavar='RESULT', help='result that ranks the trials and decides a comparison; '
                         'default: pointing_rms_deg')
     arguments.add_workers(parser)
-    parser.add_argument('--output', type=pathlib.Path, metavar='DIR', help='default: trials/SCENARIO')
+    parser.add_argument('--output', type=pathlib.Path, metavar='DIR', help='output folder; default: '
+                        'trials/SCENARIO')
     console.add_json(parser)
 
 
-def main(options):
-    """Make the trials, print what they say, write table, page and rows."""
+def main(options: argparse.Namespace) -> int:
+    """Run the trials, print their statistics, write table, page and rows. Return exit code 0."""
     from pedestal_analysis.report import trials_page
     from pedestal_analysis.trials import comparison, ensemble, monte_carlo, statistics
     plans = _plans(options)
@@ -55,7 +68,7 @@ def main(options):
             ensemble.make(plans, tables, pool, progress)
         except KeyboardInterrupt:
             print(f'pedestal: {sum(len(table.rows) for table in tables)} of {sum(plan.runs for plan in plans)} trials '
-                  f'are in {folder}; the same command goes on', file=sys.stderr)
+                  f'are in {folder}; the same command continues', file=sys.stderr)
             raise
     names = comparison.names(*plans) if len(plans) > 1 else (plans[0].name,)
     sides = comparison.Sides(*names, *tables) if len(plans) > 1 else None
@@ -79,8 +92,8 @@ def main(options):
     return 0
 
 
-def _plans(options):
-    """The plan.Plan of the trials, and that of what they are compared with."""
+def _plans(options: argparse.Namespace) -> 'list[Plan]':
+    """Return the Plan of the trials and, for a comparison, the Plan of the other side."""
     from pedestal_analysis.trials.plan import plan
     from pedestal_bringup.scenario import scenario
     changes = (*(scenario.file_overrides(options.params_file) if options.params_file else ()), *options.param)
@@ -91,8 +104,8 @@ def _plans(options):
                         (*changes, *options.against_param), first.seed, options.duration, options.sobol)]
 
 
-def _sensitivities(rows, by):
-    """Lines: how the ranking result goes with the varied parameters, the strongest first."""
+def _sensitivities(rows: Iterable[Mapping[str, typing.Any]], by: str) -> list[str]:
+    """Return lines with the correlation of the ranking result with each varied parameter, the strongest first."""
     found = [row for row in rows if row['metric'].startswith(f'{by}/rank_correlation(')]
     return [f'{row["metric"]}: {console.number(row["value"])} ({console.interval(row)})'
             for row in sorted(found, key=lambda row: -abs(row['value']))]

@@ -1,1 +1,1 @@
-"""Verbs for a recording: verify, mend, report, export, and make it again."""
+"""Verbs for a recording: verify, recover, report, export, rerun, recompute, replay."""

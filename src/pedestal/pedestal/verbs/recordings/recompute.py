@@ -1,51 +1,57 @@
 """feed recorded inputs to a node again and compare its outputs
 
-Feeds the recorded inputs of a node to its step function and compares its outputs with the recorded ones: count and
-order of the messages first, then every field. Exit code 1 when something differs beyond its tolerance, or when the
+Feeds the recorded inputs of a node to its step function and compares the new outputs with the recorded outputs: first
+count and order of the messages, then every field. Exit code 1 if a field differs by more than its tolerance, or if the
 recording never exercised the node (never locked, never in autotrack, never moved).
 
-Exact for a lockstep recording: the same version on the same machine gives the same bits. In a realtime recording a
-step gets the messages sent before the next one began, which the node had too, except for those still on their way.
-Services are not recorded: a change of acu/mode or adu/state that the node would not make by itself is requested at
-that step, and counted. Parameters that were changed while running are not recorded. Diagnostics are not recomputed.
+A lockstep recording is recomputed exactly: the same version on the same machine gives the same bits. In a realtime
+recording a step gets all messages that were sent before the next step began. A message that was then still in transit
+reached the recorded node later, so small differences are normal.
 
-With --param it does not fail but compares old with new. The recorded antenna does not move with the recomputed
-command, so the comparison covers the estimate against the recorded truth (error, noise, lag) and the noise of the
-command; the effect of a parameter on the pointing needs a new run."""
+A bag holds the replies to service requests, not the requests. A change of acu/mode or adu/state without a recorded
+cause is therefore requested again at its step, and counted. Changes of parameters during the run are not recorded.
+Diagnostics are not recomputed.
+
+With --param the verb compares old with new results, and a difference is no failure. Because the recorded antenna does
+not follow the recomputed command, only two results are compared: the estimate against the recorded truth (error,
+noise, lag), and the noise of the command. The effect of a parameter on the pointing needs a new run.
+"""
+import argparse
 import pathlib
 
 from pedestal.verbs import arguments
 from pedestal_analysis import console
 
 
-def add_arguments(parser):
-    """Bag, beam, nodes, changed parameters, tolerances, output."""
-    parser.add_argument('bag', type=pathlib.Path)
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add bag, beam, nodes, changed parameters, tolerances, output."""
+    parser.add_argument('bag', type=pathlib.Path, help='recording: a folder or an .mcap file')
     arguments.add_beam(parser)
     parser.add_argument('--node', action='append', default=[], metavar='NODE',
-                        help='acu, adu, tracking_receiver, ins or ship_motion; may be repeated; default: every node')
+                        help='node to recompute: acu, adu, tracking_receiver, ins or ship_motion; may be repeated; '
+                        'default: every node')
     parser.add_argument('--param', action='append', default=[], metavar='[NODE.]KEY=VALUE',
-                        help='change a parameter and report old against new; may be repeated')
+                        help='parameter and its new value, for a comparison of old and new; may be repeated')
     parser.add_argument('--params-file', type=pathlib.Path, metavar='FILE',
-                        help='scenario or parameter file of the recorded nodes, where the bag does not say')
+                        help='scenario or parameter file of the recorded nodes, for a bag without parameters')
     parser.add_argument('--pacing', choices=('lockstep', 'realtime'),
-                        help='how inputs belong to steps; default: as the bag says, else realtime')
-    parser.add_argument('--absolute', type=float, metavar='X', help='tolerance of every field, in its unit; default: '
-                        'by kind of field')
-    parser.add_argument('--relative', type=float, metavar='X', help='and relative to the recorded value; default: '
-                        '1e-9')
+                        help='rule that assigns inputs to steps; default: pacing in the bag, else realtime')
+    parser.add_argument('--absolute', type=float, metavar='X', help='absolute tolerance of every field, in its unit; '
+                        'default: by kind of field')
+    parser.add_argument('--relative', type=float, metavar='X', help='additional tolerance relative to the recorded '
+                        'value; default: 1e-9')
     parser.add_argument('--ignore', action='append', default=[], metavar='PATTERN',
                         help="topics or topic.field not to compare, for example 'acu/reference*'; may be repeated")
-    parser.add_argument('--allow-idle', action='store_true', help='compare also where the node was never exercised')
-    parser.add_argument('--live', action='store_true', help='feed the real node process, in lockstep over DDS')
+    parser.add_argument('--allow-idle', action='store_true', help='do not fail for a node that was never exercised')
+    parser.add_argument('--live', action='store_true', help='feed a process of the node, in lockstep over DDS')
     console.add_json(parser)
     console.add_explain(parser)
     parser.add_argument('--output', type=pathlib.Path, metavar='BAG',
-                        help='write the recording again, with the recomputed outputs in place of the recorded')
+                        help='new bag: the recording with recomputed outputs in place of the recorded outputs')
 
 
-def main(options):
-    """Recompute and print the comparison; exit code 1 where it fails."""
+def main(options: argparse.Namespace) -> int:
+    """Recompute and print the comparison. Return the exit code, 1 for a failed comparison."""
     from pedestal_analysis.reprocess import recompute_report
     lines, rows, well = recompute_report.main(options)
     print('\n'.join(lines))

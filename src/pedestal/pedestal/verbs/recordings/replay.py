@@ -1,31 +1,40 @@
-"""publish a recording into a live graph"""
+"""publish a recording into a running graph
+
+Exit code 0: every message was published. 130: the replay was stopped, for example by Ctrl-C.
+"""
+import argparse
 import pathlib
 
 
-def add_arguments(parser):
-    """Bag, which topics, pace, part of the recording."""
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add bag, topics, pace and part of the recording."""
     from pedestal_bringup.graph import operator_servers
-    parser.add_argument('bag', type=pathlib.Path)
+    parser.add_argument('bag', type=pathlib.Path, help='recording: a folder or an .mcap file')
     into = parser.add_mutually_exclusive_group()
     into.add_argument('--node', nargs='+', action='extend', default=[], metavar='NAME',
-                      help='the topics these nodes read, for example acu; default: every topic')
-    into.add_argument('--topics', nargs='+', action='extend', default=[], metavar='NAME', help='these topics')
+                      help='nodes whose subscribed topics are published, for example acu; default: every topic')
+    into.add_argument('--topics', nargs='+', action='extend', default=[], metavar='NAME', help='topics to '
+                      'publish')
     pace = parser.add_mutually_exclusive_group()
-    pace.add_argument('--rate', type=float, default=1.0, metavar='X', help='times real time; default: 1')
-    pace.add_argument('--lockstep', action='store_true', help='a step when the nodes have answered the one before')
-    parser.add_argument('--start', type=float, default=0.0, metavar='S', help='begin this far into the recording')
-    parser.add_argument('--duration', type=float, metavar='S', help='of the recording; default: to its end')
-    parser.add_argument('--paused', action='store_true', help='begin with a pause')
+    pace.add_argument('--rate', type=float, default=1.0, metavar='X', help='speed of the replay as a multiple of real '
+                      'time; default: 1')
+    pace.add_argument('--lockstep', action='store_true', help='publish a step after the nodes have answered the '
+                      'previous step')
+    parser.add_argument('--start', type=float, default=0.0, metavar='S', help='time of the recording at which '
+                        'the replay begins [s]; default: 0')
+    parser.add_argument('--duration', type=float, metavar='S', help='length of the replayed part [s]; default: to '
+                        'the end')
+    parser.add_argument('--paused', action='store_true', help='start in pause')
     parser.add_argument('--page', nargs='?', type=operator_servers.port, const=operator_servers.SERVERS['page'].port,
                         metavar='PORT',
-                        help="show it on the operator's page with a slider, without a graph; default port: "
-                             f"{operator_servers.SERVERS['page'].port}")
+                        help="TCP port of the operator's page, which shows the recording with a slider and without a "
+                             f"graph; default: {operator_servers.SERVERS['page'].port}")
     parser.add_argument('--deadline', type=float, default=60.0, metavar='S',
-                        help='wall-clock time a reader or an answer is waited for; default: 60')
+                        help='longest wait for a subscriber or an answer, in wall-clock time [s]; default: 60')
 
 
-def main(options):
-    """Replay and print the outcome; raises KeyboardInterrupt where it was stopped."""
+def main(options: argparse.Namespace) -> int:
+    """Replay and print the outcome. Return exit code 0. Raises KeyboardInterrupt if the replay was stopped."""
     if options.page is not None:
         return _on_the_page(options)
     from pedestal_analysis.reprocess.replay import ReplayOptions, replay
@@ -38,12 +47,13 @@ def main(options):
     return 0
 
 
-def _on_the_page(options):
-    """Show the recording until Ctrl-C; exit code 0."""
+def _on_the_page(options: argparse.Namespace) -> int:
+    """Show the recording on the operator's page until Ctrl-C. Return exit code 0."""
     from pedestal_analysis.reprocess import replay, replay_page
     from pedestal_recording import bag
     if options.node or options.topics or options.lockstep or options.duration:
-        raise ValueError('--page: takes --start, --rate and --paused; everything else is for a replay into a graph')
+        raise ValueError('--page: goes only with --start, --rate and --paused; other options are for a replay into a '
+                         'graph')
     wanted = replay.ReplayOptions(rate=options.rate, start=options.start, paused=options.paused)
     player = replay_page.Player(replay_page.Recording(bag.read(options.bag, '')), options.page, wanted)
     with replay.stop_by_signal() as stopped:

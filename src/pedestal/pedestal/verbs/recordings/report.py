@@ -1,20 +1,23 @@
 """write a recording as one HTML file with its figures"""
+import argparse
 import pathlib
 
 from pedestal.verbs import arguments
 
 
-def add_arguments(parser):
-    """Bag, beam, output file, folder of the figures."""
-    parser.add_argument('bag', type=pathlib.Path)
-    parser.add_argument('--output', type=pathlib.Path, metavar='FILE', help='default: report.html in the bag')
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add bag, beam, output file and folder of the figures."""
+    parser.add_argument('bag', type=pathlib.Path, help='recording: a folder or an .mcap file')
+    parser.add_argument('--output', type=pathlib.Path, metavar='FILE', help='output file; default: report.html in '
+                        'the bag')
     arguments.add_beam(parser)
-    parser.add_argument('--png', type=pathlib.Path, metavar='DIR', help='also write each figure as PNG')
+    parser.add_argument('--png', type=pathlib.Path, metavar='DIR', help='folder in which each figure is also '
+                        'written as PNG')
     arguments.add_vector(parser)
 
 
-def main(options):
-    """Write the report and print its path."""
+def main(options: argparse.Namespace) -> int:
+    """Write the report and print its path. Return exit code 0."""
     from pedestal_analysis.report import page
     if options.vector and not options.png:
         raise ValueError(f'--vector {options.vector}: needs --png DIR, the folder of the figures')

@@ -1,18 +1,22 @@
-"""make a recorded run again and compare; exit code 1 when a message differs"""
+"""repeat a recorded run and compare the two recordings
+
+Exit code 1 if a message differs.
+"""
+import argparse
 import pathlib
 
 from pedestal.verbs import arguments
 from pedestal_analysis import console
 
 
-def add_arguments(parser):
-    """Recording and bag of the new run."""
-    parser.add_argument('recording', type=pathlib.Path)
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add recording and bag of the new run."""
+    parser.add_argument('recording', type=pathlib.Path, help='recording of the first run: a folder or an .mcap file')
     arguments.add_new_bag(parser)
 
 
-def main(options):
-    """Make the run and print the comparison; exit code 1 where a message differs."""
+def main(options: argparse.Namespace) -> int:
+    """Repeat the run and print the comparison. Return the exit code, 1 if a message differs."""
     from pedestal_analysis.reprocess import rerun
     from pedestal_bringup.graph import graph
     from pedestal_bringup.scenario.program import Plan

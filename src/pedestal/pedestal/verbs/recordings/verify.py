@@ -1,14 +1,18 @@
-"""prove that a recording is complete up to the planned end of its run; exit code 1 with the gaps if not"""
+"""prove that a recording is complete up to the planned end of its run
+
+Exit code 1, with a list of the gaps, for an incomplete recording.
+"""
+import argparse
 import pathlib
 
 
-def add_arguments(parser):
-    """The bag."""
-    parser.add_argument('bag', type=pathlib.Path)
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the bag."""
+    parser.add_argument('bag', type=pathlib.Path, help='recording: a folder or an .mcap file')
 
 
-def main(options):
-    """Print the check; exit code 1 where the bag is not complete."""
+def main(options: argparse.Namespace) -> int:
+    """Print the check. Return the exit code, 1 for an incomplete bag."""
     from pedestal_recording.bag import load
     from pedestal_recording.verify import verify
     check = verify(load(options.bag))

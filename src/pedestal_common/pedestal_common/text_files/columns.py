@@ -1,0 +1,140 @@
+"""Columns of a table by their names: the quantity, and the unit behind it, as in time_s, `az [deg]`, `Azimuth (rad)`.
+
+The whole name is read. A name of a quantity and a known unit is a candidate; `az_rate` or `time_local` is another
+quantity, because `rate` and `local` are no units. Two candidates are refused by both names.
+"""
+import math
+import re
+import typing
+
+UTC, JULIAN_DATE, MODIFIED_JULIAN_DATE = 'UTC', 'JD', 'MJD'
+"""Units of a time with a date: a calendar date (or seconds since 1970), a Julian date, a modified Julian date."""
+
+_UNIT_NAMES = {
+    's': {'s': ('s', 'sec', 'secs', 'second', 'seconds'),
+          'ms': ('ms', 'msec', 'millis', 'millisecond', 'milliseconds'),
+          'us': ('us', 'µs', 'μs', 'usec', 'micros', 'microsecond', 'microseconds'),
+          'ns': ('ns', 'nsec', 'nanos', 'nanosecond', 'nanoseconds'),
+          'min': ('min', 'mins', 'minute', 'minutes'), 'h': ('h', 'hr', 'hrs', 'hour', 'hours'),
+          'd': ('d', 'day', 'days'), JULIAN_DATE: ('jd', 'jdut', 'jdutc', 'juliandate', 'juliandateutc'),
+          MODIFIED_JULIAN_DATE: ('mjd', 'mjdut', 'mjdutc')},
+    'deg': {'deg': ('deg', 'degs', 'degree', 'degrees', '°', 'º', 'true', 'degtrue'),
+            'rad': ('rad', 'rads', 'radian', 'radians'), 'mrad': ('mrad', 'mrads', 'milliradians')},
+    'm': {'m': ('m', 'meter', 'meters', 'metre', 'metres'), 'km': ('km', 'kilometer', 'kilometers', 'kilometre',
+                                                                   'kilometres'),
+          'cm': ('cm',), 'mm': ('mm',), 'ft': ('ft', 'foot', 'feet')},
+    'hz': {'hz': ('hz',), 'rad/s': ('rad/s', 'radpers')},
+    'm2_per_hz': {'m2/Hz': ('m2/hz', 'm^2/hz', 'm2perhz', 'm²/hz', 'm**2/hz'),
+                  'm2 s/rad': ('m2s/rad', 'm^2s/rad', 'm²s/rad', 'm2/rad/s', 'm^2/rad/s', 'm²/rad/s')}}
+_SIZES = {'s': 1.0, 'ms': 1e-3, 'us': 1e-6, 'ns': 1e-9, 'min': 60.0, 'h': 3600.0, 'd': 86400.0,
+          'deg': 1.0, 'rad': math.degrees(1.0), 'mrad': math.degrees(1e-3),
+          'm': 1.0, 'km': 1000.0, 'cm': 0.01, 'mm': 1e-3, 'ft': 0.3048,
+          'hz': 1.0, 'rad/s': 0.5 / math.pi, 'm2/Hz': 1.0, 'm2 s/rad': 2.0 * math.pi,
+          UTC: 1.0, JULIAN_DATE: 86400.0, MODIFIED_JULIAN_DATE: 86400.0}
+_UTC_PATTERN = re.compile(r'(ut|utc|utcg|gmt|z|zulu|utciso8601|iso8601|iso)?(hrmn(ss|sc)?(fff)?)?')
+"""Words behind the name of a time in UTC; HR:MN:SS.fff is of JPL Horizons, UTCG of STK."""
+_APPARENT_NAMES = ('aapp', 'aappr', 'rapp')
+"""Words of JPL Horizons behind an apparent angle in degrees."""
+_BETWEEN_PATTERN = re.compile(r'[\s_\[\](){}<>|,:;.\-"\']+')
+_CAMEL_CASE_PATTERN = re.compile(r'(?<=[a-z])(?=[A-Z])')
+_DERIVED_WORDS = ('rate', 'vel', 'speed', 'acc', 'err', 'sigma', 'std', 'qual', 'valid')
+"""Beginnings of words that make another quantity of the quantity before them."""
+MAX_LISTED_NAMES = 20
+"""Number of names of columns that an error lists."""
+
+
+class ColumnError(ValueError):
+    """The columns of a table do not give a quantity; one line that names the columns."""
+
+
+class Quantity(typing.NamedTuple):
+    """A quantity of a table.
+
+        label       its name in errors
+        names       {name: unit of a column without one}; '' for a column that must name its unit
+        unit        unit in which the reader takes the values, a key of the known units
+    """
+    label: str
+    names: dict
+    unit: str
+
+
+class Column(typing.NamedTuple):
+    """A column that was taken: its name in the file, the unit of its values, and the size of this unit."""
+    name: str
+    unit: str
+    size: float
+
+    def described(self):
+        """Return the name with the unit."""
+        return f'{self.name[:40]} in {self.unit}'
+
+
+def quantity(name):
+    """Return the Quantity of a name with a unit, as in time_s; a column must name its unit."""
+    word, _, unit = name.partition('_')
+    return Quantity(name, {word: ''}, unit)
+
+
+def find(names, wanted, required=True):
+    """Return the Column of a Quantity among the names of a table; None if no name begins with the quantity.
+
+    Raises ColumnError for two candidates, and for names with the quantity of which none has a known unit. The rate or
+    the error of a quantity that is not required is no such name.
+    """
+    found, others = [], []
+    for name in names:
+        unit = _unit(name, wanted)
+        if unit:
+            found.append(Column(name, unit, _SIZES[unit]))
+        elif unit == '' and (required or not _known(name, wanted)[1].startswith(_DERIVED_WORDS)):
+            others.append(name)
+    if len(found) > 1:
+        raise ColumnError(f'columns {found[0].name!r:.60} and {found[1].name!r:.60}: only one of them may be '
+                          f'the {wanted.label}: rename or remove the other')
+    if others and not found:
+        units = [*_UNIT_NAMES[wanted.unit], *([UTC] if wanted.unit == 's' else [])]
+        raise ColumnError(f'column {others[0]!r:.60}: must end with a known unit to be taken as {wanted.label}: '
+                          f'{", ".join(units[:-1])} or {units[-1]}')
+    return found[0] if found else None
+
+
+def named(names, wanted):
+    """Return True if one of the names of a table begins with the quantity, whatever follows."""
+    return any(_unit(name, wanted) is not None for name in names)
+
+
+def names_unit(name, wanted):
+    """Return True if the name of a column of a Quantity states a unit."""
+    return bool(_known(name, wanted)[1])
+
+
+def listed(names):
+    """Return the names of the columns of a table as a text for an error."""
+    more = f' and {len(names) - MAX_LISTED_NAMES} more' if len(names) > MAX_LISTED_NAMES else ''
+    return f'columns found: {", ".join(f"{name[:40]!r}" for name in names[:MAX_LISTED_NAMES]) or "none"}{more}'
+
+
+def _known(name, wanted):
+    """Return (known name of the quantity, rest without blanks and brackets) of a column; None for another quantity."""
+    for spaced in (name, _CAMEL_CASE_PATTERN.sub(' ', name)):
+        text = ' '.join(spaced.lower().replace('_', ' ').split())
+        for known in sorted(wanted.names, key=len, reverse=True):
+            if text.startswith(known) and not text[len(known):len(known) + 1].isalnum():
+                return known, _BETWEEN_PATTERN.sub('', text[len(known):]).removeprefix('/')
+    return None
+
+
+def _unit(name, wanted):
+    """Return the unit of a column, '' if the name has none that is known, None if it is another quantity."""
+    match = _known(name, wanted)
+    if not match:
+        return None
+    known, rest = match
+    if not rest:
+        return wanted.names[known]
+    if wanted.unit == 's' and _UTC_PATTERN.fullmatch(rest):
+        return UTC
+    if wanted.unit == 'deg' and rest in _APPARENT_NAMES:
+        return 'deg'
+    return next((unit for unit, texts in _UNIT_NAMES[wanted.unit].items() if rest in texts), '')

@@ -1,0 +1,89 @@
+"""Times in a column of a table: UTC as a date, Julian dates, or numbers in the unit of the column, from any origin."""
+from pedestal_common.graph.steps import SECONDS_PER_DAY
+from pedestal_common.text_files import columns, csv_table
+from tracking_receiver_sim.track import dates, instant
+
+TIME = columns.Quantity('time', {
+    **dict.fromkeys(('time', 'epoch', 'timestamp', 't'), 's'),
+    **dict.fromkeys(('utc', 'utc time', 'utc date', 'utcg', 'date', 'datetime', 'date time', 'date utc time'),
+                    columns.UTC),
+    **dict.fromkeys(('jd', 'jdut', 'jdutc', 'jd ut', 'jd utc', 'julian date', 'julian day'), columns.JULIAN_DATE),
+    **dict.fromkeys(('mjd', 'mjd ut', 'mjd utc'), columns.MODIFIED_JULIAN_DATE)}, 's')
+"""Names of the time in a table."""
+MODIFIED_JULIAN_DATE_ZERO = 2_400_000.5
+"""Julian date of the modified Julian date 0."""
+JULIAN_DATE_LIMITS = 2_400_000.5, 2_536_000.0
+"""Range of Julian dates: until 2231."""
+FIRST_EXPECTED_JULIAN_DATE = 2_440_000.5
+"""Julian date of 1968, before which no time in seconds looks like a Julian date."""
+MIN_UNIX_TIME_S = 1e8
+"""Least number of seconds since 1970 in a column of UTC [s]; a smaller number has another origin."""
+MIN_SPAN_S = 3.0
+"""Least time from the first row to the last if the times may also be days of a Julian date [s]."""
+
+
+class Times:
+    """The times of a column of a csv_table.Table, all with a date or all without.
+
+        dated       True: instants, see track.instant; False: seconds from any origin; None before the first row
+    """
+
+    def __init__(self, table, column):
+        self.table, self.column, self.dated = table, column, None
+        self.first = self.last = None
+
+    def seconds(self, row):
+        """Return the time of a row [s]. Raises TableError."""
+        value = self._seconds(row[self.column.name] or '')
+        self.first, self.last = value if self.first is None else self.first, value
+        return value
+
+    def _seconds(self, cell):
+        table, column = self.table, self.column
+        place = table.path, table.line_num, column.name
+        if column.unit in (columns.JULIAN_DATE, columns.MODIFIED_JULIAN_DATE):
+            self.dated = True
+            return julian(*place, table.point(column.name, cell), column.unit == columns.MODIFIED_JULIAN_DATE)
+        dated = column.unit == columns.UTC or column.unit == 's' and bool(
+            instant.ISO_TIME_PATTERN.fullmatch(dates.iso(cell)))
+        if self.dated not in (None, dated):
+            raise csv_table.TableError(f'{table.path}: line {table.line_num}: {column.name} = {cell!r:.60}: must be '
+                                       f'{"UTC as ISO 8601" if self.dated else "a number"} as in the lines above')
+        self.dated = dated
+        if not dated:
+            if column.unit == 's' and ':' in cell:
+                return instant.seconds(*place, cell)
+            return table.number(column, cell, -1e12, 1e12)
+        value = instant.seconds(*place, cell)
+        if value < MIN_UNIX_TIME_S and ':' not in cell:
+            raise csv_table.TableError(f'{table.path}: line {table.line_num}: {column.name} = {cell!r:.60}: must be '
+                                       f'UTC, for example {dates.DATE_EXAMPLES}, or at least {MIN_UNIX_TIME_S:g} s '
+                                       'since 1970; for seconds from another origin, name the column time_s')
+        return value
+
+    def described(self):
+        """Return the name of the column with the unit that was taken."""
+        return self.column._replace(unit=columns.UTC if self.dated else self.column.unit).described()
+
+    def check(self):
+        """Raise TableError after the last row if times taken as seconds look like days of a Julian date."""
+        if self.dated or self.column.unit != 's' or self.first is None or self.last - self.first >= MIN_SPAN_S:
+            return
+        for unit, zero in (('JD', 0.0), ('MJD', MODIFIED_JULIAN_DATE_ZERO)):
+            if FIRST_EXPECTED_JULIAN_DATE <= self.first + zero <= JULIAN_DATE_LIMITS[1]:
+                raise csv_table.TableError(
+                    f'{self.table.path}: line {self.table.head_line}: {self.column.name} = {self.first:.10g} to '
+                    f'{self.last:.10g} s: must last at least {MIN_SPAN_S:g} s at such numbers, which look like a '
+                    f'Julian date in days: name the column {unit}')
+
+
+def julian(path, line, name, text, modified=False):
+    """Return the instant, see track.instant, of a Julian date, or a modified one, in days. Raises TableError."""
+    zero = MODIFIED_JULIAN_DATE_ZERO if modified else 0.0
+    low, high = JULIAN_DATE_LIMITS
+    csv_table.number(path, line, name, text, low - zero, high - zero)
+    day, _, fraction = text.partition('.')
+    if not (day.isdecimal() and (fraction or '0').isdecimal()):
+        raise csv_table.TableError(f'{path}: line {line}: {name} = {text!r:.60}: must be a number of days')
+    return instant.of_unix_time(SECONDS_PER_DAY * (float(day) + zero - instant.UNIX_EPOCH_JULIAN_DATE)
+                                + SECONDS_PER_DAY * float(f'0.{fraction or 0}'))
