@@ -50,7 +50,7 @@ MAX_STAMP_DISTANCE_NS = 3600 * NS_PER_SECOND
 
 
 class TopicPublishers:
-    """Publishers of a nodes.Link that a node records, told apart as the nodes of the graph tell them apart.
+    """Publishers of a nodes.Link that a node records, distinguished by the gate of the nodes of the graph.
 
     lost: number of messages of the graph's publisher that are missing, by its sequence numbers
     """
