@@ -92,6 +92,26 @@ def test_a_live_acu_answers_as_it_did(pace, run, acu_and_recorder, run_process, 
             assert len(again) == int(answered), name
 
 
+def test_a_second_replay_begins_again(run, connect, start_process, run_process, domain):
+    """The answers are the recorded answers each time."""
+    acu = start_process([sys.executable, '-m', 'acu_tracker.acu_node', '--ros-args', '--params-file',
+                         run.log / 'parameters.yaml', '-p', 'acu:graph.nodes:=acu,ins,adu,operator'],
+                        ROS_DOMAIN_ID=str(domain))
+    client = connect(domain)
+    for name in ('acu/rate_command', 'acu/estimate'):
+        client.read(name)
+    for count in (1, 2, 3):
+        done = run_process([*PEDESTAL, 'replay', run.bag, '--node', 'acu', '--lockstep', '--duration', '2'], 90.0,
+                           ROS_DOMAIN_ID=str(domain))
+        assert (done.returncode, done.stderr) == (0, '')
+        client.until(lambda count=count: all(len(heard) == 401 * count for heard in client.heard.values()))
+    for name, heard in client.heard.items():
+        first, second, third = ([messages.serialize(message) for message in heard[begin:begin + 401]]
+                                for begin in (0, 401, 802))
+        assert first == second == third == data(run.bag, name)[:401], name
+    end(acu)
+
+
 def test_all_of_it_into_a_recorder_gives_the_same_file(run, start_process, run_process, domain, tmp_path,
                                                        complaints):
     recorder = start_process([sys.executable, '-m', 'pedestal_recording.recorder_node', '--ros-args', '--params-file',

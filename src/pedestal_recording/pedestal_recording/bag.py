@@ -2,6 +2,7 @@
 import contextlib
 import copy
 import functools
+import logging
 import pathlib
 import re
 import typing
@@ -18,7 +19,8 @@ from pedestal_common.text_files import plain_yaml
 from pedestal_common.wire import messages
 from pedestal_common.wire.cdr import STAMPED_TYPES
 from pedestal_recording import columns, mcap_file
-from pedestal_recording.mcap_file import MESSAGE_HEAD, BagError, McapFile
+from pedestal_recording.mcap_file import MESSAGE_HEAD, ZSTD_MAGIC, BagError, McapFile
+from pedestal_recording.readable import Readable
 
 MAX_CACHE_BYTES = 64_000_000
 """Largest size of the cache of unpacked chunks [bytes]."""
@@ -29,10 +31,15 @@ MAX_SEARCHED_DIAGNOSTICS = 100
 MAX_CHANNELS = 2000
 """Largest number of channels of a file."""
 
+MAX_SHOWN_FOREIGN_MESSAGES = 3
+"""Largest number of foreign messages of a topic whose time and size are shown."""
+
 INDEX_BLOCK_ROWS = 65_536
 """Number of rows of a block of the index."""
 
-INDEX_FIELDS = [(name, 'i8') for name in ('channel', 'sequence', 'log', 'publish', 'stamp', 'chunk', 'start', 'stop')]
+INDEX_FIELDS = [(name, 'i8') for name in ('channel', 'sequence', 'log', 'publish', 'stamp', 'foreign', 'chunk',
+                                              'start', 'stop')]
+_UNREADABLE, _OTHER_PUBLISHER = 1, 2
 _DECLARED = (Opcode.HEADER, Opcode.SCHEMA, Opcode.CHANNEL, Opcode.STATISTICS, Opcode.METADATA)
 Content = typing.TypeVar('Content')
 MetadataRecords = Mapping[str, Mapping[str, str]]
@@ -44,9 +51,12 @@ _NUMBERED = re.compile(r'(.+)_(\d+)\.mcap')
 def read(path: str | pathlib.Path, beam: str | None = None) -> 'Bag':
     """Return the Bag in a directory or an .mcap file. beam: view of one beam, '' for the first, None for all beams.
 
-    Raises BagError if the bag is missing, empty, damaged or foreign, or has no such beam.
+    The log has a warning for each topic with foreign messages. Raises BagError if the bag is missing, empty, damaged
+    or foreign, or has no such beam.
     """
     bag = load(path)
+    for line in bag.foreign:
+        logging.getLogger(__name__).warning('%s: %s', path, line)
     if bag.damage:
         where = bag.file if len(bag.files) == 1 else bag.path
         raise BagError(f'{where}: {bag.damage}; `pedestal recover` recovers its readable messages')
@@ -82,22 +92,47 @@ def load(path: str | pathlib.Path) -> 'Bag':
 def locate(path: str | pathlib.Path) -> list[pathlib.Path]:
     """Return the MCAP files of a bag in their order; the bag is a directory or one file.
 
-    Each restart of the recorder begins a new file: NAME_0.mcap, NAME_1.mcap and so on. Raises BagError for no file,
-    or for several files with other names.
+    Each restart of the recorder begins a new file: NAME_0.mcap, NAME_1.mcap and so on. Files with other names are in
+    the order of metadata.yaml. Raises BagError for no file, for several files without an order, or for messages that
+    are compressed one by one.
     """
     path = pathlib.Path(path)
     try:
         if not path.is_dir():
             return [path]
-        files = list(path.glob('*.mcap')) or list(path.glob('*.db3'))
+        files = next(filter(None, (sorted(path.glob(form)) for form in ('*.mcap', '*.db3', '*.mcap.*', '*.db3.*'))),
+                     [])
     except OSError as error:
         raise BagError(f'{path}: {mcap_file.reason(error)}') from None
-    if len(files) == 1:
-        return files
-    numbered = {file: match for file in files if (match := _NUMBERED.fullmatch(file.name))}
-    if not files or len(numbered) < len(files) or len({match[1] for match in numbered.values()}) > 1:
-        raise BagError(f'{path}: {len(files)} .mcap files in it, must be one, or NAME_0.mcap, NAME_1.mcap ...')
-    return sorted(files, key=lambda file: int(numbered[file][2]))
+    described = _described(path)
+    if str(described.get('compression_mode', '')).lower() == 'message':
+        raise compressed_messages(path, described.get('compression_format'))
+    if len(files) == 1 or files and files[0].suffix not in ('.mcap', '.db3'):
+        return files[:1]
+    numbered = [(match[1], int(match[2]), file) for file in files if (match := _NUMBERED.fullmatch(file.name))]
+    if files and len(numbered) == len(files) and len({name for name, _, _ in numbered}) == 1:
+        return [file for _, _, file in sorted(numbered)]
+    named = described.get('relative_file_paths')
+    if files and isinstance(named, list) and sorted(map(str, named)) == [file.name for file in files]:
+        return [path / name for name in named]
+    raise BagError(f'{path}: {len(files)} .mcap files in it, must be one, or NAME_0.mcap, NAME_1.mcap ... in their '
+                   'order')
+
+
+def _described(path: pathlib.Path) -> dict[str, typing.Any]:
+    """Return the content of the metadata.yaml of a bag, {} without a readable one."""
+    try:
+        return dict(plain_yaml.read(path / 'metadata.yaml')['rosbag2_bagfile_information'])
+    except (OSError, yaml.YAMLError, UnicodeDecodeError, KeyError, TypeError, ValueError):
+        return {}
+
+
+def compressed_messages(path: pathlib.Path, name: str | None) -> BagError:
+    """Return the BagError for messages that are compressed one by one in a format."""
+    folder = path.parent if (path.parent / 'metadata.yaml').is_file() else path
+    return BagError(f"{path}: its messages are compressed one by one ({name}); `ros2 bag convert -i {folder} -o "
+                    "plain.yaml` decompresses them, with plain.yaml = 'output_bags: [{uri: plain, storage_id: mcap, "
+                    "all: true}]'")
 
 
 def start(metadata_records: MetadataRecords) -> int:
@@ -132,7 +167,7 @@ class Bag:
     metadata_records   {name: {text: text}} of the first file
     index              record array (n,) in the order of the files, one row per message: channel (its number plus
                        65536 times the number of its file), sequence, log, publish, stamp [ns] (of its header; its log
-                       time without a header), chunk, start, stop (place of its bytes)
+                       time without a header), foreign (0), chunk, start, stop (place of its bytes)
     statistics         {name: count} in the summaries, None if a file has none
     breaks             lines about files without a summary before the last file: their recorder was killed
     damage             broken or early ended file, with place and reason, ''
@@ -155,6 +190,8 @@ class Bag:
         self._channels: dict[int, str] = {}
         self._stamped: list[int] = []
         self._counts: dict[str, int] = {}
+        self._judges: dict[int, Readable] = {}
+        self._compressed = 0
         blocks, ended = [np.zeros(0, INDEX_FIELDS)], True
         for number, file in enumerate(opened):
             try:
@@ -168,7 +205,22 @@ class Bag:
                 self.breaks.append(text)
         if ended and self._counts:
             self.statistics = self._counts
-        self.index = np.concatenate(blocks).view(np.recarray)
+        self._recorded = np.concatenate(blocks).view(np.recarray)
+        if self._compressed and self._compressed == len(self._recorded):
+            raise compressed_messages(self.path, 'zstd')
+        self._mark_other_publishers()
+        self.index = self._recorded[self._recorded.foreign == 0]
+
+    def _mark_other_publishers(self) -> None:
+        """Mark the messages that the recorder numbers 0, because another publisher than that of the graph sent them.
+
+        A topic without any number was written by another tool.
+        """
+        rows = self._recorded
+        if 'pacing' in self.metadata:
+            zero = rows.sequence == 0
+            numbered = np.unique(rows.channel[~zero])
+            rows.foreign[zero & np.isin(rows.channel, numbered) & (rows.foreign == 0)] = _OTHER_PUBLISHER
 
     def _scan(self, number: int, file: McapFile, blocks: list[np.ndarray]) -> None:
         """Add the messages of a file to the blocks of the index. Raises EOFError if the file ends early."""
@@ -195,7 +247,7 @@ class Bag:
         while at < len(data):
             if data[at] == Opcode.MESSAGE:
                 length, channel, sequence, log, publish = unpack(data, at)
-                add((base | channel, sequence, log, publish, log, chunk, at + MESSAGE_HEAD.size, at + 9 + length))
+                add((base | channel, sequence, log, publish, log, 0, chunk, at + MESSAGE_HEAD.size, at + 9 + length))
                 if len(rows) == INDEX_BLOCK_ROWS:
                     yield self._block(file, rows, data, offset)
                     rows.clear()
@@ -222,9 +274,25 @@ class Bag:
         places = block['start'][stamped, np.newaxis] + np.arange(4, 12)
         pairs = np.frombuffer(data, np.uint8)[places].view('<u4').astype(np.int64)
         block['stamp'][stamped] = pairs[:, 0].astype(np.int32) * np.int64(1_000_000_000) + pairs[:, 1]
+        self._judge(block, data)
         block['start'] += offset
         block['stop'] += offset
         return block
+
+    def _judge(self, block: np.ndarray, data: bytes) -> None:
+        """Mark the unreadable messages of a block of the index, and count the messages that are compressed one by one.
+        """
+        for channel in np.unique(block['channel']).tolist():
+            rows = np.flatnonzero(block['channel'] == channel)
+            start, stop = block['start'][rows], block['stop'][rows]
+            head = start[stop - start >= len(ZSTD_MAGIC), np.newaxis] + np.arange(len(ZSTD_MAGIC))
+            wanted = np.frombuffer(ZSTD_MAGIC, np.uint8)
+            self._compressed += int((np.frombuffer(data, np.uint8)[head] == wanted).all(axis=1).sum())
+            name = self._channels[channel]
+            if self.topics[name] in messages.ROS_TYPESTORE.fielddefs:
+                if channel not in self._judges:
+                    self._judges[channel] = Readable(name, self.topics[name], 'pacing' in self.metadata)
+                block['foreign'][rows[~self._judges[channel].mask(data, start, stop)]] = _UNREADABLE
 
     def _declare(self, number: int, opcode: int, content: bytes) -> None:
         record, base = mcap_file.parsed(opcode, content), number << 16
@@ -283,8 +351,8 @@ class Bag:
 
     @property
     def end(self) -> float:
-        """Log time of the last message [s]."""
-        return self.index.log.max() / 1e9
+        """Log time of the last message since the start [s]."""
+        return float(self.index.log.max() - self.start) / 1e9
 
     @property
     def planned_end(self) -> int | None:
@@ -320,12 +388,14 @@ class Bag:
         view.topics = own(self.topics)
         view._channels = {channel: nodes.plain(name) for channel, name in self._channels.items()
                           if nodes.beam_of(name) in ('', prefix[:-1])}
-        view.index = self.index[np.isin(self.index.channel, list(view._channels))].view(np.recarray)
+        view.index, view._recorded = (rows[np.isin(rows.channel, list(view._channels))].view(np.recarray)
+                                      for rows in (self.index, self._recorded))
         view.statistics = None if self.statistics is None else own(self.statistics)
         view.metadata_records = {**self.metadata_records, 'pedestal': {**self.metadata, 'beams': '1'}}
         if 'parameters' in self.metadata_records:
             view.metadata_records['parameters'] = own(self.metadata_records['parameters'])
-        view.__dict__.pop('configuration', None)
+        for cached in ('configuration', 'foreign'):
+            view.__dict__.pop(cached, None)
         receiver = view.configuration['parameters'].get('tracking_receiver', {})
         if 'antenna.beamwidth' in receiver:
             view.metadata['beamwidth'] = str(receiver['antenna.beamwidth'])
@@ -360,6 +430,37 @@ class Bag:
         """Return the rows of `index` of a topic."""
         return self.index[self.where(topic)]
 
+    def recorded(self, topic: str) -> np.recarray:
+        """Return the rows of all messages of a topic in the form of `index`, also those of foreign messages."""
+        channels = [channel for channel, name in self._channels.items() if name == topic]
+        return self._recorded[np.isin(self._recorded.channel, channels)].view(np.recarray)
+
+    @functools.cached_property
+    def foreign(self) -> list[str]:
+        """Lines about the foreign messages, which are left out: one for each topic and reason.
+
+        A foreign message is no message of its topic, or another publisher than that of the graph sent it.
+        """
+        lines = []
+        for name in self.topics:
+            rows = self.recorded(name)
+            for reason in (_UNREADABLE, _OTHER_PUBLISHER):
+                left_out = rows[rows.foreign == reason]
+                if left_out.size:
+                    lines.append(self._foreign_line(name, left_out, reason))
+        return lines
+
+    def _foreign_line(self, name: str, rows: np.recarray, reason: int) -> str:
+        shown = ', '.join(f'{(row.log - self.start) / 1e9:.6f} s ({row.stop - row.start} bytes)'
+                          for row in rows[:MAX_SHOWN_FOREIGN_MESSAGES])
+        more = f' and {rows.size - MAX_SHOWN_FOREIGN_MESSAGES} more' if rows.size > MAX_SHOWN_FOREIGN_MESSAGES else ''
+        text = 'sent by another publisher'
+        if reason == _UNREADABLE:
+            data = bytes(self._bytes(*(int(rows[0][field]) for field in ('chunk', 'start', 'stop'))))
+            text = self._judges[int(rows[0].channel)].problem(data)
+        count = f'{rows.size} foreign message{"s" if rows.size > 1 else ""}'
+        return f'{name}: {count} left out, at {shown}{more}: {text}'
+
     def last_values(self, node: str) -> dict[str, str]:
         """Return {key: value} of the last readable diagnostics of a node, {} without any."""
         rows = self.rows('diagnostics') if 'diagnostics' in self.topics else self.index[:0]
@@ -378,7 +479,7 @@ class Bag:
         """Yield (topic, log time, publish time [ns], CDR bytes) of any rows of `index`, in their order."""
         names, take = self._channels, self._bytes
         for begin in range(0, len(rows), INDEX_BLOCK_ROWS):
-            for channel, _, log, publish, _, *place in rows[begin:begin + INDEX_BLOCK_ROWS].tolist():
+            for channel, _, log, publish, _, _, *place in rows[begin:begin + INDEX_BLOCK_ROWS].tolist():
                 yield names[channel], log, publish, take(*place)
 
     def messages(self, topic: str | None = None) -> Iterator[tuple[str, int, int, typing.Any]]:

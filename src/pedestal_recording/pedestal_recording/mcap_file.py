@@ -31,6 +31,13 @@ MESSAGE_HEAD = struct.Struct('<xQHIQQ')
 """Head of a message record after its opcode: length, channel, sequence number, log time and publish time."""
 
 SQLITE_MAGIC = b'SQLite format 3'
+ZSTD_MAGIC = b'\x28\xb5\x2f\xfd'
+
+COMPRESSED_MAGIC = {
+    ZSTD_MAGIC: ('zstd', 'zstd -dc'), b'\x1f\x8b': ('gzip', 'gunzip -c'), b'\xfd7zXZ': ('xz', 'xz -dc'),
+    b'BZh': ('bzip2', 'bzip2 -dc'), b'\x04\x22\x4d\x18': ('lz4', 'lz4 -dc'), b'PK\x03\x04': ('zip', 'unzip -p')}
+"""{first bytes of a compressed file: (its format, the command that writes its content to the standard output)}."""
+
 _RECORD = struct.Struct('<BQ')
 _WINDOW = 1_000_000
 _READ = {Opcode.HEADER: records.Header.read, Opcode.SCHEMA: records.Schema.read, Opcode.CHANNEL: records.Channel.read,
@@ -118,6 +125,10 @@ class McapFile:
             raise BagError(f'{path}: empty file')
         if head == SQLITE_MAGIC:
             raise BagError(f'{path}: an SQLite bag, not an MCAP file; `ros2 bag convert` converts it')
+        for magic, (name, command) in COMPRESSED_MAGIC.items():
+            if head.startswith(magic):
+                plain = path.with_suffix('') if path.with_suffix('').suffix == '.mcap' else f'{path.stem}_plain.mcap'
+                raise BagError(f'{path}: compressed as a whole ({name}); `{command} {path} > {plain}` decompresses it')
         if not head.startswith(MAGIC):
             raise BagError(f'{path}: not an MCAP file')
         self._left = UNPACKED_LIMITS[0] + UNPACKED_LIMITS[1] * self.size

@@ -13,8 +13,12 @@ from pedestal_common.graph import nodes, topics
 from pedestal_common.graph.steps import NS_PER_SECOND, GraphError
 from pedestal_common.node import middleware, shell, subscriptions
 from pedestal_common.node.unit import LEVEL_ERROR, LEVEL_OK, LEVEL_WARN, Diagnosis
-from pedestal_common.realtime.publisher_gate import PublisherGate
-from pedestal_common.realtime.streams import Streams
+from pedestal_common.realtime.publisher_gate import (
+    CONFIRMED_TAKEOVER_NS,
+    DROP_OTHER_PUBLISHER,
+    PUBLISHER_POLL_NS,
+    PublisherGate,
+)
 from pedestal_common.text_files import files
 from pedestal_common.wire import messages
 from pedestal_common.wire.cdr import STAMPED_TYPES
@@ -45,6 +49,52 @@ MAX_STAMP_DISTANCE_NS = 3600 * NS_PER_SECOND
 """Largest plausible distance of a stamp from the time of the drive [ns]."""
 
 
+class TopicPublishers:
+    """Publishers of a nodes.Link that a node records, distinguished by the gate of the nodes of the graph.
+
+    lost: number of messages of the graph's publisher that are missing, by its sequence numbers
+    """
+
+    def __init__(self, node, link):
+        self._node, self._link = node, link
+        self._gate = PublisherGate(lambda data: (None, data), 0, self._count)
+        self._lost, self._polled, self._foreign = {}, None, False
+
+    @property
+    def lost(self):
+        """Number of missing messages of the graph's publisher."""
+        return sum(self._lost.values())
+
+    def several(self, now):
+        """Return True if more than one publisher sends at a time [ns]."""
+        return self._gate.streams.several(now)
+
+    def take(self, data, info):
+        """Return False for a message of another publisher than that of the graph.
+
+        This needs a publisher of the graph that sends, and a foreign publisher that the graph names. A doubtful
+        message counts as a message of the graph.
+        """
+        now, utc = self._node.clock()
+        taken = self._gate.take(data, info['publication_sequence_number'], info['source_timestamp'], now, utc)
+        ours = self._gate.active
+        if taken is not None:
+            self._lost[ours] = ours.lost
+        return not (taken is None and self._gate.reason == DROP_OTHER_PUBLISHER and ours is not None
+                    and now - ours.arrival < CONFIRMED_TAKEOVER_NS and self._named(now))
+
+    def _count(self):
+        names = subscriptions.foreign_publishers(self._node, self._link, self._link.name)
+        return None if names is None else len(names)
+
+    def _named(self, now):
+        if self._polled is None or now - self._polled >= PUBLISHER_POLL_NS:
+            names = subscriptions.foreign_publishers(self._node, self._link, self._link.name) or ()
+            self._polled = now
+            self._foreign = any(subscriptions.UNDISCOVERED_NODE_NAME not in name for name in names)
+        return self._foreign
+
+
 class RecorderNode(shell.Shell):
     """Recorder of the graph, in lockstep in the order of steps (StepOrder), in realtime in the order of arrival.
 
@@ -70,7 +120,7 @@ class RecorderNode(shell.Shell):
             configuration.records(self.parameters.scenario_yaml, self.parameters.parameters_yaml))
         self._order = StepOrder(recorded, names, self._bag.write)
         self._lost = collections.Counter()
-        self._streams = {}
+        self._heard = {}
         self._stamp = self.graph.start
         self._without_stamp = 0
         self._received = [0] * len(recorded)
@@ -112,9 +162,10 @@ class RecorderNode(shell.Shell):
         def take(data, info):
             received[index] += 1
             try:
-                if checked:
-                    count(info)
-                put(data, info)
+                if not checked or count(data, info):
+                    put(data, info)
+                else:
+                    self._bag.write_foreign(index, self._stamp, info['source_timestamp'], data)
             except (BagError, OrderError) as error:
                 self._fail(str(error))
         return take
@@ -123,7 +174,7 @@ class RecorderNode(shell.Shell):
         """Return a check of lockstep: the numbers of the only publisher rise by 1, on a step topic from 1 on."""
         expected = 1 if topic.rate == 'step' and self.graph.members else 0
 
-        def count(info):
+        def count(_, info):
             nonlocal expected
             number = info['publication_sequence_number']
             if number is not None and expected != 0 and number not in (1, expected):
@@ -135,18 +186,20 @@ class RecorderNode(shell.Shell):
                     self._bag.skip(index, number - expected)
                     self._fail(self._losses())
             expected = (number or 0) + 1
+            return True
         return count
 
     def _realtime_counter(self, index, topic):
-        """Return a counter of the messages missing in realtime, from the sequence numbers of each publisher."""
-        publishers = self._streams[topic.name] = Streams()
+        """Return a counter of the messages missing in realtime, which returns False for another publisher."""
+        publishers = self._heard[topic.name] = TopicPublishers(self, topic)
 
-        def count(info):
+        def count(data, info):
             before = publishers.lost
-            publishers.of(info['publication_sequence_number'], info['source_timestamp'], time.monotonic_ns())
+            ours = publishers.take(data, info)
             if publishers.lost > before:
                 self._lost[topic.name] = publishers.lost
                 self._bag.skip(index, publishers.lost - before)
+            return ours
         return count
 
     def _losses(self):
@@ -260,7 +313,7 @@ class RecorderNode(shell.Shell):
         level, message = LEVEL_OK, 'recording'
         if self._without_stamp or self._order.unplaced:
             level, message = LEVEL_WARN, 'recording; some messages have no valid stamp or no place in a step'
-        doubled = [name for name, publishers in self._streams.items() if publishers.several(time.monotonic_ns())]
+        doubled = [name for name, publishers in self._heard.items() if publishers.several(time.monotonic_ns())]
         if doubled:
             level, message = LEVEL_WARN, f'recording; {", ".join(doubled)}: more than one publisher'
         if self._lost:

@@ -18,7 +18,17 @@ from mcap.opcode import Opcode
 
 from pedestal_common.graph import nodes, topics
 from pedestal_recording import bag as bags
-from pedestal_recording.mcap_file import MAGIC, MESSAGE_HEAD, BagError, McapFile, frame, parsed, reason, unpacked
+from pedestal_recording.mcap_file import (
+    MAGIC,
+    MESSAGE_HEAD,
+    ZSTD_MAGIC,
+    BagError,
+    McapFile,
+    frame,
+    parsed,
+    reason,
+    unpacked,
+)
 from pedestal_recording.writer import BagFile
 
 _COPIED_OPCODES = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.METADATA, Opcode.CHUNK)
@@ -216,6 +226,8 @@ class _Salvage:
     _counts                {topic: messages added}
     _first, _last          log times of the added messages [ns]
     _sequence, _before     {channel of the bag: sequence number of its last message; the same of the files before}
+    _offsets               {channel of the bag: addition to the sequence numbers of the current file}
+    _compressed            number of messages that are compressed one by one
     _unsure                channels of the bag without a message since the last gap
     """
 
@@ -226,14 +238,15 @@ class _Salvage:
         self._declared = {}
         self._counts, self._lost = {}, collections.Counter()
         self._first = self._last = None
-        self._sequence, self._before, self._unsure = {}, {}, set()
+        self._sequence, self._before, self._offsets, self._unsure = {}, {}, {}, set()
+        self._compressed = 0
         self._gaps = []
         self._ended = False
 
     def add_file(self, file, data):
         """Take all messages from the bytes of a McapFile."""
         self._file = file
-        self._schemas, self._channels, self._before = {}, {}, dict(self._sequence)
+        self._schemas, self._channels, self._before, self._offsets = {}, {}, dict(self._sequence), {}
         try:
             for record in _summary(file, data):
                 self._declare(record)
@@ -334,17 +347,29 @@ class _Salvage:
         self._last = last if self._last is None else max(self._last, last)
 
     def _add(self, channel, sequence, log, publish, data):
-        """Add a message. The recorder numbers from 1, so the first number after a gap gives the size of the gap."""
-        sequence += self._before.get(channel, 0)
+        """Add a message. The recorder numbers from 1 in each file, so the first number after a gap gives its size.
+
+        A tool that splits a recording continues the numbers of the file before. The number 0 marks a message of
+        another publisher than that of the graph.
+        """
+        if sequence:
+            before = self._before.get(channel, 0)
+            sequence += self._offsets.setdefault(channel, 0 if sequence > before else before)
+            if channel in self._unsure:
+                self._lost[channel] += sequence - self._sequence.get(channel, 0) - 1
+                self._unsure.remove(channel)
+            self._sequence[channel] = sequence
         self._bag.add_message(channel, sequence & 0xffffffff, log, publish, data)
-        if channel in self._unsure:
-            self._lost[channel] += sequence - self._sequence.get(channel, 0) - 1
-            self._unsure.remove(channel)
-        self._sequence[channel] = sequence
+        self._compressed += data[:len(ZSTD_MAGIC)] == ZSTD_MAGIC
         self._counts[self._names[channel]] += 1
 
     def recovered(self):
-        """Return the Recovered of the bag, after at least one message was added."""
+        """Return the Recovered of the bag, after at least one message was added.
+
+        Raises BagError if all messages are compressed one by one: the new bag would not state their compression.
+        """
+        if self._compressed == sum(self._counts.values()):
+            raise bags.compressed_messages(self._file.path, 'zstd')
         ours = 'pacing' in self._metadata.get('pedestal', {})
         lost = {self._names[channel]: count for channel, count in self._lost.items() if ours and count > 0}
         return Recovered(self._bag.path, self._counts, self._first, self._last, self._ended,

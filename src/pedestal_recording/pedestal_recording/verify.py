@@ -37,6 +37,8 @@ class Report:
     """Result of `verify`.
 
     topics            [TopicCheck]
+    foreign           lines about the foreign messages, which are left out
+    cut               begin of a recording that holds a part of its run only [s], None for a recording from the start
     problems          of the whole bag, texts
     steps, period     number of steps of the run, and their period [s], NaN with fewer than two steps
     made              origin of the bag, one line
@@ -52,6 +54,8 @@ class Report:
     end: int
     planned_end: int | None
     lost: tuple | None
+    foreign: list
+    cut: float | None
 
     @property
     def complete(self):
@@ -71,6 +75,9 @@ class Report:
     @property
     def ending(self):
         """End of an aborted run, one line; '' for a run that came to its planned end or has none."""
+        if self.aborted and self.cut is not None:
+            return (f'part of a run: {self.cut:.6f} s to {self.end / 1e9:.6f} s; planned end '
+                    f'{self.planned_end / 1e9:.6f} s')
         return (f'aborted: ends at {self.end / 1e9:.6f} s, planned end {self.planned_end / 1e9:.6f} s'
                 if self.aborted else '')
 
@@ -92,7 +99,7 @@ class Report:
         for check in self.topics:
             lines.append(f'{check.name:{width}} {check.count:9} {check.first:14.6f} {check.last:14.6f}')
             lines += [f'  {problem}' for problem in check.problems]
-        lines += [*self.problems, self.made]
+        lines += [*self.problems, *self.foreign, self.made]
         if self.loss:
             lines.append(self.loss)
         if self.aborted:
@@ -102,7 +109,7 @@ class Report:
         steps = f'{self.steps} steps of {self.period * 1e3:g} ms'
         verdict = 'complete' if self.complete else f'NOT complete, {count} problem{"s" if count > 1 else ""}'
         if self.aborted:
-            verdict = f'aborted; up to its end {verdict}'
+            verdict = f'{"part of a run" if self.cut is not None else "aborted"}; up to its end {verdict}'
         return [*lines, f'{self.path}: {verdict}: {total} messages, {len(self.topics)} topics, {steps}']
 
 
@@ -129,14 +136,20 @@ def verify(bag) -> Report:
     graph, planned = bag.graph, bag.planned_end
     of_steps = {name: stamp for name, stamp in stamps.items()
                 if name in graph and graph[name].rate == 'step' and stamp.size}
-    grid = _grid(of_steps)
+    believed = {name: stamp[rows[name].stamp == rows[name].log] for name, stamp in of_steps.items()}
+    realtime = bag.metadata.get('pacing') == 'realtime'  # there the log time replaces an implausible stamp
+    grid = _grid({name: stamp for name, stamp in believed.items() if stamp.size} if realtime else of_steps)
+    before = steps_before(bag)
     checks = [TopicCheck(name, stamp.size, stamp[0] / 1e9 if stamp.size else np.nan,
-                         stamp[-1] / 1e9 if stamp.size else np.nan, _problems(bag, rows[name], name, stamp, grid))
+                         stamp[-1] / 1e9 if stamp.size else np.nan, _problems(bag, rows[name], name, stamp, grid,
+                                                                           before > 0))
               for name, stamp in stamps.items()]
     problems = [bag.damage] if bag.damage else []
+    if before:
+        problems.append(f'begins at {grid.first / 1e9:.6f} s: {before} steps before it are not in the recording')
     if not of_steps:
         problems.append('no topic of the steps of the drive has a message')
-    counts = {check.name: check.count for check in checks}
+    counts = {name: bag.recorded(name).size for name in bag.topics}
     if bag.statistics is not None and bag.statistics != counts:
         problems.append(f'the summary counts {_differences(bag.statistics, counts)}')
     problems += _unrecorded_steps([rows[name] for name in of_steps], bag.start, grid)
@@ -147,7 +160,8 @@ def verify(bag) -> Report:
     planned = planned - bag.start if of_steps and planned is not None else None
     return Report(str(bag.path), checks, bag.breaks + problems, grid.steps,
                   grid.period / 1e9 if grid.period else np.nan, configuration.line(bag), grid.last, planned,
-                  None if None in lost else lost)
+                  None if None in lost else lost, bag.foreign,
+                  grid.first / 1e9 if before else None)
 
 
 def count(text):
@@ -155,26 +169,41 @@ def count(text):
     return int(text) if text.isdecimal() and len(text) < 20 else None
 
 
-def _problems(bag, rows, name, stamp, grid):
-    """Return the problems of a topic, from its rows of the index (n,) and its stamps (n,) [ns] since the start."""
+def steps_before(bag):
+    """Return the number of steps before the first step of a bag.Bag that holds a part of its run only.
+
+    The messages of all topics of the steps begin with the same number then. The recorder counts from 1.
+    """
+    graph = bag.graph
+    numbers = [bag.recorded(name).sequence for name in bag.topics
+               if 'pacing' in bag.metadata and name in graph and graph[name].rate == 'step']
+    first = [int(sequence[sequence > 0][0]) for sequence in numbers if sequence.any()]
+    return first[0] - 1 if len(first) > 1 and len(set(first)) == 1 else 0
+
+
+def _problems(bag, rows, name, stamp, grid, cut):
+    """Return the problems of a topic, from its rows of the index (n,) and its stamps (n,) [ns] since the start.
+
+    cut: True in a recording that begins during its run. The messages before its begin are unknown.
+    """
     topic, ours = bag.graph.get(name), 'pacing' in bag.metadata
     rate = topic.rate if topic else ''
     if bag.metadata.get('pacing') == 'realtime' and rate == 'step':
         # Missing steps of the graph, and messages of foreign publishers, are no fault of the recording.
-        return ([] if stamp.size else ['no message']) + _numbering(rows)
+        return ([] if stamp.size else ['no message']) + _numbering(bag.recorded(name), cut)
     problems = _order(stamp) if topic and len(topic.writers) == 1 else []
     if rate == 'step':
         problems += _steps(stamp, 'adu' in topic.writers, grid)
         if ours and not np.array_equal(rows.stamp, rows.log):
             problems.append(f'{np.sum(rows.stamp != rows.log)} messages with a log time that differs from their stamp')
-    elif rate == 'once' and not 1 <= stamp.size <= len(bag.files):  # each recorder receives a latched message
+    elif rate == 'once' and not (not cut) <= stamp.size <= len(bag.files):  # each recorder receives a latched message
         problems.append(f'{stamp.size} messages, must be 1')
     elif rate == 'second' and bag.metadata.get('pacing') == 'lockstep' and grid.period:
         problems += _seconds(bag, name, stamp, grid)
     if topic and bag.topics[name] != topic.type:
         problems.append(f'type {bag.topics[name]}, must be {topic.type}')
     if ours:
-        problems += _numbering(rows)
+        problems += _numbering(bag.recorded(name), cut)
     return problems
 
 
@@ -275,22 +304,24 @@ def _unrecorded_steps(of_steps, start, grid):
             for (_, before), (after, _) in zip(spans, spans[1:]) if after - before > max(grid.period, 1)]
 
 
-def _numbering(rows):
-    """Return the problems of the sequence numbers of a topic; they begin with 1 in each file."""
-    file = rows.channel >> 16
-    return [problem for number in np.unique(file) for problem in _sequence(rows.sequence[file == number])]
+def _numbering(rows, cut):
+    """Return the problems of the sequence numbers of a topic, from its rows of the index.
 
-
-def _sequence(sequence):
-    """Return the problems of sequence numbers. The recorder counts from 1, with a gap for each lost message."""
-    if not sequence.size:
-        return []
-    steps = np.diff(sequence, prepend=0)
-    lost = int(np.sum(steps[steps > 1] - 1))
-    problems = [f'{lost} messages lost, by the sequence numbers'] if lost else []
-    if np.any(steps <= 0):
-        problems.append(f'{np.sum(steps <= 0)} sequence numbers go back or repeat')
-    return problems
+    The recorder counts from 1 in each file, with a gap for each lost message; 0 marks a message of another publisher.
+    A tool that splits a recording continues the numbers of the file before.
+    """
+    lost = back = 0
+    file, numbers = rows.channel >> 16, rows.sequence
+    before = numbers[numbers > 0][0] - 1 if cut and numbers.any() else 0
+    for number in np.unique(file):
+        sequence = numbers[(file == number) & (numbers > 0)]
+        if sequence.size:
+            steps = np.diff(sequence, prepend=before if sequence[0] > before else 0)
+            lost += int(np.sum(steps[steps > 1] - 1))
+            back += int(np.sum(steps <= 0))
+            before = sequence[-1]
+    return ([f'{lost} messages lost, by the sequence numbers'] if lost else []) + (
+        [f'{back} sequence numbers go back or repeat'] if back else [])
 
 
 def _metadata_file(bag, counts):

@@ -343,6 +343,10 @@ class Writer(BagFile):
         self._sequences[topic] = sequence = self._sequences[topic] + 1
         self.add_message(self._channels[topic], sequence & 0xffffffff, log_time, publish_time, data)
 
+    def write_foreign(self, topic, log_time, publish_time, data):
+        """Add a message of another publisher than that of the graph, with the sequence number 0."""
+        self.add_message(self._channels[topic], 0, log_time, publish_time, data)
+
     def skip(self, topic, count):
         """Leave a gap in the sequence numbers of a topic, for messages that did not reach the recorder."""
         self._sequences[topic] += count

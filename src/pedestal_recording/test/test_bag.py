@@ -93,8 +93,8 @@ def rows():
     return [(name, stamp, messages.serialize(message)) for name, stamp, message in run()]
 
 
-def write(directory, rows):
-    writer = Writer(directory, RECORDED, METADATA)
+def write(directory, rows, metadata=METADATA):
+    writer = Writer(directory, RECORDED, metadata)
     for name, stamp, data in rows:
         writer.write(NAMES.index(name), stamp, stamp, data)
     writer.close()
@@ -289,13 +289,55 @@ def test_table_of_messages_that_differ_in_names_and_length():
     np.testing.assert_array_equal(table['b.position'], [1, 10, np.nan, 31])
 
 
-@pytest.mark.parametrize('broken', [b'', b'\0\1\0\0', b'\0\1\0\0' + b'\xff' * 20])
-def test_table_of_broken_bytes_is_a_bag_error(tmp_path, broken):
-    path = write(tmp_path / 'b', [('joint_states', 0, broken)])
-    with pytest.raises(bag.BagError, match='joint_states.*JointState'):
-        bag.read(path).table('joint_states')
-    with pytest.raises(bag.BagError, match='joint_states at 0.000000 s.*JointState'):
-        list(bag.read(path).messages())
+def serialized(name, k):
+    return messages.serialize(made(name, k, np.random.default_rng(1)))
+
+
+def unlike(kind):
+    """Return bytes that another program may send on joint_states."""
+    arm = messages.template('joint_states')
+    arm.name, arm.position = ['shoulder'], np.ones(1)
+    arm.velocity = arm.effort = np.zeros(0)
+    return {'empty': b'', 'head': b'\0\1\0\0', 'ff': b'\0\1\0\0' + b'\xff' * 20, 'zeros': b'\0\1\0\0' + bytes(20),
+            'text': messages.serialize(messages.String(data='hello')), 'arm': messages.serialize(arm)}[kind]
+
+
+@pytest.mark.parametrize('name', ['joint_states', 'clock', 'acu/mode', 'diagnostics', 'target/truth'])
+@pytest.mark.parametrize('kind', ['empty', 'head', 'ff', 'zeros'])
+def test_foreign_message_is_left_out_counted_and_named(tmp_path, name, kind):
+    good = serialized(name, 1)
+    path = write(tmp_path / 'b', [(name, T, good), (name, 2 * T, unlike(kind)), (name, 3 * T, good)])
+    content = bag.read(path)
+    assert [data for _, _, _, data in content.raw(name)] == [good, good] == [
+        messages.serialize(message) for _, _, _, message in content.messages(name)]
+    assert len(content.table(name)['t']) == 2
+    [line] = content.foreign
+    size = len(unlike(kind))
+    assert line.startswith(f'{name}: 1 foreign message left out, at 0.010000 s ({size} bytes): {size} bytes are no ')
+    assert content.foreign == verify(content).foreign
+
+
+def test_message_of_another_robot_is_foreign_in_a_recording_of_the_graph_only(tmp_path):
+    rows = [('joint_states', k * T, unlike('arm') if k == 1 else serialized('joint_states', k)) for k in range(3)]
+    ours, other = (bag.read(write(tmp_path / name, rows, metadata))
+                   for name, metadata in (('ours', {'pacing': 'realtime'}), ('other', {})))
+    assert ours.rows('joint_states').size == 2 and 'no number of azimuth' in ours.foreign[0]
+    assert other.rows('joint_states').size == 3 and not other.foreign
+
+
+def test_messages_of_another_publisher_are_no_gap(tmp_path):
+    writer = Writer(tmp_path / 'b', topics.TOPICS, {'pacing': 'realtime'})
+    index = [topic.name for topic in topics.TOPICS].index('joint_states')
+    for k in range(5):
+        writer.write(index, k * T, k * T, serialized('joint_states', k))
+        writer.write_foreign(index, k * T, k * T, serialized('joint_states', 0))
+    writer.close()
+    content = bag.read(tmp_path / 'b')
+    assert content.rows('joint_states').size == 5
+    assert content.foreign == ['joint_states: 5 foreign messages left out, at 0.000000 s (132 bytes), 0.005000 s '
+                               '(132 bytes), 0.010000 s (132 bytes) and 2 more: sent by another publisher']
+    check = verify(content)
+    assert (check.steps, [row.problems for row in check.topics if row.name == 'joint_states']) == (5, [[]])
 
 
 def unreadable(tmp_path, recording):

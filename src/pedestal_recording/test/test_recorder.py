@@ -93,7 +93,7 @@ class Graph:
     def __init__(self, domain):
         self.context = rclpy.Context()
         rclpy.init(args=[], context=self.context, domain_id=domain)
-        self.node = rclpy.create_node('graph', context=self.context)
+        self.node = rclpy.create_node(nodes.REPLAY_NODE, context=self.context)
         self.executor = SingleThreadedExecutor(context=self.context)
         self.executor.add_node(self.node)
         self.publishers = {}
@@ -225,8 +225,10 @@ def test_broken_messages_are_recorded_all_the_same(tmp_path, graph, rows):
     graph.publish(broken + rows[:60])
     code, said, err = recorder.end()
     assert (code, err, said['messages']) == (0, '', 63)
-    recorded = [(name, log, data) for name, log, _, data in bag.read(tmp_path / 'b').raw()]
-    assert all(row in recorded for row in broken)
+    content = bag.read(tmp_path / 'b')
+    assert [line.split(':')[0] for line in content.foreign] == [name for name, _, _ in broken]
+    recorded = [(name, log, data) for name, log, _, data in content.take(content.recorded('joint_states'))]
+    assert broken[1] in recorded
 
 
 def test_a_message_before_the_start_may_have_the_stamp_of_the_start(tmp_path, graph):
@@ -288,6 +290,33 @@ def test_a_realtime_recorder_that_comes_late_or_hears_two_writers_has_lost_nothi
     assert stranger.wait_for_all_acked(Duration(seconds=LIMIT))
     code, said, err = recorder.end()
     assert (code, err, said['lost'], said['messages']) == (0, '', 0, 100)
+
+
+def test_messages_of_a_foreign_node_are_marked_and_no_loss(tmp_path, domain, graph, rows):
+    """The foreign node publishes messages of the type, and bytes of no message."""
+    joints = [row for row in rows if row[0] == 'joint_states'][:100]
+    recorder = Recorder(tmp_path / 'b', 'realtime')
+    graph.await_recorder()
+    graph.publish(joints[:60])
+    node = rclpy.create_node('stranger', context=graph.context)
+    stranger = node.create_publisher(message_class('sensor_msgs/msg/JointState'), 'joint_states', QoSProfile(
+        depth=1000, reliability=ReliabilityPolicy.RELIABLE))
+    time.sleep(0.5)
+    for number, (name, _, data) in enumerate(joints[60:]):
+        graph.publishers[name].publish(data)
+        if number % 2 == 0:
+            stranger.publish(data if number else b'\0\1\0\0' + b'\xff' * 20)
+        time.sleep(0.005)
+    graph.acknowledged()
+    assert stranger.wait_for_all_acked(Duration(seconds=LIMIT))
+    code, said, err = recorder.end()
+    assert (code, err, said['lost'], said['messages']) == (0, '', 0, 120)
+    content = bag.read(tmp_path / 'b')
+    assert [data for _, _, _, data in content.raw('joint_states')] == [data for _, _, data in joints]
+    assert [line.partition(' left out')[0] for line in content.foreign] == [
+        'joint_states: 1 foreign message', 'joint_states: 19 foreign messages']
+    assert not [row.problems for row in verify(content).topics if row.name == 'joint_states' and row.problems]
+    node.destroy_node()
 
 
 def refused(tmp_path, *arguments, directory, **options):

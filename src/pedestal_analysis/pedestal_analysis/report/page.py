@@ -119,6 +119,16 @@ def _loop(bag, check):
              'NOT complete, see below']]
 
 
+def _not_evaluated(run):
+    """Return a sentence on the reason why nothing of a tracking.Tracking was evaluated."""
+    unknown = run.t.size - np.sum(run.known_mode)
+    if unknown == run.t.size:
+        return 'The recording does not state the mode of the ACU, so nothing was evaluated.'
+    part = f' (mode unknown in {unknown} of {run.t.size} steps)' if unknown else ''
+    return (f'The recording holds no autotrack that is longer than the settling time{part}, so nothing was '
+            'evaluated.')
+
+
 def _results(bag, data, check):
     """Return the section with the results of the run against the truth, if known, and of its control loop."""
     parts, rows = ['<h2 id="results">Results</h2>'], []
@@ -132,8 +142,7 @@ def _results(bag, data, check):
             parts.append('<p class="bad">Pointing errors are those of the encoders: '
                          f'{html.escape(tracking.ENCODER_BEAM_NOTE)}.</p>')
         if not data.run.tracking.any():
-            parts.append('<p class="bad">The run was never in autotrack for longer than the settling time, so the '
-                         'evaluated part is empty.</p>')
+            parts.append(f'<p class="bad">{_not_evaluated(data.run)}</p>')
         parts.append(elements.table(['', 'cross-elevation (azimuth)', 'elevation', 'both axes'],
                                     _pointing(bag, data, results.measured(known)), 'n'))
         parts.append('<p class="soft">Pointing and noise are computed over the evaluated part: autotrack, from '
@@ -159,8 +168,8 @@ def _gaps(bag, check):
 
 
 def _warnings(check):
-    """Return the warnings above all results: aborted run, lost steps."""
-    return [line for line in (check.ending, check.loss) if line]
+    """Return the warnings above all results: aborted run, lost steps, foreign messages."""
+    return [line for line in (check.ending, check.loss, *check.foreign) if line]
 
 
 def _figures(module, data):

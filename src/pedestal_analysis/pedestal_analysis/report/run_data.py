@@ -65,7 +65,7 @@ def read(bag) -> RunData:
     motors = table(bag, 'adu/motor_states')
     if motors and not {f'{motor}.effort' for motor in topics.MOTOR_NAMES} <= set(motors):
         motors = None
-    statuses = [(log / 1e9, status.name, int(status.level), status.message)
+    statuses = [((log - bag.start) / 1e9, status.name, int(status.level), status.message)
                 for _, log, _, array in bag.messages('diagnostics') for status in array.status
                 ] if table(bag, 'diagnostics') else []
     return RunData(run, no_truth, raw, motors, table(bag, 'tracking_receiver/angle_error'), _modes(bag), statuses,
@@ -128,13 +128,15 @@ def _attitude(bag):
 
 
 def _modes(bag):
-    """Return [(start, stop [s], mode)], one for each change."""
-    changes = table(bag, 'acu/mode')
-    if changes is None:
-        return []
+    """Return [(start, stop [s], mode)], one for each change; the first begins with the recording."""
+    stated = table(bag, 'acu/mode')
+    changes = list(zip(stated['t'].tolist(), stated['data'])) if stated else []
+    joints = table(bag, 'joint_states')
+    if joints is not None and (before := str(tracking.modes(bag, joints['t'][:1])[0])):
+        changes.insert(0, (joints['t'][0].item(), before))
     starts, names = [], []
-    for start, name in zip(changes['t'].tolist(), changes['data']):
+    for start, name in changes:
         if not names or names[-1] != name:
             starts.append(start)
             names.append(name)
-    return list(zip(starts, [*starts[1:], bag.end], names))
+    return list(zip(starts, [*starts[1:], float(bag.end)], names)) if changes else []

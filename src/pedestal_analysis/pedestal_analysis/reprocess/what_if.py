@@ -28,7 +28,7 @@ class Overlay:
     """A recording with replaced outputs of one node, with the part of the interface of bag.Bag that results need."""
 
     def __init__(self, bag, outputs):
-        self.path, self.beams, self.metadata = bag.path, bag.beams, bag.metadata
+        self.path, self.beam, self.beams, self.metadata = bag.path, bag.beam, bag.beams, bag.metadata
         self.configuration = bag.configuration
         self._bag, self._outputs = bag, outputs
         self.topics = {**bag.topics, **dict.fromkeys(outputs, '')}
@@ -37,18 +37,28 @@ class Overlay:
         """Return {column: array (n,)} of a topic."""
         return self._outputs[topic].table(topic) if topic in self._outputs else self._bag.table(topic)
 
+    @property
+    def start(self):
+        """Time 0 of the scenario in the stamps [ns]."""
+        return self._bag.start
+
+    def messages(self, topic):
+        """Iterator of (topic, log time, publish time [ns], message) of a recorded topic."""
+        return self._bag.messages(topic)
+
 
 class RecomputedAcu:
     """Outputs of an ACU in an Overlay.
 
     estimate, command: tables of acu/estimate and acu/rate_command; autotrack: stamps [s] of the estimates in
-    autotrack; common: stamps [s] at which the ACU is evaluated.
+    autotrack; known: number of the estimates with a known mode; common: stamps [s] at which the ACU is evaluated.
     """
 
     def __init__(self, overlay):
         self.estimate, self.command = overlay.table('acu/estimate'), overlay.table('acu/rate_command')
         t = self.estimate['t']
-        self.autotrack = t[tracking.modes(overlay, t) == 'autotrack']
+        mode = tracking.modes(overlay, t)
+        self.autotrack, self.known = t[mode == 'autotrack'], int(np.sum(mode != ''))
         self.common = t[:0]
 
     def ripple(self, table):
@@ -119,7 +129,8 @@ class TruthComparison:
 COMPARISON_RESULTS = (
     Result('autotrack_from_s', 's', 'acu', lambda acu: acu.autotrack[0] if acu.autotrack.size else math.nan,
            'Time of the first step in autotrack.'),
-    Result('tracked_percent', '%', 'acu', lambda acu: 100.0 * acu.autotrack.size / max(acu.estimate['t'].size, 1),
+    Result('tracked_percent', '%', 'acu',
+           lambda acu: 100.0 * acu.autotrack.size / acu.known if acu.known else math.nan,
            'Share of the steps in autotrack.'),
     Result('recorded_pointing_rms_deg', 'deg', 'truth', lambda acu: known_rms(acu.true) * DEG_PER_RAD,
            'Rms of the true pointing error of the recorded antenna, both axes together.'),

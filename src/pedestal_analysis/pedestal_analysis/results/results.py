@@ -12,8 +12,6 @@ between beam and target.
 import math
 import typing
 
-import numpy as np
-
 from pedestal_analysis.results import consistency, isolation, known_attitude, tracking
 from pedestal_analysis.results.tracking import DEG_PER_RAD, known_rms, largest
 
@@ -85,14 +83,14 @@ RESULTS = (
            'Noise of one receiver sample, divided by the error of the filtered line of sight, both axes together.'),
     Result('lock_time_s', 's', 'tracking', lambda run: run.lock_time,
            'Time of the first lock of the receiver.', 'first lock'),
-    Result('autotrack_time_s', 's', 'tracking', lambda run: float(np.sum(run.mode == 'autotrack') * run.period),
+    Result('autotrack_time_s', 's', 'tracking', lambda run: run.autotrack_time,
            'Total time of the ACU in autotrack.', 'time in autotrack'),
-    Result('tracked_percent', '%', 'tracking', lambda run: 100.0 * float(np.mean(run.mode == 'autotrack')),
+    Result('tracked_percent', '%', 'tracking', lambda run: run.tracked_percent,
            'Share of the run in autotrack.'),
     Result('loss_s', 's', 'tracking', lambda run: run.loss,
            'Total time, in any mode, with the target further than half a beamwidth off the beam, counted from '
            'the first step in settled autotrack.', 'time with the target further than half a beamwidth off'),
-    Result('evaluated_time_s', 's', 'tracking', lambda run: float(np.sum(run.tracking) * run.period),
+    Result('evaluated_time_s', 's', 'tracking', lambda run: run.evaluated_time,
            f'Total time in settled autotrack: from {tracking.HANDOVER_SETTLING_S:g} s after the first hand-over to '
            'autotrack.', 'evaluated time'),
     Result('azimuth_nis_mean', '-', 'filter', lambda known: known.axes[0].nis,

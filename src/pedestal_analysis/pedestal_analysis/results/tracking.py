@@ -8,6 +8,7 @@ import numpy as np
 
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry import line_of_sight
+from pedestal_common.graph.steps import NS_PER_SECOND
 from pedestal_common.parameters import build
 from tracking_receiver_sim.path import arrival
 from tracking_receiver_sim.path.params import PathParameters
@@ -167,9 +168,31 @@ class Tracking:
 
     @property
     def lock_time(self):
-        """Stamp of the first receiver error [s]; NaN if the receiver never locked."""
+        """Stamp [s] of the receiver's first error; NaN without an error, and in a recording that begins during the run
+        with a locked receiver."""
         locked = np.isfinite(self.measured[:, 0])
-        return float(self.t[locked][0]) if locked.any() else math.nan
+        unknown = locked[:1].any() and self.t.size > 1 and self.t[0] > self.period
+        return float(self.t[locked][0]) if locked.any() and not unknown else math.nan
+
+    @property
+    def known_mode(self):
+        """Mask (n,) of the steps whose mode the recording states."""
+        return self.mode != ''
+
+    @property
+    def autotrack_time(self):
+        """Time in autotrack [s]; NaN without a known mode."""
+        return float(np.sum(self.mode == 'autotrack') * self.period) if self.known_mode.any() else math.nan
+
+    @property
+    def evaluated_time(self):
+        """Duration of the evaluated part [s]; NaN without a known mode."""
+        return float(np.sum(self.tracking) * self.period) if self.known_mode.any() else math.nan
+
+    @property
+    def tracked_percent(self):
+        """Share in autotrack of the steps with a known mode [%]; NaN without a known mode."""
+        return 100.0 * float(np.mean(self.mode[self.known_mode] == 'autotrack')) if self.known_mode.any() else math.nan
 
     @property
     def loss(self):
@@ -279,12 +302,26 @@ def read(bag) -> Tracking:
 
 
 def modes(bag, t):
-    """Return the mode of the ACU at each stamp t ('' before the first)."""
+    """Return the mode of the ACU at every stamp t, '' where the recording does not state it.
+
+    acu/mode states each change. In a recording that begins during a run, the first diagnostics of the ACU state the
+    mode before the first change.
+    """
     if 'acu/mode' not in bag.topics:
         return np.full(t.size, '')
     table = bag.table('acu/mode')
     index = np.searchsorted(table['t'], t + 1e-9, side='right') - 1
-    return np.where(index >= 0, np.array(['', *table['data']])[index + 1], '')
+    first = _first_mode(bag, table['t'][0] if len(table['t']) else math.inf) if (index < 0).any() else ''
+    return np.array([first, *table['data']])[index + 1]
+
+
+def _first_mode(bag, change):
+    """Return the mode in the first diagnostics of the ACU before the first change [s]; '' without them."""
+    for _, log, _, array in bag.messages('diagnostics') if 'diagnostics' in bag.topics else ():
+        for status in array.status:
+            if status.name == f'{bag.beam}acu' and (log - bag.start) / NS_PER_SECOND < change:
+                return next((value.value for value in status.values if value.key == 'mode'), '')
+    return ''
 
 
 def keyholes(bag):

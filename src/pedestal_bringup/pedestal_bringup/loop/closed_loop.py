@@ -135,8 +135,9 @@ class Run:
         sent = self.steps[topic]['stamp'] != records.NO_STAMP
         sent = slice(None) if sent.all() else sent
         numbers = records.numbers(self.steps, topic)[sent]
+        table = {column.name: numbers[:, i] for i, column in enumerate(layouts.columns(topic))}
         return {'t': self.steps[topic]['stamp'][sent] / NS_PER_SECOND,
-                **{column.name: numbers[:, i] for i, column in enumerate(layouts.columns(topic))}}
+                **layouts.blank_no_data(topics.TOPIC_BY_NAME[topic].type, table)}
 
 
 class Loop:

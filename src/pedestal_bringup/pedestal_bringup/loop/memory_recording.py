@@ -28,7 +28,7 @@ class MemoryRecording:
         self.path, self.beams = scenario.name, int(scenario.header.beam)
         self.metadata = {'beamwidth': str(receiver.antenna.beamwidth)}
         self.configuration = {'parameters': {'tracking_receiver': as_dict(receiver)}}
-        self._run, self.end = run, run.t[-1]
+        self._run, self.start, self.end = run, 0, run.t[-1]
         self._tables = {}
         self._keyholes = [(stamp, values) for stamp, values in run.forecasts if ('keyhole', 'keyhole') in values]
 

@@ -111,6 +111,20 @@ def no_data(type_name: str, numbers: list, texts: dict) -> list:
              [places[path] for path in mark.paths], mark.absent) for mark in marks]
 
 
+def blank_no_data(type_name: str, table: dict) -> dict:
+    """Return a table {column: array (n,)} with NaN where its messages mark the numbers of a field as no data.
+
+    A mark counts where all its numbers are columns of the table.
+    """
+    for mark in NO_DATA_MARKS.get(type_name, ()):
+        numbers = [column(type_name, path, {}) for path in mark.paths]
+        if all(number in table for number in numbers):
+            absent = mark.absent(*[table[number] for number in numbers])
+            table |= {name: np.where(absent, np.nan, values) for name, values in table.items()
+                      if name.partition('.')[0] == mark.field}
+    return table
+
+
 _JOINTS = {'sensor_msgs/msg/JointState': 'name', 'trajectory_msgs/msg/JointTrajectory': 'joint_names'}
 """{message type: its field with the names of the joints}."""
 

@@ -104,8 +104,8 @@ class Steps:
                 self._due[name] = awaited.popleft()
 
     def reset_after_gap(self, topic: str) -> None:
-        """Reset the state of a topic whose next realtime message does not continue the earlier ones. The trigger
-        resets all topics."""
+        """Reset the state of a topic whose next message does not continue the earlier ones. The trigger resets all
+        topics."""
         for name in (topic,) if topic != self.trigger else self._last:
             self._last[name] = None
             if name in self._due:
@@ -113,7 +113,8 @@ class Steps:
                 self._arrived[name].clear()
                 self._due[name] = None
         if topic == self.trigger:
-            self._pending = None
+            self._pending = self._period = None
+            self._ahead.clear()
 
     def _refuse(self, reason: str) -> None:
         """Raise GraphError in lockstep; count the refused message in realtime."""

@@ -289,6 +289,10 @@ class Shell(Node):
             self._next_second = (stamp // NS_PER_SECOND + 1) * NS_PER_SECOND
             self.diagnostics.publish(stamp)
 
+    def restart(self):
+        """Await the next step as the first step."""
+        self._started, self._stamp, self._next_second = False, 0, 0
+
     def prepare(self, unit):
         """Compile the laws of a unit, which takes half a minute and more when they are not cached. Raises Stopped
         after a signal."""

@@ -67,6 +67,16 @@ def subscribe(node, link, ros_name, take, role):
     return [open_with(latched, take_once, event_callbacks=unmatched), open_with(volatile, take_once)]
 
 
+def foreign_publishers(node, link, ros_name):
+    """Return the names of the nodes that publish a topic and are no publisher of its nodes.Link.
+
+    Return None in a graph without a publisher of the link. An undiscovered node may be foreign.
+    """
+    if not any(writer in node.graph.members for writer in link.writers):
+        return None
+    return [name for name in node.publishers_of(ros_name) if name not in link.writers and name != nodes.REPLAY_NODE]
+
+
 class TopicSubscriber:
     """Subscriber to one topic, which passes the messages that its PublisherGate accepts to take(message, True after a
     gap).
@@ -124,10 +134,7 @@ class TopicSubscriber:
     def unexpected_publishers(self):
         """Return the names of the publishers that the graph does not expect; [] in a graph without the expected
         nodes."""
-        if not self._expected:
-            return []
-        return [name for name in self._node.publishers_of(self._ros_name)
-                if name not in self.link.writers and name != nodes.REPLAY_NODE]
+        return foreign_publishers(self._node, self.link, self._ros_name) or []
 
     def _unexpected_count(self):
         """Return the number of unexpected publishers for PublisherGate. A node before its discovery counts as

@@ -18,25 +18,36 @@ from pedestal_common.node.unit import LEVEL_ERROR, LEVEL_WARN
 from pedestal_common.realtime import priority
 from pedestal_common.wire import commands, messages, records
 
+REPLAY_POLL_S = 0.2
+"""Time between two searches for another replay [s]."""
+
 
 class Port:
     """Unit and its topics. prefix: of its beam in a node that serves several beams, else ''."""
 
     def __init__(self, node, unit, prefix=''):
-        self.unit, self.prefix = unit, prefix
-        self.decoders = {self.named(name): records.Decoder(name, unit.inputs)
-                         for name in (unit.trigger, *unit.latencies)}
+        self.prefix = prefix
         self.stamps = np.zeros(1, np.int64)
-        self._initial = unit.memory.record.copy()
         written = [name for name in unit.writes if not prefix or name in nodes.BEAM_TOPICS
                    or prefix == nodes.prefixes(node.graph.beams)[0]]
-        self._encoders = [(records.Encoder(name, message, unit.outputs), node.writer(self.named(name)))
-                          for name, message in unit.messages.items() if name in written]
-        self._texts = {name: [node.writer(self.named(name)), topics.NO_TEXT_CODE, '']
-                       for name in written if records.is_text(name)}
+        self._writers = {name: node.writer(self.named(name)) for name in written
+                         if name in unit.messages or records.is_text(name)}
         self._reply = node.writer(self.named(unit.NODE.replies)) if unit.NODE.replies else None
         self._announce, self._epoch_of = node.announce, node.epoch
-        self._clock, self._epoch, self._last = node.clock, 0, None
+        self._clock = node.clock
+        self.use(unit)
+
+    def use(self, unit):
+        """Run a unit from its first step on."""
+        self.unit = unit
+        self.decoders = {self.named(name): records.Decoder(name, unit.inputs)
+                         for name in (unit.trigger, *unit.latencies)}
+        self._initial = unit.memory.record.copy()
+        self._encoders = [(records.Encoder(name, message, unit.outputs), self._writers[name])
+                          for name, message in unit.messages.items() if name in self._writers]
+        self._texts = {name: [writer, topics.NO_TEXT_CODE, ''] for name, writer in self._writers.items()
+                       if records.is_text(name)}
+        self._epoch, self._last = 0, None
 
     def named(self, topic):
         """Return the name of the topic in the graph."""
@@ -124,11 +135,13 @@ class UnitNode(shell.Shell):
         self._waiting_for_once, self._held = set(), collections.deque()
         self._settled, self._settling = not self.graph.lockstep, None
         self._urgent = [port.unit.urgent for port in self.ports]
+        self._once, self._replays = frozenset(), set()
         self._callees = {} if self.graph.lockstep else {
             name: self.create_client(Trigger, self._root + name if self.beam else name) for name in unit_type.CALLS}
         self._called = set()
         for port in self.ports:
             self._listen(port)
+        self._once = frozenset(self._waiting_for_once)
         for name in unit_type.REQUESTS:
             self.create_service(Trigger, name, self._service(name))
         self.diagnose_with(self.diagnose)
@@ -162,12 +175,15 @@ class UnitNode(shell.Shell):
                 self.get_logger().warning(self.refused)
         return take
 
-    @staticmethod
-    def _text_taker(port, name):
-        return lambda message: port.unit.take_text(name, message.data)
+    def _text_taker(self, port, name):
+        def take(message):
+            self._look_for_replay()
+            port.unit.take_text(name, message.data)
+        return take
 
     def _once_taker(self, port, name):
         def take(message):
+            self._look_for_replay()
             stamp = messages.nanoseconds(message.header.stamp)
             try:
                 port.unit.decode(name, messages.since(message, self.epoch(stamp) if stamp else 0))
@@ -212,16 +228,47 @@ class UnitNode(shell.Shell):
             if nodes.plain(name) not in self.row.writes:
                 self.reader(name, decoding(decoders[name]), self._step_taker(name))
         self._progress = (None, time.monotonic())
+        if trigger not in self.row.writes:
+            self.every(REPLAY_POLL_S, self._look_for_replay)
         if self.graph.lockstep:
             self.every(0.2, self._watch)
         else:
             self._answered = self._watched = self._begun = time.monotonic_ns()
             self.every(0.05, self._watch_trigger)
 
+    def _look_for_replay(self):
+        """Begin again if another replay publishes the trigger than the one before."""
+        if self.steps is None or self.steps.trigger in self.row.writes:
+            return
+        replays = {bytes(info.endpoint_gid) for info in
+                   self.get_publishers_info_by_topic(self._link(self.steps.trigger)[1])
+                   if shell.node_of(info, self._root) == nodes.REPLAY_NODE}
+        if self._replays and replays - self._replays:
+            self._begin_again()
+        self._replays |= replays
+
+    def _begin_again(self):
+        """Forget all steps and messages, as a node that starts."""
+        self.get_logger().info('begins again, for another replay')
+        for port in self.ports:
+            unit = type(port.unit)(self.parameters, port.unit.reads)
+            unit.lockstep = self.graph.lockstep
+            port.use(unit)
+        self.unit = self.ports[0].unit
+        self.steps.reset_after_gap(self.steps.trigger)
+        self.refused = self.steps.refusal = ''
+        self._waiting_for_once = set(self._once)
+        self._held.clear()
+        self._settled, self._settling = not self.graph.lockstep, None
+        self._urgent = [port.unit.urgent for port in self.ports]
+        self.restart()
+
     def _step_taker(self, name):
         steps = self.steps
 
         def take(message, after_gap):
+            if message[0] <= self._stamp:
+                self._look_for_replay()
             if after_gap:
                 steps.reset_after_gap(name)
                 if name == steps.trigger and message[0] <= self._stamp:
