@@ -42,7 +42,8 @@ def test_two_options_are_enough(adsb):
 
 def test_the_flight_is_told_where_the_run_begins(adsb):
     log, path = Plan(scenario.load('track_file', [f'{PATH}={adsb}', SMOOTH])).announced()
-    assert log.startswith('flight.csv: ADS-B of 4b1812 RGA3: 57 of 60 fixes, 3 held positions dropped, times in whole')
+    assert log.startswith('flight.csv: ADS-B of 4b1812 RGA3, columns timestamp in UTC, latitude in deg, longitude in '
+                          'deg, geoaltitude in ft: 57 of 60 fixes, 3 held positions dropped, times in whole')
     assert 'altitudes in steps of 100 ft, smoothed: off the fixes by ' in log
     assert path.startswith('59 s, at most 3') and ' km from the station at latitude 47.' in path
     assert Plan(scenario.load('uav_flyby')).announced() == []

@@ -8,7 +8,7 @@ from acu_tracker import signals
 from acu_tracker.estimation import target
 from acu_tracker.estimation.filters import measurement
 from acu_tracker.geometry import attitude, attitude_error, direction, encoders
-from acu_tracker.guidance.azimuth_turn import MAX_OFFSET_BEAMWIDTHS
+from acu_tracker.geometry.azimuth_turn import MAX_OFFSET_BEAMWIDTHS
 from pedestal_common.compiled import compiled
 
 UNKNOWN_POINTING = encoders.Pointing(math.nan, math.nan, math.nan, math.nan)

@@ -4,7 +4,7 @@ import math
 import numpy as np
 import pytest
 
-from acu_tracker.guidance import azimuth_turn
+from acu_tracker.geometry import azimuth_turn
 from acu_tracker.params import AcuParameters
 from acu_tracker.program.program_track import NO_TRACK
 from acu_tracker.unit import Acu

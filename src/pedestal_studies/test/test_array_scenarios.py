@@ -59,8 +59,7 @@ def test_a_beam_that_only_leads_is_seen_at_the_beginning_of_its_intervals():
 
 
 @pytest.mark.parametrize('name, overrides, line', [
-    (SWAY, ['adu.transport_delay=0.021'], 'adu: transport_delay = 0.021 s: must be a multiple of the period 0.01 s: a '
-                                          'beam changes at the steps'),
+    (SWAY, ['adu.transport_delay=0.021'], 'adu: transport_delay = 0.021 s: must be a multiple of the period 0.01 s'),
     (SWAY, ['adu.period=0.0001', 'adu.transport_delay=0.3'], 'adu: transport_delay = 0.3 s: must be below 511 periods '
                                                              'of 0.0001 s'),
     (SWAY, ['acu.azimuth.controller=feedforward'], "acu: azimuth.controller = 'feedforward': must be beam: the drive "

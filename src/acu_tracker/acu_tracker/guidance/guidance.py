@@ -10,11 +10,11 @@ import numpy as np
 
 from acu_tracker import modes, tracking
 from acu_tracker.estimation import target
-from acu_tracker.geometry import attitude, azimuth_wrap, direction
+from acu_tracker.geometry import attitude, azimuth_turn, azimuth_wrap, direction
 from acu_tracker.geometry.azimuth_wrap import Travel
 from acu_tracker.geometry.motion import AxisMotion, Motion, line_of_sight
 from acu_tracker.geometry.vector import rotation
-from acu_tracker.guidance import azimuth_turn, manual
+from acu_tracker.guidance import manual
 from acu_tracker.lookahead import planner
 from acu_tracker.mode import signal_level_modes
 from acu_tracker.modes import Mode, Reason
