@@ -41,7 +41,7 @@ PAPER_000_CLAIMS = (
              'sine_0p4hz_peak_error_percent'),
             ('figure 6: largest tracking error 0.04 rad', 'after the first period, sine of 0.4 Hz',
              'sine_0p4hz_max_error_rad'),
-            ('figure 6: largest error below 4.6 %', 'largest tracking error over the amplitude',
+            ('figure 6: largest error below 4.6 %', 'largest tracking error divided by the amplitude',
              'sine_0p4hz_max_error_percent'),
             ('figure 6: mean square error below 2.81 %', 'rms 0.0281 rad, neither squared nor relative',
              'sine_0p4hz_rms_error_rad')))),
@@ -53,10 +53,10 @@ PAPER_000_CLAIMS = (
          ('figure 5: settling time 0.2 s', 'within 2 % of the step; the gains for the sine of 0.4 rad/s',
           'paper-r2', 'step_settling_2percent_s')),
     *_of('scenarios',
-         ('figures 7, 8: the filtered error is smooth (no number)', 'noise of a sample over noise of the estimate, '
-          'cross-elevation, flyby at 500 m', 'uav_flyby', 'noise_reduction_cross_elevation'),
-         ('figures 9, 10: the filtered position is smooth (no number)', 'noise of a sample over noise of the '
-          'estimate, elevation, flyby at 500 m', 'uav_flyby', 'noise_reduction_elevation'),
+         ('figures 7, 8: the filtered error is smooth (no number)', 'noise of a sample divided by noise of the '
+          'estimate, cross-elevation, flyby at 500 m', 'uav_flyby', 'noise_reduction_cross_elevation'),
+         ('figures 9, 10: the filtered position is smooth (no number)', 'noise of a sample divided by noise of '
+          'the estimate, elevation, flyby at 500 m', 'uav_flyby', 'noise_reduction_elevation'),
          ('figures 7, 8: the filtered error is smooth (no number)', 'the same ratio at 60 m, cross-elevation',
           'uav_flyby-60m', 'noise_reduction_cross_elevation'),
          ('figures 9, 10: the filtered position is smooth (no number)', 'the same ratio at 60 m, elevation',
@@ -68,8 +68,8 @@ PAPER_000_CLAIMS = (
           'bias-off', 'standstill_peak_to_peak_rad'),
          ('the dual-motor drive removes the backlash (no number)', 'peak to peak at standstill, bias torque 5 Nm',
           'bias-on', 'standstill_peak_to_peak_rad'),
-         ('the dual-motor drive removes the backlash (no number)', 'error of a reversal without bias torque, over '
-          'the error with 5 Nm', 'bias-on', 'reversal_ratio_off_to_on'),
+         ('the dual-motor drive removes the backlash (no number)', 'error of a reversal without bias torque, '
+          'divided by the error with 5 Nm', 'bias-on', 'reversal_ratio_off_to_on'),
          ('one speed loop keeps the motors in step (no number)', 'opposing torque at rest, one speed loop',
           'mean-speed', 'fight_torque_rms_nm'),
          ('one speed loop keeps the motors in step (no number)', 'opposing torque at rest, a speed loop for each '
@@ -134,7 +134,7 @@ PAPER_003_CLAIMS = (
           '3.50 deg/s as printed; 30 m/s at 500 m is 3.44 deg/s'),
     *_of('manoeuvre',
          *((f'figure {number}: {quantity}, 50 runs: the gap grows with the manoeuvre (no number)',
-            f'error of cv over error of the IMM, reversal of {reversal} s', f'reversal-{reversal}s/imm-b',
+            f'error of cv divided by error of the IMM, reversal of {reversal} s', f'reversal-{reversal}s/imm-b',
             f'{quantity}_ratio_of_cv')
            for number, quantity in ((3, 'rate'), (4, 'acceleration')) for reversal in (4, 0.5))),
     *_of('imm-feedforward',
@@ -158,7 +158,7 @@ PAPER_004_CLAIMS = (
           'as printed; the noises and the flight are ours'),
     *_of('telemetry-flight',
          *((f'figure{"s" if " " in numbers else ""} {numbers}: {quantity} of the {axis}, {shown} (no number)',
-            f'rms error of the {measurement} over rms error of the estimate', f'{axis}/filtered',
+            f'rms error of the {measurement} divided by rms error of the estimate', f'{axis}/filtered',
             f'{quantity}_reduction')
            for axis, figures in (('azimuth', ('1, 2', '3', '4')), ('elevation', ('5, 6', '7', '8')))
            for numbers, shown, quantity, measurement in zip(
@@ -174,10 +174,10 @@ PAPER_004_CLAIMS = (
          ('the model is observable (no number)', 'condition, angle measured, with T as the unit of time',
           'observability/angle', 'condition')),
     *_of('rate-measurement',
-         ('a measured rate widens the band (no number)', 'bandwidth of the rate with a measured rate, over the '
-          'bandwidth without', 'position-rate', 'rate_bandwidth_ratio'),
+         ('a measured rate widens the band (no number)', 'bandwidth of the rate with a measured rate, divided by '
+          'the bandwidth without', 'position-rate', 'rate_bandwidth_ratio'),
          ('a measured rate lessens the dynamic error (no number)', 'dynamic error at 0.2 Hz without a measured rate, '
-          'over the error with it', 'position-rate', 'dynamic_error_ratio'),
+          'divided by the error with it', 'position-rate', 'dynamic_error_ratio'),
          ('the filter is uniformly asymptotically stable (no number)', 'largest eigenvalue', 'position-rate',
           'largest_eigenvalue')))
 

@@ -32,25 +32,26 @@ ROWS_FILE = 'docs/rows.json'
 SCENARIO_RESULTS = (
     ('`leo_pass`: pointing error against truth, per axis, rms', 'leo_pass', 'pointing_rms_deg'),
     ('`leo_pass`: largest pointing error', 'leo_pass', 'pointing_max_deg'),
-    ('`leo_pass`: rms pointing error over the noise of a receiver sample', 'leo_pass', 'pointing_to_noise'),
+    ('`leo_pass`: rms pointing error divided by the noise of a receiver sample', 'leo_pass', 'pointing_to_noise'),
     ('`ship_pass`, sea state 5, INS one step late: pointing error, rms', 'ship_pass', 'pointing_rms_deg'),
-    ('`ship_pass`: rms pointing error over that of `leo_pass`', 'ship_pass', 'pointing_to_leo_pass'),
-    ('`ship_pass`, INS 20 ms late (`ins.latency=0.02`): rms pointing error over that of `leo_pass`', 'ship_pass-late',
-     'pointing_to_leo_pass'),
+    ('`ship_pass`: rms pointing error divided by that of `leo_pass`', 'ship_pass', 'pointing_to_leo_pass'),
+    ('`ship_pass`, INS 20 ms late (`ins.latency=0.02`): rms pointing error divided by that of `leo_pass`',
+     'ship_pass-late', 'pointing_to_leo_pass'),
     ("`ship_pass`: isolation from the ship's rotation", 'ship_pass', 'isolation_db'),
-    ('`ship_pass`: isolation that the noise alone would show', 'ship_pass', 'isolation_limit_db'),
+    ('`ship_pass`: isolation that a perfect antenna would show with this noise', 'ship_pass', 'isolation_limit_db'),
     ('`ship_pass` without noise: isolation', 'ship_pass-quiet', 'isolation_db'),
-    ('`ship_pass_ss6`: rms pointing error over that of `leo_pass`', 'ship_pass_ss6', 'pointing_to_leo_pass'),
+    ('`ship_pass_ss6`: rms pointing error divided by that of `leo_pass`', 'ship_pass_ss6', 'pointing_to_leo_pass'),
     ('`ship_pass_ss6`: isolation', 'ship_pass_ss6', 'isolation_db'),
     ('`ship_overhead`: time outside half a beamwidth', 'ship_overhead', 'loss_s'),
-    ('`ship_overhead`: that time over the time announced before the slew', 'ship_overhead', 'loss_to_predicted'),
-    ('`ship_align_and_track`: time from a heading 180 deg wrong to a stated 1 sigma of 0.2 deg',
+    ('`ship_overhead`: time outside half a beamwidth, divided by the time announced before the slew', 'ship_overhead',
+     'loss_to_predicted'),
+    ('`ship_align_and_track`: time from a start heading wrong by 180 deg until the INS states a 1 sigma of 0.2 deg',
      'ship_align_and_track', 'aligned_s'),
     ('`ship_align_and_track`: heading error after the alignment, rms', 'ship_align_and_track',
      'heading_error_rms_deg'),
     ('`ship_align_and_track`: time from the alignment to autotrack', 'ship_align_and_track',
      'autotrack_after_alignment_s'),
-    ('`uav_flyby`, 500 m: noise of a sample over noise of the estimate, cross-elevation', 'uav_flyby',
+    ('`uav_flyby`, 500 m: noise of a sample divided by noise of the estimate, cross-elevation', 'uav_flyby',
      'noise_reduction_cross_elevation'),
     ('`uav_flyby`, 500 m: the same ratio, elevation', 'uav_flyby', 'noise_reduction_elevation'),
     ('`uav_flyby` at 60 m (`pedestal study scenarios` prints its command): the same ratio, cross-elevation',
@@ -59,10 +60,10 @@ SCENARIO_RESULTS = (
 """(text, case, metric) of the results of the study scenarios in docs/measured.md."""
 HEADLINE_RESULTS = (
     ('a satellite pass ashore: pointing error against truth, per axis, rms', 'leo_pass', 'pointing_rms_deg'),
-    ('the same pass: rms pointing error over the noise of a receiver sample', 'leo_pass', 'pointing_to_noise'),
-    ('a UAV at 500 m: noise of a sample over noise of the estimate, elevation', 'uav_flyby',
+    ('the same pass: rms pointing error divided by the noise of a receiver sample', 'leo_pass', 'pointing_to_noise'),
+    ('a UAV at 500 m: noise of a sample divided by noise of the estimate, elevation', 'uav_flyby',
      'noise_reduction_elevation'),
-    ('a satellite pass from a ship in sea state 5: rms pointing error over that ashore', 'ship_pass',
+    ('a satellite pass from a ship in sea state 5: rms pointing error divided by that ashore', 'ship_pass',
      'pointing_to_leo_pass'),
     ("a satellite pass from a ship in sea state 6: isolation from the ship's rotation", 'ship_pass_ss6',
      'isolation_db'))
@@ -162,7 +163,7 @@ def filter_numbers(rows):
                    _spread(rows['filters', f'{profile}/{name}/{COLOURED_NOISE}', 'reduction']))
                   for profile, case in cases.items() if ('filters', case, 'reduction') in rows]
     return ('filter', 'motion', 'angle rms deg', 'reduction', 'rate rms deg/s', 'mean NIS',
-            'rate error over own sigma', 'reduction, noise within 5 Hz'), lines
+            'rate error divided by own sigma', 'reduction, noise within 5 Hz'), lines
 
 
 def manoeuvre_numbers(rows):
@@ -186,7 +187,7 @@ def feedforward_numbers(rows):
         lines += [(case, _spread(rows['imm-feedforward', case, 'miss_rms_deg']), '', '')
                   for case in imm_feedforward.DRIVE_CASES if case.startswith(axis)]
     return ('case', 'miss rms deg', 'rate noise deg/s',
-            'miss of a conventional filter of equal rate noise, over this miss'), lines
+            'miss of a conventional filter of equal rate noise, divided by this miss'), lines
 
 
 def matrix_table(rows):
@@ -206,7 +207,7 @@ def pareto_numbers(rows):
         _spread(rows['pareto', name, 'miss_ratio_at_equal_rate_noise'])
         if ('pareto', name, 'miss_ratio_at_equal_rate_noise') in rows else '') for name in pareto.FILTER_TUNINGS]
     return ('filter', 'least miss of any tuning, deg', 'rate noise at the least miss, deg/s',
-            'miss at the rate noise of imm-predicted, over the miss of imm-predicted'), lines
+            'miss at the rate noise of imm-predicted, divided by the miss of imm-predicted'), lines
 
 
 def flyby_numbers(rows):
@@ -225,7 +226,7 @@ def alignment_numbers(rows):
               *(_spread(rows['alignment', f'{name}/swell', metric]) for metric in swell))
              for name in alignment.CASE_METHODS]
     return ('method', 'time to 12 arcmin, s', *(f'azimuth at {t} s, arcmin' for t in (100, 250, 300, 600)),
-            'level, arcmin', 'azimuth on swell at 200 s, arcmin', 'that error over own sigma'), [
+            'level, arcmin', 'azimuth on swell at 200 s, arcmin', 'that error divided by own sigma'), [
         *lines, ('limit', *(_spread(rows['alignment', 'limit', metric]) for metric in metrics), '', '')]
 
 
