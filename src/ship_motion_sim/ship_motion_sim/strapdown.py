@@ -60,8 +60,8 @@ def sculling(a, f, last_a, last_f):
     """Return the velocity increment [m/s] in the deck axes at the start of an interval.
 
     a [rad], f [m/s], each (3,): increments of angle and force in the interval; last_a, last_f: those of
-    the previous interval. For steady rates the result is f + a x f / 2 + a x (a x f) / 6. Under quick sway the last term
-    changes the vertical acceleration by 1 ug.
+    the previous interval. For steady rates the result is f + a x f / 2 + a x (a x f) / 6. Under quick sway the last
+    term changes the vertical acceleration by 1 ug.
     """
     rx, ry, rz = cross(a[0], a[1], a[2], f[0], f[1], f[2])
     ux, uy, uz = cross(a[0], a[1], a[2], rx, ry, rz)

@@ -4,7 +4,8 @@
     K1 = K4 = 2 s0, k2 = 4 s0^2/g, K3 = 4 s0^4/g
 
 All four poles are at -s0 +- j s0. An azimuth error of 180 deg is an unstable equilibrium. Because the loop is closed
-from power-up, the transient of the first levelling leaves this equilibrium. The velocities are those of a gyrocompass, the integrals of two accelerometers, without the term w_cU x v of the rotating axes.
+from power-up, the transient of the first levelling leaves this equilibrium. The velocities are those of a gyrocompass,
+the integrals of two accelerometers, without the term w_cU x v of the rotating axes.
 """
 import math
 

@@ -3,9 +3,9 @@
 aligning    The strapdown runs at the rate of the IMU, the method every `step` seconds. The commands of the method
             rotate n'. Method oba commands no rotation: its strapdown integrates in inertial space (`step`: earth
             rate, command and gravity are zero).
-aligned     Navigation begins as soon as the 1-sigma of azimuth is small enough. Without an aid the INS is free inertial.
-            With an aid, riccati_eso continues with the difference of both velocities, so level and azimuth keep
-            improving.
+aligned     Navigation begins as soon as the 1-sigma of azimuth is small enough. Without an aid the INS is free
+            inertial. With an aid, riccati_eso continues with the difference of both velocities, so level and azimuth
+            keep improving.
 
 An aid is a velocity in deck axes (log) or ENU (gnss).
 
