@@ -8,7 +8,15 @@ s, c, u, o   records of STATE_DTYPE, CONSTANTS_DTYPE, signals.INPUTS_DTYPE and O
 g, k, m      parts of s: guidance, tracking, mode
 t            s.stamp [s]
 
-all_tables: the Tables; gap: the outage.Outage (a silence between two steps is `silence`).
+Other names:
+all_tables   the Tables
+no_signal    the outage.Outage: the time without a signal of the receiver
+silence      True if the previous step is more than step_gap ago
+rested       True if the axes had no motion command up to now, or the previous step is more than step_gap ago
+way          the bridge.Way: the program track, rotated to the place where the target was last tracked
+table        mode whose table was followed last (s.mode.table)
+lock, slope, track   of modes.Conditions: autotrack can begin, has not diverged, has its target
+unasked      state of uncommanded_motion
 """
 import math
 
@@ -56,7 +64,7 @@ lead       t_m - t_k [s]; t_m: middle of the interval in which the command of t_
 
 
 def axis_constants(params, period, reaction) -> np.ndarray:
-    """Return the constants (1,) of AxisParameters for steps of period [s]; reaction [s]: see position_loop.follow."""
+    """Return the constants (1,) of AxisParameters for steps of period [s]; reaction [s]: AcuParameters.reaction."""
     c, n = np.zeros(1, AXIS_CONSTANTS_DTYPE), params.notch
     c['p'] = record(params, AxisParameters)
     c['notch'] = notch.coefficients(n.frequency, n.width, n.depth, period)
@@ -78,7 +86,10 @@ def constants(params) -> np.ndarray:
 
 
 def initial_state(params) -> np.ndarray:
-    """Return the state (1,) before the first step of AcuParameters: standby, the initial mode pending."""
+    """Return the state (1,) of AcuParameters before the first step.
+
+    The mode is standby, and the initial mode is pending.
+    """
     s = np.zeros(1, STATE_DTYPE)
     s['stamp'] = -math.inf
     mode_change.initialise(s['mode'], params)
@@ -155,16 +166,16 @@ def step(s, c, u, o, all_tables):
                                                               c.p.resume_time))
     s.stamp = u.stamp
     flags = _observe(s, c, u, o, tables.of_mode(all_tables, s.mode.table), silence)
-    gap, begins = _outage(s, c), _rests(s, c, u) or dt > c.p.step_gap
+    no_signal, rested = _outage(s, c), _rests(s, c, u) or dt > c.p.step_gap
     waiting = s.mode.pending if s.mode.now == Mode.STANDBY else modes.NO_REQUEST
-    _, of_tables = _change(s, c, u, o, all_tables, waiting, gap)
+    _, of_tables = _change(s, c, u, o, all_tables, waiting, no_signal)
     _wait(s, c, u, o)
     if encoders.taken(s.tracking.encoders, s.stamp):
-        _start_from_actual(s, c, u, begins, silence)
+        _start_from_actual(s, c, u, rested, silence)
     program = tables.of_mode(all_tables, s.mode.table)
-    _move(s, c, u, o, program, gap, begins, c.p.period if dt > c.p.step_gap else dt)
+    _move(s, c, u, o, program, no_signal, rested, c.p.period if dt > c.p.step_gap else dt)
     _write_outputs(s, c, u, o, flags | of_tables)
-    if guidance.look_ahead(s.guidance, s.tracking, c, s.mode.now, program, gap, s.stamp):
+    if guidance.look_ahead(s.guidance, s.tracking, c, s.mode.now, program, no_signal, s.stamp):
         mode_change.restart(s.mode)
     _supervise(s, c, u, o, dt)
 
@@ -173,7 +184,7 @@ def step(s, c, u, o, all_tables):
 def _observe(s, c, u, o, program, silence):
     """Take the inputs of the step: encoders, attitude, receiver, preset; run the monitors on them.
 
-    Return the bits of signals.INVALID_INPUTS. silence: whether the step comes after a gap.
+    Return the bits of signals.INVALID_INPUTS. silence: True if the previous step is more than step_gap ago.
     """
     g, k, mode = s.guidance, s.tracking, s.mode.now
     way = bridge.way(g.bridge, program)
@@ -232,25 +243,28 @@ def _rests(s, c, u):
 
 
 @compiled
-def _change(s, c, u, o, all_tables, request, gap):
-    """Run the mode machine at s.stamp with a `request` or NO_REQUEST, and apply the consequences of a change.
+def _change(s, c, u, o, all_tables, request, no_signal):
+    """Select the mode at s.stamp, for a `request` or NO_REQUEST, and carry out what a change of mode requires.
 
     Return (result, flags of the tables).
     """
     g, k, before, table = s.guidance, s.tracking, s.mode.now, s.mode.table
-    now, flags = _situation(s, c, u, all_tables, request, gap)
+    now, flags = _situation(s, c, u, all_tables, request, no_signal)
+    # A divergence, or a slope of the wrong sign, is latched.
     if now.conditions.slope != Reason.NONE:
         divergence.latch(k.divergence)
     o.locked = now.conditions.lock == Reason.NONE
     result = mode_change.change(s.mode, now, request)
     mode = s.mode.now
     if result == modes.REQUEST_ACCEPTED and modes.FOLLOWS_TABLE[mode]:
-        tracker.recount(k.target.tracker)
+        # Autotrack needs lock_count new measurements to begin again.
+        tracker.reset_accepted_count(k.target.tracker)
     if s.mode.table != table:
         bridge.clear(g.bridge)
     if mode != before:
         if modes.USES_SIGNAL_LEVEL[mode]:
-            if before == Mode.AUTOTRACK and not gap.coasting:
+            if before == Mode.AUTOTRACK and not no_signal.coasting:
+                # The rotated program begins where the target was last tracked. This avoids a jump of the antenna.
                 guidance.bridge_to(g, k, c, tables.of_mode(all_tables, s.mode.table), s.stamp)
             guidance.begin_by_level(g, k, c, before, mode, s.stamp)
         if before == Mode.AUTOTRACK and now.conditions.track != Reason.NONE:
@@ -260,21 +274,23 @@ def _change(s, c, u, o, all_tables, request, gap):
 
 
 @compiled
-def _situation(s, c, u, all_tables, request, gap):
+def _situation(s, c, u, all_tables, request, no_signal):
     """Return (modes.Situation at s.stamp, flags of the tables).
 
     A table is evaluated only if its mode can matter in this step. `wanted` holds these modes: the request, the running
-    mode, and the modes to which the running mode may fall back.
+    mode, the mode whose table was followed last, and the mode to which the running mode may fall back.
     """
     m, g, k, t = s.mode, s.guidance, s.tracking, s.stamp
     unstable, pins = tracking.unstable(k, c, u, t), stow.obstacle(s.stow, c.p.stow_pins, u.pins)
     closed = m.now == Mode.AUTOTRACK and supervision.axes_follow_commands(s.supervision)
-    lock, slope, track = tracking.conditions(k, c, t, gap, closed)
+    lock, slope, track = tracking.conditions(k, c, t, no_signal, closed)
     if track == Reason.NONE and signal_level_modes.in_side_lobe(g.acquisition, c, t):
         track = Reason.SIDE_LOBE
-    # A filter without an estimate cannot coast.
+    # The fallback AUTOTRACK means coasting. Because a filter without an estimate cannot coast, the program replaces
+    # the fallback.
     chosen = m.fallback if m.fallback != Mode.AUTOTRACK or k.target.tracker.running else Mode.PROGRAM
     falls_back = m.now == Mode.SEARCH or (m.now == Mode.AUTOTRACK and track != Reason.NONE)
+    # The request; the running mode; the mode whose table was followed last; the mode to which the mode falls back.
     wanted = request, m.now, m.table if falls_back else m.now, chosen if falls_back else m.now
     program = tle = sun = Reason.NONE
     flags = flag = 0
@@ -303,7 +319,7 @@ def _situation(s, c, u, all_tables, request, gap):
 
 @compiled
 def _wait(s, c, u, o):
-    """Advance the stow pins, and resume a mode that the drive interrupted when the drive is ready again."""
+    """Advance the stow pins. When the drive is ready again, resume the mode that the drive interrupted."""
     m = s.mode
     if c.p.stow_pins and stow.step(s.stow, c, u, m.now):
         mode_change.mark_stowed(m)
@@ -313,34 +329,35 @@ def _wait(s, c, u, o):
 
 
 @compiled
-def _start_from_actual(s, c, u, begins, silence):
+def _start_from_actual(s, c, u, rested, silence):
     """Start both axes from their actual angles where they begin to move, and each axis that ignores its command."""
-    if begins:
+    if rested:
         guidance.start_from(s.guidance, u.position[0])
     watched = s.supervision.axis
-    axes.start_from_actual(s.axis, c, u, (watched[0].immobile != 0, watched[1].immobile != 0), begins, silence)
+    axes.start_from_actual(s.axis, c, u, (watched[0].immobile != 0, watched[1].immobile != 0), rested, silence)
 
 
 @compiled
-def _move(s, c, u, o, program, gap, begins, dt):
-    """Move the axes, or let them rest. begins: whether they rested up to now; dt [s]: duration of the motion."""
+def _move(s, c, u, o, program, no_signal, rested, dt):
+    """Move the axes, or let the axes rest; dt [s]: duration of the motion."""
     g, k, m, t = s.guidance, s.tracking, s.mode, s.stamp
     actual = axes.now(s.axis)
-    order = guidance.Order(m.now, m.begins or begins, actual.azimuth.angle, t)
+    order = guidance.Order(m.now, m.begins or rested, actual.azimuth.angle, t)
     guidance.move_by_hand(g, c, order, floor.by_hand(c, u, g.manual.angle[0]), actual, dt)
     if _rests(s, c, u):
         axes.rest(s.axis, c, o, dt)
     else:
         now, order = Instants(t, t + c.lead, dt), guidance.Order(m.now, m.begins, actual.azimuth.angle, t)
-        motion = guidance.motion(g, k, c, order, bridge.way(g.bridge, program), gap, now)
-        V = tracking.deck_rates(k, c, t, actual.azimuth.angle, actual.elevation.angle)
-        axes.follow(s.axis, c, u, o, motion, now, (k.error, V, m.now == Mode.AUTOTRACK))
+        motion = guidance.motion(g, k, c, order, bridge.way(g.bridge, program), no_signal, now)
+        deck_rates = tracking.deck_rates(k, c, t, actual.azimuth.angle, actual.elevation.angle)
+        axes.follow(s.axis, c, u, o, motion, now, (k.error, deck_rates, m.now == Mode.AUTOTRACK))
         mode_change.mark_started(m)
         limited = o.angle_limited[0] != 0 or o.angle_limited[1] != 0
         guidance.watch_beam(g, c, m.now, axes.now(s.axis), limited, now.t_m)
-        if _note_outage_reason(s, c) and m.now == Mode.AUTOTRACK and not gap.coasting:
+        if _note_outage_reason(s, c) and m.now == Mode.AUTOTRACK and not no_signal.coasting:
+            # The rotated program begins where the target was last tracked. This avoids a jump of the antenna.
             guidance.bridge_to(g, k, c, program, t)
-        o.blocked, o.coasting = s.outage.blocked, m.now == Mode.AUTOTRACK and gap.coasting
+        o.blocked, o.coasting = s.outage.blocked, m.now == Mode.AUTOTRACK and no_signal.coasting
     for i in range(2):
         uncommanded_motion.command(s.unasked, i, o.rate[i], t, min(dt, c.p.period), c.p.step_gap + c.p.command_delay)
         frozen.command(s.frozen, i, o.rate[i], c.p.period)
@@ -385,4 +402,5 @@ def _supervise(s, c, u, o, dt):
         c.p.unasked_rate, c.p.tracker.receiver.beamwidth)
     mode = Mode.STANDBY if _rests(s, c, u) else s.mode.now
     conditions.take(s.supervision, mode, u, o, c.axis, s.unasked, facts)
+    # The count of the changes of the alarm list.
     o.alarms = s.supervision.alarms.revision

@@ -176,7 +176,7 @@ def test_an_angle_that_walks_solves_the_riccati_equation_with_that_noise(kind):
     c = axis_filter.constants(build(FilterParameters, {'kind': kind, **PARAMS}))[0]
     f, walk = np.zeros(1, axis_filter.FILTER_DTYPE)[0], 3.0 * SIGMA**2
     axis_filter.start(f, c, 0.0, SIGMA**2, 0.1)
-    f['walk'] = walk
+    f['drift_variance_rate'] = walk
     for _ in range(3000):
         axis_filter.predict(f, c, T)
         axis_filter.correct(f, c, AxisMeasurement(0.0, SIGMA**2, math.nan, math.nan))

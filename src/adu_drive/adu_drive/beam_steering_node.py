@@ -1,4 +1,7 @@
-"""ROS node of an electronically steered array: owns the time, publishes the active beams, executes references."""
+"""ROS node of an electronically steered array.
+
+The node sets the time of the graph, publishes the beams that are active, and points each beam to its references.
+"""
 import pedestal_common.entry  # noqa: F401
 
 # isort: split
@@ -10,7 +13,7 @@ from pedestal_common.node.unit import Diagnosis
 
 
 class BeamSteeringNode(Timekeeper):
-    """Node with a unit for each beam and common diagnostics."""
+    """Node with a unit for each beam and common diagnostics. A port is a unit with its topics."""
 
     def __init__(self):
         super().__init__('adu_drive.beam_steering_node')
@@ -22,6 +25,7 @@ class BeamSteeringNode(Timekeeper):
         values = [(port.prefix + key, text) for port, diagnosis in of_beams for key, text in diagnosis.values
                   if key != 'state']
         state = [pair for pair in worst.values if pair[0] == 'state']
+        # The message names the command topic of the worst beam.
         command = port.unit.COMMAND
         return Diagnosis(worst.level, worst.message.replace(command, port.named(command)), values + state)
 

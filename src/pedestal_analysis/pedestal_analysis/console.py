@@ -11,7 +11,7 @@ import textwrap
 EXIT_WRONG_COMMAND = 2
 """Exit code of a verb with wrong arguments."""
 EXIT_DISTURBED = 3
-"""Exit code of a run that was disturbed."""
+"""Exit code of a run that was disturbed, for example by lost steps."""
 
 STDOUT_PATH = pathlib.Path('/dev/stdout')
 """Path that --json - selects."""
@@ -30,7 +30,8 @@ MIN_TABLE_COLUMNS = 150
 def _bar(columns, advance, description, total=None, **fields):
     """Yield a function that calls advance(bar, task, ...) on a terminal and does nothing in a pipe.
 
-    columns(rich.progress) -> columns of the bar; description, total, fields: of its only task.
+    columns: function of the module rich.progress that returns the columns of the bar; description, total, fields: of
+    the only task of the bar.
     """
     if not sys.stderr.isatty():
         yield lambda *_: None
@@ -119,7 +120,7 @@ def show_results(title, columns, results, whole, marks=()):
     """Print a table of metrics.
 
     columns: heads, '' for a single column; results: {metric: (value, unit)} of each column; whole: {metric: (value,
-    unit)} of the run; marks: {metric: note on a value that is off} of each column.
+    unit)} of the run; marks: {metric: why the value is suspect} of each column.
     """
     from rich.console import Console
     from rich.table import Table
@@ -130,8 +131,8 @@ def show_results(title, columns, results, whole, marks=()):
         table.add_column(column or 'value', justify='right')
     table.add_column('unit')
     marked = {}
-    for column, of in zip(columns, marks):
-        for metric, text in of.items():
+    for column, notes in zip(columns, marks):
+        for metric, text in notes.items():
             marked.setdefault(metric, []).append(f'{column}: {text}' if column else text)
     if marked:
         table.add_column('off')

@@ -28,7 +28,7 @@ Keyboards repeat about 30 times a second after a pause.
 JOG_RATES_DEG_S = (0.1, 0.5, 1.0, 2.0, 5.0)
 """Selectable jog rates [deg/s]."""
 
-KEY_VERBS = {'s': ('stop', 'stop'), 'b': ('standby', 'standby'), 'w': ('stow', 'stow'), 'p': ('preset', 'preset'),
+KEY_COMMANDS = {'s': ('stop', 'stop'), 'b': ('standby', 'standby'), 'w': ('stow', 'stow'), 'p': ('preset', 'preset'),
              'g': ('program', 'program'), 'a': ('autotrack', 'autotrack'), 't': ('take', 'take control'),
              'r': ('release', 'release control'), 'c': ('acu/reset_faults', 'reset faults')}
 """{key: (command, text on the screen)}."""
@@ -81,11 +81,12 @@ class Console:
         """Take a pressed key at the time now [s]."""
         if key in QUIT_KEYS:
             self.finished = True
-        elif key in KEY_VERBS:
-            self._request(KEY_VERBS[key][0])
+        elif key in KEY_COMMANDS:
+            self._request(KEY_COMMANDS[key][0])
         elif key in ARROW_DIRECTIONS:
             is_held = ARROW_DIRECTIONS[key] == self._jog and now - self._press_time < KEY_HOLD_S
             self._jog, self._press_time = ARROW_DIRECTIONS[key], now
+            # A new press jogs at once.
             self._last_jog_time = self._last_jog_time if is_held else 0.0
         elif key in ('+', '-'):
             place = JOG_RATES_DEG_S.index(self.rate) + (1 if key == '+' else -1)
@@ -105,7 +106,7 @@ class Console:
     def _request(self, verb, arguments=None):
         self._pending[self._remote.request(verb, arguments)] = verb
 
-    def drawn(self):
+    def content(self):
         """Return the content of the screen."""
         rows = state.rows(self._remote)
         groups = {}
@@ -118,7 +119,7 @@ class Console:
                 table.add_row(row.name, Text(row.text, justify='right'), row.unit)
             panels.append(Panel(table, title=group, padding=(0, 1)))
         alarms = [Text(f'{node}: {text}', style='bold red') for node, text in state.alarms(self._remote)]
-        keys = '  '.join(f'[{key}] {doc}' for key, (_, doc) in KEY_VERBS.items())
+        keys = '  '.join(f'[{key}] {doc}' for key, (_, doc) in KEY_COMMANDS.items())
         return Group(Columns(panels), *alarms, Text(self.last_reply, style='bold'),
                      Text(f'{keys}  [arrows] jog at {self.rate:g} deg/s  [+-] rate  [q] quit', style='dim'))
 
@@ -126,14 +127,14 @@ class Console:
 def operate(session):
     """Run the console until the operator quits it."""
     console = Console(session)
-    with keyboard() as pressed, Live(console.drawn(), refresh_per_second=8, screen=False, transient=True) as live:
-        drawn = 0.0
+    with keyboard() as pressed, Live(console.content(), refresh_per_second=8, screen=False, transient=True) as live:
+        last_draw_time = 0.0
         while not console.finished:
             session.spin(0.02)
             now = time.monotonic()
             for key in pressed():
                 console.press(key, now)
             console.update(now)
-            if now - drawn > 0.12:
-                drawn = now
-                live.update(console.drawn())
+            if now - last_draw_time > 0.12:
+                last_draw_time = now
+                live.update(console.content())

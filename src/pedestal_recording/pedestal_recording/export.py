@@ -18,7 +18,7 @@ TIME_COLUMN, STAMP_COLUMN = 't [s]', 'stamp [ns]'
 
 
 def export(path, file_format='csv', output=None, names=(), overwrite=False):
-    """Write the topics of a bag as tables. Yield (file, rows, columns), or (None, reason, topic) of an omitted topic.
+    """Write the topics of a bag as tables. Yield (file, rows, columns), or (None, reason, name) of an omitted topic.
 
     file_format   'csv' or 'parquet'
     names         topics to write, each of a known type; when empty, all topics except those of unknown type
@@ -45,13 +45,13 @@ def export(path, file_format='csv', output=None, names=(), overwrite=False):
             yield None, reason, name
             continue
         content = table(bag, name)
-        with whole(file) as part:
+        with atomic_file(file) as part:
             write(part, content, {'topic': name, 'type': bag.topics[name], **bag.metadata})
         yield file, len(content[STAMP_COLUMN]), len(content)
 
 
 @contextlib.contextmanager
-def whole(file):
+def atomic_file(file):
     """Yield the path of a temporary file that becomes `file` when it is whole, and is removed after an error."""
     part = file.with_name(file.name + '.part')
     try:
@@ -80,13 +80,14 @@ def _times(stamps):
 
 
 def _header(name, type_name, column):
-    """Return the header of a column, with its unit for a topic of the graph that has the type of the graph."""
+    """Return the header of a column, with its unit if the topic and its type are those of the graph."""
     unit = layouts.unit(nodes.plain(name), type_name, column)
     return f'{column} [{unit}]' if unit else column
 
 
 def _has_tracks(bag, name):
-    """Return True if a message has more or fewer than one point; one message of each length is read."""
+    """Return True if a message has more or fewer than one point. Of the messages of equal
+    length in bytes, one is read."""
     of_length = {len(data): data for _, _, _, data in bag.raw(name)}
     try:
         return any(len(messages.deserialize(data, bag.topics[name]).points) != 1 for data in of_length.values())

@@ -160,7 +160,7 @@ class Ins(Simulated):
             values += [('method', p.method), ('state', navigator.STAGES[stage])]
             if known:
                 values.append(('level_error_rms_rad', f'{sigma[0]:g}'))
-        if stage == navigator.STAGE_NAVIGATING:
+        if stage == navigator.STAGE_ALIGNED:
             values += [(f'velocity_{axis}', f'{v:.3f}') for axis, v in zip(('east', 'north', 'up'),
                                                                            outputs['velocity'])]
         if status:

@@ -15,7 +15,7 @@ VELOCITY_AIDS = ('none', 'log', 'gnss')
 
 @dataclasses.dataclass(frozen=True)
 class HullParameters(Parameters):
-    """A ship of about 10 000 t. The gains are plausible, not identified (reference/nav.md section 3.1)."""
+    """A ship of about 10 000 t. The gains are plausible, not identified."""
     length: float = parameter(145.0, 5.0, 500.0, 'm', 'length on the waterline')
     beam: float = parameter(20.6, 1.0, 100.0, 'm', 'beam on the waterline')
     draught: float = parameter(7.2, 0.2, 40.0, 'm', 'draught')
@@ -151,7 +151,7 @@ class ShipMotionParameters(Parameters):
 
 @dataclasses.dataclass(frozen=True)
 class AdrcParameters(Parameters):
-    """Method adrc; the defaults reproduce figure 4 of paper 001 (reference/nav.md section 1.2)."""
+    """Method adrc; the defaults reproduce figure 4 of paper 001."""
     observer: float = parameter(0.3, 0.01, 20.0, 'rad/s', 'bandwidth of the extended state observer')
     control: float = parameter(1.0, 0.01, 20.0, 'rad/s', 'bandwidth of the level control')
     start: float = parameter(60.0, 1.0, 3600.0, 's', 'time from power-up after which the azimuth uses the level '

@@ -1,9 +1,13 @@
-"""Strapdown mechanisation in a computed ENU frame n': attitude and velocity from increments, at a fixed position.
+"""Strapdown integration in a computed ENU frame n': attitude and velocity from increments, at a fixed position.
 
     step(state, angle, force, dt, earth_rate, command, gravity)
 
-    C' = C [w_ib x] - [(w_ie + w_c) x] C        (reference/nav.md section 1.1)
+    C' = C [w_ib x] - [(w_ie + w_c) x] C
     v' = C f - (2 w_ie + w_c) x v - g u
+
+    C               rotation deck -> n'
+    f, g, u         specific force, gravity, upward unit vector
+    w_ib, w_ie      rates of the deck and of the earth against inertial space
 
 w_c is the rate at which an alignment rotates n', and the components of the velocity with it. The position is fixed, so
 there is no transport rate, as in the tangent plane of the truth (see imu.specific_force). Coning and sculling use the
@@ -52,17 +56,17 @@ def coning(a, b):
 
 
 @compiled
-def sculling(a, f, b, e):
+def sculling(a, f, last_a, last_f):
     """Return the velocity increment [m/s] in the deck axes at the start of an interval.
 
-    a [rad], f [m/s], each (3,): increments of angle and force in the interval; b, e: those of the previous interval.
-    For steady rates the result is f + a x f / 2 + a x (a x f) / 6. Under quick sway the last term is 1 ug of the
-    vertical.
+    a [rad], f [m/s], each (3,): increments of angle and force in the interval; last_a, last_f: those of
+    the previous interval. For steady rates the result is f + a x f / 2 + a x (a x f) / 6. Under quick sway the last
+    term changes the vertical acceleration by 1 ug.
     """
     rx, ry, rz = cross(a[0], a[1], a[2], f[0], f[1], f[2])
     ux, uy, uz = cross(a[0], a[1], a[2], rx, ry, rz)
-    sx, sy, sz = cross(b[0], b[1], b[2], f[0], f[1], f[2])
-    tx, ty, tz = cross(e[0], e[1], e[2], a[0], a[1], a[2])
+    sx, sy, sz = cross(last_a[0], last_a[1], last_a[2], f[0], f[1], f[2])
+    tx, ty, tz = cross(last_f[0], last_f[1], last_f[2], a[0], a[1], a[2])
     return (f[0] + 0.5 * rx + ux / 6.0 + (sx + tx) / 12.0, f[1] + 0.5 * ry + uy / 6.0 + (sy + ty) / 12.0,
             f[2] + 0.5 * rz + uz / 6.0 + (sz + tz) / 12.0)
 
@@ -77,6 +81,7 @@ def step(s, angle, force, dt, earth_rate, command, gravity):
     v, q = s.velocity, s.quaternion
     dx, dy, dz = sculling(angle, force, s.last_angle, s.last_force)
     gx, gy, gz = to_earth(s.mat, dx, dy, dz)
+    # tx, ty, tz: rotation of n' in the interval, negative.
     tx, ty, tz = (-dt * (earth_rate[0] + command[0]), -dt * (earth_rate[1] + command[1]),
                   -dt * (earth_rate[2] + command[2]))
     hx, hy, hz = cross(0.5 * tx, 0.5 * ty, 0.5 * tz, gx, gy, gz)        # rotation of n' within the interval

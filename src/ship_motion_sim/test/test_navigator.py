@@ -52,7 +52,7 @@ def errors(outputs, truth):
 
 def aligned_at(outputs):
     """Step at which `aligned` is first said."""
-    return int(np.argmax(outputs[INS_STATE_TOPIC] == navigator.STAGE_NAVIGATING))
+    return int(np.argmax(outputs[INS_STATE_TOPIC] == navigator.STAGE_ALIGNED))
 
 
 @pytest.mark.parametrize('method, aid, output', [
@@ -66,7 +66,7 @@ def test_it_aligns_under_way_from_180_deg_wrong_and_knows_how_well(method, aid, 
     assert abs(e[2, 2]) > 2.0 or method == 'oba'
     states = outputs[INS_STATE_TOPIC]
     assert 100.0 < aligned * STEP * 1e-9 < 250.0 and (states[:aligned] == navigator.STAGE_ALIGNING).all()
-    assert (states[aligned:] == navigator.STAGE_NAVIGATING).all()
+    assert (states[aligned:] == navigator.STAGE_ALIGNED).all()
     assert (sigma[aligned:, 2] < 0.0036).all() and (sigma[:aligned - 1, 2] > 0.0035).all()
     assert (np.abs(e[aligned:, 2]) < 3.0 * sigma[aligned:, 2]).all()
     assert (np.abs(e[aligned:, :2]) < 4.0 * sigma[aligned:, :2] + 1e-4).all()
@@ -105,7 +105,7 @@ def test_a_gyrocompass_that_dwells_at_180_deg_is_not_aligned():
         outputs = answered(raw, **still, method='classical', imu_output='increment',
                         **{'alignment.initial_heading_deg': heading, 'alignment.aligned_sigma': 0.006})
         error, stage = abs(errors(outputs, truth)[-1, 2]), outputs[INS_STATE_TOPIC][-1]
-        assert stage == (navigator.STAGE_ALIGNING if dwells else navigator.STAGE_NAVIGATING)
+        assert stage == (navigator.STAGE_ALIGNING if dwells else navigator.STAGE_ALIGNED)
         assert error > 3.1 if dwells else error < 1e-3
 
 
@@ -168,10 +168,10 @@ def test_after_a_long_silence_of_the_imu_it_aligns_anew(how):
         statuses.append(ins.INS_STATUS_TEXTS[unit.parts['outputs']['status']])
     back = statuses.index('no IMU data for too long: the attitude is lost, the alignment starts again')
     assert back == (9000 if how == 'missing' else 9200)
-    assert outputs[INS_STATE_TOPIC][back - 1 if how == 'missing' else 8999] == navigator.STAGE_NAVIGATING
+    assert outputs[INS_STATE_TOPIC][back - 1 if how == 'missing' else 8999] == navigator.STAGE_ALIGNED
     assert (outputs[INS_STATE_TOPIC][back:back + 5000] == navigator.STAGE_ALIGNING).all()
     e, sigma = errors(outputs, truth), np.sqrt(outputs[ATTITUDE_TOPIC]['orientation_variance'])
-    assert sigma[back, 2] > 1.0 and outputs[INS_STATE_TOPIC][-1] == navigator.STAGE_NAVIGATING
+    assert sigma[back, 2] > 1.0 and outputs[INS_STATE_TOPIC][-1] == navigator.STAGE_ALIGNED
     assert abs(e[-1, 2]) < 3.0 * sigma[-1, 2] < 0.01
 
 

@@ -136,7 +136,7 @@ def test_variance_of_many_seeds_is_the_integral_of_rao_squared_times_spectrum(an
     np.testing.assert_array_less(np.abs(drawn.mean(axis=0) - expected), 4.0 * error + 0.01 * expected)
 
 
-NAV_TABLE = [   # sea state, wave angle, degree of freedom, sigma [deg]: reference/nav.md section 3.1, U = 7 m/s
+NAV_TABLE = [   # sea state, wave angle, degree of freedom, sigma [deg], at U = 7 m/s
     (3, 90, waves.ROLL, 0.20), (3, 45, waves.ROLL, 0.28), (3, 180, waves.PITCH, 0.05), (3, 135, waves.PITCH, 0.11),
     (4, 90, waves.ROLL, 0.66), (4, 45, waves.ROLL, 0.83), (4, 180, waves.PITCH, 0.26), (4, 135, waves.PITCH, 0.40),
     (5, 90, waves.ROLL, 1.49), (5, 45, waves.ROLL, 1.80), (5, 180, waves.PITCH, 0.66), (5, 135, waves.PITCH, 0.84),

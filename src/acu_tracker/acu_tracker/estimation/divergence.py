@@ -2,9 +2,10 @@
 
     m = mean over the last errors of (nu_A^2 / S_A + nu_E^2 / S_E) / 2
 
-m is 1 while the errors are as large as the filter expects. An error with the wrong sign, with turned axes or three
-times too large drives the antenna away from its target. Then m is large before the beam leaves the target, and still
-large when the signal is lost. This avoids coasting on a wrong estimate.
+nu: innovation; S: its variance; A, E: azimuth and elevation. m is 1 while the errors are as large as the filter
+expects. An error signal with the wrong sign, with rotated axes or with a gain three times too high drives the antenna
+away from its target. Then m is large before the beam leaves the target, and still large when the signal is lost. This
+avoids coasting on a wrong estimate.
 """
 import numpy as np
 
@@ -14,7 +15,7 @@ DIVERGENCE_DTYPE = np.dtype([('m', 'f8'), ('diverged', 'i8')], align=True)
 """m: the mean [-]; diverged: 1 from the detection of a divergence until its reset."""
 
 DIVERGENCE_ERROR_COUNT = 100
-"""Number of errors in the mean m. A filter without a fault reaches m = 1.25 in its worst half second."""
+"""Number of errors in the mean m. Of a filter without a fault, the largest m is 1.25 in its worst half second."""
 
 MAX_COUNTED_ERROR = 12.5
 """Largest contribution of one error to m [-]: half the default gate.

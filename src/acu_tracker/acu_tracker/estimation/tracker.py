@@ -59,7 +59,7 @@ def stop(t):
 
 
 @compiled
-def recount(t):
+def reset_accepted_count(t):
     """Reset the count of accepted measurements, so that the lock takes lock_count new ones."""
     t.accepted_in_a_row = 0
 

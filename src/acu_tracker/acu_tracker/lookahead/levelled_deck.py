@@ -18,10 +18,9 @@ def initialise(s):
 
 @compiled
 def take(s, stamp, q, mean_time, restart):
-    """Move the mean by an attitude q (4,) of stamp [s]: an average over about mean_time [s];
-    restart: begin with this one.
+    """Add an attitude q (4,) of stamp [s] to the mean, an average over about mean_time [s].
 
-    A ship whose mean is not known yet is assumed to be level.
+    restart: begin with this attitude. The mean begins level, with the heading of the first attitude.
     """
     mean = s.mean
     if restart or not s.latest > -math.inf:
@@ -37,12 +36,13 @@ def take(s, stamp, q, mean_time, restart):
         for i in range(4):
             dot += mean[i] * q[i]
         norm = 0.0
+        # Because q and -q are the same attitude, the nearer one to the mean is taken.
         for i in range(4):
             mean[i] += share * (math.copysign(1.0, dot) * q[i] - mean[i])
             norm += mean[i] * mean[i]
         for i in range(4):
             mean[i] /= math.sqrt(norm)
-        # x, y: difference between the two decks' vertical axes in the two horizontal directions.
+        # x, y: horizontal components of the difference of the vertical axes of the deck and the levelled deck.
         x = 2.0 * (q[0] * q[2] - q[3] * q[1] - mean[0] * mean[2] + mean[3] * mean[1])
         y = 2.0 * (q[1] * q[2] + q[3] * q[0] - mean[1] * mean[2] - mean[3] * mean[0])
         s.spread += T / (min(stamp - s.since, mean_time) + T) * (x * x + y * y - s.spread)

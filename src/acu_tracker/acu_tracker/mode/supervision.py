@@ -8,11 +8,12 @@ UNCOMMANDED_MOTION_ALARM, FROZEN_DRIVE_ALARM, DIVERGENCE_ALARM = (
 """Indices of the alarms of the latched faults."""
 
 LATCHED_FAULT_BITS = 1 << UNCOMMANDED_MOTION_ALARM | 1 << FROZEN_DRIVE_ALARM | 1 << DIVERGENCE_ALARM
+"""Bits of these alarms."""
 
 
 @compiled
 def latched(uncommanded, frozen, diverged):
-    """Return the bits of the alarms whose fault waits for a reset; each argument: 1 while its fault does."""
+    """Return the bits of the alarms whose fault waits for a reset; each argument: 1 while its fault waits."""
     return (uncommanded << UNCOMMANDED_MOTION_ALARM) | (frozen << FROZEN_DRIVE_ALARM) | (diverged << DIVERGENCE_ALARM)
 
 
@@ -40,7 +41,10 @@ def drive_refusal(ready, uncommanded, frozen):
 
 @compiled
 def reset(alarms, t):
-    """Reset the latched alarms at t [s], with the conditions of LATCHED_FAULT_BITS. Return True if one was latched."""
+    """Clear the conditions of LATCHED_FAULT_BITS and reset the latched alarms at t [s].
+
+    Return True if an alarm was latched.
+    """
     for i in (UNCOMMANDED_MOTION_ALARM, FROZEN_DRIVE_ALARM, DIVERGENCE_ALARM):
         annunciator.set_condition(alarms, i, False, t)
     return annunciator.reset(alarms, t)

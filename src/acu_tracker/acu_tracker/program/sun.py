@@ -2,8 +2,8 @@
 
     n          days since 2000-01-01 12:00 (J2000)
     L, g       mean longitude, corrected for aberration, and mean anomaly of the sun
-    lambda     ecliptic longitude; its latitude is 0
-    epsilon    obliquity of the ecliptic
+    longitude  ecliptic longitude; its latitude is 0
+    obliquity  obliquity of the ecliptic
     R          distance [AU]
 
 The Astronomical Almanac (US Naval Observatory, HM Nautical Almanac Office), section C,

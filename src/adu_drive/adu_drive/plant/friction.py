@@ -1,7 +1,6 @@
-"""LuGre friction with its two elementary functions.
+"""LuGre friction, and the two elementary functions that it uses.
 
-The functions are written out, so that they take a few ns and give the same bits on every machine
-(reference/performance.md).
+The functions are written out, so that they take a few ns and give the same bits on every machine.
 """
 import math
 
@@ -35,7 +34,12 @@ def lugre(z, v, T_c, T_sc, per_v2, sigma_0, h_sigma_0, sigma_1_h, h):
         dz/dt = v - sigma_0 |v| z / g(v),  g = T_c + (T_s - T_c) exp(-(v / v_s)^2),  F = sigma_0 z + sigma_1 dz/dt
 
     The step is implicit in z with one division, because the explicit form is stiff (sigma_0 |v| / g).
-    T_sc = T_s - T_c, per_v2 = 1 / v_s^2.
+
+    T_c, T_s         Coulomb torque, static torque [Nm]; T_sc = T_s - T_c
+    v_s              Stribeck rate [rad/s]; per_v2 = 1 / v_s^2
+    sigma_0, sigma_1 stiffness [Nm/rad] and damping [Nm s/rad] of the bristles
+    h                sub-step [s]; h_sigma_0 = h sigma_0; sigma_1_h = sigma_1 / h
+
     Canudas de Wit, Olsson, Astrom, Lischinsky, IEEE Trans. Automatic Control 40 (1995) 419.
     """
     g = T_c + T_sc * exp_minus(v * v * per_v2)

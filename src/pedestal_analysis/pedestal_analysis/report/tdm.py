@@ -16,7 +16,7 @@ from pedestal_common.geometry import orbit
 from pedestal_common.graph import nodes
 from pedestal_recording import bag as bags
 from pedestal_recording import columns
-from pedestal_recording.export import whole
+from pedestal_recording.export import atomic_file
 from tracking_receiver_sim.track import instant
 
 RATE_LIMITS_HZ = 1e-3, 1000.0
@@ -63,7 +63,7 @@ def export(path, created, output=None, rate=10.0, participants=(), overwrite=Fal
         tracks = _Tracks(view, rate)
         file.parent.mkdir(parents=True, exist_ok=True)
         records = 0
-        with whole(file) as part, open(part, 'w', encoding='ascii', newline='') as stream:
+        with atomic_file(file) as part, open(part, 'w', encoding='ascii', newline='') as stream:
             stream.write(_header(view, created))
             for segment in tracks.segments():
                 records += len(segment[0])

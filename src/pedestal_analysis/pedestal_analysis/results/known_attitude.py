@@ -35,15 +35,16 @@ class KnownAttitude:
         return self.error[:, 2]
 
     @property
-    def after(self):
+    def is_aligned(self):
         """Mask (n,) bool of the rows from alignment on."""
         return self.t >= self.aligned
 
     @property
     def at_alignment(self):
         """(heading error, stated standard deviation of heading) [rad] at alignment; NaN without alignment."""
-        first = np.argmax(self.after)
-        return (float(self.heading[first]), float(self.sigma[first, 1])) if self.after.any() else (math.nan, math.nan)
+        first = np.argmax(self.is_aligned)
+        return ((float(self.heading[first]), float(self.sigma[first, 1])) if self.is_aligned.any()
+                else (math.nan, math.nan))
 
 
 def read(bag):
@@ -53,13 +54,15 @@ def read(bag):
     table = bag.table(ATTITUDE_TOPIC)
     t = table['t']
     quaternion = [f'orientation.{letter}' for letter in 'xyzw']
-    true, known = tracking.on_grid(bag, t, 'ship/truth', quaternion), np.column_stack([table[x] for x in quaternion])
-    both = np.isfinite(true + known).all(axis=1)
+    true = tracking.on_grid(bag, t, 'ship/truth', quaternion)
+    reported = np.column_stack([table[name] for name in quaternion])
+    both = np.isfinite(true + reported).all(axis=1)
     if not both.any():
         return None
     from scipy.spatial.transform import Rotation  # slow to import, and most runs are ashore
     t, true = t[both], Rotation.from_quat(true[both])
-    error = (Rotation.from_quat(known[both]) * true.inv()).as_rotvec() * (1.0, 1.0, -1.0)
+    error = (Rotation.from_quat(reported[both]) * true.inv()).as_rotvec() * (1.0, 1.0, -1.0)
+    # x stands for both level axes.
     sigma = np.sqrt(np.column_stack([table[f'orientation_variance.{axis}'] for axis in 'xz'])[both])
     return KnownAttitude(t, error, sigma, _aligned(bag, t[0]))
 

@@ -24,13 +24,14 @@ class TableError(ValueError):
 class Table:
     """Rows of the trials of a plan.Plan in the file FOLDER/NAME.csv; FOLDER/NAME.json describes the trials.
 
-    varied, results: heads of the columns. Use as a context; the open file is locked against other processes.
-    Raises TableError if the file exists and belongs to other trials.
+    identity: {key: text} that distinguishes these trials from others; varied, results: heads of the columns.
+    Use as a context; the open file is locked against other processes. Raises TableError if the file exists and belongs
+    to other trials.
     """
 
     def __init__(self, folder, name, identity, varied, results):
         folder = pathlib.Path(folder)
-        self.file, self._described = folder / f'{name}.csv', folder / f'{name}.json'
+        self.file, self._description_file = folder / f'{name}.csv', folder / f'{name}.json'
         self.varied, self.results = list(varied), list(results)
         self._identity = {**identity, 'columns': ' '.join(self.head)}
         self._stream, self.rows = None, []
@@ -66,23 +67,23 @@ class Table:
             self.rows = list(csv.reader(io.StringIO(whole.decode())))[1:]
             os.truncate(self.file, len(whole))
             return
-        part = self._described.with_suffix('.part')
+        part = self._description_file.with_suffix('.part')
         part.write_text(json.dumps(self._identity, indent=1) + '\n')
-        os.replace(part, self._described)
+        os.replace(part, self._description_file)
         os.truncate(self.file, 0)
         self._write([self.head])
 
     def _compare(self):
         """Raise TableError if the file belongs to other trials."""
         try:
-            there = json.loads(self._described.read_text())
+            found = json.loads(self._description_file.read_text())
         except (OSError, ValueError):
-            there = {}
+            found = {}
         for key, value in self._identity.items():
-            if there.get(key) != value:
+            if found.get(key) != value:
                 names = {'columns': 'other columns', 'content': 'another scenario file of that name',
                          'sources': 'another version of the pedestal packages'}
-                difference = names.get(key, f'{key} {there.get(key)}, not {value}')
+                difference = names.get(key, f'{key} {found.get(key)}, not {value}')
                 raise TableError(f'{self.file} contains other trials ({difference}): use another --output, or delete '
                                  'the file')
 

@@ -1,4 +1,4 @@
-"""Closed loop of a scenario without ROS: the units of its nodes in the graph's order, in one compiled call.
+"""Closed loop of a scenario without ROS: the units of its nodes in the graph's order, in compiled calls.
 
 In step k the drive moves to t_k by the commands of step k - 1 and publishes its position; then ship, INS, receiver and
 control unit answer. All units read and write one record that holds every topic, so a run equals a lockstep recording
@@ -31,12 +31,15 @@ STEP_DTYPE = records.of(*(topic.name for topic in topics.TOPICS
 TRUTH_DTYPE = np.dtype([('bias', 'f8', 2), ('error', 'f8', 2)])
 """Numbers of t_k that no topic holds: bias torques [Nm], true error of the beam (cross-elevation, elevation) [rad]."""
 
+# A Memory holds state, inputs and outputs of a unit's compiled step.
 _LAWS = {memory: law for node in nodes.UNIT_NODES for memory, (law, _) in node.unit_type().LAWS.items()}
 
 
 def step(memory, stamp, inputs, outputs):
-    """Make the step of any unit, selected by the type of its memory; without a unit do nothing. Compiled code calls
-    it."""
+    """Make the step of any unit, selected by the type of its memory; without a unit do nothing.
+
+    Only compiled code calls it; `by_type` below gives it the law of each memory.
+    """
     raise NotImplementedError
 
 
@@ -128,7 +131,7 @@ class Run:
         if records.is_text(topic):
             unit = next(unit for unit in self.units.values() if topic in unit.NODE.writes)
             if topics.TOPIC_BY_NAME[topic].type != 'std_msgs/msg/String':
-                # A list: a run keeps the times of its changes, not its content.
+                # Of a topic with a list (alarms), a run keeps only the times of its changes.
                 return {'t': self.t[np.flatnonzero(np.diff(self.steps[topic], prepend=topics.NO_TEXT_CODE))]}
             stamps, texts = announced(unit, topic, self.stamps, self.steps)
             return {'t': stamps / NS_PER_SECOND, 'data': texts}
@@ -170,15 +173,18 @@ class Loop:
         for unit in self.units.values():
             unit.execute_due(stamp)
 
-    def free_until(self, first):
-        """Return the step after `first` before which `before_step` is due again."""
+    def next_event_step(self, first):
+        """Return the first step after `first` that needs `before_step`."""
         due = min((first * self.period_ns // NS_PER_SECOND + 1) * NS_PER_SECOND,
                   *(unit.next_due for unit in self.units.values()))
         return min(-(-due // self.period_ns), self.steps)
 
     def run(self, injected=None, watch=None) -> Run:
-        """Make every step of the scenario; to be called once. injected (steps, 2): see `loop`. watch(steps made) ->
-        steps until it is called again: a function that sees the units in between."""
+        """Make every step of the scenario; to be called once.
+
+        injected (steps, 2): see `loop`. watch(steps made): called between blocks, to look at the units; returns the
+        number of steps until its next call.
+        """
         if injected is None:
             injected = np.zeros((self.steps, 2))
         steps, truth = records.empty(STEP_DTYPE, self.steps), np.zeros(self.steps, TRUTH_DTYPE)
@@ -188,7 +194,7 @@ class Loop:
         while first < self.steps:
             self.before_step(first, forecasts)
             last = min(first + (watch(first) if watch else MAX_BLOCK_STEPS), first + MAX_BLOCK_STEPS,
-                       self.free_until(first))
+                       self.next_event_step(first))
             part = slice(first, last)
             memories = tuple(self.units[name].block(last - first) if name in self.units else None
                              for name in UNIT_ORDER)

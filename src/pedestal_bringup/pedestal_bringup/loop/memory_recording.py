@@ -1,4 +1,4 @@
-"""Run in memory with the interface of a bag.Bag, as analysis/ and report/ use it: a recording without a file."""
+"""Run in memory with the interface of bag.Bag that pedestal_analysis uses: a recording without a file."""
 import functools
 
 import numpy as np
@@ -9,6 +9,9 @@ from pedestal_common.parameters import as_dict
 from pedestal_common.wire import messages
 
 DIAGNOSTICS_TOPIC = 'diagnostics'
+
+KEYHOLE_ENTRY = 'keyhole', 'keyhole'
+"""(key, value) of a forecast of a keyhole."""
 
 
 def record(scenario, beam=''):
@@ -28,9 +31,9 @@ class MemoryRecording:
         self.path, self.beams = scenario.name, int(scenario.header.beam)
         self.metadata = {'beamwidth': str(receiver.antenna.beamwidth)}
         self.configuration = {'parameters': {'tracking_receiver': as_dict(receiver)}}
-        self._run, self.start, self.end = run, 0, run.t[-1]
+        self._run, self.start, self.end = run, 0, run.t[-1]      # [s]
         self._tables = {}
-        self._keyholes = [(stamp, values) for stamp, values in run.forecasts if ('keyhole', 'keyhole') in values]
+        self._keyholes = [(stamp, values) for stamp, values in run.forecasts if KEYHOLE_ENTRY in values]
 
     @functools.cached_property
     def topics(self):
@@ -47,7 +50,7 @@ class MemoryRecording:
         return self._tables[topic]
 
     def rows(self, topic):
-        """Return the numbers (n,) of the messages of a topic."""
+        """Return the indices 0 ... n - 1 of the messages of a topic."""
         return np.arange(len(self.table(topic)['t']))
 
     def messages(self, topic):

@@ -160,7 +160,7 @@ def runs(loops, names, kept=None):
     while first < count:
         for loop, forecast in zip(loops, forecasts):
             loop.before_step(first, forecast)
-        last = min(first + MAX_STEPS_PER_CALL, *(loop.free_until(first) for loop in loops))
+        last = min(first + MAX_STEPS_PER_CALL, *(loop.next_event_step(first) for loop in loops))
         blocks = [unit.block(last - first) for unit in receivers]
         tables, ends = zip(*map(_joined_tracks, zip(*(unit.memory.tables for unit in acus))))
         _loop(moving, receiver_unit.Memory(receiver_record, breaks, coefficients,

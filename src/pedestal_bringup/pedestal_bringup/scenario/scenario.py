@@ -1,8 +1,8 @@
 """Scenarios: a ROS 2 parameter file, one section per node, and a section `scenario` as its header.
 
-`ros2 run PACKAGE EXECUTABLE --ros-args --params-file SCENARIO.yaml` loads the same file unchanged, in any namespace
-where its sections are named /**/NODE. Parameters that several nodes share (_spread) are missing then. They are in the
-file parameters.yaml that `pedestal run` writes beside the bag.
+`ros2 run PACKAGE EXECUTABLE --ros-args --params-file SCENARIO.yaml` loads the same file unchanged. For a
+namespace, name the sections /**/NODE. Parameters that several nodes share (_share_parameters) are missing then. They
+are in the file parameters.yaml that `pedestal run` writes beside the bag.
 """
 import contextlib
 import dataclasses
@@ -117,13 +117,14 @@ SHARED_PARAMETERS = (
     *(('tracking_receiver', f'target.station.{name}', 'acu', f'prediction.station.{name}')
       for name in ('latitude_deg', 'longitude_deg', 'height')),
 )
-"""(node, parameter, second node, its parameter with the same value), unless a scenario gives the second another
-value."""
+"""(node, parameter, second node, parameter): the second parameter takes the value of the first where the scenario does
+not set it."""
 
 
 MEASUREMENT_FLAGS = tuple((node.name, topic.measured, topic.flag) for node in nodes.NODES if node.name != 'acu'
                           for topic in map(topics.TOPIC_BY_NAME.__getitem__, node.writes) if topic.measured)
-"""(node, its parameter, the parameter of its subscribers) that is true if one of its topics exists."""
+"""(node, its parameter `measured`, the subscribers' parameter `flag`) of each optional topic; both are true if the
+topic exists (topics.Topic)."""
 
 
 class ScenarioError(ValueError):
@@ -144,8 +145,8 @@ class Scenario:
 
     @property
     def nodes(self) -> tuple[str, ...]:
-        """Nodes that take part, in the order of nodes.NODES and of the beams; the operator where there is a program
-        track."""
+        """Nodes that take part, in the order of nodes.NODES and of the beams; the operator takes part only with a
+        program track."""
         ship = ('ship_motion', 'ins') if self.header.ship else ()
         operator = ('operator',) if self.header.program.source != 'none' else ()
         return nodes.members((*ship, 'tracking_receiver', 'acu', 'adu', 'recorder', *operator),
@@ -162,7 +163,7 @@ class Scenario:
 
     def given(self, node: str) -> dict[str, typing.Any]:
         """Return {dotted name: value} of the values of this scenario for a node."""
-        return _whole(self.values, node)
+        return _values_of(self.values, node)
 
     def node_parameters(self, node: str) -> typing.Any:
         """Return the parameter dataclass of one node with the values of this scenario."""
@@ -211,8 +212,8 @@ def text(name_or_path: str | pathlib.Path) -> tuple[str, str]:
     return name, entry.read_text()
 
 
-def _whole(sections: Sections, node: str) -> dict[str, typing.Any]:
-    """Return the values of a node, with those for every beam first."""
+def _values_of(sections: Sections, node: str) -> dict[str, typing.Any]:
+    """Return the values of a node: values for every beam (section `acu`), replaced by its own."""
     return {**sections.get(nodes.plain(node), {}), **sections.get(node, {})}
 
 
@@ -221,7 +222,7 @@ def _is_node(name: str) -> bool:
 
 
 def _sections(name: str, content: str) -> Sections:
-    with _named(f'scenario {name}'):
+    with _errors_named(f'scenario {name}'):
         sections = by_node(parameter_file.parse(content))
         if 'scenario' not in sections:
             raise ScenarioError('the section `scenario` is missing')
@@ -296,7 +297,7 @@ def file_sections(path: str | pathlib.Path, namespace: str = '') -> Sections:
     """Return {node or `scenario`: {dotted name: value}} of a ROS 2 parameter file, for a graph in a namespace. Raises
     ParameterFileError, ScenarioError."""
     sections = parameter_file.read(path)
-    with _named(f'--params-file {path}'):
+    with _errors_named(f'--params-file {path}'):
         return by_node(sections, f'/{namespace.strip("/")}'.rstrip('/'))
 
 
@@ -305,7 +306,7 @@ def file_overrides(path: str | pathlib.Path, namespace: str = '') -> list[str]:
     ScenarioError."""
     sections = file_sections(path, namespace)
     for node, values in sections.items():
-        with _named(f'--params-file {path}, {node}'):
+        with _errors_named(f'--params-file {path}, {node}'):
             _check_each(node, values)
     return [override(f'{node}.{key}', value) for node, values in sections.items() for key, value in values.items()]
 
@@ -370,19 +371,20 @@ def parse(name: str, content: str, overrides: Iterable[str] = (), seed: int | No
     return checked(Draft(name, _sections(name, content)).changed(overrides), seed, duration, pacing)
 
 
-def checked(changed: Draft, seed: int | None = None, duration: float | None = None,
+def checked(new_draft: Draft, seed: int | None = None, duration: float | None = None,
             pacing: str | None = None) -> Scenario:
-    """Return the Scenario of a new Draft, which is changed in place. seed, duration and pacing replace the header's
-    where given.
+    """Return the Scenario of a new Draft. The Draft is changed; use it once.
+
+    seed, duration and pacing replace the values of the header where given.
 
     Raises ScenarioError for an unknown name or a value out of range.
     """
-    name, sections = changed.name, dict(changed.sections)
+    name, sections = new_draft.name, dict(new_draft.sections)
     header_values = sections.pop('scenario')
     for key, value in (('seed', seed), ('duration', duration), ('pacing', pacing)):
         if value is not None:
             header_values[key] = value
-    _follow_flight(name, sections.get('tracking_receiver', {}), header_values)
+    _derive_from_flight(name, sections.get('tracking_receiver', {}), header_values)
     header = _checked(name, 'scenario', ScenarioParameters, header_values)
     of_beams = [name for name in nodes.members(BEAM_NODES, header.graph_beams) if nodes.beam_of(name)]
     for node in sections:
@@ -393,31 +395,32 @@ def checked(changed: Draft, seed: int | None = None, duration: float | None = No
             sections.setdefault('acu', {}).setdefault(f'{axis}.controller', 'beam')
     for node in (*SECTION_NODES, *of_beams):
         sections.setdefault(node, {})
-        _checked(name, node, nodes.row(node, header.beam).parameters_type(), _whole(sections, node))
-    _spread(name, sections, header, seed)
+        _checked(name, node, nodes.row(node, header.beam).parameters_type(), _values_of(sections, node))
+    _share_parameters(name, sections, header, seed)
     for node in of_beams:
-        _spread_to_beam(name, node, sections, header, seed)
+        _share_with_beam(name, node, sections, header, seed)
     notes = _narrow(sections, header)
     for node, values in sections.items():
         try:
-            checked = _checked(name, node, nodes.row(node, header.beam).parameters_type(), _whole(sections, node))
+            node_parameters = _checked(name, node, nodes.row(node, header.beam).parameters_type(),
+                                       _values_of(sections, node))
         except ScenarioError as error:
             raise ScenarioError('; '.join((str(error), *notes))) from None
-        with _named(f'scenario {name}, {node}'):
-            checked.check_graph(header.graph_beams, header.pacing == 'lockstep')
-        typed = parameters.as_dict(checked)
+        with _errors_named(f'scenario {name}, {node}'):
+            node_parameters.check_graph(header.graph_beams, header.pacing == 'lockstep')
+        typed = parameters.as_dict(node_parameters)
         sections[node] = {key: typed.get(key, value) for key, value in values.items()}
     return Scenario(name, header, sections, notes)
 
 
 LIMIT_ENDS = (('low', 'lower', 1.0), ('high', 'upper', -1.0))
-"""(end of the limits of the control unit, of the drive, sign of the way into the travel)."""
+"""(name of the end in the control unit, in the drive, sign of the direction into the travel)."""
 
 
 def _narrow(sections: Sections, header: ScenarioParameters) -> tuple[str, ...]:
     """Set each limit of a control unit to that of the drive where the drive's is narrower. Return a line for each.
 
-    This holds for an end of the travel that the scenario gives for one of both; two defaults stay as they are.
+    Only ends that the scenario sets in the drive or in the control unit are changed; two defaults stay as they are.
     """
     drive, notes = nodes.row('adu', header.beam).parameters_type(), []
     if header.beam:
@@ -426,7 +429,7 @@ def _narrow(sections: Sections, header: ScenarioParameters) -> tuple[str, ...]:
     for section in [section for section in sections if nodes.plain(section) == 'acu']:
         for axis, (end, drive_end, inward) in itertools.product(topics.AXES, LIMIT_ENDS):
             own, of_drive = f'{axis}.limits.{end}', f'{axis}.limits.{drive_end}'
-            values = _whole(sections, section)
+            values = _values_of(sections, section)
             if own not in values and of_drive not in sections['adu']:
                 continue
             wide, narrow = values.get(own, acu_defaults[own]), sections['adu'].get(of_drive, drive_defaults[of_drive])
@@ -437,7 +440,8 @@ def _narrow(sections: Sections, header: ScenarioParameters) -> tuple[str, ...]:
     return tuple(notes)
 
 
-def _follow_flight(name: str, receiver_values: dict[str, typing.Any], header_values: dict[str, typing.Any]) -> None:
+def _derive_from_flight(name: str, receiver_values: dict[str, typing.Any],
+                        header_values: dict[str, typing.Any]) -> None:
     """Derive station, reference range and duration from the file of a recorded flight, where the scenario does not
     give them. Raises ScenarioError, TableError."""
     target = _checked(name, 'tracking_receiver', nodes.row('tracking_receiver').parameters_type(),
@@ -455,7 +459,7 @@ def _follow_flight(name: str, receiver_values: dict[str, typing.Any], header_val
             (header_values if key == 'duration' else receiver_values).setdefault(key, value)
 
 
-def _spread(name: str, sections: Sections, header: ScenarioParameters, seed: int | None) -> None:
+def _share_parameters(name: str, sections: Sections, header: ScenarioParameters, seed: int | None) -> None:
     """Give every node the parameters that several share: length and period of the run, seeds, ship, latencies, beam.
 
     Raises ScenarioError where the section of a node has another value.
@@ -486,12 +490,14 @@ def _spread(name: str, sections: Sections, header: ScenarioParameters, seed: int
 
     for node in ('acu', 'tracking_receiver'):
         share(node, 'period', value_of('adu', 'period'))
+    # The flag is set where the topic exists, or where the scenario sets the flag.
     for owner, key, flag in MEASUREMENT_FLAGS:
         measured = (header.ship or not nodes.row(owner).optional) and value_of(owner, key, False)
         for node in ('acu', 'recorder'):
             if measured or any(flag in values for section, values in sections.items()
                                if nodes.plain(section) == node):
                 share(node, flag, measured)
+    # With ins_error the INS publishes its errors, so the parameters tracker.attitude have no effect.
     modelled = [(section, key) for section in sections for key in sections[section]
                 if key.startswith('tracker.attitude.')]
     if modelled and sections['acu'].get('ins_error'):
@@ -507,19 +513,20 @@ def _spread(name: str, sections: Sections, header: ScenarioParameters, seed: int
         sections['tracking_receiver'].setdefault('receiver.beam', 'held')
         for prefix in nodes.prefixes(header.graph_beams):
             tracking = _checked(name, f'{prefix}tracking_receiver', nodes.row('tracking_receiver').parameters_type(),
-                                _whole(sections, f'{prefix}tracking_receiver'))
+                                _values_of(sections, f'{prefix}tracking_receiver'))
             for key, value in (('age', receiver.age(tracking, tracking.period)),
                                ('beam_age', receiver.beam_age(tracking, tracking.period))):
                 if f'tracker.receiver.{key}' not in sections['acu']:
                     sections[f'{prefix}acu'].setdefault(f'tracker.receiver.{key}', value)
 
 
-def _spread_to_beam(name: str, node: str, sections: Sections, header: ScenarioParameters, seed: int | None) -> None:
+def _share_with_beam(name: str, node: str, sections: Sections, header: ScenarioParameters, seed: int | None) -> None:
     """Give a node of one beam the parameters of its own receiver, and a seed for its own noise."""
     values, beam = sections[node], nodes.beam_of(node)
     own_receiver = f'{beam}/tracking_receiver'
     if node == own_receiver and (seed is not None or 'seed' not in values):
         spread = np.random.SeedSequence((header.seed, int(beam.removeprefix('beam_'))))
+        # Seeds are below 2^31.
         values['seed'] = int(spread.generate_state(1)[0] >> 1)
     for owner, key, other, known_as in SHARED_PARAMETERS:
         own = sections.get(f'{beam}/{owner}', {})
@@ -532,7 +539,7 @@ def _spread_to_beam(name: str, node: str, sections: Sections, header: ScenarioPa
 
 
 def _checked(name: str, section: str, parameters_type: type[_P], values: Mapping[str, typing.Any]) -> _P:
-    with _named(f'scenario {name}, {section}'):
+    with _errors_named(f'scenario {name}, {section}'):
         return _built(parameters_type, values if section == 'scenario' else parameters.without_ros(values))
 
 
@@ -551,7 +558,7 @@ def _built_once(parameters_type: type[_P], key: tuple[tuple[str, type, typing.An
 
 
 @contextlib.contextmanager
-def _named(origin: str) -> Iterator[None]:
+def _errors_named(origin: str) -> Iterator[None]:
     """Make any refusal a ScenarioError that names its origin, the scenario or file and its section."""
     try:
         yield

@@ -1,4 +1,4 @@
-"""Interval of an instant in a table of increasing times."""
+"""Search for the interval of a table of increasing times that holds an instant."""
 from pedestal_common.compiled import compiled
 
 

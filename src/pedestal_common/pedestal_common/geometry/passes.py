@@ -1,8 +1,9 @@
 """Passes of a satellite over a station: from its rise above the horizon to its set.
 
 The search computes the elevation by SGP4 every SEARCH_STEP_S seconds. Rise and set are exact to a millisecond, and the
-culmination is the highest instant between them. A pass shorter than SEARCH_STEP_S may be missed: it stays below 1 deg.
-A pass under way at the beginning or at the end of the search is followed to its rise and to its set.
+culmination is the highest instant between them. A pass shorter than SEARCH_STEP_S may be missed, which is
+harmless: it stays below 1 deg. A pass under way at the beginning or at the end of the search is followed to its rise
+and to its set.
 """
 import datetime
 import math
@@ -84,22 +85,22 @@ def passes_after(satrec, station, begin, days=SEARCH_DAYS) -> list[Pass]:
         return begin + datetime.timedelta(milliseconds=round(1e3 * t))
 
     times = np.arange(0.0, SECONDS_PER_DAY * days, SEARCH_STEP_S)
-    seen = elevation(times)
-    if not (seen > 0.0).any():
+    heights = elevation(times)
+    if not (heights > 0.0).any():
         raise TargetError(f'satellite {satrec.number} does not rise within {days:g} days of '
                           f'{begin:%Y-%m-%dT%H:%M:%SZ} at latitude {station.latitude_deg:g}, longitude '
                           f'{station.longitude_deg:g} deg')
-    if seen[0] > 0.0:
+    if heights[0] > 0.0:
         before, above = _until_below(elevation, times[0], -SEARCH_STEP_S)
-        times, seen = np.append(before[::-1], times), np.append(above[::-1], seen)
-    if seen[-1] > 0.0:
+        times, heights = np.append(before[::-1], times), np.append(above[::-1], heights)
+    if heights[-1] > 0.0:
         after, above = _until_below(elevation, times[-1], SEARCH_STEP_S)
-        times, seen = np.append(times, after), np.append(seen, above)
-    edges = np.diff(np.concatenate(([False], seen > 0.0, [False])).astype(int))
+        times, heights = np.append(times, after), np.append(heights, above)
+    edges = np.diff(np.concatenate(([False], heights > 0.0, [False])).astype(int))
     found = []
     for i, j in zip(np.flatnonzero(edges > 0), np.flatnonzero(edges < 0) - 1):
         rise, down = crossing(i - 1) if i else None, crossing(j) if j + 1 < len(times) else None
-        best = i + int(np.argmax(seen[i:j + 1]))
+        best = i + int(np.argmax(heights[i:j + 1]))
         top = minimize_scalar(lambda t: -elevation(t)[0], bounds=(
             max(times[i] if rise is None else rise, times[best] - SEARCH_STEP_S),
             min(times[j] if down is None else down, times[best] + SEARCH_STEP_S)), method='bounded',
@@ -114,8 +115,8 @@ def passes_after(satrec, station, begin, days=SEARCH_DAYS) -> list[Pass]:
 
 def _until_below(elevation, start, step):
     """Return (times, elevations) after `start` [s] in steps [s], which may be negative, up to the first below the
-    horizon, at most MAX_PASS_DAYS away, and only as far as SGP4 goes."""
-    times, seen = np.zeros(0), np.zeros(0)
+    horizon, at most MAX_PASS_DAYS away, and ending where SGP4 fails."""
+    times, heights = np.zeros(0), np.zeros(0)
     while len(times) * abs(step) < MAX_PASS_DAYS * SECONDS_PER_DAY:
         chunk = start + step * np.arange(len(times) + 1, len(times) + 1 + PASS_CHUNK_STEPS)
         try:
@@ -124,14 +125,14 @@ def _until_below(elevation, start, step):
             break
         down = np.flatnonzero(above <= 0.0)
         last = int(down[0]) + 1 if down.size else len(chunk)
-        times, seen = np.append(times, chunk[:last]), np.append(seen, above[:last])
+        times, heights = np.append(times, chunk[:last]), np.append(heights, above[:last])
         if down.size:
             break
-    return times, seen
+    return times, heights
 
 
 def search_start(satrec, now):
-    """Return (beginning of the search, why it is not now, or ''): now, or the epoch of elements that are too old."""
+    """Return (beginning of the search, reason): now and '', or the epoch of elements that are too old and why."""
     epoch = orbit.calendar(satrec.jdsatepoch, satrec.jdsatepochF)
     age = (now - epoch).total_seconds() / SECONDS_PER_DAY
     if abs(age) <= orbit.MAX_TLE_AGE_DAYS:

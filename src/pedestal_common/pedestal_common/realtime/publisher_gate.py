@@ -1,10 +1,14 @@
 """Gate of a topic in a realtime graph: it accepts messages of the active publisher, valid and newer than the last.
 
-The first publisher becomes active. Messages of any other publisher are dropped and reported. A publisher that restarts
-becomes active once the active one was silent for SILENCE_LIMIT_NS. A publisher that overlapped with the active one, or
-whose sequence numbers are higher than this silence allows, is a different node. It becomes active only after it was
-the only publisher for CONFIRMED_TAKEOVER_NS and the graph shows no unexpected publisher. While the publishers are
-unclear every message is dropped, so the motion that the topic commands stops. No ROS and no clock here.
+first publisher      becomes active at once
+restarted publisher  counts its numbers from the beginning; becomes active once the active publisher was silent for
+                     SILENCE_LIMIT_NS
+different node       overlapped with the active publisher, or has sequence numbers that are too high for a restart in
+                     this silence; becomes active after it was the only publisher for CONFIRMED_TAKEOVER_NS, while the
+                     graph shows no unexpected publisher
+unclear publishers   every message is dropped, so the motion that the topic commands stops
+
+Messages of a publisher that is not active are dropped and reported. The module uses neither ROS nor a clock.
 """
 import collections
 
@@ -36,14 +40,21 @@ class PublisherGate:
     decode      decode(data) -> (stamp [ns], None of a topic without stamps; message); ValueError for invalid data
     future      largest accepted lead of a stamp over this node's UTC [ns]
     unexpected  unexpected() -> number of unexpected publishers in the graph, None where it is unknown. It is called
-                when a candidate may become active. As many publishers must be known by their messages, because the
-                candidate may be one of them. None in its place: every publisher is accepted.
-    paced       True if the messages have a pace, which distinguishes publishers. Without a pace every message is
-                dropped while the graph shows an unexpected publisher; the last accepted message stays valid.
+                when a candidate may become active. The candidate may itself be an unexpected publisher. It becomes
+                active only if at least as many other streams overlapped: then these are the unexpected
+                publishers. `unexpected=None`: every publisher is accepted.
+    paced       True if the messages come at a steady rate, by which publishers are distinguished. Otherwise every
+                message is dropped while the graph shows an unexpected publisher; the last accepted message stays
+                valid.
     oldest      largest accepted time from sending to reception [ns]; None: any
 
     dropped     {reason: count}; reason: of the last dropped message, detail: in numbers; dropped_at: its time [ns]
-    after_gap   True if the last accepted message does not continue the one before it
+    after_gap   True if messages may be missing before the last accepted message, because the publisher changed or
+                the stamps went back
+    offset      smallest time from sending to reception since the publisher became active [ns]
+
+    Fields of a streams.Stream that this class uses: `overlapped`, `graph_check_time`, and growth(elapsed), the largest
+    growth of its numbers in a time [ns].
     """
 
     def __init__(self, decode, future, unexpected=lambda: 0, paced=True, oldest=None):
@@ -58,7 +69,7 @@ class PublisherGate:
         self.offset = None
         self._active_at = None  # time of the last message of the active publisher [ns]
         self._stamp = None
-        self._back_since = self._back = None
+        self._back_since = self._back = None    # since when earlier stamps arrive [ns], and the newest of these
 
     def take(self, data, number, source, now, utc):
         """Return the decoded message, None for a dropped message. number: its sequence number; source: its time of
@@ -67,7 +78,7 @@ class PublisherGate:
         if not self._paced:
             if self._unexpected():
                 return self._drop(DROP_OTHER_PUBLISHER, '', now)
-        elif self._unexpected and not self._is_active(self.streams.of(number, source, now), now):
+        elif self._unexpected and not self._admit(self.streams.of(number, source, now), now):
             return None
         if self._oldest is not None and utc - source > self._oldest:
             return self._drop(DROP_STALE, f'{(utc - source) * 1e-9:.3f} s from sending to reception', now)
@@ -80,15 +91,18 @@ class PublisherGate:
         self._note_offset(utc - source)
         return message
 
-    def _is_active(self, stream, now):
-        """Return True if the publisher of a message, None for an unclear one, is active."""
+    def _admit(self, stream, now):
+        """Return True if a message is of the active publisher, else drop the message.
+
+        A publisher that may take over becomes active first. stream: Stream of the message, None if it is unclear.
+        """
         if stream is not None and stream is self.active and self._may_be_another(stream, now):
             self.active = None
         if stream is None:
             self._drop(DROP_UNCLEAR_PUBLISHER, '', now)
         elif stream is self.active:
             for other in self._other_active(stream, now):
-                other.known = True
+                other.overlapped = True
             self._active_at = now
             return True
         elif self._may_take_over(stream, now):
@@ -101,30 +115,30 @@ class PublisherGate:
         return False
 
     def _may_be_another(self, stream, now):
-        """Return True if the active publisher was silent until now and left out numbers, while the graph shows an
-        unexpected publisher without messages. This node may have stalled, and the first message may come from that
-        publisher."""
+        """Return True if the active publisher was silent, its numbers then jumped, and the graph shows an unexpected
+        publisher without messages. Because this node may have stalled, the message may be of that publisher."""
         return (now - self._active_at >= SILENCE_LIMIT_NS and stream.skipped[1] == stream.last
-                and (self._unexpected() or 0) > sum(other.known for other in self._other_active(stream, now)))
+                and (self._unexpected() or 0) > sum(other.overlapped for other in self._other_active(stream, now)))
 
     def _may_take_over(self, stream, now):
         """Return True if an inactive publisher becomes active now."""
         active = self.active
         silent = SILENCE_LIMIT_NS if active is None else now - active.arrival
-        # A message of an unexpected publisher may arrive after that publisher has left the graph.
-        stream.known = stream.known or (active is not None and stream.last > active.growth(silent))
-        if silent < (CONFIRMED_TAKEOVER_NS if stream.known else SILENCE_LIMIT_NS):
+        # A publisher that restarted counts from the beginning. A number too high for this silence is of a different
+        # node. A message of that node may arrive after the node has left the graph.
+        stream.overlapped = stream.overlapped or (active is not None and stream.last > active.growth(silent))
+        if silent < (CONFIRMED_TAKEOVER_NS if stream.overlapped else SILENCE_LIMIT_NS):
             return False
-        if stream.looked is not None and now - stream.looked < PUBLISHER_POLL_NS:
+        if stream.graph_check_time is not None and now - stream.graph_check_time < PUBLISHER_POLL_NS:
             return False
-        stream.looked = now
-        count, others = self._unexpected(), self._other_active(stream, now)
-        if stream.known:
-            free = not count and not others and silent >= (UNCONFIRMED_TAKEOVER_NS if count is None
-                                                           else CONFIRMED_TAKEOVER_NS)
+        stream.graph_check_time = now
+        unexpected, others = self._unexpected(), self._other_active(stream, now)
+        if stream.overlapped:
+            free = not unexpected and not others and silent >= (UNCONFIRMED_TAKEOVER_NS if unexpected is None
+                                                                else CONFIRMED_TAKEOVER_NS)
         else:
-            free = not count or count <= sum(other.known for other in others)
-        stream.known = stream.known and not free
+            free = not unexpected or unexpected <= sum(other.overlapped for other in others)
+        stream.overlapped = stream.overlapped and not free
         return free
 
     def _other_active(self, stream, now):

@@ -54,19 +54,19 @@ class Stream:
 
     A PublisherGate adds:
 
-    known     True if it was active together with the active publisher
-    looked    time of the last check for other publishers [ns]
+    overlapped         True if the stream was active together with the active publisher, or may be of a different node
+    graph_check_time   time of the last check of the graph for other publishers [ns]
     """
-    __slots__ = ('_messages', 'arrival', 'begun', 'interval', 'known', 'last', 'looked', 'lost', 'owed', 'skipped',
-                 'source', 'unclear')
+    __slots__ = ('_messages', 'arrival', 'begun', 'graph_check_time', 'interval', 'last', 'lost', 'overlapped', 'owed',
+                 'skipped', 'source', 'unclear')
 
     def __init__(self, number, source, now):
         self._messages = collections.deque([(number, source)], PACE_WINDOW_MESSAGES)
         self.begun = now
         self.last, self.source, self.arrival = number, source, now
-        self.interval = self.looked = None
+        self.interval = self.graph_check_time = None
         self.lost, self.owed, self.skipped = 0, 0.0, (0, 0)
-        self.known = self.unclear = False
+        self.overlapped = self.unclear = False
 
     def fits(self, number, source):
         """Return True if a message can be of this stream."""
@@ -162,12 +162,12 @@ class Streams:
                       key=lambda stream: stream.arrival)[-1:]
 
     def _begun(self, number, source, now):
-        """Add a new stream. It is known if its publisher may have been close to another one."""
+        """Add a new stream. It is marked `overlapped` if its publisher may have been close to another publisher."""
         self.streams = [other for other in self.streams if now - other.arrival < EXPIRY_LIMIT_NS]
         stream = Stream(number, source, now)
         stream.unclear = bool(self._close)
         lowest, since = self._parted
-        stream.known = number >= lowest and now - since < EXPIRY_LIMIT_NS
+        stream.overlapped = number >= lowest and now - since < EXPIRY_LIMIT_NS
         self.streams.append(stream)
         return stream
 
@@ -184,7 +184,7 @@ class Streams:
             stream.arrival = now
         active = [stream for stream in self.streams if stream.unclear and now - stream.arrival < ACTIVE_LIMIT_NS]
         if len(active) == 1 and now - active[0].begun >= ACTIVE_LIMIT_NS:
-            active[0].known = True    # because this may be the publisher that was active beside the active one
+            active[0].overlapped = True    # because this may be the publisher that was active beside the active one
             self._cleared(active)
         elif len(active) == len(self._close) == 2:
             before, after = (_by_pace(pair) for pair in (self._close, active))

@@ -1,4 +1,7 @@
-"""Files of other programs, opened so that neither their kind nor their length hangs or fills the process."""
+"""Opening of files of other programs.
+
+A pipe, a device or a file of enormous length is refused, because it would block the process or fill its memory.
+"""
 import errno
 import hashlib
 import os

@@ -1,4 +1,7 @@
-"""Backlash: standstill, reversal and fast moves under the bias schedules, and two speed loops beside one.
+"""Study of backlash. Two motors turn an axis and pull against each other with a bias torque.
+
+The study measures standstill, reversals and fast moves with each schedule of the bias, and compares one speed loop
+with two.
 
 Three cases have the controller of paper 000, as in the scenarios: bias-off, bias-on (5 Nm, fading, as in the paper)
 and hold-fade. With the controller `best` of the study servo, the sine and the fast step are run with every schedule.
@@ -31,13 +34,16 @@ The slow sine shows the lash alone. The fast sine has a peak rate of 0.2 rad/s, 
 
 
 def bias(schedule, torque=12.0, hold=14.0, out=45.0):
-    """Return the parameters of a bias schedule, torques per motor [Nm]."""
+    """Return the parameters of a bias schedule, torques per motor [Nm].
+
+    torque: bias; hold: demand up to which the bias is full; out: demand at which the bias is zero.
+    """
     return {'adu.azimuth.bias.schedule': schedule, 'adu.azimuth.bias.torque': torque,
             'adu.azimuth.bias.hold': hold, 'adu.azimuth.bias.out': out}
 
 
 PAPER_CASES = {'bias-off': bias('off'), 'bias-on': {}, 'hold-fade': bias('hold_fade')}
-"""{case with the controller of the paper: parameters}."""
+"""{case with the controller of the paper: parameters}; bias-on: the bias of the scenario, 5 Nm, fading."""
 
 BIAS_SCHEDULES = {
     'off': bias('off'), 'constant-5': bias('constant', 5.0), 'constant-12': bias('constant', 12.0),
@@ -72,7 +78,7 @@ MOVE_DURATION_S = 0.5
 
 
 def standstill(record):
-    """Return (times [s], load angle [rad]) from STANDSTILL_START_S on."""
+    """Return (times [s], load angle [rad]) from STANDSTILL_START_S on; record: a closed_loop.Run, here and below."""
     late = record.t >= STANDSTILL_START_S
     return record.t[late], record['adu/truth']['position'][late, 0]
 
@@ -140,6 +146,7 @@ def rows(done):
         if kind in REVERSAL_FREQUENCIES_RAD_S and name != 'bias-off' and (kind, 'bias-off') in done:
             without = measured(kind, 'bias-off', done[kind, 'bias-off'])[f'{kind}_error_rad'][0]
             values[f'{kind}_ratio_off_to_on'] = without / values[f'{kind}_error_rad'][0], ''
+        # hold-fade is the schedule of the product; the other schedules get a prefix.
         case = f'schedule-{name}' if kind in ('sine', 'step') and name != 'hold-fade' else name
         table += [row(case, metric, value, unit, target=METRIC_TARGETS.get((name, metric)))
                   for metric, (value, unit) in values.items()]

@@ -2,7 +2,7 @@
 
 After levelling, the commands only cancel the tilt by the rotation of the earth, so (14), (15) at rest give (19):
 sin az = w_cE / w_N, cos az = 1 + w_cN / w_N. The commands are noisy. The least-squares slope of their integral since
-`start` removes the noise; a plain mean does not (reference/nav.md section 1.3).
+`start` removes the noise; a plain mean does not.
 """
 import cmath
 import math

@@ -3,9 +3,9 @@
     v' = f - K1 v, w_cE = -k2 v_N, w_cN = k2 v_E, w_cU = K3 / (w_N (s + K4)) v_N
     K1 = K4 = 2 s0, k2 = 4 s0^2/g, K3 = 4 s0^4/g
 
-All four poles are at -s0 +- j s0 (reference/nav.md section 1.2). An azimuth error of 180 deg is an unstable
-equilibrium. Because the loop is closed from power-up, the transient of the first levelling leaves it. The velocities
-are those of a gyrocompass, the integrals of two accelerometers, without the term w_cU x v of the rotating axes.
+All four poles are at -s0 +- j s0. An azimuth error of 180 deg is an unstable equilibrium. Because the loop is closed
+from power-up, the transient of the first levelling leaves this equilibrium. The velocities are those of a gyrocompass,
+the integrals of two accelerometers, without the term w_cU x v of the rotating axes.
 """
 import math
 
@@ -21,7 +21,7 @@ MAX_AZIMUTH_RATE_RAD_S = 0.1
 CONSTANTS_DTYPE = np.dtype([
     ('s0', 'f8'),                                       # bandwidth [rad/s]
     ('K1', 'f8'), ('k2', 'f8'), ('K3', 'f8'), ('K4', 'f8'),
-    ('azimuth', 'f8'), ('level', 'f8'), ('residual', 'f8'),     # 1 sigma of the settled loop [rad]
+    ('azimuth_sigma', 'f8'), ('level_sigma', 'f8'), ('residual', 'f8'),     # 1 sigma of the settled loop [rad]
 ], align=True)
 
 STATE_DTYPE = np.dtype([
@@ -48,8 +48,8 @@ def constants(k, s0, h) -> np.ndarray:
     P = steady_state.covariance(np.eye(5) + h * rates, Q)
     record['residual'] = math.sqrt(P[4, 4])
     record['s0'], record['K1'], record['k2'], record['K3'], record['K4'] = s0, K1, k2, K3, K4
-    record['azimuth'] = math.sqrt(P[3, 3] + (float(k['gyro_bias']) / w_north)**2)
-    record['level'] = math.sqrt(P[1, 1] + (float(k['accelerometer_bias']) / g)**2)
+    record['azimuth_sigma'] = math.sqrt(P[3, 3] + (float(k['gyro_bias']) / w_north)**2)
+    record['level_sigma'] = math.sqrt(P[1, 1] + (float(k['accelerometer_bias']) / g)**2)
     return record
 
 
@@ -76,5 +76,5 @@ def step(s, c, k, v_east, v_north, h):
     s.residual += h * (s.command[2] - 0.5 * c.s0 * s.residual)
     left = UNKNOWN_AZIMUTH_SIGMA_RAD * envelope(c.s0 * s.t)
     moving = max(s.residual**2 - 9.0 * c.residual**2, 0.0)      # beyond three sigma of its noise
-    s.azimuth_sigma = min(math.sqrt(c.azimuth**2 + moving + left**2), UNKNOWN_AZIMUTH_SIGMA_RAD)
-    s.level_sigma = c.level + left
+    s.azimuth_sigma = min(math.sqrt(c.azimuth_sigma**2 + moving + left**2), UNKNOWN_AZIMUTH_SIGMA_RAD)
+    s.level_sigma = c.level_sigma + left

@@ -1,7 +1,7 @@
 """Level commands of an ADRC: tracking differentiator and nonlinear combination; paper 001 (7), (8), (11).
 
 (11) is u = (u0 - z3) / b0. The printed form is u0 - z3 / b0. With it the east channel (b0 < 0) has positive feedback
-and ends at 180 deg of level; the gain of the north channel is g times too high (reference/nav.md section 1.1).
+and ends at 180 deg of level; the gain of the north channel is g times too high.
 """
 from pedestal_common.compiled import compiled
 from pedestal_common.fhan import fhan

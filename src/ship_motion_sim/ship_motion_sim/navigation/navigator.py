@@ -1,13 +1,16 @@
 """A strapdown INS from power-up on: alignment by the selected method, then navigation.
 
 aligning    The strapdown runs at the rate of the IMU, the method every `step` seconds. The commands of the method
-            rotate n'. Method oba has no commands; it integrates the gyros in inertial space.
-navigating  Begins as soon as the 1-sigma of azimuth is small enough. Without an aid the INS is free inertial. With an
-            aid, riccati_eso continues with the difference of both velocities, so level and azimuth keep improving.
+            rotate n'. Method oba commands no rotation: its strapdown integrates in inertial space (`step`: earth
+            rate, command and gravity are zero).
+aligned     Navigation begins as soon as the 1-sigma of azimuth is small enough. Without an aid the INS is free
+            inertial. With an aid, riccati_eso continues with the difference of both velocities, so level and azimuth
+            keep improving.
 
 An aid is a velocity in deck axes (log) or ENU (gnss).
 
-n, n'       ENU; computed navigation frame, which differs from n by the azimuth and by small level errors
+n, n'       ENU; computed navigation frame: n turned about the vertical by the azimuth, which is unknown at first, and
+            tilted by small level errors
 w_c, w_cN   commanded rate of n' against the earth, and its north component [rad/s]
 w_N         north component of the earth rate [rad/s]
 Methods     classical: gyrocompass; adrc, adrc_scheduled: ADRC; riccati_eso: extended state observer with Kalman
@@ -26,7 +29,7 @@ from ship_motion_sim.alignment.conditions import CONDITIONS_DTYPE, UNKNOWN_AZIMU
 from ship_motion_sim.params import INS_METHODS, VELOCITY_AIDS
 
 STAGES = ('aligning', 'aligned')
-STAGE_ALIGNING, STAGE_NAVIGATING = range(len(STAGES))
+STAGE_ALIGNING, STAGE_ALIGNED = range(len(STAGES))
 METHOD_CLASSICAL, METHOD_ADRC, METHOD_ADRC_SCHEDULED, METHOD_RICCATI_ESO, METHOD_OBA = map(
     INS_METHODS.index, ('classical', 'adrc', 'adrc_scheduled', 'riccati_eso', 'oba'))
 AID_NONE, AID_LOG, AID_GNSS = range(len(VELOCITY_AIDS))
@@ -42,15 +45,15 @@ CONSTANTS_DTYPE = np.dtype([
 STATE_DTYPE = np.dtype([
     ('stage', 'i8'),
     ('velocity_set', 'i8'),                     # 1 after the velocity was set to that of the aid
-    ('since', 'f8'),                            # time since the last step of the laws [s]
-    ('free', 'f8'),                             # time since navigation without aid began [s]
+    ('since_step', 'f8'),                       # time since the last step of the laws [s]
+    ('unaided_time', 'f8'),                     # time since navigation without aid began [s]
     ('strapdown', strapdown.STATE_DTYPE),
     ('command', 'f8', (3,)),                    # w_c [rad/s]
     ('north_command_smoothed', 'f8'),           # w_cN of the gyrocompass, smoothed [rad/s]
     ('azimuth', 'f8'),                          # estimated azimuth of n' [rad]
     ('azimuth_sigma', 'f8'), ('level_sigma', 'f8'),         # [rad]
     ('aligned_azimuth_sigma', 'f8'), ('aligned_level_sigma', 'f8'),     # at the start of navigation [rad]
-    ('no_rate', 'f8', (3,)),                    # zeros: rate of inertial space, no command
+    ('zero_rate', 'f8', (3,)),                  # zeros, for the integration in inertial space
     ('classical', classical.STATE_DTYPE), ('adrc', adrc.STATE_DTYPE), ('adrc_scheduled', adrc_scheduled.STATE_DTYPE),
     ('riccati_eso', riccati_eso.STATE_DTYPE), ('oba', oba.STATE_DTYPE),
 ], align=True)
@@ -75,7 +78,7 @@ def least_azimuth_sigma(c):
     """Return the 1 sigma [rad] of azimuth that the method approaches after a long time; c: record of
     CONSTANTS_DTYPE."""
     if c['method'] == METHOD_CLASSICAL:
-        return float(c['classical']['azimuth'])
+        return float(c['classical']['azimuth_sigma'])
     k = c['conditions']
     return float(k['gyro_bias'] / k['earth_rate'][1])
 
@@ -89,7 +92,7 @@ def initial_state(constants, quaternion) -> np.ndarray:
 
 @compiled
 def begin(s, c, qx, qy, qz, qw):
-    """Set the state s, STATE_DTYPE filled with zeros, to that at power-up; c: record of CONSTANTS_DTYPE."""
+    """Set the state s (zeros of STATE_DTYPE) to the state at power-up; c: record of CONSTANTS_DTYPE."""
     if c.method == METHOD_OBA:
         qx, qy, qz, qw = 0.0, 0.0, 0.0, 1.0
     strapdown.set_attitude(s.strapdown, qx, qy, qz, qw)
@@ -101,10 +104,11 @@ def begin(s, c, qx, qy, qz, qw):
 
 @compiled
 def aided_velocity(s, c, aid):
-    """Return the (E, N) components in n' [m/s] of the velocity (3,) of the aid; GNSS only after n' is aligned with n.
+    """Return the (E, N) components in n' [m/s] of the velocity (3,) of the aid.
 
-    The velocity of GNSS is not rotated by the later estimate of azimuth. This avoids a feedback of the estimate
-    through the velocity of the ship (7 m/s), which would amplify its errors.
+    GNSS: called only after the alignment, when n' is n (params.py refuses gnss with a method that commands n'). The
+    velocity of GNSS is not rotated by s.azimuth, which riccati_eso still improves in navigation. This avoids a
+    feedback of the estimate through the velocity of the ship (7 m/s), which would amplify its errors.
     """
     if c.aid == AID_LOG:
         east, north, _ = to_earth(s.strapdown.mat, aid[0], aid[1], aid[2])
@@ -126,6 +130,7 @@ def copy_method_outputs(s, m):
 def align_in_inertial_space(s, c, aid, h):
     """Execute one step of oba, h [s] after the last; aid (3,) [m/s]."""
     a, k = s.strapdown.velocity, c.conditions
+    # ux, uy, uz: velocity of the log, in the axes of the strapdown; vx, vy, vz: velocity of GNSS, ENU.
     ux = uy = uz = vx = vy = vz = 0.0
     if c.aid == AID_LOG:
         ux, uy, uz = to_earth(s.strapdown.mat, aid[0], aid[1], aid[2])
@@ -137,10 +142,10 @@ def align_in_inertial_space(s, c, aid, h):
 
 @compiled
 def reject_reversed_azimuth(s, c, h):
-    """Declare the azimuth of the gyrocompass unknown if the level command shows that az is beyond 60 deg.
+    """Declare the azimuth of the gyrocompass unknown if the level command shows an azimuth az above 60 deg.
 
-    The loop is at rest also at 180 deg of azimuth, where the level command to the north is twice the earth rate: (19)
-    of paper 001, cos az = 1 + w_cN / w_N.
+    The loop has a second equilibrium at 180 deg of azimuth, where the level command to the north is twice the
+    earth rate: (19) of paper 001, cos az = 1 + w_cN / w_N.
     """
     # s0: bandwidth of the gyrocompass [rad/s], here of the low-pass.
     s.north_command_smoothed += c.classical.s0 * h * (s.command[1] - s.north_command_smoothed)
@@ -170,9 +175,9 @@ def step_method(s, c, method, aid, h):
         adrc_scheduled.step(s.adrc_scheduled, k, v_east, v_north, h)
         copy_method_outputs(s, s.adrc_scheduled)
     else:
-        w_c = (riccati_eso.NAVIGATING_BANDWIDTH_RAD_S if s.stage == STAGE_NAVIGATING
-               else riccati_eso.ALIGNING_BANDWIDTH_RAD_S)
-        riccati_eso.step(s.riccati_eso, k, v_east, v_north, h, w_c)
+        bandwidth = (riccati_eso.NAVIGATING_BANDWIDTH_RAD_S if s.stage == STAGE_ALIGNED
+                     else riccati_eso.ALIGNING_BANDWIDTH_RAD_S)
+        riccati_eso.step(s.riccati_eso, k, v_east, v_north, h, bandwidth)
         copy_method_outputs(s, s.riccati_eso)
 
 
@@ -190,6 +195,7 @@ def attitude(s, c):
 @compiled
 def error_velocity(s, c):
     """Return the (E, N) components in n' [m/s] of the velocity that the method attributes to an error of the INS."""
+    # observer.z[0, 0], z[1, 0]: estimated error of the east and the north velocity.
     if c.method == METHOD_ADRC:
         return s.adrc.observer.z[0, 0], s.adrc.observer.z[1, 0]
     if c.method == METHOD_ADRC_SCHEDULED:
@@ -215,15 +221,16 @@ def begin_navigation(s, c, aid):
     if c.method == METHOD_OBA:
         v[0] = v[1] = 0.0
     strapdown.set_attitude(s.strapdown, qx, qy, qz, qw)
-    s.stage, s.azimuth = STAGE_NAVIGATING, 0.0
+    s.stage, s.azimuth = STAGE_ALIGNED, 0.0
     if c.aid != AID_NONE:
         v[0], v[1] = aided_velocity(s, c, aid)
     for i in range(3):
         s.command[i] = 0.0
     s.aligned_azimuth_sigma, s.aligned_level_sigma = s.azimuth_sigma, s.level_sigma
-    known = max(s.azimuth_sigma**2 - (k.gyro_bias / k.earth_rate[1])**2, 0.0)
+    # The velocity does not show the azimuth error of a constant gyro bias. The observer starts without this part.
+    without_bias_variance = max(s.azimuth_sigma**2 - (k.gyro_bias / k.earth_rate[1])**2, 0.0)
     m = s.riccati_eso
-    extended_observer.start(m.observer, k, s.level_sigma, math.sqrt(known))
+    extended_observer.start(m.observer, k, s.level_sigma, math.sqrt(without_bias_variance))
     for i in range(2):
         m.v1[i] = m.v2[i] = 0.0
 
@@ -235,10 +242,10 @@ def grow_unaided_sigmas(s, k, h):
     The causes are random walk and bias of the gyros, and the earth rate resolved with a heading that is wrong by its
     1 sigma, which tilts the level.
     """
-    s.free += h
-    walk = k.gyro_noise**2 * s.free
-    s.azimuth_sigma = math.sqrt(s.aligned_azimuth_sigma**2 + walk + (k.gyro_bias * s.free)**2)
-    drift = math.hypot(k.gyro_bias, k.earth_rate[1] * s.aligned_azimuth_sigma) * s.free
+    s.unaided_time += h
+    walk = k.gyro_noise**2 * s.unaided_time
+    s.azimuth_sigma = math.sqrt(s.aligned_azimuth_sigma**2 + walk + (k.gyro_bias * s.unaided_time)**2)
+    drift = math.hypot(k.gyro_bias, k.earth_rate[1] * s.aligned_azimuth_sigma) * s.unaided_time
     s.level_sigma = math.sqrt(s.aligned_level_sigma**2 + walk + drift * drift)
 
 
@@ -248,16 +255,16 @@ def step(s, c, angle, force, dt, aid):
 
     angle, force (3,): increments of the interval, FLU [rad, m/s]; aid (3,) [m/s], finite.
     """
-    k, inertial = c.conditions, c.method == METHOD_OBA and s.stage == STAGE_ALIGNING
-    if inertial:
-        strapdown.step(s.strapdown, angle, force, dt, s.no_rate, s.no_rate, 0.0)
+    k, in_inertial_space = c.conditions, c.method == METHOD_OBA and s.stage == STAGE_ALIGNING
+    if in_inertial_space:
+        strapdown.step(s.strapdown, angle, force, dt, s.zero_rate, s.zero_rate, 0.0)
     else:
         strapdown.step(s.strapdown, angle, force, dt, k.earth_rate, s.command, k.gravity)
-    s.since += dt
-    if s.since < c.step - 0.5 * dt:
+    s.since_step += dt
+    if s.since_step < c.step - 0.5 * dt:
         return
-    h, s.since = s.since, 0.0
-    if inertial:
+    h, s.since_step = s.since_step, 0.0
+    if in_inertial_space:
         align_in_inertial_space(s, c, aid, h)
     elif s.stage == STAGE_ALIGNING:
         step_method(s, c, c.method, aid, h)

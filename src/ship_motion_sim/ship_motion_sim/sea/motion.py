@@ -127,7 +127,7 @@ def body_rates(roll, pitch, roll_1, pitch_1, yaw_1, roll_2, pitch_2, yaw_2):
     """Return (w [rad/s], dw [rad/s2]), three floats each, FLU, of fixed-axis roll, pitch [rad] and the first and
     second derivatives of roll, pitch and yaw.
 
-    mat_ed = Rz(yaw) Ry(pitch) Rx(roll): reference/nav.md section 3.2 (in FLU as in FRD), differentiated.
+    mat_ed = Rz(yaw) Ry(pitch) Rx(roll), in FLU as in FRD, differentiated.
     """
     sr, cr, sp, cp = math.sin(roll), math.cos(roll), math.sin(pitch), math.cos(pitch)
     wx = roll_1 - yaw_1 * sp

@@ -1,6 +1,6 @@
 """A seaway as a sum of sine waves, and the response of the hull to each wave. Plain numpy, run once at the start.
 
-reference/nav.md section 3.1. The surface at the ship is zeta = sum Re(a e^{j(w_e t + phase)}). For a wave that travels
+The surface at the ship is zeta = sum Re(a e^{j(w_e t + phase)}). For a wave that travels
 along the unit vector (d_x, d_y) of the deck (FLU), zeta ~ e^{-j k (d_x x + d_y y)}. Its slope along x is -j k d_x a.
 """
 import math

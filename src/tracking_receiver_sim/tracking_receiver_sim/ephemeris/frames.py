@@ -1,4 +1,4 @@
-"""Conversion of frames of orbits to the earth-fixed frame, and of time systems of files to UTC.
+"""Conversion of orbits from other frames to the earth-fixed frame, and of time systems of files to UTC.
 
 The rotations are those of skyfield: IAU 2006 precession and IAU 2000A nutation, UT1 - UTC and leap seconds from its
 built-in tables, no polar motion (up to 0.3", 9 m on the ground). Every ITRF is taken as WGS84; the difference is some
@@ -15,7 +15,8 @@ from tracking_receiver_sim.track import instant
 EARTH_FIXED_PATTERN = re.compile(r'ITRF(?:-?\d{2}|-?\d{4})?|WGS84')
 INERTIAL_FRAMES = ('EME2000', 'GCRF', 'ICRF', 'TEME', 'TOD')
 TIME_SYSTEM_OFFSETS_S = {'UTC': None, 'TAI': 0.0, 'TT': 32.184, 'TDB': 32.184, 'GPS': -19.0}
-"""{time system: its seconds ahead of TAI, None for UTC}; TDB differs from TT by up to 2 ms, see instants."""
+"""{time system: time system minus TAI [s]}; None for UTC, whose offset varies.
+TDB differs from TT by up to 2 ms, see instants."""
 
 NUTATION_BATCH_SIZE = 2000
 """Number of instants whose nutation is computed at once: each takes 30 kB."""
@@ -27,13 +28,14 @@ def known(frame):
 
 
 def names():
-    """Return a text for people that lists the supported frames."""
+    """Return a text for an error message that lists the supported frames."""
     return f'{", ".join(INERTIAL_FRAMES)} or ITRF with or without its year'
 
 
 def instants(system, days, seconds):
     """Return the instants (n,), see track.instant, of days since 1970 and seconds of the day (n,) in a time system of
-    TIME_SYSTEM_OFFSETS_S. Raises ValueError(index) for second 60 of a minute without a leap second."""
+    TIME_SYSTEM_OFFSETS_S. Raises ValueError(index of the row) for second 60 of a minute without a leap
+    second."""
     offset = TIME_SYSTEM_OFFSETS_S[system]
     if offset is None:
         late = np.flatnonzero(seconds >= SECONDS_PER_DAY)

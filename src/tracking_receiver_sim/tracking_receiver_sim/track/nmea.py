@@ -1,4 +1,6 @@
-"""Logs of NMEA 0183: GGA for time of day, position and height, RMC for the date. Other sentences are passed over.
+"""Reader of logs of NMEA 0183: time of day, position and height from GGA, the date from RMC.
+
+Other sentences are passed over.
 
 The height above the ellipsoid is altitude + geoidal separation. Text before the $ of a line and behind the checksum is
 passed over: the time of a logger, a tag block, `NMEA,` and the time of Android. Cut sentences, sentences with a wrong
@@ -33,11 +35,11 @@ def rows(path, log):
     """Yield the fixes (line, (), time [s], latitude, longitude [deg], altitude [m]) of a log.
 
     log: fixes.Log, which receives the description of the file. The time is an instant if an RMC has a date, otherwise
-    it is since midnight. Raises TableError.
+    it is since midnight. (): NMEA names no aircraft; other formats have its identities there. Raises TableError.
     """
-    begins = _begin(path)
-    log.form, log.time_name, log.dated = 'NMEA', 'time', begins is not None
-    clock, without_separation = _Clock(begins), False
+    first_day = _first_day(path)
+    log.form, log.time_name, log.dated = 'NMEA', 'time', first_day is not None
+    clock, without_separation = _Clock(first_day), False
     for line, sentence in _sentences(path, log):
         if sentence.sentence_type == 'RMC':
             with contextlib.suppress(ValueError):
@@ -96,8 +98,8 @@ def _sentences(path, log):
 
 def _missing(gga):
     """Return the part that a GGA lacks, '' if it has all."""
-    there = {'a fix': gga.gps_qual and gga.lat and gga.lon, 'time': gga.data[0], 'altitude': gga.altitude is not None}
-    return next((name for name, value in there.items() if not value), '')
+    parts = {'a fix': gga.gps_qual and gga.lat and gga.lon, 'time': gga.data[0], 'altitude': gga.altitude is not None}
+    return next((name for name, value in parts.items() if not value), '')
 
 
 def _lines(path):
@@ -114,8 +116,8 @@ def _lines(path):
 
 
 class _Clock:
-    """Time of consecutive sentences, which hold only the time of day. The midnight between two sentences is the one
-    that makes them less than half a day apart.
+    """Time of consecutive sentences, which hold only the time of day. Where the time of day jumps by more than
+    half a day, midnight lies between two sentences.
 
         first   day since 1970 of the first sentence, None if it is unknown
         days    midnights since the first sentence
@@ -132,9 +134,9 @@ class _Clock:
         ValueError for a leap second on a day that has none.
         """
         if self._last is not None:
-            passed = round((self._last - second) / SECONDS_PER_DAY)
-            self.leaps += passed > 0 and self._last >= SECONDS_PER_DAY
-            self.days += passed
+            midnights = round((self._last - second) / SECONDS_PER_DAY)
+            self.leaps += midnights > 0 and self._last >= SECONDS_PER_DAY
+            self.days += midnights
         self._last = second
         if self.first is None:
             return SECONDS_PER_DAY * self.days + second + self.leaps
@@ -143,7 +145,7 @@ class _Clock:
         return instant.of_day(self.first + self.days, second)
 
 
-def _begin(path):
+def _first_day(path):
     """Return the day since 1970 of the first sentence with a fix, None if no RMC has a date.
 
     The date of an RMC belongs to the time of the same RMC, which may lie on the other side of midnight.

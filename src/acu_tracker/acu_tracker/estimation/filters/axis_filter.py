@@ -1,6 +1,11 @@
-"""The target filter of one axis, of any of `kinds`: each is a bank of motion models, a single filter a bank of one.
+"""The target filter of one axis, of any kind of kinds.FILTER_KINDS.
+
+Each kind is a bank of motion models; a single filter is a bank of one model.
 
 The state stays at the last accepted measurement; `predict` and `outlook` extrapolate from there.
+
+The noise of the angle may be coloured by a first-order lag. The filter then uses the differences y_k - rho y_k-1,
+whose noise is white (Bryson, Henrikson 1968; kalman.update_correlated).
 """
 import math
 
@@ -19,24 +24,26 @@ BANK_SIZE = len(MODEL_NAMES)
 CONSTANTS_DTYPE = np.dtype([('count', 'i8'), ('bank', 'i8'),
                             ('models', motion_models.MOTION_MODEL_DTYPE, (BANK_SIZE,)), ('states', 'i8'),
                             ('dwell', 'f8'), ('alpha', 'f8'), ('beta', 'f8'), ('gamma', 'f8'),
-                            ('rate_measurement', 'i8'), ('colour', 'f8')], align=True)
+                            ('rate_measurement', 'i8'), ('noise_bandwidth', 'f8')], align=True)
 """count: number of models in use, the first of `models`; bank: number that identifies their set; states: the
-most states of any of them. `alpha`: 0 except for constant gains; colour: bandwidth of the noise of the angle
-[rad/s], 0 for white noise."""
+most states of any of them. `alpha`: 0 except for constant gains; noise_bandwidth: bandwidth of the noise of the
+angle [rad/s], 0 for white noise."""
 
 FILTER_DTYPE = np.dtype([('bank', 'i8'), ('count', 'i8'), ('states', 'i8'), ('T', 'f8'),
                          ('x', 'f8', (BANK_SIZE, 3)), ('p', 'f8', (BANK_SIZE, 6)), ('mu', 'f8', (BANK_SIZE,)),
                          ('x_prior', 'f8', (BANK_SIZE, 3)), ('p_prior', 'f8', (BANK_SIZE, 6)),
-                         ('mu_prior', 'f8', (BANK_SIZE,)), ('y', 'f8'), ('follows', 'i8'),
-                         ('past', 'f8', (BANK_SIZE, 5)), ('weights', 'f8', (BANK_SIZE,)), ('walk', 'f8')], align=True)
+                         ('mu_prior', 'f8', (BANK_SIZE,)), ('last_angle', 'f8'), ('correlated', 'i8'),
+                         ('past', 'f8', (BANK_SIZE, 5)), ('weights', 'f8', (BANK_SIZE,)),
+                         ('drift_variance_rate', 'f8')], align=True)
 """State of the filter.
 
 bank, count, states: of the constants that x, p, mu belong to. `x`, `p`, `mu`: estimate, covariance (as in
 kalman.Symmetric) and probability of each model, after the last measurement. `x_prior`, `p_prior`, `mu_prior`:
-predicted by T [s] from there. `predict` sets these; `expected`, `innovation`, `correct` use them. `y`: the last
-measured angle [rad]; follows: 1 if the noise of the next angle is correlated with the noise of y. `past`:
-kalman.PreviousAngle of each model, of the same prediction. `weights`: scratch. `walk`: variance per second [rad2/s]
-that the angle gains in addition to every model.
+predicted by T [s] from there. `predict` sets these; `expected`, `innovation`, `correct` use them. `last_angle`:
+the last measured angle [rad]; correlated: 1 if the noise of the next angle is correlated with that of last_angle.
+`past`: x1, p11, c1, c2, c3 of the kalman.PreviousAngle of each model, of the same prediction. `weights`: scratch.
+`drift_variance_rate`: variance per second [rad2/s] that the prediction of every model adds to that of the angle, for
+the drift of the attitude error (target.py).
 """
 
 ESTIMATE_DTYPE = np.dtype([('angle', 'f8'), ('rate', 'f8'), ('acceleration', 'f8'), ('variance', 'f8'),
@@ -58,7 +65,7 @@ def constants(params, noise_bandwidth=0.0) -> np.ndarray:
     c['models'][0, :len(bank.models)] = bank.models
     c['bank'], c['states'] = np.sum(1 << bank.models['kind']), bank.models['states'].max()
     c['dwell'], (c['alpha'], c['beta'], c['gamma']) = bank.dwell, bank.gains
-    c['rate_measurement'], c['colour'] = params.rate_measurement, 2.0 * math.pi * noise_bandwidth
+    c['rate_measurement'], c['noise_bandwidth'] = params.rate_measurement, 2.0 * math.pi * noise_bandwidth
     return c
 
 
@@ -80,7 +87,7 @@ def _fill(f, c, g):
 
 
 @compiled
-def _open_acceleration(f, c, rate_sigma):
+def _reset_acceleration_variance(f, c, rate_sigma):
     """Set the variance of the acceleration to that at the start."""
     for j in range(c.count):
         f.p[j, 5] = motion_models.initial_variance(c.models[j], rate_sigma)
@@ -90,8 +97,8 @@ def _open_acceleration(f, c, rate_sigma):
 def start(f, c, y, R, rate_sigma):
     """Start at a measured angle y [rad] of variance R; rate_sigma: standard deviation of the unknown rate [rad/s]."""
     _fill(f, c, Gaussian(AxisMotion(y, 0.0, 0.0), Symmetric(R, 0.0, 0.0, rate_sigma * rate_sigma, 0.0, 0.0)))
-    _open_acceleration(f, c, rate_sigma)
-    f.y, f.follows = y, 1
+    _reset_acceleration_variance(f, c, rate_sigma)
+    f.last_angle, f.correlated = y, 1
 
 
 @compiled
@@ -104,15 +111,17 @@ def transfer(f, c, rate_sigma):
         unknown = f.states == 2
         _fill(f, c, imm.combine(f.mu, f.x, f.p, f.count))
         if unknown:
-            _open_acceleration(f, c, rate_sigma)
+            _reset_acceleration_variance(f, c, rate_sigma)
 
 
 @compiled
 def move(f, c, motion):
-    """Shift the models so that together they estimate this AxisMotion, as far as they have an acceleration; their
-    covariances stay."""
+    """Shift the models so that together they estimate this AxisMotion; their covariances stay.
+
+    Models without an acceleration state ignore the acceleration.
+    """
     x = outlook(f, c, 0.0)
-    f.follows = 0
+    f.correlated = 0
     for j in range(c.count):
         f.x[j, 0] += motion.angle - x.angle
         f.x[j, 1] += motion.rate - x.rate
@@ -134,7 +143,7 @@ def predict(f, c, T):
         model = motion_models.discretised(c.models[j], g.x.acceleration, T)
         _put(f.x_prior, f.p_prior, j, Gaussian(kalman.predicted_mean(g.x, model.mean, T),
                                                kalman.predicted_covariance(g.P, model.F, model.Q, T)))
-        f.p_prior[j, 0] += f.walk * T
+        f.p_prior[j, 0] += f.drift_variance_rate * T
         o, past = f.past[j], kalman.past(g, model.F, T)
         o[0], o[1], o[2], o[3], o[4] = past
 
@@ -161,7 +170,7 @@ def variances(g):
 def _correlation(f, c):
     """Return rho, the correlation of the noise of a measurement now with that of the last one, for noise through a
     first-order lag; 0 for white noise."""
-    return math.exp(-c.colour * f.T) if c.colour > 0.0 and f.follows else 0.0
+    return math.exp(-c.noise_bandwidth * f.T) if c.noise_bandwidth > 0.0 and f.correlated else 0.0
 
 
 @compiled
@@ -169,6 +178,7 @@ def innovation(f, c, m):
     """Return the AxisInnovation of an AxisMeasurement against the prediction; y_k - rho y_k-1 replaces the angle."""
     rho = _correlation(f, c)
     x, P = expected(f)
+    # u, U: mean and variance of the predicted difference; p12: its covariance with the rate; o: x1, p11, c1, c2, c3.
     u = U = p12 = 0.0
     for j in range(c.count):
         u += f.mu_prior[j] * (f.x_prior[j, 0] - rho * f.past[j, 0])
@@ -177,10 +187,10 @@ def innovation(f, c, m):
         d1, d2 = f.x_prior[j, 0] - rho * o[0] - u, f.x_prior[j, 1] - x.rate
         U += w * (p[0] - 2.0 * rho * o[2] + rho * rho * o[1] + d1 * d1)
         p12 += w * (p[1] - rho * o[3] + d1 * d2)
-    nu, nu_rate, S = m.angle - rho * f.y - u, m.rate - x.rate, U + (1.0 - rho * rho) * m.variance
-    # Innovation of the rate, given the angle.
-    more = nu_rate - p12 / S * nu
-    return AxisInnovation(nu, S, nu * nu / S, nu_rate, more * more / (P.p22 + m.rate_variance - p12 * p12 / S))
+    nu, nu_rate, S = m.angle - rho * f.last_angle - u, m.rate - x.rate, U + (1.0 - rho * rho) * m.variance
+    nu_rate_given_angle = nu_rate - p12 / S * nu
+    return AxisInnovation(nu, S, nu * nu / S, nu_rate, nu_rate_given_angle * nu_rate_given_angle
+                          / (P.p22 + m.rate_variance - p12 * p12 / S))
 
 
 @compiled
@@ -188,12 +198,14 @@ def correct(f, c, m):
     """Correct the prediction with an AxisMeasurement."""
     rho = _correlation(f, c)
     own = (1.0 - rho * rho) * m.variance
+    # x, p: prediction of a model; o: x1, p11, c1, c2, c3 of its PreviousAngle.
     for j in range(c.count):
         x, p, o = f.x_prior[j], f.p_prior[j], f.past[j]
         g = Gaussian(AxisMotion(x[0], x[1], x[2]), Symmetric(p[0], p[1], p[2], p[3], p[4], p[5]))
-        nu, S = m.angle - rho * f.y - (x[0] - rho * o[0]), p[0] - 2.0 * rho * o[2] + rho * rho * o[1] + own
+        nu, S = m.angle - rho * f.last_angle - (x[0] - rho * o[0]), p[0] - 2.0 * rho * o[2] + rho * rho * o[1] + own
         f.weights[j] = kalman.log_likelihood(nu, S)
-        # Constant gains; after a start or a gap Kalman's larger gain, a growing memory, until alpha is reached.
+        # Constant gains are used where the Kalman gain p11 / S is below alpha. After a start or a gap the Kalman gain
+        # is larger, and is used.
         if g.P.p11 < c.alpha * S:
             g = kalman.update_with_gain(g, nu, m.variance, constant_gain.gain(c.alpha, c.beta, c.gamma, f.T))
         elif rho > 0.0:
@@ -206,7 +218,7 @@ def correct(f, c, m):
             g = kalman.update_rate(g, nu, m.rate_variance)
         _put(f.x, f.p, j, g)
     imm.weigh(f.mu_prior, f.weights, c.count, f.mu)
-    f.y, f.follows = m.angle, 1
+    f.last_angle, f.correlated = m.angle, 1
 
 
 @compiled

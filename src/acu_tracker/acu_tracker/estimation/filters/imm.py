@@ -1,8 +1,9 @@
 """Interacting multiple models: a bank of filters, each weighted by its probability (Blom, Bar-Shalom 1988).
 
 Paper 003, eq. 5 to 11, with two corrections. The mixing before the prediction is added. In eq. 11 the weights are the
-probabilities, and the spread of the models is added (the reversed second factor of the print subtracts it).
-Probabilities are weighted by logarithms of likelihoods, so that even a measurement far from all models ranks them.
+probabilities, and the spread of the models is added. In the printed equation the second factor has the
+reversed sign, which would subtract the spread. Probabilities are weighted by logarithms of likelihoods, so that even a
+measurement far from all models ranks them.
 """
 import math
 
@@ -16,7 +17,7 @@ def switching(T, dwell, count):
     """Return (stay, switch): probabilities that a model still holds after T [s],
     and that a given other model has replaced it.
 
-    A chain in continuous time leaves a model after `dwell` [s] on average, for each other model with equal
+    A chain in continuous time leaves a model after `dwell` [s] on average, and each other model follows with equal
     probability: near exp(-T / dwell) for short T, 1 / count for long T.
     """
     if count == 1:
@@ -47,6 +48,7 @@ def mix(mu, count, stay, switch, j, weights):
 @inlined
 def alone(x, p, j):
     """Return what `combine` returns for model j alone; only the sign of a zero may differ."""
+    # 0.0 + turns -0.0 into 0.0, as the sum of `combine` does.
     return Gaussian(AxisMotion(0.0 + x[j, 0], 0.0 + x[j, 1], 0.0 + x[j, 2]),
                     Symmetric(0.0 + p[j, 0], 0.0 + p[j, 1], 0.0 + p[j, 2], 0.0 + p[j, 3], 0.0 + p[j, 4],
                               0.0 + p[j, 5]))

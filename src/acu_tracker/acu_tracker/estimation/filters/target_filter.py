@@ -48,7 +48,7 @@ def start(f, c, m, rate_sigma):
 def walk(f, azimuth, elevation):
     """Set the variances per second [rad2/s] by which the measured angles walk from now on, for an INS whose error
     changes slowly. The Cartesian filter neglects them."""
-    f.axis[0].walk, f.axis[1].walk = azimuth, elevation
+    f.axis[0].drift_variance_rate, f.axis[1].drift_variance_rate = azimuth, elevation
 
 
 @compiled

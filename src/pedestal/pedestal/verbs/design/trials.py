@@ -1,7 +1,7 @@
 """run a scenario many times with varied parameters, and print statistics and the worst trials
 
-Each trial has its own seed and the results of `pedestal run`. A trial runs all laws in one process, without ROS. For
-each of the worst trials a `pedestal run` command is printed, which gives the same numbers with separate nodes.
+Each trial has its own seed and the results of `pedestal run`. A trial runs all nodes in one process, without ROS. For
+each of the worst trials a `pedestal run` command is printed, which runs separate nodes and gives the same numbers.
 
 --vary NODE.KEY=DISTRIBUTION draws a parameter from uniform(low, high), normal(mean, sigma) or choice(a, b, ...). With
 an x after the distribution, as in normal(1, 0.1)x, the drawn number is a factor of the value of the scenario. The
@@ -72,21 +72,21 @@ def main(options: argparse.Namespace) -> int:
             raise
     names = comparison.names(*plans) if len(plans) > 1 else (plans[0].name,)
     sides = comparison.Sides(*names, *tables) if len(plans) > 1 else None
-    by = statistics.ranked_by(tables[0], options.by)
+    ranking = statistics.ranked_by(tables[0], options.by)
     rows = comparison.rows(sides) if sides else []
     for name, table in zip(names, tables):
         rows += [*statistics.of_results(name, table), *statistics.of_questions(name, table),
                  *statistics.of_sensitivity(name, table)]
-    shown = trials_page.read(plans[0], tables[0], by, sides, options.command, WORST_TRIAL_COUNT)
+    shown = trials_page.read(plans[0], tables[0], ranking, sides, options.command, WORST_TRIAL_COUNT)
     file = folder / 'trials.html'
     file.write_text(trials_page.page(shown, rows), encoding='utf-8')
     console.show_trials(f'{plans[0].runs} trials: {" against ".join(names)}', rows)
-    print('\n'.join(_sensitivities(rows, by)))
-    print(f'the worst trials by {by}:')
+    print('\n'.join(_correlation_lines(rows, ranking)))
+    print(f'the worst trials by {ranking}:')
     for i in shown.worst:
-        print(f'{console.number(tables[0].column(by)[i]):>10}  {plans[0].command(i)}')
+        print(f'{console.number(tables[0].column(ranking)[i]):>10}  {plans[0].command(i)}')
     if sides:
-        print(comparison.sentence(sides, by))
+        print(comparison.sentence(sides, ranking))
     print(f'table {tables[0].file}, page {file}')
     console.write_json(options.json, {'name': plans[0].name, 'rows': rows})
     return 0
@@ -104,8 +104,8 @@ def _plans(options: argparse.Namespace) -> 'list[Plan]':
                         (*changes, *options.against_param), first.seed, options.duration, options.sobol)]
 
 
-def _sensitivities(rows: Iterable[Mapping[str, typing.Any]], by: str) -> list[str]:
+def _correlation_lines(rows: Iterable[Mapping[str, typing.Any]], ranking: str) -> list[str]:
     """Return lines with the correlation of the ranking result with each varied parameter, the strongest first."""
-    found = [row for row in rows if row['metric'].startswith(f'{by}/rank_correlation(')]
+    found = [row for row in rows if row['metric'].startswith(f'{ranking}/rank_correlation(')]
     return [f'{row["metric"]}: {console.number(row["value"])} ({console.interval(row)})'
             for row in sorted(found, key=lambda row: -abs(row['value']))]
