@@ -50,7 +50,8 @@ def test_what_is_allowed_is_stable(step):
         for method in INS_METHODS[1:]:
             c = navigator.constants(p, method, 'none', 0.8)[0]
             sigmas = [float(c[name][field]) for name, field in (
-                ('adrc', 'level'), ('adrc', 'velocity_variance'), ('classical', 'level'), ('classical', 'azimuth'))]
+                ('adrc', 'level'), ('adrc', 'velocity_variance'), ('classical', 'level_sigma'),
+                ('classical', 'azimuth_sigma'))]
             assert all(0.0 < sigma < 10.0 for sigma in sigmas), (p, sigmas)
 
 
