@@ -58,12 +58,8 @@ class TopicPublishers:
     def __init__(self, node, link):
         self._node, self._link = node, link
         self._gate = PublisherGate(lambda data: (None, data), 0, self._count)
-        self._lost, self._polled, self._foreign = {}, None, False
-
-    @property
-    def lost(self):
-        """Number of missing messages of the graph's publisher."""
-        return sum(self._lost.values())
+        self.lost, self._counted = 0, {}
+        self._polled, self._foreign = None, False
 
     def several(self, now):
         """Return True if more than one publisher sends at a time [ns]."""
@@ -79,7 +75,8 @@ class TopicPublishers:
         taken = self._gate.take(data, info['publication_sequence_number'], info['source_timestamp'], now, utc)
         ours = self._gate.active
         if taken is not None:
-            self._lost[ours] = ours.lost
+            self.lost += ours.lost - self._counted.get(ours, 0)
+            self._counted[ours] = ours.lost
         return not (taken is None and self._gate.reason == DROP_OTHER_PUBLISHER and ours is not None
                     and now - ours.arrival < CONFIRMED_TAKEOVER_NS and self._named(now))
 
