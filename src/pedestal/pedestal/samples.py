@@ -5,10 +5,8 @@ Closed-form expressions give the numbers. Each file has the format in which a us
 import math
 from collections.abc import Callable
 
+from pedestal_common.text_files.columns import METRES_PER_FOOT
 from tracking_receiver_sim.params import LeoPassParameters
-
-METRES_PER_FOOT = 0.3048
-"""International foot [m]."""
 
 FLIGHT_TIMES_S = range(91)
 """Times of the rows of the flight [s]."""

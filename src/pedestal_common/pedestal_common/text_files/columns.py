@@ -7,6 +7,11 @@ import math
 import re
 import typing
 
+from pedestal_common.graph.steps import SECONDS_PER_DAY
+
+METRES_PER_FOOT = 0.3048
+"""International foot [m]."""
+
 UTC, JULIAN_DATE, MODIFIED_JULIAN_DATE = 'UTC', 'JD', 'MJD'
 """Units of a time with a date: a calendar date (or seconds since 1970), a Julian date, a modified Julian date."""
 
@@ -26,11 +31,11 @@ _UNIT_NAMES = {
     'hz': {'hz': ('hz',), 'rad/s': ('rad/s', 'radpers')},
     'm2_per_hz': {'m2/Hz': ('m2/hz', 'm^2/hz', 'm2perhz', 'm²/hz', 'm**2/hz'),
                   'm2 s/rad': ('m2s/rad', 'm^2s/rad', 'm²s/rad', 'm2/rad/s', 'm^2/rad/s', 'm²/rad/s')}}
-_SIZES = {'s': 1.0, 'ms': 1e-3, 'us': 1e-6, 'ns': 1e-9, 'min': 60.0, 'h': 3600.0, 'd': 86400.0,
+_SIZES = {'s': 1.0, 'ms': 1e-3, 'us': 1e-6, 'ns': 1e-9, 'min': 60.0, 'h': 3600.0, 'd': SECONDS_PER_DAY,
           'deg': 1.0, 'rad': math.degrees(1.0), 'mrad': math.degrees(1e-3),
-          'm': 1.0, 'km': 1000.0, 'cm': 0.01, 'mm': 1e-3, 'ft': 0.3048,
+          'm': 1.0, 'km': 1000.0, 'cm': 0.01, 'mm': 1e-3, 'ft': METRES_PER_FOOT,
           'hz': 1.0, 'rad/s': 0.5 / math.pi, 'm2/Hz': 1.0, 'm2 s/rad': 2.0 * math.pi,
-          UTC: 1.0, JULIAN_DATE: 86400.0, MODIFIED_JULIAN_DATE: 86400.0}
+          UTC: 1.0, JULIAN_DATE: SECONDS_PER_DAY, MODIFIED_JULIAN_DATE: SECONDS_PER_DAY}
 _UTC_PATTERN = re.compile(r'(ut|utc|utcg|gmt|z|zulu|utciso8601|iso8601|iso)?(hrmn(ss|sc)?(fff)?)?')
 """Words behind the name of a time in UTC; HR:MN:SS.fff is of JPL Horizons, UTCG of STK."""
 _APPARENT_NAMES = ('aapp', 'aappr', 'rapp')

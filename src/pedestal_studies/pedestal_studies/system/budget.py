@@ -83,7 +83,6 @@ ERROR_TERMS = (
     Term('polarisation', ('tracking_receiver.target.polarisation.axial_ratio_db',
                           'tracking_receiver.antenna.polarisation.axial_ratio_db'), False,
          'level lost by polarisation mismatch'))
-TERM_BY_NAME = {term.name: term for term in ERROR_TERMS}
 NO_TERMS, ALL_TERMS = 'none', 'whole'
 """Values of `on` in place of the name of a term: no term, every term."""
 

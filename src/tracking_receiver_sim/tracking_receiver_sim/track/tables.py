@@ -13,10 +13,7 @@ import typing
 from pedestal_common.text_files import columns, csv_table
 from tracking_receiver_sim.track import times
 
-METRES_PER_FOOT = 0.3048
-"""Length of a foot [m]."""
-
-ALTITUDE_LIMITS_FT_IN_M = -3000.0 * METRES_PER_FOOT, 500_000.0 * METRES_PER_FOOT
+ALTITUDE_LIMITS_FT_IN_M = -3000.0 * columns.METRES_PER_FOOT, 500_000.0 * columns.METRES_PER_FOOT
 ALTITUDE_LIMITS_M = -1000.0, 150_000.0
 """Ranges of altitudes of ADS-B, of files in feet and in metres [m]."""
 
