@@ -356,7 +356,8 @@ class Acu(Unit):
         """Return the text of the reason why a mode is refused."""
         more = self.predictor.refusal_details(mode, reason, self.now * 1e-9) if mode in (Mode.TLE, Mode.SUN) else ''
         more = more or diagnosis.missing(self, diagnosis.INPUTS_OF_REASONS.get(reason, ''))
-        return modes.REASONS[reason] + (f', {more}' if more else '')
+        beyond = self._beyond_limits(modes.MODES[mode]) if reason == Reason.OUTSIDE_LIMITS else ''
+        return modes.REASONS[reason] + (f', {more}' if more else beyond)
 
     @property
     def drive_status(self):
@@ -375,7 +376,16 @@ class Acu(Unit):
         for reason, name in diagnosis.INPUTS_OF_REASONS.items():
             if reason in words and (text := diagnosis.missing(self, name)):
                 words[reason] += f', {text}'
-        return {mode: words[code] for mode, code in zip(modes.MODES, why) if code in words}
+        refused = {mode: words[code] for mode, code in zip(modes.MODES, why) if code in words}
+        return {mode: text + self._beyond_limits(mode) if text == modes.REASONS[Reason.OUTSIDE_LIMITS] else text
+                for mode, text in refused.items()}
+
+    def _beyond_limits(self, mode):
+        """Return the details of the reason OUTSIDE_LIMITS of a mode that goes to fixed deck angles; '' for another."""
+        p = self.parameters
+        angles = {'preset': self.parts['state']['guidance']['preset']['angle'],
+                  'stow': (p.azimuth.stow, p.elevation.stow)}.get(mode)
+        return '' if angles is None else f', {diagnosis.beyond_limits(p, angles)}'
 
     def requests_for(self, topic, text):
         """Return [service of the mode] for a text on acu/mode, else []."""

@@ -15,7 +15,7 @@ from pedestal_common.node.shell import Shell
 from pedestal_common.wire import commands, messages, records
 from pedestal_common.wire.commands import Reply
 from pedestal_operator.antenna import Antenna
-from pedestal_operator.requests import Requests
+from pedestal_operator.requests import JOG_REPEAT_PERIOD_S, Requests
 
 NUMBER_TOPICS = ('joint_states', 'acu/reference', 'tracking_receiver/angle_error')
 """Topics of numbers that every client receives."""
@@ -25,6 +25,9 @@ TEXT_TOPICS = ('acu/mode', 'adu/state', 'acu/keyhole')
 
 REPLY_TIMEOUT_S = 5.0
 """Longest wait for the reply to a command [s]."""
+
+DISCOVERY_MARGIN_S = 0.05
+"""Time for the discovery of this node by the commanded node [s], after its own discovery of that node."""
 
 RETRY_PERIOD_S = 1.0
 """Time without a reply after which a command is repeated [s], because discovery may have been incomplete."""
@@ -179,7 +182,7 @@ class RemoteSession:
                           and remote.count_publishers(reply_topic) > 0, seconds):
             raise GraphError(f'no {remote.beam}{row.name} on ROS_DOMAIN_ID {remote.context.get_domain_id()} within '
                              f'{seconds:g} s: is a graph running?')
-        self.until(lambda: False, 0.2)  # time for the discovery of this node by the other one
+        self.until(lambda: False, DISCOVERY_MARGIN_S)
 
     def request(self, verb, arguments=None, seconds=REPLY_TIMEOUT_S) -> Reply:
         """Send a command and wait for the Reply. Raises GraphError after `seconds`."""
@@ -189,4 +192,18 @@ class RemoteSession:
             if time.monotonic() > deadline:
                 raise GraphError(f'{self.remote.node.name} did not reply to {verb} within {seconds:g} s')
             self.remote.repeat_request(number)
+        return reply
+
+    def hold_jog(self, verb, arguments, seconds) -> Reply:
+        """Repeat a jog for some seconds, then stop the axes; also after a stop of this program. Return the last Reply.
+
+        If the antenna has left the mode, its new mode stays.
+        """
+        end = time.monotonic() + seconds
+        try:
+            while (reply := self.request(verb, arguments)).granted and (left := end - time.monotonic()) > 0.0:
+                self.until(lambda: False, min(JOG_REPEAT_PERIOD_S, left))
+        finally:
+            if self.remote.texts.get('acu/mode') == verb:
+                self.request(verb)
         return reply

@@ -51,9 +51,14 @@ class Row(typing.NamedTuple):
     @property
     def text(self):
         """Value as text for a person."""
-        if self.value is None or isinstance(self.value, float) and math.isnan(self.value):
+        if self.json is None:
             return '-'
         return f'{self.value:.4f}' if isinstance(self.value, float) else str(self.value)
+
+    @property
+    def json(self):
+        """Value for JSON, which has no NaN."""
+        return None if isinstance(self.value, float) and math.isnan(self.value) else self.value
 
 
 class Shown(typing.NamedTuple):

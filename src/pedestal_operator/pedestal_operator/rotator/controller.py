@@ -5,6 +5,7 @@ One program at a time is in control. Set-points become a motion. A jog lasts unt
 import math
 
 from pedestal_common.wire.commands import HELD_REFUSAL, LIMITS_REFUSAL, RANGE_REFUSAL
+from pedestal_operator.requests import JOG_REPEAT_PERIOD_S
 from pedestal_operator.rotator.outcomes import (
     OUTCOME_BUSY,
     OUTCOME_DONE,
@@ -20,9 +21,6 @@ CLIENT_REPLY_TIMEOUT_S = 1.5
 
 CONTROL_TIMEOUT_S = 10.0
 """Time without a command of a client after which its control is released [s]."""
-
-JOG_REPEAT_PERIOD_S = 0.2
-"""Period of the repetition of a jog [s], less than half of the jog timeout of the control unit."""
 
 
 class PendingRequest:

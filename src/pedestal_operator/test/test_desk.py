@@ -1,16 +1,21 @@
-"""State of the antenna as the page, the console and `pedestal status` show it."""
+"""State of the antenna as the page, the console and `pedestal status` show it, and the screen of the console."""
 import math
 import types
 
 import pytest
 
 from pedestal_common.wire import messages
-from pedestal_operator import state
+from pedestal_operator import console, state
 from pedestal_operator.antenna import Antenna
 from pedestal_operator.page import page_security
+from pedestal_operator.requests import Requests
 
 HEALTHY = {'mode': 'rate', 'reason': 'command', 'fallback': 'coast', 'control': '', 'drive': 'enabled', 'coasting': '0',
            'azimuth limit_s': '12.4', 'elevation limit_s': 'inf'}
+
+FAULT = {'drive': 'fault: azimuth encoder jump, azimuth following error, elevation encoder disagreement',
+         'control': 'berta@page 127.0.0.1', 'refused tle': 'no elements'}
+REPLY = 'reset: refused: the cause of uncommanded motion is still there, and the antenna has not come to rest yet'
 
 
 def alarm(name, condition, cause=''):
@@ -22,11 +27,11 @@ def alarm(name, condition, cause=''):
 class Station(Antenna):
     """An antenna whose messages and their ages [s] a test chooses."""
 
-    def __init__(self, acu=None, alarms=(), rates=(0.0, 0.0), **ages):
+    def __init__(self, diagnostics=None, alarms=(), rates=(0.0, 0.0), ages=None):
         self.beam, self.texts, self.alarms = '', {}, list(alarms)
-        self._ages = {'acu': 0.1, 'adu': 0.1, 'joint_states': 0.0} | ages
+        self._ages = {'acu': 0.1, 'adu': 0.1, 'joint_states': 0.0} | (ages or {})
         self.numbers = {'joint_states': (0.5, 0.6, *map(math.radians, rates))}
-        values = [messages.KeyValue(key=key, value=value) for key, value in {**HEALTHY, **(acu or {})}.items()]
+        values = [messages.KeyValue(key=key, value=value) for key, value in {**HEALTHY, **(diagnostics or {})}.items()]
         self.status = {'acu': types.SimpleNamespace(values=values, level=0, message='rate (command)'),
                        'adu': types.SimpleNamespace(values=[], level=0, message='enabled')}
         self.status = {name: status for name, status in self.status.items() if self._ages[name] < math.inf}
@@ -50,7 +55,7 @@ def test_a_healthy_antenna():
                                          ('unknown', {'joint_states': math.inf})])
 def test_a_silent_drive_is_silent_in_every_place(drive, ages):
     """Also before the control unit reports the silence, and before the first angle arrived."""
-    station = Station({'drive': drive, 'azimuth limit_s': '0.0'}, **ages)
+    station = Station({'drive': drive, 'azimuth limit_s': '0.0'}, ages=ages)
     header = state.header(station)
     assert header['link'] == ('no adu', 'bad')
     assert state.axis_states(station) == [('silent', 'bad')] * 2
@@ -59,14 +64,14 @@ def test_a_silent_drive_is_silent_in_every_place(drive, ages):
 
 
 def test_a_silent_control_unit_has_no_mode_and_no_commands():
-    station = Station(acu={'control': 'anna@page 127.0.0.1'}, **{'acu': 12.2})
+    station = Station({'control': 'anna@page 127.0.0.1'}, ages={'acu': 12.2})
     header = state.header(station)
     assert header['mode'] == ('unknown', 'bad') and header['reason'] == ('last: rate, 12 s ago', 'bad')
     assert header['link'] == ('no ACU', 'bad') and header['control'] == ('unknown', 'bad')
     for holds in (True, False):
         assert state.refusals(station, holds) == dict.fromkeys(state.OPERATOR_COMMANDS, 'the control unit is silent')
     assert ('acu', 'silent') in state.node_reports(station)
-    assert state.header(Station(acu=None, **{'acu': math.inf, 'adu': math.inf}))['drive'] == ('unknown', 'bad')
+    assert state.header(Station(ages={'acu': math.inf, 'adu': math.inf}))['drive'] == ('unknown', 'bad')
 
 
 @pytest.mark.parametrize('control, holds, may_take, expected', [
@@ -97,3 +102,65 @@ def test_the_first_alarm_is_the_first_unacknowledged_one():
     assert (first['name'], first['action'], first['raised_s']) == ('signal lost', 'mend signal lost', 3.0)
     assert state.first_alarm(Station(alarms=listed[:1]))['name'] == 'drive fault'
     assert state.first_alarm(Station(alarms=listed[2:])) is None
+
+
+class Remote(Station):
+    """A Station that keeps the requests of a console."""
+
+    def __init__(self, *arguments, **named):
+        super().__init__(*arguments, **named)
+        self.who, self._requests, self.sent = 'anna', Requests('test'), []
+
+    def request(self, verb, arguments=None):
+        self.sent.append(verb)
+        return self._requests.add(verb, self.who, arguments).number
+
+    def replied(self, number):
+        return self._requests.replied(number)
+
+
+def made(*arguments, **named):
+    """(Remote, its Console)"""
+    remote = Remote(*arguments, **named)
+    return remote, console.Console(types.SimpleNamespace(remote=remote))
+
+
+def texts(shown, size):
+    lines = [line.plain for line in shown.screen(*size)]
+    assert len(lines) <= size[1]
+    return '\n'.join(line[:size[0]] for line in lines)
+
+
+@pytest.mark.parametrize('size', [(80, 24), (60, 20)])
+@pytest.mark.parametrize('first', ['drive fault', 'an alarm with a long name and a long meaning'])
+def test_mode_alarm_reply_and_keys_are_on_every_screen(size, first):
+    listed = [alarm(first, 'unacknowledged'), *(alarm(f'signal lost {i}', 'acknowledged', first) for i in range(9))]
+    _, shown = made(FAULT, alarms=listed)
+    shown.last_reply = REPLY
+    text = texts(shown, size)
+    assert text.startswith('RATE  command\n') and f'9 more alarms, first HIGH {first[:20]}' in text
+    assert f'-> mend {first}' in text.replace('\n', ' ') and 'has not come to rest yet' in text.replace('\n', ' ')
+    for key, (_, doc) in console.KEY_COMMANDS.items():
+        assert f'[{key}] {doc}' in text
+    assert '[q] quit' in text and 'drive fault: azimuth encoder jump' in text and 'control berta' in text
+
+
+def test_a_silent_control_unit_is_not_shown_as_healthy():
+    text = texts(made(ages={'acu': 12.3})[1], (60, 20))
+    assert text.startswith('UNKNOWN  last: rate, 12 s ago\n') and 'alarms unknown' in text and 'no alarm' not in text
+
+
+def test_a_silent_drive_has_no_angles_of_now():
+    text = texts(made({'drive': 'silent'}, ages={'joint_states': 4.0})[1], (60, 20))
+    assert 'drive silent for 4 s' in text and 'link no adu' in text and text.count('silent') == 3
+
+
+@pytest.mark.parametrize('key, command, control, sent', [('s', 'stop', 'berta', True), ('b', 'standby', 'berta', True),
+                                                         ('g', 'program', 'berta', False), ('g', 'program', '', True),
+                                                         ('g', 'program', 'anna', True), ('\x1b[A', 'rate', 'x', False)])
+def test_a_key_whose_command_would_be_refused_shows_the_reason_instead(key, command, control, sent):
+    remote, shown = made({'control': control})
+    shown.press(key, 1.0)
+    shown.update(1.0)
+    assert remote.sent == [command] * sent
+    assert shown.last_reply == ('' if sent else f'{"jog" if command == "rate" else command}: held by {control}')
