@@ -341,7 +341,7 @@ class Acu(Unit):
         return Reply(bool(granted), f'{refusal}mode is {modes.MODES[outputs["mode"]]}')
 
     def _reset(self):
-        """Return the Reply to a reset of the latched alarms and faults. It also requests the reset of a drive in fault.
+        """Return the Reply to a reset of the latched alarms and faults; also request the reset of a drive in fault.
 
         A drive in an emergency stop is reset by a person at adu/reset_faults only.
         """
@@ -402,7 +402,7 @@ class Acu(Unit):
 
     @property
     def calls(self):
-        """Services of CALLS to call now: the stop during uncommanded motion, the reset after a reset by an operator."""
+        """Services of CALLS to call now: stop during uncommanded motion, reset after a reset by an operator."""
         stop, reset = self.CALLS
         if self.parts['state']['unasked']['moves']:
             return (stop,)

@@ -78,8 +78,8 @@ def progress_of_trials():
 def add_json(parser):
     """Add the option --json [FILE] to the parser of a verb that measures."""
     parser.add_argument('--json', type=lambda text: STDOUT_PATH if text == '-' else pathlib.Path(text), metavar='FILE',
-                        nargs='?', const=STDOUT_PATH, help='file for the results as JSON; without FILE, or with -: JSON '
-                        'to standard output, all other output to standard error')
+                        nargs='?', const=STDOUT_PATH, help='file for the results as JSON; without FILE, or with -: '
+                        'JSON to standard output, all other output to standard error')
 
 
 def check_json(path):

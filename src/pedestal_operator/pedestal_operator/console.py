@@ -28,7 +28,7 @@ JOG_RATES_DEG_S = (0.1, 0.5, 1.0, 2.0, 5.0)
 
 KEY_COMMANDS = {'s': ('stop', 'stop'), 'b': ('standby', 'standby'), 'w': ('stow', 'stow'), 'p': ('preset', 'preset'),
              'g': ('program', 'program'), 'a': ('autotrack', 'autotrack'), 't': ('take', 'take control'),
-             'r': ('release', 'release control'), 'c': ('acu/reset_faults', 'reset faults')}
+             'r': ('release', 'release control'), 'c': ('reset', 'reset faults')}
 """{key: (command, text on the screen)}."""
 
 ARROW_DIRECTIONS = {'\x1b[A': (0, 1), '\x1b[B': (0, -1), '\x1b[C': (1, 0), '\x1b[D': (-1, 0)}
@@ -191,8 +191,8 @@ def _axis_lines(remote):
 def _receiver_line(remote):
     x, y, level = (row.value for row in state.rows(remote) if row.group == 'receiver')
     locked = remote.diagnostics_of('acu').get('locked') == '1'
-    return Text.assemble('receiver  ', ('locked', '') if locked else ('no lock', 'yellow'), f'  level {_number(level, 1)}'
-                         f' dB-Hz  error {_number(x)} / {_number(y)} deg')
+    return Text.assemble('receiver  ', ('locked', '') if locked else ('no lock', 'yellow'),
+                         f'  level {_number(level, 1)} dB-Hz  error {_number(x)} / {_number(y)} deg')
 
 
 def _report_lines(remote):

@@ -13,7 +13,8 @@ from pedestal_common.node.unit import LEVEL_OK
 BUTTON_MODES = tuple(row.name for row in MODE_ROWS if row.button)
 """Modes with a button or a key; `stop` has a separate button, `rate` is the jog, `slave` is for programs."""
 
-OPERATOR_COMMANDS = (*BUTTON_MODES, 'rate', 'take', 'release', 'reset', 'fallback', 'acknowledge', 'shelve', 'unshelve')
+OPERATOR_COMMANDS = (*BUTTON_MODES, 'rate', 'take', 'release', 'reset', 'fallback', 'acknowledge', 'shelve',
+                     'unshelve')
 """Commands of an operator, except `stop`, which is never refused in advance."""
 
 FREE_COMMANDS = ('standby', 'take')
@@ -37,7 +38,8 @@ REST_RATE_DEG_S = 0.002
 UNACKNOWLEDGED_STATES = ('unacknowledged', 'returned unacknowledged', 'latched unacknowledged')
 """States of an alarm that waits for an acknowledgement."""
 
-ALARM_KEYS = ('state', 'priority', 'annunciated', 'first_out', 'cause', 'action', 'detail', 'shelved_reason', 'raised_s')
+ALARM_KEYS = ('state', 'priority', 'annunciated', 'first_out', 'cause', 'action', 'detail', 'shelved_reason',
+              'raised_s')
 """Keys of an alarm on acu/alarms."""
 
 

@@ -10,8 +10,8 @@ from pedestal_operator.antenna import Antenna
 from pedestal_operator.page import page_security
 from pedestal_operator.requests import Requests
 
-HEALTHY = {'mode': 'rate', 'reason': 'command', 'fallback': 'coast', 'control': '', 'drive': 'enabled', 'coasting': '0',
-           'azimuth limit_s': '12.4', 'elevation limit_s': 'inf'}
+HEALTHY = {'mode': 'rate', 'reason': 'command', 'fallback': 'coast', 'control': '', 'drive': 'enabled',
+           'coasting': '0', 'azimuth limit_s': '12.4', 'elevation limit_s': 'inf'}
 
 FAULT = {'drive': 'fault: azimuth encoder jump, azimuth following error, elevation encoder disagreement',
          'control': 'berta@page 127.0.0.1', 'refused tle': 'no elements'}
@@ -31,7 +31,8 @@ class Station(Antenna):
         self.beam, self.texts, self.alarms = '', {}, list(alarms)
         self._ages = {'acu': 0.1, 'adu': 0.1, 'joint_states': 0.0} | (ages or {})
         self.numbers = {'joint_states': (0.5, 0.6, *map(math.radians, rates))}
-        values = [messages.KeyValue(key=key, value=value) for key, value in {**HEALTHY, **(diagnostics or {})}.items()]
+        values = [messages.KeyValue(key=key, value=value)
+                  for key, value in {**HEALTHY, **(diagnostics or {})}.items()]
         self.status = {'acu': types.SimpleNamespace(values=values, level=0, message='rate (command)'),
                        'adu': types.SimpleNamespace(values=[], level=0, message='enabled')}
         self.status = {name: status for name, status in self.status.items() if self._ages[name] < math.inf}
@@ -43,7 +44,8 @@ class Station(Antenna):
 def test_a_healthy_antenna():
     header = state.header(Station())
     assert {name: shown.text for name, shown in header.items()} == {
-        'mode': 'rate', 'reason': 'command', 'drive': 'enabled', 'control': 'none', 'fallback': 'coast', 'link': 'live'}
+        'mode': 'rate', 'reason': 'command', 'drive': 'enabled', 'control': 'none', 'fallback': 'coast',
+        'link': 'live'}
     assert all(shown.level == '' for shown in header.values())
     assert state.axis_states(Station(rates=(0.0, 0.3))) == [('limit in 12 s', 'warn'), ('moving', '')]
     assert state.axis_states(Station({'elevation limited': 'rate'}))[1] == ('rate limited', 'warn')
@@ -155,9 +157,9 @@ def test_a_silent_drive_has_no_angles_of_now():
     assert 'drive silent for 4 s' in text and 'link no adu' in text and text.count('silent') == 3
 
 
-@pytest.mark.parametrize('key, command, control, sent', [('s', 'stop', 'berta', True), ('b', 'standby', 'berta', True),
-                                                         ('g', 'program', 'berta', False), ('g', 'program', '', True),
-                                                         ('g', 'program', 'anna', True), ('\x1b[A', 'rate', 'x', False)])
+@pytest.mark.parametrize('key, command, control, sent', [
+    ('s', 'stop', 'berta', True), ('b', 'standby', 'berta', True), ('g', 'program', 'berta', False),
+    ('g', 'program', '', True), ('g', 'program', 'anna', True), ('\x1b[A', 'rate', 'x', False)])
 def test_a_key_whose_command_would_be_refused_shows_the_reason_instead(key, command, control, sent):
     remote, shown = made({'control': control})
     shown.press(key, 1.0)

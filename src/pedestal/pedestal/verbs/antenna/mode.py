@@ -27,10 +27,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--az', type=float, metavar='DEG', help='azimuth [deg]; in mode rate: azimuth rate [deg/s]')
     parser.add_argument('--el',
                         type=float, metavar='DEG', help='elevation [deg]; in mode rate: elevation rate [deg/s]')
-    parser.add_argument('given', nargs='*', metavar='NAME=VALUE', help='other arguments of the mode (radians, SI units; '
-                        'see docs/operating.md, Commands); or azimuth and elevation as two numbers, as --az and --el')
-    parser.add_argument('--hold', type=float, metavar='S', help='time for which mode rate is repeated, after which the '
-                        'axes stop [s]; default: once, which lasts 0.5 s')
+    parser.add_argument('given', nargs='*', metavar='NAME=VALUE', help='other arguments of the mode (radians, SI '
+                        'units; see docs/operating.md, Commands); or two numbers, as --az and --el')
+    parser.add_argument('--hold', type=float, metavar='S', help='time for which mode rate is repeated before the axes '
+                        'stop [s]; default: the command is sent once and lasts 0.5 s')
     arguments.add_remote(parser)
 
 
