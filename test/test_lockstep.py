@@ -14,6 +14,7 @@ from pedestal_bringup.loop import closed_loop
 from pedestal_bringup.scenario import scenario
 from pedestal_common import parameters
 from pedestal_common.graph import nodes
+from pedestal_common.wire import messages
 from pedestal_recording import bag as bags
 from pedestal_recording.bag import load
 from pedestal_recording.verify import verify
@@ -143,3 +144,30 @@ def test_readers_of_others_see_the_same(runs):
     table = ours.table('joint_states')
     assert np.array_equal(theirs, np.column_stack((table['azimuth.position'], table['elevation.position'])))
     assert np.array_equal(theirs, decoded)
+
+
+FOREIGN_BYTES = b'\0\1\0\0' + b'\xff' * 20
+
+
+def test_foreign_messages_in_a_run_are_left_out_and_named(start_run, connect):
+    """The run ends with its results, and its recording is complete without the foreign messages."""
+    run = start_run('leo_pass', '--pacing', 'lockstep', '--duration', '20', '--param', PARAM)
+    stranger = connect(run.domain_id, 'stranger')
+    stranger.until(lambda: run.recorded(60_000))
+    stranger.write('joint_states', 'acu/rate_command')
+    rate_command = messages.template('acu/rate_command')
+    messages.put_stamp(rate_command.header.stamp, 5 * 10**9)
+    for name, data in (('joint_states', FOREIGN_BYTES), ('acu/rate_command', messages.serialize(rate_command))):
+        for _ in range(3):
+            stranger.publishers[name].publish(data)
+            stranger.spin(0.05)
+    result = run.finish()
+    assert result.returncode == 0, result.stderr
+    assert 'pointing_rms_deg' in result.stdout
+    assert 'joint_states: 3 foreign messages left out, at ' in result.stdout + result.stderr
+    assert 'acu/rate_command: 3 foreign messages left out, at ' in result.stdout + result.stderr
+    content = load(run.bag)
+    assert [line.partition(' left out')[0] for line in content.foreign] == [
+        'joint_states: 3 foreign messages', 'acu/rate_command: 3 foreign messages']
+    assert '(24 bytes)' in content.foreign[0]
+    assert verify(content).complete

@@ -41,11 +41,8 @@ class Timekeeper(unit_node.UnitNode):
         p = self.parameters
         self.period_ns = round(p.period * NS_PER_SECOND)
         self.last_step = round(p.duration / p.period) if p.duration > 0.0 else None
-        self.k, self.made = -1, 0
-        self.lost_steps = self.missed_steps = self.late_ticks = 0
-        self.newest, self.command_stamps = {}, {}
-        self.begun = self.last_step_time = time.monotonic_ns()
         self.stopping = False
+        self._count_from_first_step()
         latencies = {port.named(name): latency for port in self.ports
                      for name, latency in port.unit.latencies.items()}
         self.commands = [port.named(port.unit.COMMAND) for port in self.ports]
@@ -58,6 +55,18 @@ class Timekeeper(unit_node.UnitNode):
                 for name, decoder in port.decoders.items():
                     if name != self.unit.trigger:
                         self.reader(name, unit_node.decoding(decoder), self._newest_receiver(name))
+
+    def _count_from_first_step(self):
+        self.k, self.made = -1, 0
+        self.lost_steps = self.missed_steps = self.late_ticks = 0
+        self.newest, self.command_stamps = {}, {}
+        self.begun = self.last_step_time = time.monotonic_ns()
+
+    def restart(self):
+        """Begin the steps of lockstep again, for another replay."""
+        super().restart()
+        self._count_from_first_step()
+        self.timer = self.every(0.001, self.start)
 
     @property
     def awaits(self):

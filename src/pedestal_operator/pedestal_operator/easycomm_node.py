@@ -10,7 +10,7 @@ from pedestal_common.node import shell
 from pedestal_operator.rotator import easycomm
 from pedestal_operator.rotator.controller import PendingRequest
 from pedestal_operator.rotator.line_server import Client
-from pedestal_operator.rotator.outcomes import OUTCOME_DONE, Refused
+from pedestal_operator.rotator.outcomes import OUTCOME_DONE, OUTCOME_REFUSED, Refused
 from pedestal_operator.rotator.server_node import ServerNode, ServerParameters, tcp_port
 
 SERVER_VERSION = 'pedestal'
@@ -59,7 +59,12 @@ class EasycommNode(ServerNode):
                     raise ValueError(f'more than {easycomm.MAX_LINE_BYTES} bytes')
                 self._do(client, line, easycomm.read(line), now)
             except ValueError as error:
-                self._note(client, line, str(error))
+                client.pending.append((line, PendingRequest([], now, OUTCOME_REFUSED, str(error))))
+            self._note_outcomes(client, now)
+        self._note_outcomes(client, now)
+
+    def _note_outcomes(self, client, now):
+        """Note the known outcomes of the settings, in their order."""
         while client.pending and (outcome := client.pending[0][1].look(self, now)) is not None:
             line, pending = client.pending.pop(0)
             self._note(client, line, '' if outcome == OUTCOME_DONE else pending.reason)

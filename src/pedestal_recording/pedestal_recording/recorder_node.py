@@ -24,6 +24,7 @@ from pedestal_common.wire import messages
 from pedestal_common.wire.cdr import STAMPED_TYPES
 from pedestal_recording import configuration
 from pedestal_recording.bag import BagError
+from pedestal_recording.readable import Readable
 from pedestal_recording.recorder_params import RecorderParameters
 from pedestal_recording.step_order import OrderError, StepOrder
 from pedestal_recording.writer import Writer
@@ -68,8 +69,8 @@ class TopicPublishers:
     def take(self, data, info):
         """Return False for a message of another publisher than that of the graph.
 
-        This needs a publisher of the graph that sends, and a foreign publisher that the graph names. A doubtful
-        message counts as a message of the graph.
+        This needs a publisher of the graph that sends and is distinguished from the others, and a foreign publisher
+        that the graph names. A doubtful message counts as a message of the graph.
         """
         now, utc = self._node.clock()
         taken = self._gate.take(data, info['publication_sequence_number'], info['source_timestamp'], now, utc)
@@ -78,7 +79,8 @@ class TopicPublishers:
             self.lost += ours.lost - self._counted.get(ours, 0)
             self._counted[ours] = ours.lost
         return not (taken is None and self._gate.reason == DROP_OTHER_PUBLISHER and ours is not None
-                    and now - ours.arrival < CONFIRMED_TAKEOVER_NS and self._named(now))
+                    and ours in self._gate.streams.streams and now - ours.arrival < CONFIRMED_TAKEOVER_NS
+                    and self._named(now))
 
     def _count(self):
         names = subscriptions.foreign_publishers(self._node, self._link, self._link.name)
@@ -168,21 +170,27 @@ class RecorderNode(shell.Shell):
         return take
 
     def _lockstep_counter(self, index, topic):
-        """Return a check of lockstep: the numbers of the only publisher rise by 1, on a step topic from 1 on."""
-        expected = 1 if topic.rate == 'step' and self.graph.members else 0
+        """Return a check of lockstep: the numbers of the only publisher rise by 1, on a step topic from 1 on.
 
-        def count(_, info):
-            nonlocal expected
+        The check returns False for a foreign message: see subscriptions.LockstepSubscriber.
+        """
+        numbers = subscriptions.SoleNumbers(self, topic, topic.name,
+                                            first=1 if topic.rate == 'step' and self.graph.members else None)
+        readable = Readable(topic.name, topic.type, ours=True)
+
+        def count(data, info):
             number = info['publication_sequence_number']
-            if number is not None and expected != 0 and number not in (1, expected):
-                if number < expected:
+            if not numbers.is_next(number):
+                if numbers.shows_foreign() or readable.problem(data):
+                    return False
+                if number > numbers.next:
+                    self._lost[topic.name] += number - numbers.next
+                    self._bag.skip(index, number - numbers.next)
+                    self._fail(self._losses())
+                elif number != 1:
                     self._fail(f'{topic.name} has more than one publisher: another graph runs on ROS_DOMAIN_ID '
                                f'{self.context.get_domain_id()}; set a free one')
-                else:
-                    self._lost[topic.name] += number - expected
-                    self._bag.skip(index, number - expected)
-                    self._fail(self._losses())
-            expected = (number or 0) + 1
+            numbers.note(number)
             return True
         return count
 

@@ -319,6 +319,29 @@ def test_messages_of_a_foreign_node_are_marked_and_no_loss(tmp_path, domain, gra
     node.destroy_node()
 
 
+def test_messages_of_a_foreign_node_in_lockstep_are_marked_and_no_loss(tmp_path, graph, rows):
+    """The foreign node publishes a message of the type, and bytes of no message."""
+    recorder = Recorder(tmp_path / 'b', 'lockstep')
+    graph.await_recorder()
+    arrival, half = shuffled(rows, 5), len(rows) // 2
+    graph.publish(arrival[:half])
+    node = rclpy.create_node('stranger', context=graph.context)
+    stranger = node.create_publisher(message_class('sensor_msgs/msg/JointState'), 'joint_states', QoSProfile(
+        depth=1000, reliability=ReliabilityPolicy.RELIABLE))
+    time.sleep(0.5)
+    for data in (next(data for name, _, data in rows if name == 'joint_states'), b'\0\1\0\0' + b'\xff' * 20):
+        stranger.publish(data)
+    assert stranger.wait_for_all_acked(Duration(seconds=LIMIT))
+    graph.publish(arrival[half:])
+    code, said, err = recorder.end()
+    assert (code, err, said['lost'], said['messages']) == (0, '', 0, len(rows) + 2)
+    content = bag.read(tmp_path / 'b')
+    assert [(name, log, data) for name, log, _, data in content.raw()] == rows
+    assert [line.partition(' left out')[0] for line in content.foreign] == ['joint_states: 1 foreign message'] * 2
+    assert verify(content).complete
+    node.destroy_node()
+
+
 def refused(tmp_path, *arguments, directory, **options):
     recorder = Recorder(directory, 'realtime', *arguments, **options)
     code, said, err = recorder.end(None)

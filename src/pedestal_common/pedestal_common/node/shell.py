@@ -28,7 +28,7 @@ from pedestal_common.graph.graph_parameters import GraphParameters
 from pedestal_common.graph.steps import NS_PER_SECOND, SECONDS_PER_DAY, GraphError
 from pedestal_common.node import middleware
 from pedestal_common.node.diagnostics import Diagnostics
-from pedestal_common.node.subscriptions import TopicSubscriber, subscribe
+from pedestal_common.node.subscriptions import LockstepSubscriber, TopicSubscriber, pair, subscribe
 from pedestal_common.realtime import utc
 from pedestal_common.wire import messages
 
@@ -225,19 +225,24 @@ class Shell(Node):
 
     def reader(self, name, decode, take):
         """Call take(message, after_gap) for every message on a topic of the graph. decode(CDR bytes) -> (stamp [ns] or
-        None, message) raises ValueError for other bytes, which end a lockstep node. In realtime they are dropped, like
-        the messages that a PublisherGate refuses; after_gap: True for a message that does not continue the one
-        before."""
+        None, message) raises ValueError for other bytes. From a node of the graph they end a lockstep node. In all
+        other cases they are dropped, like the messages that a PublisherGate refuses. after_gap: True for a message
+        that does not continue the one before."""
         link, ros_name = self._link(name)
 
         if self.graph.lockstep:
+            listener = LockstepSubscriber(self, link, ros_name, decode, take)
             self.create_subscription(middleware.message_class(link.type), ros_name,
-                                     self._guarded(lambda data: take(decode(data)[1], False)),
-                                     middleware.qos(link.rate), raw=True)
+                                     pair(self._guarded(listener.callback)), middleware.qos(link.rate), raw=True)
         else:
             listener = TopicSubscriber(self, link, ros_name, decode, take)
             self.listeners.append(listener)
             listener.open(lambda: subscribe(self, link, ros_name, self._guarded(listener.callback), 'read'))
+
+    def warn_of_foreign(self, link, data):
+        """Log the first foreign message of a topic in lockstep. The recording has all of them."""
+        self.get_logger().warning(f'{link.name}: a foreign message of {len(data)} bytes dropped at '
+                                  f'{self._stamp / NS_PER_SECOND:.6f} s')
 
     def publishers_of(self, ros_name):
         """Return the names of the nodes that publish a topic now."""

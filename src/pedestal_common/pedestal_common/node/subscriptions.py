@@ -77,6 +77,65 @@ def foreign_publishers(node, link, ros_name):
     return [name for name in node.publishers_of(ros_name) if name not in link.writers and name != nodes.REPLAY_NODE]
 
 
+class SoleNumbers:
+    """Sequence numbers of the graph's publisher of a topic in lockstep, which rise by 1.
+
+    node: the shell.Shell that subscribes; link: nodes.Link of the topic, named ros_name in ROS
+    next: number of the next message, None if any number may follow
+    """
+
+    def __init__(self, node, link, ros_name, first=None):
+        self._node, self._link, self._ros_name, self.next = node, link, ros_name, first
+
+    def is_next(self, number):
+        """Return True if a message with this number follows the last one. A middleware without numbers has None."""
+        return number is None or self.next in (None, number)
+
+    def note(self, number):
+        """Note the number of a message of the graph."""
+        self.next = None if number is None else number + 1
+
+    def shows_foreign(self):
+        """Return True if the graph shows a foreign publisher of a topic with one publisher."""
+        return len(self._link.writers) == 1 and bool(foreign_publishers(self._node, self._link, self._ros_name))
+
+
+class LockstepSubscriber:
+    """Subscriber to one topic in lockstep, which passes the messages of the graph to take(message, False).
+
+    A message with another number than the next (see SoleNumbers) is foreign if the graph shows a foreign publisher, or
+    if the message is unreadable. Foreign messages are dropped.
+
+    node, link, ros_name, decode: see TopicSubscriber. An unreadable message of the graph raises its ValueError.
+    """
+
+    def __init__(self, node, link, ros_name, decode, take):
+        self._node, self._link, self._decode, self._take = node, link, decode, take
+        self._numbers, self._dropped = SoleNumbers(node, link, ros_name), 0
+
+    def callback(self, data, info):
+        """Take a message."""
+        number = info['publication_sequence_number']
+        follows = self._numbers.is_next(number)
+        if not follows and self._numbers.shows_foreign():
+            self._drop(data)
+            return
+        try:
+            _, message = self._decode(data)
+        except ValueError:
+            if follows and not self._numbers.shows_foreign():
+                raise
+            self._drop(data)
+            return
+        self._numbers.note(number)
+        self._take(message, False)
+
+    def _drop(self, data):
+        self._dropped += 1
+        if self._dropped == 1:
+            self._node.warn_of_foreign(self._link, data)
+
+
 class TopicSubscriber:
     """Subscriber to one topic, which passes the messages that its PublisherGate accepts to take(message, True after a
     gap).

@@ -135,7 +135,7 @@ class UnitNode(shell.Shell):
         self._waiting_for_once, self._held = set(), collections.deque()
         self._settled, self._settling = not self.graph.lockstep, None
         self._urgent = [port.unit.urgent for port in self.ports]
-        self._once, self._replays = frozenset(), set()
+        self._once, self._replays, self._replay_left = frozenset(), set(), False
         self._callees = {} if self.graph.lockstep else {
             name: self.create_client(Trigger, self._root + name if self.beam else name) for name in unit_type.CALLS}
         self._called = set()
@@ -228,8 +228,8 @@ class UnitNode(shell.Shell):
             if nodes.plain(name) not in self.row.writes:
                 self.reader(name, decoding(decoders[name]), self._step_taker(name))
         self._progress = (None, time.monotonic())
-        if trigger not in self.row.writes:
-            self.every(REPLAY_POLL_S, self._look_for_replay)
+        self._replayed = next(name for name in (trigger, *latencies) if nodes.plain(name) not in self.row.writes)
+        self.every(REPLAY_POLL_S, self._look_for_replay)
         if self.graph.lockstep:
             self.every(0.2, self._watch)
         else:
@@ -237,15 +237,16 @@ class UnitNode(shell.Shell):
             self.every(0.05, self._watch_trigger)
 
     def _look_for_replay(self):
-        """Begin again if another replay publishes the trigger than the one before."""
-        if self.steps is None or self.steps.trigger in self.row.writes:
+        """Begin again if another replay than the one before publishes the first input of the steps."""
+        if self.steps is None:
             return
         replays = {bytes(info.endpoint_gid) for info in
-                   self.get_publishers_info_by_topic(self._link(self.steps.trigger)[1])
+                   self.get_publishers_info_by_topic(self._link(self._replayed)[1])
                    if shell.node_of(info, self._root) == nodes.REPLAY_NODE}
         if self._replays and replays - self._replays:
             self._begin_again()
         self._replays |= replays
+        self._replay_left = bool(self._replays) and not replays
 
     def _begin_again(self):
         """Forget all steps and messages, as a node that starts."""
@@ -340,7 +341,7 @@ class UnitNode(shell.Shell):
 
     def _watch(self):
         pending = self.steps.pending_stamp
-        if pending is None or self._progress[0] != pending:
+        if pending is None or self._progress[0] != pending or self._replay_left:
             self._progress = (pending, time.monotonic())
         elif time.monotonic() - self._progress[1] > self.graph.deadline:
             waiting = self.steps.waiting_for
