@@ -6,6 +6,7 @@ the ACU refused it; the reason is printed.
     pedestal mode preset --az 30 --el 45
     pedestal mode preset point=zenith    go to the stored preset zenith (parameter acu.points)
     pedestal mode rate --az 0.5          turn at 0.5 deg/s for half a second; repeat the command to continue
+    pedestal mode tle --tle iss.tle      follow the satellite of a file
     pedestal mode stow
 """
 import argparse
@@ -25,12 +26,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('given',
                         nargs='*', metavar='NAME=VALUE', help='other arguments of the mode (radians, SI units); '
                         'see docs/operating.md, Commands')
+    arguments.add_elements(parser)
     arguments.add_remote(parser)
 
 
 def main(options: argparse.Namespace) -> int:
     """Send the command. Return the exit code."""
-    given = ask.pairs(options.given)
+    given = ask.with_elements(options)
     for name, degrees in (('azimuth', options.az), ('elevation', options.el)):
         if degrees is not None and name in given:
             raise ValueError(f'--{name[:2]} {degrees:g}: {name} is given twice')
