@@ -28,7 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(options: argparse.Namespace) -> int:
     """Send the command. Return the exit code."""
-    return send_command(options, options.verb, with_elements(options), options.node)
+    return send_command(options, options.verb, with_elements(options, options.given), options.node)
 
 
 def pairs(texts: Iterable[str]) -> dict[str, str | float]:
@@ -44,9 +44,9 @@ def pairs(texts: Iterable[str]) -> dict[str, str | float]:
     return given
 
 
-def with_elements(options: argparse.Namespace) -> dict[str, str | float]:
-    """Return {name: text} of the arguments NAME=VALUE and of --tle. Raises ValueError."""
-    given = pairs(options.given)
+def with_elements(options: argparse.Namespace, texts: Iterable[str]) -> dict[str, str | float]:
+    """Return {name: text} of texts NAME=VALUE and of --tle. Raises ValueError."""
+    given = pairs(texts)
     for name, text in arguments.elements(options).items():
         if name in given:
             raise ValueError(f'--tle {options.tle}: {name} is given twice')
@@ -54,8 +54,9 @@ def with_elements(options: argparse.Namespace) -> dict[str, str | float]:
     return given
 
 
-def send_command(options: argparse.Namespace, verb: str, given: Mapping[str, str | float], node: str = 'acu') -> int:
-    """Send a command to a node and print its reply. Return the exit code."""
+def send_command(options: argparse.Namespace, verb: str, given: Mapping[str, str | float], node: str = 'acu',
+                 hold: float | None = None) -> int:
+    """Send a command to a node and print its reply. Return the exit code. hold: time of its repetition [s]."""
     from pedestal_common.graph import nodes
     commanded = [row.name for row in nodes.NODES if row.obeys]
     if node not in commanded:
@@ -63,5 +64,7 @@ def send_command(options: argparse.Namespace, verb: str, given: Mapping[str, str
     with arguments.remote(options, node) as spun:
         spun.wait_for_node(options.timeout)
         reply = spun.request(verb, given, options.timeout)
+        if hold and reply.granted:
+            reply = spun.hold_jog(verb, given, hold)
     print(f'{node}: {reply.text}')
     return 0 if reply.granted else 1
