@@ -102,14 +102,17 @@ def backlash_study(source, progress):
     for i, name in enumerate(AXES):
         lash = plant.plants[name].axis.gear_train.lash
         rows.append(row(f'{plant.name}/{name}', 'lash_rad', lash, 'rad'))
-        left = {end: metrics.peak(_reversals(flown['sine', end], i)[1]) for end in BIAS_PARAMETERS}
+        reversal_errors = {}
         for end in BIAS_PARAMETERS:
-            rows += [row(f'{plant.name}/{name}{end}', 'standstill_peak_to_peak_rad',
-                         np.ptp(_standstill(flown['standstill', end], i)[1]), 'rad'),
-                     row(f'{plant.name}/{name}{end}', 'reversal_error_rad', left[end], 'rad')]
-        rows.append(row(f'{plant.name}/{name}', 'reversal_ratio_off_to_on', left['/bias-off'] / left[''], '-'))
-    return Result(rows, {kind: lambda kind=kind, cut=cut: _bias_figure(kind, cut, flown)
-                         for kind, cut in (('standstill', _standstill), ('sine', _reversals))})
+            _, angle = _standstill(flown['standstill', end], i)
+            _, residual = _reversals(flown['sine', end], i)
+            reversal_errors[end] = metrics.peak(residual)
+            rows += [row(f'{plant.name}/{name}{end}', 'standstill_peak_to_peak_rad', np.ptp(angle), 'rad'),
+                     row(f'{plant.name}/{name}{end}', 'reversal_error_rad', reversal_errors[end], 'rad')]
+        rows.append(row(f'{plant.name}/{name}', 'reversal_ratio_off_to_on',
+                        reversal_errors['/bias-off'] / reversal_errors[''], '-'))
+    return Result(rows, {kind: lambda kind=kind, motion_of=motion_of: _bias_figure(kind, motion_of, flown)
+                         for kind, motion_of in (('standstill', _standstill), ('sine', _reversals))})
 
 
 def _standstill(run, i):
@@ -125,15 +128,16 @@ def _reversals(run, i):
     return run.t[steady], metrics.residual(run.t[steady], _sine_error(run, i)[steady], 1.0 / SINE_FREQUENCY_HZ)
 
 
-def _bias_figure(kind, cut, flown):
-    """Draw the remaining motion of both axes, with the bias of the scenario and without bias."""
+def _bias_figure(kind, motion_of, flown):
+    """Draw the remaining motion of both axes, with the bias of the scenario and without bias; motion_of: `_standstill`
+    or `_reversals`."""
     figure, axes = new_panels(2, height=4.6, sharex=True,
                               y=f'{"error" if kind == "sine" else "angle"} [\N{MICRO SIGN}rad]')
     for i, (panel, name) in enumerate(zip(axes[:, 0], AXES)):
         for end, colour, label in (('/bias-off', TRUTH_COLOUR, 'without bias'),
                                    ('', FILTERED_COLOUR, 'as the scenario is')):
-            t, left = cut(flown[kind, end], i)
-            panel.plot(t, 1e6 * left, color=colour, label=label)
+            t, remaining = motion_of(flown[kind, end], i)
+            panel.plot(t, 1e6 * remaining, color=colour, label=label)
         panel.set_title(f'{kind}, {name}')
     return drawing.legend(figure)
 

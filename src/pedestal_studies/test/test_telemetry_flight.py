@@ -27,7 +27,7 @@ def test_rates_and_accelerations_are_the_derivatives_of_the_angles():
 def test_the_matrices_are_those_of_the_continuous_model():
     """Phi by the matrix exponential, U by its integral; by hand the angle's observability has the determinant of a
     chain of integrators, T^3, in the unit T nearly 1."""
-    alpha, T = study.ALPHA, study.T
+    alpha, T = study.ALPHA, study.MEASUREMENT_PERIOD_S
     A = np.array([[0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, -alpha, alpha], [0.0, 0.0, 0.0, 0.0]])
     whole = expm(A * T)
     Phi, U = study.model(T)

@@ -18,6 +18,8 @@ from ship_motion_sim.sea import motion
 
 IMU_NORMALS_PER_STEP = 6
 """Number of standard normals of a step: three gyros, three accelerometers."""
+FIRST_GYRO_NORMAL, FIRST_ACCELEROMETER_NORMAL = 0, 3
+"""Indices of the normals of the first gyro and of the first accelerometer."""
 IMU_STATUS_TEXTS = ('ok', 'step is not positive', 'truth is not valid')
 IMU_OK, IMU_BAD_STEP, IMU_BAD_TRUTH = range(len(IMU_STATUS_TEXTS))
 
@@ -41,7 +43,7 @@ CONSTANTS_DTYPE = np.dtype([
 
 STATE_DTYPE = np.dtype([
     ('truth', motion.OUTPUTS_DTYPE),            # at a node of the quadrature
-    ('angle_left', 'f8', (3,)), ('force_left', 'f8', (3,)),     # remainder of the quantisation [rad, m/s]
+    ('angle_left', 'f8', (3,)), ('force_left', 'f8', (3,)),     # remainders of the quantised increments [rad, m/s]
 ], align=True)
 
 INPUTS_DTYPE = np.dtype([
@@ -118,11 +120,11 @@ def mean_rates(s, c, ship, t, dt, rate, force):
 
 
 @compiled
-def add_sensor_errors(errors, dt, values, normals, first, left):
+def add_sensor_errors(errors, dt, values, normals, first, remainder):
     """Add the errors of three gyros or accelerometers to their true rates (3,), measured over dt [s].
 
-    White noise is given as a density, so a sample has the noise density / sqrt(dt). left (3,): remainder of the
-    increment after quantisation, kept for the next sample.
+    White noise is given as a density, so a sample has the noise density / sqrt(dt). The normals are used from index
+    `first` on. remainder (3,): part of the increment that quantisation cut off, kept for the next sample.
     """
     x, y, z = values[0], values[1], values[2]
     per_sample = 1.0 / math.sqrt(dt)
@@ -131,9 +133,9 @@ def add_sensor_errors(errors, dt, values, normals, first, left):
         values[i] += errors.scale * values[i] + errors.misalignment * across
         values[i] += errors.bias[i] + errors.noise * per_sample * normals[first + i]
         if errors.quantum > 0.0:
-            increment = values[i] * dt + left[i]
+            increment = values[i] * dt + remainder[i]
             counted = errors.quantum * math.floor(increment / errors.quantum + 0.5)
-            left[i] = increment - counted
+            remainder[i] = increment - counted
             values[i] = counted / dt
 
 
@@ -160,5 +162,5 @@ def step(s, c, ship, u, truth, out, normals):
     else:
         rate[0], rate[1], rate[2] = inertial_rate(truth, c.earth_rate)
         force[0], force[1], force[2] = specific_force(truth, c.earth_rate, c.gravity)
-    add_sensor_errors(c.gyro, u.dt, rate, normals, 0, s.angle_left)
-    add_sensor_errors(c.accelerometer, u.dt, force, normals, 3, s.force_left)
+    add_sensor_errors(c.gyro, u.dt, rate, normals, FIRST_GYRO_NORMAL, s.angle_left)
+    add_sensor_errors(c.accelerometer, u.dt, force, normals, FIRST_ACCELEROMETER_NORMAL, s.force_left)

@@ -61,6 +61,7 @@ def apply_due_imu_faults(m, stamp):
 
 @compiled
 def _apply_imu_fault(e, fault, values):
+    """Add a fault to the record e of IMU_INJECTED_DTYPE; values: its arguments, in the order of injection/table.py."""
     message_faults.apply(e.message_fault, IMU_MESSAGE_FAULT_CODES, fault, values)
     if fault == IMU_BIAS_CODE:
         e.rate[int(values[0])] += values[1]
@@ -76,6 +77,7 @@ def corrupt_imu(e, stamp, outputs):
         raw.linear_acceleration[i] += e.force[i]
         if e.message_fault.sigma > 0.0:
             raw.angular_velocity[i] += message_faults.noise(e.message_fault, stamp, i)
+    # Each number of a message has an index, at which a freeze stores it: rates 0 to 2, forces 3 to 5.
     message_faults.numbers(e.message_fault, raw.angular_velocity, 0)
     message_faults.numbers(e.message_fault, raw.linear_acceleration, 3)
     if e.message_fault.drop != 0:
@@ -100,6 +102,8 @@ def apply_due_ins_faults(m, stamp):
 
 @compiled
 def _apply_ins_fault(c, e, fault, values):
+    """Add a fault to the constants c of the INS and to the record e of INS_INJECTED_DTYPE; values: its arguments, in
+    the order of injection/table.py."""
     message_faults.apply(e.message_fault, INS_MESSAGE_FAULT_CODES, fault, values)
     if fault == INS_DELAY_CODE:
         c.latency_ns += round(values[0] * NS_PER_SECOND)
@@ -127,6 +131,7 @@ def corrupt_ins(e, stamp, outputs):
         data.orientation[i] = q[i]
     for i in range(3):
         data.angular_velocity[i] += e.rate[i]
+    # Indices at which a freeze stores the numbers: orientation 0 to 3, rates 4 to 6.
     message_faults.numbers(e.message_fault, data.orientation, 0)
     message_faults.numbers(e.message_fault, data.angular_velocity, 4)
     if data.stamp != NO_STAMP:

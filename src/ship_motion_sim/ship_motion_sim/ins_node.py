@@ -1,4 +1,8 @@
-"""ROS node of the INS: subscribes to the IMU, publishes measured attitude and deck rate."""
+"""ROS node of the INS: subscribes to the IMU, publishes measured attitude and deck rate.
+
+The unit ins_unit.Ins (ship_motion_sim/ins_unit.py) holds the laws; change the INS there. `entry` is imported first
+because a signal during the other imports would end the process with a traceback.
+"""
 import pedestal_common.entry  # noqa: F401
 
 # isort: split

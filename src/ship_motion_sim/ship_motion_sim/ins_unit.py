@@ -153,7 +153,7 @@ class Ins(Simulated):
         self.parts['worst'] = 0
         stage, sigma, p = int(outputs['stage']), outputs['variance']**0.5, self.parameters
         values = [('latency_s', f'{p.latency:g}')]
-        known = self.parts['state']['released'] > 0
+        known = self.parts['state']['released'] > 0     # True after the first published attitude
         if known:
             values.append(('heading_error_rms_rad', f'{sigma[2]:g}'))
         if stage != ins.NO_STAGE:

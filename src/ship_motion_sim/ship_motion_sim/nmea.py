@@ -31,6 +31,7 @@ def attitude(stamp, roll, pitch, yaw, heave):
     """Return HEHDT and PASHR in one datagram at a stamp [ns], for roll, pitch, yaw [rad] (REP 103: FLU in ENU) and
     heave [m]."""
     psi = heading(yaw)
+    # PASHR ends with the accuracies of roll, pitch and heading (0.000 deg: exact), GNSS quality 1 and INS status 0.
     return sentence(f'HEHDT,{psi:.3f},T') + sentence(
         f'PASHR,{time_of_day(stamp)},{psi:.3f},T,{math.degrees(roll):+.3f},{-math.degrees(pitch):+.3f},{heave:+.3f},'
         '0.000,0.000,0.000,1,0')

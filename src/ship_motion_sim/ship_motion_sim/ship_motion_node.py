@@ -1,4 +1,9 @@
-"""ROS node of the ship: its truth and the data of its IMU at every step of the drive; NMEA for other equipment."""
+"""ROS node of the ship: its truth and the data of its IMU at every step of the drive; NMEA for other equipment.
+
+The unit ship_unit.ShipMotion (ship_motion_sim/ship_unit.py) holds the law; change the ship and its IMU there. This
+module adds the NMEA datagrams. `entry` is imported first because a signal during the other imports would end the
+process with a traceback.
+"""
 import pedestal_common.entry  # noqa: F401
 
 # isort: split
@@ -16,8 +21,8 @@ class ShipMotionNode(unit_node.UnitNode):
 
     def begin(self):
         """Open the socket, then begin like every unit. Raises ParameterError for a host without an address."""
-        self.unsent = ''
-        self.next_datagram = 0
+        self.send_failure = ''          # reason why a datagram was not sent since the last diagnosis
+        self.next_datagram_ns = 0       # stamp from which the next datagram is due
         if self.parameters.nmea.port:
             self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
             self.socket.setblocking(False)
@@ -35,7 +40,7 @@ class ShipMotionNode(unit_node.UnitNode):
     def answer(self, stamp, values):
         """Publish the step at a stamp [ns]; then send the attitude if the next datagram is due."""
         super().answer(stamp, values)
-        if self.parameters.nmea.port and stamp >= self.next_datagram:
+        if self.parameters.nmea.port and stamp >= self.next_datagram_ns:
             self.send_attitude(stamp)
 
     def send_attitude(self, stamp):
@@ -44,20 +49,21 @@ class ShipMotionNode(unit_node.UnitNode):
         Linux reports a datagram without a receiver when the next one is sent, which then fails. So every second
         datagram to missing equipment succeeds.
         """
-        period = round(1e9 / self.parameters.nmea.rate)
-        self.next_datagram = stamp - stamp % period + period
+        period_ns = round(1e9 / self.parameters.nmea.rate)
+        self.next_datagram_ns = stamp - stamp % period_ns + period_ns
         truth = self.unit.parts['truth']
         try:
             self.socket.send(nmea.attitude(stamp, truth['roll'], truth['pitch'], truth['yaw'], truth['position'][2]))
         except OSError as error:
-            self.unsent = f'NMEA to {self.parameters.nmea.host}:{self.parameters.nmea.port}: {error.strerror}'
+            to = self.parameters.nmea
+            self.send_failure = f'NMEA to {to.host}:{to.port}: {error.strerror}'
 
     def diagnose(self):
         """Return the diagnosis of the unit, with WARN instead of OK if a datagram could not be sent."""
         diagnosis = super().diagnose()
-        unsent, self.unsent = self.unsent, ''
-        if unsent and diagnosis.level == LEVEL_OK:
-            return diagnosis._replace(level=LEVEL_WARN, message=unsent)
+        failure, self.send_failure = self.send_failure, ''
+        if failure and diagnosis.level == LEVEL_OK:
+            return diagnosis._replace(level=LEVEL_WARN, message=failure)
         return diagnosis
 
 

@@ -88,7 +88,7 @@ class ShipMotion(Simulated):
         return self.memory._replace(normals=self._noise.standard_normal((steps, imu.IMU_NORMALS_PER_STEP)))
 
     @property
-    def over(self):
+    def recording_ended(self):
         """True if the last step lies past the end of a recorded motion."""
         ship = self.parts['ship']
         return ship['pieces'] > 0 and self.parts['last'] * 1e-9 > ship['breaks'][ship['pieces'] - 1]
@@ -101,7 +101,7 @@ class ShipMotion(Simulated):
                               (self.parts['imu_outputs']['status'], imu.IMU_STATUS_TEXTS)):
             if status:
                 return Diagnosis(LEVEL_ERROR, texts[status], values)
-        if self.over:
+        if self.recording_ended:
             return Diagnosis(LEVEL_WARN, 'the recorded motion has ended, the deck is at rest', values)
         return Diagnosis(LEVEL_OK, 'under way', values)
 

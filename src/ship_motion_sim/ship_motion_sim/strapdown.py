@@ -35,6 +35,7 @@ def from_rotvec(x, y, z):
     """Return the unit quaternion (x, y, z, w) of a rotation vector [rad]."""
     square = x * x + y * y + z * z
     half = 0.5 * math.sqrt(square)
+    # sin(half) / (2 half) is 0/0 without rotation; the first two terms of its series are exact below 1e-4 rad.
     scale = math.sin(half) / (2.0 * half) if square > 1e-8 else 0.5 - square / 48.0
     return scale * x, scale * y, scale * z, math.cos(half)
 

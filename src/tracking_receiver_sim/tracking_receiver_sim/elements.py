@@ -26,6 +26,8 @@ MAX_COMPARED_NAMES = 40_000
 MAX_XML_DEPTH, MAX_VALUE_CHARS = 100, 200
 """Largest depth of nested XML elements, and the number of characters to which a value is cut."""
 PARSE_CHUNK_BYTES = 1 << 20
+FIRST_SATELLITE_YEAR = 57
+"""Smallest two-digit year of a TLE that lies in the 20th century: the first satellite flew in 1957."""
 TLE_EPOCH_COLUMNS = slice(18, 32)
 """Columns of the epoch in line 1 of a TLE."""
 
@@ -68,6 +70,7 @@ def read(path, name='', when=None) -> Elements:
     try:
         with csv_table.stream(path) as stream:
             beginning = content.beginning(stream.read(FORMAT_PROBE_BYTES)).lstrip()
+        # history: sets of elements of the wanted satellite; others: number of sets of other satellites of this name.
         names, others = [], 0
         history: list[Satellite] = []
         for satellite in _reader(beginning)(path):
@@ -109,6 +112,7 @@ def _nearest(path, history, when):
         return history[0], ''
     epochs = [_epoch(path, satellite) for satellite in history]
     wanted = when or max(epochs)
+    # Of two sets that are equally near, the later one in the file is taken.
     i = min(range(len(history)), key=lambda i: (abs(epochs[i] - wanted), -i))
     return history[i], (f'{pathlib.Path(path).name}: {len(history)} sets of elements of satellite '
                         f'{history[i].number or history[i].name}, of {min(epochs):%Y-%m-%d} to '
@@ -122,7 +126,7 @@ def _epoch(path, satellite):
         text = satellite.lines[0][TLE_EPOCH_COLUMNS]
         try:
             year, day = int(text[:2]), float(text[2:])
-            return (datetime.datetime(year + (1900 if year >= 57 else 2000), 1, 1)
+            return (datetime.datetime(year + (1900 if year >= FIRST_SATELLITE_YEAR else 2000), 1, 1)
                     + datetime.timedelta(days=day - 1.0))
         except (ValueError, OverflowError):
             raise TargetError(f'TLE file {path}: line {satellite.line}, column {TLE_EPOCH_COLUMNS.start + 1}: epoch = '
@@ -135,6 +139,7 @@ def _epoch(path, satellite):
 
 
 def _reader(beginning):
+    """Return the function path -> Satellites for a file that begins with a text."""
     if beginning.startswith('<'):
         return _xml
     if beginning.startswith(('{', '[')):
@@ -150,6 +155,7 @@ def _reader(beginning):
 
 def _tles(path):
     """Yield the satellites of a file of TLEs, with or without a line of the name before each."""
+    # first, before: (line number, text) of the line above and of the one above that; a name stands in `before`.
     before, first = (0, ''), (0, '')
     for number, text in lines.read(path):
         text = text.strip()
@@ -169,11 +175,13 @@ def _number(text):
 
 
 def _designator(line):
+    """Return the international designator in line 1 of a TLE, such as 1998-067A."""
     year, piece = line[9:11], line[11:17].strip()
-    return f'{"19" if year >= "57" else "20"}{year}-{piece}'
+    return f'{"19" if year >= str(FIRST_SATELLITE_YEAR) else "20"}{year}-{piece}'
 
 
 def _omm(line, fields):
+    """Return the Satellite of an OMM that begins at a line; fields: {keyword: text}."""
     number = _number(fields.get('NORAD_CAT_ID', ''))
     return Satellite(line, fields.get('OBJECT_NAME') or number or fields.get('OBJECT_ID', ''), number,
                      fields.get('OBJECT_ID', '').upper(), None, fields)
@@ -209,6 +217,7 @@ def _json(path):
     """Yield the satellites of a JSON array of objects, or of one object, decoded one by one."""
     text = csv_table.text(path)
     decoder, between = json.JSONDecoder(parse_int=str, parse_float=str), re.compile(r'[\s,\[\]]*')
+    # at: place in the text; line: its line number; counted: place up to which line ends are counted.
     at, line, counted = between.match(text).end(), 1, 0
     while at < len(text):
         line, counted = line + text.count('\n', counted, at), at

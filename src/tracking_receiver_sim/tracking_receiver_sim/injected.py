@@ -43,7 +43,8 @@ def _clear_faults(c, e):
 
 @compiled
 def _apply_fault(c, e, fault, values):
-    """Apply a fault to the constants and results of the receiver."""
+    """Apply a fault to the constants and results of the receiver; values: its arguments, in the order of
+    injection/table.py."""
     message_faults.apply(e.message_fault, MESSAGE_FAULT_CODES, fault, values)
     if fault == Fault.DELAY:
         c.latency_ns += round(values[0] * NS_PER_SECOND)
@@ -81,6 +82,7 @@ def corrupt_messages(e, stamp, outputs):
         error.vector[i] += e.bias[i]
         if e.message_fault.sigma > 0.0:
             error.vector[i] += message_faults.noise(e.message_fault, stamp, i)
+    # Indices at which a freeze stores the numbers: errors 0 to 2, rates 3 to 5, range 6.
     message_faults.numbers(e.message_fault, error.vector, 0)
     message_faults.numbers(e.message_fault, rate.vector, 3)
     message_faults.numbers(e.message_fault, distance.range, 6)

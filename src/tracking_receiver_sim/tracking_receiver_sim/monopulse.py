@@ -43,7 +43,7 @@ def difference_pattern(v, k_m):
 def channels(v_x, v_e, k_m, cos_beta, sin_beta):
     """Return the (sum, difference X, difference E) voltages of a unit carrier, v_x and v_e beamwidths off the axis.
 
-    Cross-coupling rotates the error axes by beta (anchors.md section 5).
+    Cross-coupling rotates the error axes by beta, so that each difference also contains a part of the other error.
     """
     S_x, S_e = sum_pattern(v_x), sum_pattern(v_e)
     x, e = difference_pattern(v_x, k_m) * S_e, S_x * difference_pattern(v_e, k_m)

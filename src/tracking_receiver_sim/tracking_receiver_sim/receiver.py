@@ -63,6 +63,9 @@ STATE_DTYPE = np.dtype([
                        align=True)
 """State of the receiver.
 
+    agc_power, level_power  sum power over noise power, smoothed for the gain and for the C/N0
+    ring_...            result that waits for the latency to pass, see Result
+    scintillation       state of scintillation.wander
     error_known         1 if cross_elevation, elevation hold the true error at stamp_ns [rad], direction the target in
                         FLU [m]
     timer_ns            time past a lock level
@@ -78,7 +81,7 @@ CONSTANTS_DTYPE = np.dtype([
     ('boresight', 'f8', 2),
     ('path', arrival.PATH_DTYPE), ('multipath', multipath.MULTIPATH_DTYPE),
     ('scintillation', scintillation.SCINTILLATION_DTYPE),
-    ('first_noise', 'i8', 2),
+    ('first_measured_normal', 'i8'), ('first_scintillation_normal', 'i8'),
     ('samples', 'i8'), ('tau', 'f8'), ('period_ns', 'i8'), ('agc_gain', 'f8'), ('level_gain', 'f8'),
     ('smoothing', 'i8'), ('smoothing_gain', 'f8'), ('smoothing_samples', 'i8'), ('held', 'i8'),
     ('power', 'f8'), ('reference_range', 'f8'), ('half_exponent', 'f8'), ('horizon_mask', 'f8'),
@@ -92,7 +95,7 @@ CONSTANTS_DTYPE = np.dtype([
     angle_scale         theta3 over the k_m that the receiver assumes
     sign                1 or -1, of each difference channel
     boresight           null of the differences off the beam, cross-elevation and elevation [rad]
-    first_noise         index of the first normal of rate and range, and of the scintillation
+    first_..._normal    index of the first normal of the measured rate and range, and of the scintillation
     power, acquire_power, lose_power    carrier power over noise power in one sample
     range_variance      variance of the range [m2], in single precision
 """
@@ -148,7 +151,8 @@ def constants(params, period, built) -> np.ndarray:
     c['boresight'] = antenna.boresight_cross_elevation, antenna.boresight_elevation
     c['path'], c['multipath'] = arrival.constants(params.path), multipath.constants(params.path.multipath)
     c['scintillation'] = scintillation.constants(params.path.scintillation, period)
-    c['first_noise'] = NORMALS_PER_SAMPLE * receiver.samples_per_step, _measured_normals(receiver)
+    c['first_measured_normal'] = NORMALS_PER_SAMPLE * receiver.samples_per_step
+    c['first_scintillation_normal'] = _measured_normals(receiver)
     c['power'] = _hertz(receiver.cn0_dbhz) * tau * polarisation.efficiency(params.target.polarisation,
                                                                            antenna.polarisation)
     c['reference_range'], c['half_exponent'] = receiver.reference_range, 0.5 * receiver.range_exponent
@@ -257,7 +261,7 @@ def carrier_amplitude(c, e, n, u, hidden):
     """Return the sum voltage on axis from a target at an ENU vector [m] of the antenna; 0 below the horizon mask or
     hidden."""
     _, elevation = earth_angles(e, n, u)
-    if hidden or not elevation >= c.horizon_mask:
+    if hidden or not elevation >= c.horizon_mask:       # also true for an elevation of NaN
         return 0.0
     distance = max(math.sqrt(e * e + n * n + u * u), 1.0)
     return math.sqrt(c.power) * (c.reference_range / distance)**c.half_exponent
@@ -270,6 +274,7 @@ def sample(s, c, amplitude, v_x, v_e, image, normals, first):
 
     amplitude: carrier on axis [-]; v_x, v_e: offsets in beamwidths; normals: used from index `first` on.
     """
+    # Real and imaginary part of a channel each have half of its noise power, 1. S_g, D_xg, D_eg: image in the ground.
     half = math.sqrt(0.5)
     S, D_x, D_e = channels(v_x, v_e, c.slope, c.cos_beta, c.sin_beta)
     S_imag = D_x_imag = D_e_imag = 0.0
@@ -331,7 +336,7 @@ def rate_and_range(s, c, i, target_state, normals):
     """Return the measured ((cross-elevation rate, elevation rate) [rad/s], range [m]) of a TargetState; NaN if not
     measured."""
     rates, distance = NOT_MEASURED, math.nan
-    first = c.first_noise[0]
+    first = c.first_measured_normal
     if c.rate_measured != 0:
         rate_x, rate_e = error_rate(i, s.antenna, s.antenna_velocity, target_state)
         rates = rate_x + c.rate_sigma * normals[first], rate_e + c.rate_sigma * normals[first + 1]
@@ -416,7 +421,8 @@ def step(s, c, i, o, breaks, coefficients, normals):
             o.true_cross_elevation, o.true_elevation = dX, dE
             if c.scintillation.on != 0:
                 sin_E = u / math.sqrt(e * e + n * n + u * u)
-                fading, X, E = scintillation.wander(c.scintillation, s.scintillation, sin_E, normals, c.first_noise[1])
+                fading, X, E = scintillation.wander(c.scintillation, s.scintillation, sin_E, normals,
+                                                    c.first_scintillation_normal)
                 amplitude, dX, dE = fading * amplitude, dX + X, dE + E
         error = measure(s, c, amplitude, dX, dE, image, normals)
         s.cross_elevation, s.elevation = dX, dE

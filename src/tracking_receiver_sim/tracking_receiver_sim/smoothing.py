@@ -62,6 +62,7 @@ def steps_back(kind, samples, n):
     if kind == 'none':
         return 0.0
     if kind == 'recursion':
+        # A step has `kept` times the weight of the next newer step; this is the mean age of a geometric series.
         kept = (1.0 - 1.0 / n)**samples
         return kept / (1.0 - kept)
     return sum(k // samples for k in range(n)) / n

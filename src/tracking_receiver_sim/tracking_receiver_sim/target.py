@@ -139,6 +139,7 @@ def build(params, duration, horizon_mask=0.0) -> Target:
     Raises TargetError, also if the target stays below the horizon, or below a horizon_mask [rad] under it.
     """
     builders: dict[str, Callable] = {'leo_pass': _leo_pass, 'track_file': _track_file, 'flyby': _flyby}
+    # known: start_time and summary, as far as the kind has them.
     breaks, coefficients, *known = builders.get(params.kind, _angles)(params, duration)
     constants = np.zeros(1, TARGET_DTYPE)
     constants['kind'], constants['angle'] = TARGET_KINDS.index(params.kind), record(params.angle)
@@ -189,6 +190,7 @@ def culmination(params, satrec):
 
     best = -math.inf
     for day in np.arange(0.0, leo_pass.search_days, 1.0):
+        # The search begins one step before the day and ends one step after it, so that it finds a peak at midnight.
         seconds = 86400.0 * min(1.0, leo_pass.search_days - day)
         times = 86400.0 * day + np.arange(-PASS_SEARCH_STEP_S, seconds + 1.5 * PASS_SEARCH_STEP_S, PASS_SEARCH_STEP_S)
         elevation = elevations(times)
@@ -221,6 +223,7 @@ def _peak(elevations, begin, end):
 def _start(params, satrec, duration):
     """Return (Julian day, fraction) of stamp 0; the pass finder chooses a whole second of UTC."""
     if not params.leo_pass.start_time:
+        # The added 0.5 s turns the cut to whole seconds below into rounding.
         start = culmination(params, satrec) - 0.5 * duration + 0.5
         when = orbit.calendar(satrec.jdsatepoch, satrec.jdsatepochF + start / 86400.0)
         return orbit.julian_date(when.replace(microsecond=0))

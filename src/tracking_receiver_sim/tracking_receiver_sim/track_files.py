@@ -13,16 +13,19 @@ FORMAT_PROBE_BYTES = 65536
 
 
 class FileKind(typing.NamedTuple):
-    """Kind of track. lay_out(data, TargetParameters, duration, margin) -> flight.Flight; run(data, TargetParameters,
-    given) -> {parameter: value} for a scenario that does not set them."""
+    """Kind of track, with two functions.
+
+        lay_out         (data, TargetParameters, duration, margin) -> flight.Flight
+        run_parameters  (data, TargetParameters, given) -> {parameter: value} for a scenario that does not set them
+    """
     lay_out: typing.Callable
-    run: typing.Callable
+    run_parameters: typing.Callable
 
 
 LOG_KIND = FileKind(lambda log, target, _duration, _margin: flight.lay_out(log, target.track_file, target.station),
-                    place.run)
-ORBIT_KIND = FileKind(course.of_orbit, course.run_of_orbit)
-DIRECTIONS_KIND = FileKind(course.of_directions, course.run_of_directions)
+                    place.run_parameters)
+ORBIT_KIND = FileKind(course.flight_of_orbit, course.run_parameters_of_orbit)
+DIRECTIONS_KIND = FileKind(course.flight_of_directions, course.run_parameters_of_directions)
 
 
 class FileFormat(typing.NamedTuple):
@@ -35,10 +38,12 @@ class FileFormat(typing.NamedTuple):
 
 
 def _read_log(rows):
+    """Return the function TrackFileParameters -> fixes.Fixes of a reader of rows."""
     return lambda track: fixes.read(track, rows)
 
 
 def _read_object(read):
+    """Return the function TrackFileParameters -> data of a reader of one object."""
     return lambda track: read(track.path, track.aircraft)
 
 
@@ -52,6 +57,7 @@ FILE_FORMATS = (
     FileFormat('table of azimuth and elevation', DIRECTIONS_KIND, directions.is_table,
                _read_object(directions.read_table)),
     FileFormat('CSV', LOG_KIND, lambda beginning: True, _read_log(tables.rows)))
+"""Formats in the order in which a file is compared with them; the last one takes every other file."""
 
 DERIVED_PARAMETERS = (*place.STATION_FIELDS, 'receiver.reference_range', 'duration')
 """Parameters that a track file gives if the scenario does not: of the receiver, and the duration of the run."""
@@ -81,4 +87,4 @@ def derived_parameters(target, given):
     given: names of the parameters that the scenario sets; only those of the station and the start matter here.
     """
     kind, data = read(target.track_file)
-    return kind.run(data, target, given)
+    return kind.run_parameters(data, target, given)

@@ -1,4 +1,9 @@
-"""ROS node of the tracking receiver: publishes the channels of the receiver for each direction of the beam."""
+"""ROS node of the tracking receiver: publishes the channels of the receiver for each direction of the beam.
+
+The unit unit.TrackingReceiver (tracking_receiver_sim/unit.py) runs the law receiver.step
+(tracking_receiver_sim/receiver.py); change the receiver there. `entry` is imported first because a signal during the
+other imports would end the process with a traceback.
+"""
 import pedestal_common.entry  # noqa: F401
 
 # isort: split

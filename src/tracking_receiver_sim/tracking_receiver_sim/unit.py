@@ -119,7 +119,8 @@ class TrackingReceiver(Simulated):
         same with and without scintillation.
         """
         self.parts['row'] = 0
-        receiver_count, total_count = int(self.parts['constants']['first_noise'][1]), self.memory.normals.shape[1]
+        receiver_count = int(self.parts['constants']['first_scintillation_normal'])
+        total_count = self.memory.normals.shape[1]
         drawn = self._noise.standard_normal((steps, receiver_count))
         if total_count > receiver_count:
             drawn = np.hstack((drawn, self._air.standard_normal((steps, total_count - receiver_count))))

@@ -38,6 +38,7 @@ def _filled(topic):
 
 class Ring(Node):
     """Node of the ring: it publishes its messages when a message arrives on its trigger, and drops all others."""
+    # shell.main runs a node through these two attributes and `draining`, `close`; the Ring has the loop of the shell.
     awaits = 'its trigger'
     spin = shell.Shell.spin
 
@@ -64,7 +65,7 @@ class Ring(Node):
         """Send the first lap as soon as every subscriber is there."""
         if all(publisher.get_subscription_count() >= readers for publisher, _, readers in self.writers):
             self.start_timer.cancel()
-            time.sleep(1.0)
+            time.sleep(1.0)     # The other nodes may not have found all publishers yet.
             self.send()
 
     def ignore(self, _message):

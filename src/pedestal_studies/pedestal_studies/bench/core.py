@@ -29,7 +29,8 @@ SHORT_RUN_STEPS, SHORT_RUN_COUNT = 40, 100
 """Drive steps of a run that is short enough to be rarely interrupted by other processes; number of these runs."""
 SUBSTEPS_PER_STEP = 2 * 100
 """Plant sub-steps of both axes in one drive step of 5 ms."""
-SOLVE_IVP_TICKS = 100
+SOLVE_IVP_TICKS, SUBSTEPS_PER_TICK = 100, 2
+"""Ticks of the current loop that scipy computes; sub-steps of the plant in one tick."""
 
 
 @compiled
@@ -47,9 +48,8 @@ def _steps_on_lanes(drives, count):
         drive_unit.step(moving.state, moving.constants, moving.inputs, moving.outputs)
 
 
-FILTER_STEPS = 20_000
-FILTERPY_STEPS = 500
-FILTER_PERIOD_S = 0.01
+FILTER_STEPS, FILTERPY_STEPS, FILTER_PERIOD_S = 20_000, 500, 0.01
+"""Steps of a compiled filter and of a filter of filterpy; time between two measurements [s]."""
 
 
 def filter_step(**parameters):
@@ -191,7 +191,7 @@ def run():
 
     tick = axis.CURRENT_LOOP_PERIOD_S
     scipy_time = best_of(lambda: solve_ivp_axis.run(AduParameters().azimuth, SOLVE_IVP_TICKS, tick, (5.0, 5.0)), 3)
-    scipy_substep = scipy_time / SOLVE_IVP_TICKS / 2 * 1e9
+    scipy_substep = scipy_time / SOLVE_IVP_TICKS / SUBSTEPS_PER_TICK * 1e9
     rows = [*drives, row('core', 'realtime_factor', factor, '', '>= 200'),
             row('solve_ivp', 'substep_ns', scipy_substep, 'ns'),
             row('solve_ivp', 'ratio', scipy_substep / drives[0]['value'], ''), *filter_rows()]

@@ -32,11 +32,11 @@ def measure_recorder(path, again, rate):
         recorder = subprocess.Popen([sys.executable, '-m', 'pedestal_recording.recorder_node', '--ros-args',
                                      '--params-file', str(path.with_name(path.name + '.log') / 'parameters.yaml'),
                                      '-p', f'recorder:bag:={again}'], stdout=log, stderr=subprocess.STDOUT)
-        begun = []
+        begun = []      # wall time and CPU time of the recorder at the first message
         try:
             result = replay.replay(path, replay.ReplayOptions(rate=rate), lambda: begun.extend(
                 (time.perf_counter(), _cpu_time(recorder.pid))))
-            if result.ended != 'whole':
+            if result.ended != 'whole':     # Ctrl-C ended the replay, so it ends the benchmark too.
                 raise KeyboardInterrupt
             _, status, used = os.wait4(recorder.pid, 0)
             wall = time.perf_counter() - begun[0]
@@ -55,8 +55,10 @@ def measure_recorder(path, again, rate):
 
 def _cpu_time(pid):
     """Return the CPU time [s] that a process has used."""
+    # The fields after the name in parentheses; utime and stime are the 12th and 13th of them (proc(5)).
     fields = pathlib.Path(f'/proc/{pid}/stat').read_text().rpartition(')')[2].split()
-    return (int(fields[11]) + int(fields[12])) / os.sysconf('SC_CLK_TCK')
+    user_ticks, system_ticks = map(int, fields[11:13])
+    return (user_ticks + system_ticks) / os.sysconf('SC_CLK_TCK')
 
 
 def disk_rate(folder):

@@ -12,7 +12,8 @@ from scipy.integrate import solve_ivp
 def right_hand_side(t, x, p, v_q):
     """Return d/dt of (i_d, i_q, w, theta) of both motors and (w, theta, z) of the load, with constant q voltages [V].
 
-    p: adu_drive.params.AxisParameters.
+    p: adu_drive.params.AxisParameters. x: state of 11 numbers. i_d, i_q: currents [A]; w, theta: rate and angle; z:
+    deflection of the bristles of the friction (LuGre).
     """
     g, f, N = p.gear_train, p.friction, p.gear_train.ratio
     w, theta, z = x[8:]

@@ -186,8 +186,9 @@ def feedforward_numbers(rows):
                 'miss_rms_deg', 'rate_noise_deg_s')), ratio))
         lines += [(case, _spread(rows['imm-feedforward', case, 'miss_rms_deg']), '', '')
                   for case in imm_feedforward.DRIVE_CASES if case.startswith(axis)]
-    return ('case', 'miss rms deg', 'rate noise deg/s',
-            'miss of a conventional filter of equal rate noise, divided by this miss'), lines
+    return ('case', 'meaning', 'miss rms deg', 'rate noise deg/s',
+            'miss of a conventional filter of equal rate noise, divided by this miss'), [
+        (case, imm_feedforward.SOURCE_MEANINGS[case.partition('/')[2]], *numbers) for case, *numbers in lines]
 
 
 def matrix_table(rows):
@@ -202,19 +203,20 @@ def matrix_table(rows):
 
 def pareto_numbers(rows):
     """Return the table of the least miss of any tuning of a filter, and of its miss at the rate noise of the IMM."""
-    lines = [(name, *(_spread(rows['pareto', name, metric]) for metric in (
+    lines = [(name, pareto.FILTER_MEANINGS[name], *(_spread(rows['pareto', name, metric]) for metric in (
         'least_miss_deg', 'rate_noise_at_least_miss_deg_s')),
         _spread(rows['pareto', name, 'miss_ratio_at_equal_rate_noise'])
         if ('pareto', name, 'miss_ratio_at_equal_rate_noise') in rows else '') for name in pareto.FILTER_TUNINGS]
-    return ('filter', 'least miss of any tuning, deg', 'rate noise at the least miss, deg/s',
+    return ('filter', 'meaning', 'least miss of any tuning, deg', 'rate noise at the least miss, deg/s',
             'miss at the rate noise of imm-predicted, divided by the miss of imm-predicted'), lines
 
 
 def flyby_numbers(rows):
     """Return the table of the errors on the 60 m flyby with a measured rate and with a differenced rate."""
-    lines = [(name, *(_spread(rows['rate-measurement', f'{rate_measurement.FLYBY_PROFILE}/{name}', metric])
+    lines = [(name, rate_measurement.RATE_SOURCE_MEANINGS[name],
+              *(_spread(rows['rate-measurement', f'{rate_measurement.FLYBY_PROFILE}/{name}', metric])
                       for metric in ('angle_rms_deg', 'rate_rms_deg_s'))) for name in rate_measurement.FLYBY_CASES]
-    return ('source of the rate', 'angle rms deg', 'rate rms deg/s'), lines
+    return ('case', 'source of the rate', 'angle rms deg', 'rate rms deg/s'), lines
 
 
 def alignment_numbers(rows):
@@ -222,12 +224,13 @@ def alignment_numbers(rows):
     metrics = ('time_to_12arcmin_rms_s', *(f'azimuth_rms_arcmin_{t}s' for t in (100, 250, 300, 600)),
                'level_rms_arcmin')
     swell = [f'azimuth_{metric}_{alignment.SWELL_EVALUATION_TIME_S}s' for metric in ('rms_arcmin', 'error_over_sigma')]
-    lines = [(name, *(_spread(rows['alignment', name, metric]) for metric in metrics),
+    lines = [(name, alignment.CASE_MEANINGS[name], *(_spread(rows['alignment', name, metric]) for metric in metrics),
               *(_spread(rows['alignment', f'{name}/swell', metric]) for metric in swell))
              for name in alignment.CASE_METHODS]
-    return ('method', 'time to 12 arcmin, s', *(f'azimuth at {t} s, arcmin' for t in (100, 250, 300, 600)),
+    return ('method', 'meaning', 'time to 12 arcmin, s', *(f'azimuth at {t} s, arcmin' for t in (100, 250, 300, 600)),
             'level, arcmin', 'azimuth on swell at 200 s, arcmin', 'that error divided by own sigma'), [
-        *lines, ('limit', *(_spread(rows['alignment', 'limit', metric]) for metric in metrics), '', '')]
+        *lines, ('limit', alignment.CASE_MEANINGS['limit'],
+                 *(_spread(rows['alignment', 'limit', metric]) for metric in metrics), '', '')]
 
 
 def acquisition_numbers(rows):
@@ -284,7 +287,7 @@ def budget_table(mode):
                  **{name: ('random', doc) for name, doc in budget.documented(mode, random=True).items()}, **sums}
         lines = [(name, kind, doc, *(_milli(rows['budget', f'{mode}/{name}', metric]) for metric in (
             'cross_elevation_rms_deg', 'elevation_rms_deg', 'rms_deg'))) for name, (kind, doc) in kinds.items()]
-        whole = lines.pop()
+        whole = lines.pop()         # The row of `whole` follows the row of `combined`, with which it is compared.
         ratio = rows['budget', f'{mode}/combined', 'to_whole']
         combined = ('combined', '', f'all terms; combined over whole: {_spread(ratio)}, target {_target_text(ratio)}',
                     '', '', _milli(rows['budget', f'{mode}/combined', 'rms_deg']))

@@ -2,10 +2,13 @@
 
 The IMU, the sway and the white velocity of 0.05 m/s per axis are those of paper 001 (section 5 and table 1), with a
 misalignment of 3, 3 and 180 deg. The velocity has one value per 0.02 s. The paper does not state this period, and the
-results scale with it. The case `limit` is the limit that the gyros and this velocity permit: the covariance of
-riccati_eso and the gyros' bias over w_N. Cases <method> are the conditions of the paper. Cases <method>/swell have a
-velocity of 0.5 m/s at 0.1 Hz on every axis in addition. Cases <method>/quadrant-N have any heading of the ship, an
-error of azimuth in quadrant N, and random biases.
+results scale with it. CASE_MEANINGS describes the five methods. Cases <method> are the conditions of the paper. Cases
+<method>/swell have a velocity of 0.5 m/s at 0.1 Hz on every axis in addition. Cases <method>/quadrant-N have any
+heading of the ship, an error of azimuth in quadrant N, and random biases.
+
+The case `limit` is the information limit, the 1 sigma that the gyros and this velocity permit. It is the root sum
+square of the 1 sigma of the Riccati filter and of the azimuth error that the bias of an east gyro causes, bias /
+(earth rate * cos latitude).
 """
 import dataclasses
 import functools
@@ -86,6 +89,15 @@ INS_PARAMETERS = AlignmentParameters(step=LAW_STEP_S, aligned_sigma=1e-5, veloci
 """Parameters of the INS. Its alignment never ends, so that its error can be evaluated to the end of a run."""
 
 CASE_METHODS = {method.replace('_', '-'): method for method in INS_METHODS if method != 'model'}
+"""{case: method}; `model` is not among them, because it does not align."""
+CASE_MEANINGS = {
+    'classical': 'gyrocompass: the level error that a wrong azimuth causes corrects the azimuth',
+    'adrc': 'paper 001, corrected: active disturbance rejection control (ADRC) levels, its commands give the azimuth',
+    'adrc-scheduled': 'ADRC whose observer begins with a high bandwidth, which then falls as 6/t',
+    'riccati-eso': 'extended state observer (ESO) with the gains of a Kalman filter (Riccati equation)',
+    'oba': 'optimisation-based alignment: the rotation that best maps the measured specific force onto gravity',
+    'limit': 'information limit: 1 sigma of the Riccati filter and of the error by the bias of an east gyro'}
+"""{case: description} of the methods and of the limit, for the table of the documentation."""
 CASE_COLOURS = dict(zip(CASE_METHODS, (RAW_COLOUR, TRUTH_COLOUR, MOTOR_1_COLOUR, FILTERED_COLOUR, MOTOR_2_COLOUR)))
 SETTLED_AZIMUTH_ARCMIN = 12.0
 """Rms over the runs below which the azimuth counts as settled [arcmin]."""
@@ -103,6 +115,24 @@ motion and of imu."""
 
 Increments = namedtuple('Increments', 'angle force attitude')
 """Increments of an IMU, angle (n, 3) [rad], force (n, 3) [m/s], FLU, and the true attitude (n, 4) at their ends."""
+
+
+AZIMUTH_COLUMN, EAST_TILT_COLUMN, LEVEL_COLUMNS = 2, 0, slice(0, 2)
+"""Columns of an error about east, north, up: the error of azimuth, the tilt about east, both level errors."""
+
+
+class Conditions(typing.NamedTuple):
+    """Conditions of a run: heading of the ship [deg]; misalignment a_x, a_y, a_z [rad]; biases of three gyros and
+    three accelerometers, in units of their 1 sigma."""
+    heading_deg: float
+    misalignment: np.ndarray
+    biases: np.ndarray
+
+
+class InformationLimit(typing.NamedTuple):
+    """1 sigma of azimuth and of level (n,) [rad] at the instants of the evaluation."""
+    azimuth: np.ndarray
+    level: np.ndarray
 
 
 class Sums(typing.NamedTuple):
@@ -147,12 +177,12 @@ class Accuracy:
     @property
     def azimuth(self):
         """Rms of the error in azimuth over the runs (n,) [arcmin]."""
-        return self.rms[:, 2]
+        return self.rms[:, AZIMUTH_COLUMN]
 
     @property
     def level(self):
         """Rms of the level errors over the runs and the time from SHORT_RUN_DURATION_S on [arcmin]."""
-        return tracking.rms(self.rms[round(SHORT_RUN_DURATION_S / EVALUATION_PERIOD_S):, :2])
+        return tracking.rms(self.rms[round(SHORT_RUN_DURATION_S / EVALUATION_PERIOD_S):, LEVEL_COLUMNS])
 
     @property
     def ratio(self):
@@ -227,25 +257,26 @@ def quaternion(axis, angle):
 def misaligned(attitude, angles):
     """Return the attitude deck -> n' of an attitude deck -> n: C_n^n' = R_y(a_y)^T R_x(a_x)^T R_z(a_z)^T.
 
-    angles: a_x, a_y, a_z [rad].
+    n: the ENU frame; n': the frame that the INS takes for it. angles: a_x, a_y, a_z [rad].
     """
-    for axis in (2, 0, 1):
+    for axis in (2, 0, 1):      # z, x, y: the order of the factors from right to left
         attitude = product(quaternion(axis, -angles[axis]), attitude)
     return attitude
 
 
 def draw_conditions(batch, random):
-    """Return (heading [deg], misalignment (3,) [rad], signs or sizes of the six biases) of one run."""
+    """Return the Conditions of one run."""
     if not batch.kind.startswith('quadrant'):
         # The paper's axes point to starboard and to the bow; our x points to the bow, our y to port.
-        return 0.0, MISALIGNMENT_RAD, np.array((1.0, -1.0, 1.0, 1.0, -1.0, 1.0))
+        return Conditions(0.0, MISALIGNMENT_RAD, np.array((1.0, -1.0, 1.0, 1.0, -1.0, 1.0)))
     azimuth = 0.5 * math.pi * (int(batch.kind[-1]) - 1 + random.random())
-    return random.uniform(0.0, 360.0), np.array((*MISALIGNMENT_RAD[:2], azimuth)), random.standard_normal(6)
+    misalignment = np.array((*MISALIGNMENT_RAD[:2], azimuth))
+    return Conditions(random.uniform(0.0, 360.0), misalignment, random.standard_normal(6))
 
 
 def disturbance(batch, random, n):
     """Return the velocity (n + 1, 3) of sea and swell at the IMU's samples, ENU [m/s]."""
-    held = round(LAW_STEP_S / IMU_PERIOD_S)
+    held = round(LAW_STEP_S / IMU_PERIOD_S)     # samples of the IMU for which a value of the sea stays
     velocity = np.repeat(VELOCITY_NOISE_M_S * random.standard_normal((n // held + 1, 3)), held, axis=0)[:n + 1]
     if batch.kind == 'swell':
         t = IMU_PERIOD_S * np.arange(n + 1)[:, None]
@@ -256,11 +287,12 @@ def disturbance(batch, random, n):
 def simulated_run(batch, run):
     """Return (Increments, misaligned attitude (x, y, z, w) at 0 s) of one run of a batch."""
     seed = {'': BASE_SEED, 'swell': SWELL_SEED}.get(batch.kind, QUADRANT_SEED)
+    # The last character of the kind, its number, gives each quadrant a noise of its own; the kind '' has none.
     random = np.random.default_rng((seed, *batch.kind.encode()[-1:], run))
-    heading, angles, biases = draw_conditions(batch, random)
-    biases = biases * np.repeat((GYRO_BIAS_RAD_S, ACCELEROMETER_BIAS_M_S2), 3)
+    conditions = draw_conditions(batch, random)
+    biases = conditions.biases * np.repeat((GYRO_BIAS_RAD_S, ACCELEROMETER_BIAS_M_S2), 3)
     params = ShipMotionParameters(
-        dataclasses.replace(SHIP_PARAMETERS, heading_deg=heading),
+        dataclasses.replace(SHIP_PARAMETERS, heading_deg=conditions.heading_deg),
         ImuParameters(*biases[:3], GYRO_NOISE_DENSITY, *biases[3:], ACCELEROMETER_NOISE_DENSITY, gyro_scale=90e-6,
                       accelerometer_scale=70e-6, output='increment'))
     ship, n = motion.constants(params.ship), round(batch.duration / IMU_PERIOD_S)
@@ -268,7 +300,7 @@ def simulated_run(batch, run):
     inputs, truth = np.zeros(1, imu.INPUTS_DTYPE), np.zeros(1, motion.OUTPUTS_DTYPE)
     inputs['dt'] = IMU_PERIOD_S
     motion.truth(ship[0], 0.0, truth[0])
-    start = misaligned(truth[0]['quaternion'], angles)
+    start = misaligned(truth[0]['quaternion'], conditions.misalignment)
     increments = Increments(np.zeros((n, 3)), np.zeros((n, 3)), np.zeros((n, 4)))
     simulate(Sensors(imu.initial_state(), imu.constants(params), ship, inputs, truth, np.zeros(1, imu.OUTPUTS_DTYPE)),
              random.standard_normal((n, imu.IMU_NORMALS_PER_STEP)), disturbance(batch, random, n), increments)
@@ -276,7 +308,11 @@ def simulated_run(batch, run):
 
 
 def errors(estimated, attitude):
-    """Return the errors (n, 3) about east, north, up [rad] of an estimated attitude (n, 4) against the true one."""
+    """Return the errors (n, 3) about east, north, up [rad] of an estimated attitude (n, 4) against the true one.
+
+    They are the rotation vector of the estimated attitude times the inverse of the true one. The sign of w takes the
+    shorter of the two rotations that a quaternion describes.
+    """
     x, y, z, w = product(estimated.T, (attitude * (-1.0, -1.0, -1.0, 1.0)).T)
     size = np.sqrt(x * x + y * y + z * z)
     angle = 2.0 * np.arctan2(size, np.abs(w)) * np.sign(np.where(w == 0.0, 1.0, w))
@@ -292,27 +328,34 @@ def align_batch(batch):
         for case, method in CASE_METHODS.items():
             constants = navigator.constants(INS_PARAMETERS, method, 'none', latitude)
             state, estimates = navigator.initial_state(constants, start), np.zeros(n, ALIGNMENT_ESTIMATE)
-            align(state.copy(), constants, angle[:2], force[:2], IMU_PERIOD_S, every, estimates)      # compiles
+            # This call compiles the law before the call that is timed.
+            align(state.copy(), constants, angle[:2], force[:2], IMU_PERIOD_S, every, estimates)
             begun = time.perf_counter()
             align(state, constants, angle, force, IMU_PERIOD_S, every, estimates)
             wall_time = time.perf_counter() - begun
             e = errors(estimates['quaternion'], attitude[every - 1::every])
             sums[case] = sums.get(case, Sums()).plus(Sums(
-                e * e, (e[:, 2] / estimates['azimuth_sigma'])**2, e if batch.first + i == 0 else None, wall_time,
-                batch.duration / LAW_STEP_S, 1))
+                squares=e * e, ratios=(e[:, AZIMUTH_COLUMN] / estimates['azimuth_sigma'])**2,
+                first=e if batch.first + i == 0 else None, wall_time=wall_time, steps=batch.duration / LAW_STEP_S,
+                runs=1))
     return sums
 
 
 def limit():
-    """Return (azimuth, level) 1 sigma (n,) [rad] of the information limit: the Riccati covariance and the biases."""
+    """Return the InformationLimit: the 1 sigmas that riccati_eso states for a motionless IMU without noise.
+
+    The covariance of riccati_eso depends on the assumed noises, not on the measurements. Noise and sway could only
+    enlarge the 1 sigmas, because innovations larger than expected increase them.
+    """
     constants = navigator.constants(INS_PARAMETERS, 'riccati_eso', 'none', math.radians(SHIP_PARAMETERS.latitude_deg))
     state, n = navigator.initial_state(constants, (0.0, 0.0, 0.0, 1.0)), round(RUN_DURATION_S / IMU_PERIOD_S)
     estimates, still = np.zeros(round(RUN_DURATION_S / EVALUATION_PERIOD_S), ALIGNMENT_ESTIMATE), np.zeros((n, 3))
+    # A deck at rest turns with the earth, and its accelerometers measure the reaction to gravity.
     k = constants[0]['conditions']
     still_force = np.tile((0.0, 0.0, float(k['gravity']) * IMU_PERIOD_S), (n, 1))
     align(state, constants, still + k['earth_rate'] * IMU_PERIOD_S, still_force, IMU_PERIOD_S,
           round(EVALUATION_PERIOD_S / IMU_PERIOD_S), estimates)
-    return estimates['azimuth_sigma'], estimates['level_sigma']
+    return InformationLimit(estimates['azimuth_sigma'], estimates['level_sigma'])
 
 
 def settling_time(rms):
@@ -335,7 +378,8 @@ METRIC_TARGETS = {
         ('azimuth_rms_arcmin_300s', '<= 6.5'))},
     ('oba/swell', f'azimuth_rms_arcmin_{SWELL_EVALUATION_TIME_S}s'): '<= 10',
     **{(f'{case}/swell', f'azimuth_error_over_sigma_{SWELL_EVALUATION_TIME_S}s'): '<= 1.3' for case in CASE_METHODS}}
-"""{(case, metric): target}."""
+"""{(case, metric): target}. The targets are ours, because the paper prints only PAPER_VALUES. A time with a tolerance
+shows any change of the laws: it is the time that these conditions gave when the study was written."""
 PAPER_VALUES = {('classical', 'time_to_12arcmin_rms_s'): 420, ('adrc', 'time_to_12arcmin_rms_s'): 250}
 
 
@@ -353,7 +397,7 @@ KIND_METRICS: dict[str, dict[str, tuple]] = {
 
 
 def rows(accuracy, bound):
-    """Return the rows of accuracy {kind: {case: Accuracy}}; bound: as of `limit`."""
+    """Return the rows of accuracy {kind: {case: Accuracy}}; bound: InformationLimit."""
     table = []
     for kind, cases in accuracy.items():
         for method, a in cases.items():
@@ -375,8 +419,8 @@ def remarks(runs):
         f'{runs} runs. Every number is a statistic over all runs, such as an rms. Its interval comes from the '
         f'jackknife over {JACKKNIFE_PARTS} parts of the runs. If the rms levels off just below 12 arcmin, its last '
         'crossing of 12 arcmin is known only to tens of seconds.',
-        'The classical loop leaves the error of 180 deg with a motion of more than a turn, so its time depends on '
-        'details. Bandwidths of 0.024 to 0.028 rad/s give 414 to 494 s in no order. The other signs of the initial '
+        'The classical loop begins 180 deg off and first swings by more than a turn, so its time depends on details. '
+        'Bandwidths of 0.024 to 0.028 rad/s give 414 to 494 s in no order. The other signs of the initial '
         'tilts give 425 to 542 s.',
         'level_rms_arcmin is over 300 to 600 s. step_us is the time of one step of 0.02 s with two steps of the '
         'strapdown.']
@@ -412,16 +456,16 @@ RMS_LABEL = 'rms of the error [arcmin]'
 def azimuth_figure(accuracy, bound):
     """Draw figures 3 and 4 of the paper for azimuth, one run; then the rms over all runs, {case: Accuracy}."""
     figure, axes = new_panels(3, height=9.0, y=('azimuth error [deg]', 'azimuth error [arcmin]', RMS_LABEL))
-    t = EVALUATION_PERIOD_S * np.arange(1, len(bound[0]) + 1)
+    t = EVALUATION_PERIOD_S * np.arange(1, len(bound.azimuth) + 1)
     for case, a in accuracy.items():
-        axes[0, 0].plot(t, np.degrees(a.whole.first[:, 2]), color=CASE_COLOURS[case], label=case)
-        axes[1, 0].plot(t, a.whole.first[:, 2] / ARCMIN_RAD, color=CASE_COLOURS[case])
-        axes[2, 0].plot(t, a.rms[:, 2], color=CASE_COLOURS[case], label=case)
+        axes[0, 0].plot(t, np.degrees(a.whole.first[:, AZIMUTH_COLUMN]), color=CASE_COLOURS[case], label=case)
+        axes[1, 0].plot(t, a.whole.first[:, AZIMUTH_COLUMN] / ARCMIN_RAD, color=CASE_COLOURS[case])
+        axes[2, 0].plot(t, a.azimuth, color=CASE_COLOURS[case], label=case)
     axes[0, 0].set_title('azimuth error of one run (figure 3 of the paper)')
     axes[1, 0].set_title('the same after 100 s (figure 4)')
     axes[1, 0].set_xlim(100.0, RUN_DURATION_S)
     axes[1, 0].set_ylim(-60.0, 60.0)
-    finish_panel(axes[2, 0], bound[0], 'azimuth: rms over the runs')
+    finish_panel(axes[2, 0], bound.azimuth, 'azimuth: rms over the runs')
     return drawing.legend(figure)
 
 
@@ -436,14 +480,15 @@ def finish_panel(axes, bound, title):
 def level_figure(accuracy, bound):
     """Draw figure 4 of the paper for level: one run after 100 s; then the rms over all runs."""
     figure, axes = new_panels(2, height=6.4, y=('level error [arcmin]', RMS_LABEL))
-    t = EVALUATION_PERIOD_S * np.arange(1, len(bound[1]) + 1)
+    t = EVALUATION_PERIOD_S * np.arange(1, len(bound.level) + 1)
     for case, a in accuracy.items():
-        axes[0, 0].plot(t, a.whole.first[:, 0] / ARCMIN_RAD, color=CASE_COLOURS[case], linewidth=0.8, label=case)
-        axes[1, 0].plot(t, tracking.rms(a.rms[:, :2], axis=1), color=CASE_COLOURS[case], label=case)
+        axes[0, 0].plot(t, a.whole.first[:, EAST_TILT_COLUMN] / ARCMIN_RAD, color=CASE_COLOURS[case], linewidth=0.8,
+                        label=case)
+        axes[1, 0].plot(t, tracking.rms(a.rms[:, LEVEL_COLUMNS], axis=1), color=CASE_COLOURS[case], label=case)
     axes[0, 0].set_title('level error about east of one run (figure 4 of the paper)')
     axes[0, 0].set_xlim(100.0, RUN_DURATION_S)
     axes[0, 0].set_ylim(-4.0, 4.0)
-    finish_panel(axes[1, 0], bound[1], 'level: rms over the runs')
+    finish_panel(axes[1, 0], bound.level, 'level: rms over the runs')
     return drawing.legend(figure)
 
 
@@ -451,8 +496,8 @@ def swell_figure(accuracy, bound):
     """Draw the rms of the azimuth on swell, {case: Accuracy}, beside the limit."""
     figure, axes = new_panels(1, height=3.8, y=RMS_LABEL)
     for case, a in accuracy.items():
-        axes[0, 0].plot(EVALUATION_PERIOD_S * np.arange(1, len(a.rms) + 1), a.rms[:, 2], color=CASE_COLOURS[case],
+        axes[0, 0].plot(EVALUATION_PERIOD_S * np.arange(1, len(a.rms) + 1), a.azimuth, color=CASE_COLOURS[case],
                         label=case)
-    finish_panel(axes[0, 0], bound[0][:round(SHORT_RUN_DURATION_S / EVALUATION_PERIOD_S)],
+    finish_panel(axes[0, 0], bound.azimuth[:round(SHORT_RUN_DURATION_S / EVALUATION_PERIOD_S)],
                  f'azimuth on swell of {SWELL_VELOCITY_M_S:g} m/s, {SWELL_FREQUENCY_HZ:g} Hz: rms over the runs')
     return drawing.legend(figure)

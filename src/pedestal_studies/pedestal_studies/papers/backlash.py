@@ -3,9 +3,16 @@
 The study measures standstill, reversals and fast moves with each schedule of the bias, and compares one speed loop
 with two.
 
-Three cases have the controller of paper 000, as in the scenarios: bias-off, bias-on (5 Nm, fading, as in the paper)
-and hold-fade. With the controller `best` of the study servo, the sine and the fast step are run with every schedule.
-`pedestal run servo_step|servo_sine --param ...` runs every case too (Case.command).
+Three cases have the controller of paper 000, as in the scenarios. With the controller `best` of the study servo, the
+sine and the fast step are run with every schedule. `pedestal run servo_step|servo_sine --param ...` runs every case
+too (Case.command). The demand is the torque that the speed loop commands. The schedules of the bias torque are:
+
+    off         no bias torque
+    constant    the same bias torque at every demand
+    fade        full without demand, falling to zero as the demand grows to `out`
+    hold_fade   full up to the demand `hold`, then falling to zero at the demand `out`
+
+The metrics fight_torque_... are the opposing torque of the motors beyond the commanded bias, see `opposing_torque`.
 """
 import math
 
@@ -42,13 +49,17 @@ def bias(schedule, torque=12.0, hold=14.0, out=45.0):
             'adu.azimuth.bias.hold': hold, 'adu.azimuth.bias.out': out}
 
 
-PAPER_CASES = {'bias-off': bias('off'), 'bias-on': {}, 'hold-fade': bias('hold_fade')}
-"""{case with the controller of the paper: parameters}; bias-on: the bias of the scenario, 5 Nm, fading."""
+PAPER_CASES = {
+    'bias-off': bias('off'),
+    'bias-on': {},                          # no change: the bias of the scenario, 5 Nm, fading, as in the paper
+    'hold-fade': bias('hold_fade')}
+"""{case with the controller of the paper: parameters}."""
 
 BIAS_SCHEDULES = {
-    'off': bias('off'), 'constant-5': bias('constant', 5.0), 'constant-12': bias('constant', 12.0),
-    'fade-5': bias('fade', 5.0, 0.0, 30.0), 'fade-12': bias('fade', 12.0, 0.0, 30.0), 'hold-fade': bias('hold_fade')}
-"""{schedule: parameters}."""
+    'off': bias('off'), 'constant-5': bias('constant', torque=5.0), 'constant-12': bias('constant', torque=12.0),
+    'fade-5': bias('fade', torque=5.0, hold=0.0, out=30.0), 'fade-12': bias('fade', torque=12.0, hold=0.0, out=30.0),
+    'hold-fade': bias('hold_fade')}
+"""{schedule: parameters}; the number in a name is the bias torque [Nm], hold-fade has 12 Nm."""
 
 SPEED_LOOP_STRUCTURES = {
     'mean-speed': {'adu.azimuth.speed_loop.structure': 'mean'},
@@ -121,13 +132,14 @@ and a step with each of SPEED_LOOP_STRUCTURES.
 def measured(kind, name, record):
     """Return {metric: (value, unit)} of one record."""
     if kind == 'standstill':
-        return {'standstill_peak_to_peak_rad': (np.ptp(standstill(record)[1]), 'rad')}
+        _, angle = standstill(record)
+        return {'standstill_peak_to_peak_rad': (np.ptp(angle), 'rad')}
     if kind in REVERSAL_FREQUENCIES_RAD_S:
-        left = steady_residual(record, REVERSAL_AMPLITUDE_RAD, REVERSAL_FREQUENCIES_RAD_S[kind])[1]
-        return {f'{kind}_error_rad': (metrics.peak(left), 'rad')}
+        _, residual = steady_residual(record, REVERSAL_AMPLITUDE_RAD, REVERSAL_FREQUENCIES_RAD_S[kind])
+        return {f'{kind}_error_rad': (metrics.peak(residual), 'rad')}
     if kind == 'sine':
-        left = steady_residual(record, servo.SINE_AMPLITUDE_RAD, servo.SINE_FREQUENCIES_RAD_S['0p4hz'])[1]
-        return {'sine_residual_rad': (metrics.peak(left), 'rad')}
+        _, residual = steady_residual(record, servo.SINE_AMPLITUDE_RAD, servo.SINE_FREQUENCIES_RAD_S['0p4hz'])
+        return {'sine_residual_rad': (metrics.peak(residual), 'rad')}
     if kind == 'step':
         overshoot = metrics.overshoot_percent(record['adu/truth']['position'][:, 0], servo.STEP_SIZE_RAD)
         return {'step_overshoot_percent': (overshoot, '%')}
@@ -211,8 +223,8 @@ def reversal_figure(done):
     w = REVERSAL_FREQUENCIES_RAD_S['reversal']
     axes[0, 0].plot(t, REVERSAL_AMPLITUDE_RAD * np.sin(w * t), color=INK_COLOUR)
     for panel, name in zip(axes[1:, 0], ('bias-off', 'bias-on')):
-        t, left = steady_residual(done['reversal', name], REVERSAL_AMPLITUDE_RAD, w)
-        panel.plot(t, 1e6 * left, color=TRUTH_COLOUR if name == 'bias-off' else FILTERED_COLOUR)
+        t, residual = steady_residual(done['reversal', name], REVERSAL_AMPLITUDE_RAD, w)
+        panel.plot(t, 1e6 * residual, color=TRUTH_COLOUR if name == 'bias-off' else FILTERED_COLOUR)
         panel.set_title(f'{name}: error without its fundamental')
     axes[2, 0].set_xlim(*reversal_window())
     return figure
@@ -220,18 +232,19 @@ def reversal_figure(done):
 
 def reversal_window():
     """Return (begin, end) [s] of the 3 s about the first reversal in the second period of the slow sine."""
+    # The first crest of the second period.
     at = 1.25 * 2.0 * math.pi / REVERSAL_FREQUENCIES_RAD_S['reversal']
     return at - 1.0, at + 2.0
 
 
 def torques_figure(done):
-    """Draw the torque of both motors over the reversal, without and with bias."""
-    figure, axes = new_panels(3, height=5.6, y='torque [Nm]', sharex=True, sharey=True)
+    """Draw the torque of both motors over the reversal, a panel for each of PAPER_CASES."""
+    figure, axes = new_panels(len(PAPER_CASES), height=5.6, y='torque [Nm]', sharex=True, sharey=True)
     for panel, name in zip(axes[:, 0], PAPER_CASES):
         record = done['reversal', name]
         drawing.draw_torques(panel, record)
         panel.set_title(name)
-    axes[2, 0].set_xlim(*reversal_window())
+    axes[-1, 0].set_xlim(*reversal_window())
     return drawing.legend(figure)
 
 

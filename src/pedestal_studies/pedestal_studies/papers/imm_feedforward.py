@@ -10,8 +10,10 @@ imm, imm-b               IMM whose ca model has a process noise of 40 and of 5 d
 perfect-state            truth in the middle of the interval in which the command is in force
 ...-predicted            the same filter, predicted from the time of the miss to that instant, d + T / 2 later
 drive-...                whole product: receiver with this latency, control unit, motors and gears
+drive-imm-default        the same with the default parameters of the IMM of the product
 
-All filters get the same noise. The target of `drive-...` makes reversals without a pause, which is a sine.
+d: delay of the miss, 40 ms; T: time between two commands, 10 ms. All filters get the same noise. The target of
+`drive-...` makes reversals without a pause, which is a sine.
 """
 import dataclasses
 import math
@@ -54,7 +56,8 @@ DEFAULT_RUNS = 50
 """Runs of each case, with independent noise."""
 
 DRIVE_DURATION_S, DRIVE_EVALUATION_START_S, DRIVE_ELEVATION_RAD = 36.0, 6.0, 0.5
-"""Duration of a run through the product [s], start of its evaluation in autotrack [s], and elevation [rad]."""
+"""Duration of a run through the product, from receiver to gears [s], start of its evaluation in autotrack [s], and
+elevation [rad]."""
 
 CV_NOISES = (0.1, 0.2, 0.3, 0.5, 4.0)
 """Process noises of the conventional filter [deg/s2/sqrt(Hz)]."""
@@ -63,11 +66,22 @@ PAPER_CV_NOISES = {'azimuth': 0.1, 'elevation': 0.3}
 """Process noise of `kalman-cv` that comes nearest to the paper's results; the paper prints none."""
 
 FEEDFORWARD_SOURCES = {
-    'imm': imm(40.0, predicted=False), 'imm-predicted': imm(40.0, predicted=True),
-    'perfect-state': Source(None, predicted=True), 'imm-b-predicted': imm(5.0, predicted=True),
+    'imm': imm(q_ca=40.0, predicted=False), 'imm-predicted': imm(q_ca=40.0, predicted=True),
+    'perfect-state': Source(filter=None, predicted=True), 'imm-b-predicted': imm(q_ca=5.0, predicted=True),
     'kalman-ca-0.1': ca(0.1), 'kalman-ca-40': ca(40.0),
     'kalman-ca-40-predicted': dataclasses.replace(ca(40.0), predicted=True)}
-"""{name: Source} of rate and acceleration. The first argument of imm and ca is the process noise [deg/s3/sqrt(Hz)]."""
+"""{name: Source} of rate and acceleration. The argument of ca and q_ca of imm are process noises [deg/s3/sqrt(Hz)]."""
+
+SOURCE_MEANINGS = {
+    'kalman-cv': 'conventional Kalman filter of constant velocity, with the noise that comes nearest to the paper',
+    'imm': 'IMM of cv, ca and current_statistical, tuned on the azimuth',
+    'imm-predicted': 'the same IMM, predicted over the delay of the miss to the middle of the interval of the command',
+    'perfect-state': 'true rate and acceleration in that middle: the limit of the rate loop',
+    'kalman-ca-40-predicted': 'Kalman filter of constant acceleration with 40 deg/s3/sqrt(Hz), predicted like the IMM',
+    'drive-kalman-cv': 'kalman-cv in receiver, control unit, motors and gears',
+    'drive-imm': 'imm in receiver, control unit, motors and gears',
+    'drive-imm-default': 'the default IMM of the product in receiver, control unit, motors and gears'}
+"""{name of a case without its axis: description}, for the table of the documentation."""
 
 
 def cv_name(axis, q):
@@ -248,7 +262,7 @@ def miss_figure(axis, figures_of_paper, misses):
     t, counts, _ = from_first_reversal(axis)
     for name, panel in zip(names, axes[:, 0]):
         case = f'{axis}/{name}'
-        one = feedforward_loop.steps_of(*CASES[case], 0, 1)['miss'][0, counts]
+        one = feedforward_loop.steps_of(*CASES[case], first=0, count=1)['miss'][0, counts]
         panel.plot(t, np.degrees(one), color=RAW_COLOUR, linewidth=0.7, label='one run')
         panel.plot(t, np.degrees(misses[case].miss_mean[counts]), color=FILTERED_COLOUR, linewidth=1.4,
                    label='mean of the runs')
@@ -264,7 +278,7 @@ def feedforward_figure():
     for panel, field, column in ((axes[0, 0], 'rate', 1), (axes[1, 0], 'acceleration', 2)):
         panel.plot(t, np.degrees(target[counts, column]), color=INK_COLOUR, linestyle='--', label='truth')
         for name in ('kalman-cv', 'imm', 'imm-predicted'):
-            one = feedforward_loop.steps_of(*CASES[f'azimuth/{name}'], 0, 1)[field][0, counts]
+            one = feedforward_loop.steps_of(*CASES[f'azimuth/{name}'], first=0, count=1)[field][0, counts]
             panel.plot(t, np.degrees(one), color=SOURCE_COLOURS[name], label=name)
     reversal = t[np.argmax(np.abs(target[counts, 2]))]
     axes[0, 0].set_xlim(reversal - 1.5, reversal + 2.5)
@@ -277,7 +291,8 @@ def probability_figure():
     figure, axes = new_panels(2, height=4.6, y=('acceleration\n[deg/s2]', 'probability'), sharex=True,
                               height_ratios=(1, 1.6))
     t, counts, target = from_first_reversal('azimuth')
-    mu = feedforward_loop.steps_of(*CASES['azimuth/imm'], 0, feedforward_loop.BATCH_RUNS)['mu'][:, counts].mean(axis=0)
+    steps = feedforward_loop.steps_of(*CASES['azimuth/imm'], first=0, count=feedforward_loop.BATCH_RUNS)
+    mu = steps['mu'][:, counts].mean(axis=0)        # probability of each model
     axes[0, 0].plot(t, np.degrees(target[counts, 2]), color=INK_COLOUR)
     axes[0, 0].set_title('the target, and the probability of each model of imm')
     for model, colour in (('cv', TRUTH_COLOUR), ('ca', MOTOR_2_COLOUR), ('current_statistical', FILTERED_COLOUR)):

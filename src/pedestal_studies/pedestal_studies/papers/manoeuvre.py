@@ -2,8 +2,9 @@
 
 A target moves to and fro through 20 deg at 3.5 deg/s. Its reversals are half a cosine and last 4, 2, 1, 0.5 and 0.35
 s, one after the other. It is measured at 100 Hz with 0.02 deg. Cases are reversal-<s>/<filter>, with the rms of a run
-inside the reversal. `cv` and `ca` are conventional filters. `imm-a` and `imm-b` are `imm`
-and `imm-b` of the study imm-feedforward.
+inside the reversal. `cv` and `ca` are conventional filters of constant velocity and of constant acceleration. `imm-a`
+and `imm-b` are IMMs whose ca model has a process noise of 40 and of 5 deg/s3/sqrt(Hz): `imm` and `imm-b` of the study
+imm-feedforward.
 """
 import math
 
@@ -38,11 +39,14 @@ MEASUREMENT_NOISE = ensemble.Noise(feedforward_loop.MISS_SIGMA_RAD)
 """Noise of the measured angle."""
 
 FILTERS = {'cv': feedforward_loop.cv(0.1).filter, 'ca': feedforward_loop.ca(10.0).filter,
-           'imm-a': feedforward_loop.imm(40.0, predicted=False).filter,
-           'imm-b': feedforward_loop.imm(5.0, predicted=False).filter}
+           'imm-a': feedforward_loop.imm(q_ca=40.0, predicted=False).filter,
+           'imm-b': feedforward_loop.imm(q_ca=5.0, predicted=False).filter}
 """{filter: FilterParameters}."""
 
 FILTER_COLOURS = {'cv': TRUTH_COLOUR, 'ca': RAW_COLOUR, 'imm-a': MOTOR_1_COLOUR, 'imm-b': FILTERED_COLOUR}
+
+ACCELERATION_ROW = 1
+"""Row of the acceleration in the rms of `measured`; row 0 is the rate."""
 
 RATE_RATIO_TARGET = '>= 3'
 """Target of the rate error of cv over the rate error of imm-b."""
@@ -50,6 +54,7 @@ RATE_RATIO_TARGET = '>= 3'
 
 def motion():
     """Return (times (n,) [s], truth (angle, rate, acceleration) (n,), {reversal: mask (n,)}) of all reversals."""
+    # legs: time at which the target is in the middle before each reversal; starts: begin of each reversal.
     stroke, rate = profiles.S_MOTION_STROKE_RAD, profiles.S_MOTION_RATE_RAD_S
     begin, legs, starts = LEAD_TIME_S, [], {}
     for reversal in REVERSAL_DURATIONS_S:
@@ -113,10 +118,10 @@ def rows(values):
         table += [row(case, 'rate_rms_deg_s', rate, 'deg/s'),
                   row(case, 'acceleration_rms_deg_s2', acceleration, 'deg/s2')]
         if name != 'cv':
-            cv = values[reversal, 'cv']
-            table += [row(case, 'rate_ratio_of_cv', cv[0] / rate, '',
+            cv_rate, cv_acceleration = values[reversal, 'cv']
+            table += [row(case, 'rate_ratio_of_cv', cv_rate / rate, '',
                           target=RATE_RATIO_TARGET if name == 'imm-b' else None),
-                      row(case, 'acceleration_ratio_of_cv', cv[1] / acceleration, '')]
+                      row(case, 'acceleration_ratio_of_cv', cv_acceleration / acceleration, '')]
     return table
 
 
@@ -128,7 +133,7 @@ def peak_acceleration(reversal):
 def remarks(values):
     """Return the sentences that explain the rows; values as of `measured`."""
     worse = [f'{peak_acceleration(reversal):.1f}' for reversal in REVERSAL_DURATIONS_S
-             if values[reversal, 'imm-a'][1].mean() > values[reversal, 'cv'][1].mean()]
+             if values[reversal, 'imm-a'][ACCELERATION_ROW].mean() > values[reversal, 'cv'][ACCELERATION_ROW].mean()]
     lines = ['_ratio_of_cv is the error of cv over the error of the filter. cv estimates no acceleration, so its '
              'error is the acceleration itself.']
     if worse:

@@ -1,9 +1,12 @@
 """Miss over rate noise for all tunings of every filter: a fair comparison of paper 003's feed-forward.
 
-The loop is that of the study imm-feedforward, azimuth, with prediction over the delay for all filters. Any filter has
-a small miss if its rate may be noisy. Each filter is therefore tuned from low to high bandwidth, and the curves are
-compared. Cases <filter> are the miss at the point of the curve with the rate noise of imm, and the rate noise at the
-point with the miss of imm.
+The loop is that of the study imm-feedforward, azimuth, with prediction over the delay for all filters. The miss is the
+pointing error: the angle from the axis of the antenna to the target. The rate noise is the rms error of the rate that
+is fed forward while the rate of the target is constant. Any filter has a small miss if its rate may be noisy. Each
+filter is therefore tuned from low to high bandwidth, and its curve of miss over rate noise is compared with one
+point. This point is the case imm-predicted: the IMM with the tuning of the study imm-feedforward. Cases <filter> are
+numbers of the curve of a filter; case `imm` is the curve of the IMM over its tunings. The numbers are the miss at the
+rate noise of imm-predicted, the rate noise at the miss of imm-predicted, and the least miss.
 """
 import dataclasses
 import math
@@ -30,8 +33,11 @@ DEFAULT_RUNS = 50
 
 LOOP_AXIS = 'azimuth'
 
-REFERENCE_SOURCE = feedforward_loop.imm(40.0, True)
-"""Case imm-predicted of the study imm-feedforward, with which the rows compare."""
+REFERENCE_SOURCE = feedforward_loop.imm(q_ca=40.0, predicted=True)
+"""Case imm-predicted of the study imm-feedforward, with which the curves are compared."""
+
+REFERENCE_POINT = ('reference', 0.0)
+"""Key of REFERENCE_SOURCE beside the keys (filter, value) of the tunings."""
 
 
 def _current_statistical(a_max):
@@ -49,20 +55,26 @@ FILTER_TUNINGS = {
     'cv': ('q [deg/s2/sqrt(Hz)]', _logarithmic(0.05, 50.0, 13), feedforward_loop.cv),
     'ca': ('q [deg/s3/sqrt(Hz)]', _logarithmic(0.05, 500.0, 13), feedforward_loop.ca),
     'current_statistical': ('a_max [deg/s2], alpha 0.5 1/s', _logarithmic(0.5, 1000.0, 13), _current_statistical),
-    'imm': ('q of its ca [deg/s3/sqrt(Hz)]', _logarithmic(0.5, 500.0, 10), lambda q: feedforward_loop.imm(q, True))}
-"""{filter: (name of the tuned parameter, its values, function value -> Source)}."""
+    'imm': ('q of its ca [deg/s3/sqrt(Hz)]', _logarithmic(0.5, 500.0, 10),
+            lambda q: feedforward_loop.imm(q_ca=q, predicted=True))}
+"""{filter: (name of the tuned parameter, its values, function value -> Source)}; q: process noise."""
+
+FILTER_MEANINGS = {'cv': 'Kalman filter of constant rate', 'ca': 'Kalman filter of constant acceleration',
+                   'current_statistical': "'current' statistical model of paper 000",
+                   'imm': 'IMM of cv, ca and current_statistical, with other noises of its ca'}
+"""{filter: description}, for the table of the documentation."""
 
 FILTER_COLOURS = {'cv': TRUTH_COLOUR, 'ca': RAW_COLOUR, 'current_statistical': MOTOR_2_COLOUR, 'imm': FILTERED_COLOUR}
 
 MISS_RATIO_TARGET = '>= 5'
-"""Target of the miss of cv at the rate noise of the imm, over the miss of the imm (reference: 7 to 9)."""
+"""Target of the miss of cv at the rate noise of imm-predicted, divided by the miss of imm-predicted."""
 
 
 def cases():
     """Return {(filter, value): (axis, Source)} of all tunings and of the reference."""
     tunings = {(name, value): (LOOP_AXIS, dataclasses.replace(source(value), predicted=True))
              for name, (_, values, source) in FILTER_TUNINGS.items() for value in values}
-    return tunings | {('reference', 0.0): (LOOP_AXIS, REFERENCE_SOURCE)}
+    return tunings | {REFERENCE_POINT: (LOOP_AXIS, REFERENCE_SOURCE)}
 
 
 def run(progress, runs=DEFAULT_RUNS, pool=None) -> Result:
@@ -74,7 +86,7 @@ def run(progress, runs=DEFAULT_RUNS, pool=None) -> Result:
 
 
 def measured(statistics):
-    """Return (noise of a uniform rate [deg/s], miss rms [deg]) of every run of MissStatistics, an array (2, runs)."""
+    """Return (rate noise [deg/s], miss rms [deg]) of every run of MissStatistics, an array (2, runs)."""
     return np.array([statistics.of(metric) for metric in ('rate_noise_deg_s', 'miss_rms_deg')])
 
 
@@ -109,13 +121,14 @@ def rows(points):
     The curves are read run by run, because all filters have the same noise in a run. A number that is not on the curve
     of every run has no row.
     """
-    noise, miss = points['reference', 0.0]
+    noise, miss = points[REFERENCE_POINT]
     table = [row('imm-predicted', 'miss_rms_deg', miss, 'deg'),
              row('imm-predicted', 'rate_noise_deg_s', noise, 'deg/s')]
     for name in FILTER_TUNINGS:
         fronts = [frontier({case: values[:, i] for case, values in points.items()}, name) for i in range(len(miss))]
         table += [row(name, 'least_miss_deg', np.array([front[1, -1] for front in fronts]), 'deg'),
                   row(name, 'rate_noise_at_least_miss_deg_s', np.array([front[0, -1] for front in fronts]), 'deg/s')]
+        # A front begins at its least noise and ends at its least miss.
         if all(front[0, 0] <= own for front, own in zip(fronts, noise)):
             equal = np.array([miss_at(*run) for run in zip(fronts, noise)])
             table += [row(name, 'miss_at_equal_rate_noise_deg', equal, 'deg'),
@@ -134,7 +147,7 @@ def remarks(points):
     """
     tuned = '; '.join(f'{name}: {what} {values[0]:g} to {values[-1]:g}'
                       for name, (what, values, _) in FILTER_TUNINGS.items())
-    noise, miss = points['reference', 0.0]
+    noise, miss = points[REFERENCE_POINT]
     loud = [name for name in FILTER_TUNINGS if frontier(points, name)[0, 0] > noise]
     never = [name for name in FILTER_TUNINGS if frontier(points, name)[1, -1] > miss]
     lines = [f'Every filter is predicted to the instant of its command. The tunings are {tuned}. The rows give the '
@@ -149,7 +162,7 @@ def remarks(points):
 
 def miss_figure(points):
     """Draw miss over rate noise, a curve for every filter; points as of `remarks`."""
-    figure, axes = new_panels(1, height=4.8, x='noise of the rate fed forward, uniform part [deg/s]',
+    figure, axes = new_panels(1, height=4.8, x='noise of the rate fed forward, at constant rate [deg/s]',
                               y='miss rms [deg]')
     panel = axes[0, 0]
     for name, colour in FILTER_COLOURS.items():
@@ -158,8 +171,8 @@ def miss_figure(points):
         for value in (values[0], values[len(values) // 2], values[-1]):
             panel.annotate(f'{value:g}', points[name, value], xytext=(3, 3), textcoords='offset points', color=colour,
                            fontsize=8)
-    panel.loglog(*points['reference', 0.0], 'o', ms=7.0, color=MOTOR_1_COLOUR, fillstyle='none', label='imm-predicted')
-    noise, miss = points['reference', 0.0]
+    noise, miss = points[REFERENCE_POINT]
+    panel.loglog(noise, miss, 'o', ms=7.0, color=MOTOR_1_COLOUR, fillstyle='none', label='imm-predicted')
     panel.axvline(noise, color=INK_COLOUR, linewidth=0.6, linestyle=':')
     panel.axhline(miss, color=INK_COLOUR, linewidth=0.6, linestyle=':')
     return drawing.legend(figure)

@@ -72,25 +72,31 @@ def jerk(q):
 
 
 COMPARED_LOOPS = {
+    # The loop of the paper, with and without compensation of 0.85 of the ship's rate.
     'paper': PaperLoop(delay=LOOP_DELAY_MS), 'paper-delta': PaperLoop(delay=LOOP_DELAY_MS, delta=0.85),
+    # The same loop, which points the beam at the angle predicted for the next update, R(k+1/k).
     'type-2': PaperLoop(delay=LOOP_DELAY_MS, form='type_2'),
     'type-2-delta': PaperLoop(delay=LOOP_DELAY_MS, form='type_2', delta=0.85),
+    # Filters that expect more or less jerk of the target; tracked-10ms commands the beam every 10 ms, not every 1 ms.
     'tracked-10ms': FilterLoop(jerk(1.0), RECEIVER_NOISE_RAD, hold=10),
     'best': FilterLoop(jerk(0.1), RECEIVER_NOISE_RAD),
     'fast': FilterLoop(jerk(1.0), RECEIVER_NOISE_RAD), 'faster': FilterLoop(jerk(10.0), RECEIVER_NOISE_RAD),
+    # `best` with a delay of 150 ms, and `best` which assumes a delay that is 10 ms too short.
     'best-delay-150ms': FilterLoop(jerk(0.1), RECEIVER_NOISE_RAD, delay=150),
     'best-told-10ms-less': FilterLoop(jerk(0.1), RECEIVER_NOISE_RAD, assumed_delay=LOOP_DELAY_MS - 10)}
-"""Loops on one plant: the paper's loop with the ship's rate, its type-2 form, and constant-acceleration filters.
+"""Loops on one plant: the paper's loop, its type-2 form, and constant-acceleration filters.
 
-The input of the filters is beam in force + error. The command is their prediction for the middle of the interval,
-every 1 ms (tracked-10ms: every 10 ms). In `best-told-10ms-less` the loop assumes a delay that is 10 ms too short.
+The input of the filters is beam in force + error. The command is their prediction for the middle of the interval in
+which the beam is held.
 """
 
 INS_LOOPS = {
     'best/sway-ins': FilterLoop(jerk(1e-3), RECEIVER_NOISE_RAD, use_ins=True, stamp_error=INS_STAMP_ERROR_MS),
     'best/sway-ins/exact-stamps': FilterLoop(jerk(1e-3), RECEIVER_NOISE_RAD, use_ins=True),
     'best/sway-ins/rate-only': FilterLoop(jerk(1e-3), RECEIVER_NOISE_RAD, use_ins=True, tau=0.0)}
-"""Loops with a filter in the earth frame: with an error of the stamps, with exact stamps, without acceleration."""
+"""Loops with a filter in the earth frame, to which the INS rotates the measured angle. The stamps of the INS are 5 ms
+wrong, exact, or exact without use of the acceleration from the INS (rate-only). On the sway the target stands still in
+the earth frame, so the filter expects little jerk."""
 
 METRIC_TARGETS = {
     ('step/alpha=0.1/T=10ms/S0', 'overshoot_percent'): '19.7 +- 0.5',
@@ -177,10 +183,11 @@ def name(loop):
 
 def steps():
     """Return {PaperLoop: step response (n,) of the beam from rest, over the size of the step at sample 0}."""
-    loops = [PaperLoop(alpha, T, smoothing=S) for alpha in ALPHA_GAINS for T in LOOP_PERIODS_MS
+    loops = [PaperLoop(alpha=alpha, period=T, smoothing=S) for alpha in ALPHA_GAINS for T in LOOP_PERIODS_MS
              for S in SMOOTHING_CODES]
     loops += [PaperLoop(delay=delay, smoothing=S) for delay in LOOP_DELAYS_MS[1:] for S in SMOOTHING_CODES]
     loops += [PaperLoop(slope=slope) for slope in SLOPE_RATIOS if slope != 1.0]
+    # The step comes after the smoothing is full of samples at rest, and 3 s of its response follow.
     target = np.full(3000 + SMOOTHING_SAMPLES, STEP_SIZE_RAD)
     target[:SMOOTHING_SAMPLES] = 0.0
     return {loop: loop.run(target)[0][SMOOTHING_SAMPLES:] / STEP_SIZE_RAD for loop in loops}
@@ -215,7 +222,7 @@ def eigenvalue_limit(loop, near):
 
 def limits():
     """Return {PaperLoop: (largest stable delay by bisection, by eigenvalues) [ms]}."""
-    loops = [PaperLoop(alpha, T, smoothing=S) for alpha in ALPHA_GAINS for T in LOOP_PERIODS_MS
+    loops = [PaperLoop(alpha=alpha, period=T, smoothing=S) for alpha in ALPHA_GAINS for T in LOOP_PERIODS_MS
              for S in SMOOTHING_CODES]
     loops += [PaperLoop(slope=slope) for slope in SLOPE_RATIOS if slope != 1.0] + [PaperLoop(form='type_2')]
     delays = {}
@@ -292,11 +299,13 @@ def beam(case, run=None):
     sway, rate = sway_target()
     noise, ins_angle, ins_rate = 3 * (np.zeros(len(sway)),) if run is None else noises(run)
     if case in INS_LOOPS:
-        return INS_LOOPS[case].run(sway, noise, sway + ins_angle, rate + ins_rate)[0]
-    name, of = case.split('/')
-    loop = COMPARED_LOOPS[name]
-    more = {'rate': rate} if isinstance(loop, PaperLoop) and of == 'sway' else {}
-    return loop.run(compared_targets()[of], noise=noise, **more)[0]
+        beam_angles, _ = INS_LOOPS[case].run(sway, noise, attitude=sway + ins_angle, rate=rate + ins_rate)
+        return beam_angles
+    loop_name, target = case.split('/')
+    loop = COMPARED_LOOPS[loop_name]
+    ship_rate = {'rate': rate} if isinstance(loop, PaperLoop) and target == 'sway' else {}
+    beam_angles, _ = loop.run(compared_targets()[target], noise=noise, **ship_rate)
+    return beam_angles
 
 
 def jitter(item):
@@ -307,7 +316,8 @@ def jitter(item):
     case, runs = item
     if case in GRAPH_CASES:
         quiet = graph_error(case, quiet=True)
-        return [math.degrees(rms((graph_error(case, seed=FIRST_SEED + i) - quiet)[:, 1])) for i in range(runs)]
+        return [math.degrees(rms((graph_error(case, seed=FIRST_SEED + i) - quiet)[:, ELEVATION_COLUMN]))
+                for i in range(runs)]
     clean = beam(case)
     return [math.degrees(rms(settled(beam(case, i) - clean))) for i in range(runs)]
 
@@ -409,6 +419,8 @@ def graph_case(case, quiet=False):
                                                   'acu.tracker.receiver.sigma_floor': sigma})
 
 
+ELEVATION_COLUMN = 1
+"""Column of the elevation in an error of GRAPH_CASES; column 0 is the cross-elevation."""
 GRAPH_EVALUATION_START_S = 10.0
 """Start of the evaluation of the runs of GRAPH_CASES [s]."""
 

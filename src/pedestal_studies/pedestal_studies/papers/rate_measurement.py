@@ -11,6 +11,7 @@ measured rate |G_1| never does, because the two measurements make a complementar
 """
 import dataclasses
 import math
+import typing
 
 import numpy as np
 
@@ -71,6 +72,21 @@ SETTLING_TIME_S = 5.0
 DIFFERENCED_RATES = {'differenced-1': 1, 'differenced-20': 20}
 """{case: steps of T over which the measured angles are differenced to a rate}."""
 
+RATE_SOURCE_MEANINGS = {
+    'position': 'none: only the angle is measured', 'position-rate': 'sensor of its own, noise 0.1 deg/s',
+    'position-rate-0.02': 'sensor of its own, noise 0.02 deg/s',
+    'differenced-1': 'difference of the measured angles over one step of 10 ms',
+    'differenced-20': 'difference of the measured angles over 20 steps, 0.2 s'}
+"""{case of the flyby: source of its rate}, for the table of the documentation."""
+
+
+class FlybyRecord(typing.NamedTuple):
+    """Measured angle [rad], measured rate [rad/s] and axis_filter.ESTIMATE_DTYPE of a flyby, each (n,)."""
+    angle: np.ndarray
+    rate: np.ndarray
+    estimate: np.ndarray
+
+
 BATCH_RUNS, NOISE_SEED = 25, 1
 """Flybys of one batch; seed of their noise."""
 
@@ -104,18 +120,19 @@ def steady_state_matrices(sigma_a, rate_sigma):
     """
     c = axis_filter.constants(filter_of(math.radians(sigma_a), 1.0))        # floor 1: sigma_a = a_max at all times
     R_rate = math.radians(rate_sigma) ** 2
-    none = 0.0 if math.isfinite(R_rate) else math.nan
+    zero_rate = 0.0 if math.isfinite(R_rate) else math.nan
     f = np.zeros(1, axis_filter.FILTER_DTYPE)
-    _settle(f, c, none, R_rate, SETTLING_STEPS)
+    _settle(f, c, zero_rate, R_rate, SETTLING_STEPS)
 
     def after(x, y, y_rate):
+        """Return the state (3,) one step after the state x, with the measurements y and y_rate."""
         one = f.copy()
         one['x'][0, 0] = x
         _step(one, c, y, y_rate, R_rate)
         return one['x'][0, 0]
 
-    A = np.column_stack([after(unit, 0.0, none) for unit in np.eye(3)])
-    B = np.column_stack([after(0.0, 1.0, none), after(0.0, 0.0, 1.0 if math.isfinite(R_rate) else math.nan)])
+    A = np.column_stack([after(unit, 0.0, zero_rate) for unit in np.eye(3)])
+    B = np.column_stack([after(0.0, 1.0, zero_rate), after(0.0, 0.0, 1.0 if math.isfinite(R_rate) else math.nan)])
     return A, B
 
 
@@ -141,7 +158,8 @@ def measures(sigma_a, rate_sigma):
     """Return {metric: (value, unit)} of the filter with constant gains."""
     A, B = steady_state_matrices(sigma_a, rate_sigma)
     angle, rate = responses(A, B, RESPONSE_FREQUENCIES_HZ)
-    error = 1.0 - responses(A, B, np.array([DYNAMIC_ERROR_FREQUENCY_HZ]))[0][0]
+    (angle_at_frequency,), _ = responses(A, B, np.array([DYNAMIC_ERROR_FREQUENCY_HZ]))
+    error = 1.0 - angle_at_frequency
     return {'rate_bandwidth_hz': (bandwidth(rate), 'Hz'), 'angle_bandwidth_hz': (bandwidth(angle), 'Hz'),
             'dynamic_error_0p2hz': (abs(error), ''), 'largest_eigenvalue': (np.abs(np.linalg.eigvals(A)).max(), '')}
 
@@ -181,7 +199,7 @@ def flyby():
 
 
 def flyby_record(name, run):
-    """Return (measured angle [rad], measured rate [rad/s], ESTIMATE), each (n,), of one flyby.
+    """Return the FlybyRecord of one flyby.
 
     name: one of FLYBY_CASES. The noise depends only on `run`.
     """
@@ -193,7 +211,7 @@ def flyby_record(name, run):
     else:
         sigma = math.radians(RATE_SIGMAS_DEG_S[name])
         y_rate, R_rate = target[:, 1] + sigma * normals[1], sigma * sigma
-    return y, y_rate, filtered(t, target, y, y_rate, R_rate)
+    return FlybyRecord(y, y_rate, filtered(t, target, y, y_rate, R_rate))
 
 
 def batch(item):
@@ -204,7 +222,7 @@ def batch(item):
     name, first, count = item
     t, target = flyby()
     counts = t >= SETTLING_TIME_S
-    estimates = [flyby_record(name, run)[2] for run in range(first, first + count)]
+    estimates = [flyby_record(name, run).estimate for run in range(first, first + count)]
     return np.degrees([[tracking.rms((out[field] - target[:, i])[counts]) for i, field in enumerate(('angle', 'rate'))]
                        for out in estimates])
 
@@ -223,6 +241,7 @@ def rows(measured, errors):
     for name, values in measured.items():
         table += [row(name, metric, value, unit, target='< 1' if metric == 'largest_eigenvalue' else None)
                    for metric, (value, unit) in values.items()]
+        # The case without a measured rate and with the same sigma_a is the other part of the ratios.
         kind, _, sigma_a = name.partition('/')
         if kind != 'position':
             without = measured['position' + ('/' + sigma_a if sigma_a else '')]
@@ -301,15 +320,15 @@ def flyby_figure():
     labels = ('rate [deg/s]', 'error of the angle [deg]', 'error of the rate [deg/s]', 'acceleration [deg/s2]')
     figure, axes = new_panels(4, height=8.6, y=labels, sharex=True)
     t, target = flyby()
-    y, y_rate, _ = flyby_record('position-rate', 0)
+    record = flyby_record('position-rate', run=0)
     near = np.abs(t - 0.5 * profiles.RECORD_DURATION_S) <= 0.2 * profiles.RECORD_DURATION_S
-    measured = (y_rate, y - target[:, 0], y_rate - target[:, 1], None)
+    measured = (record.rate, record.angle - target[:, 0], record.rate - target[:, 1], None)
     truth = (target[:, 1], 0.0 * t, 0.0 * t, target[:, 2])
     for panel, values in zip(axes[:, 0], measured):
         if values is not None:
             panel.plot(t[near], np.degrees(values[near]), color=RAW_COLOUR, linewidth=0.5, label='measured')
     for name in ('position', 'position-rate'):
-        out = flyby_record(name, 0)[2]
+        out = flyby_record(name, run=0).estimate
         for panel, values in zip(axes[:, 0], (out['rate'], out['angle'] - target[:, 0], out['rate'] - target[:, 1],
                                               out['acceleration'])):
             panel.plot(t[near], np.degrees(values[near]), color=CASE_COLOURS[name], label=name)

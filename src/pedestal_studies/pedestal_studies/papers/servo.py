@@ -51,13 +51,16 @@ PAPER_R1_PARAMETERS: dict[str, float] = {}
 """No changes: the scenarios servo_step and servo_sine have the gains for the reading 0.4 Hz."""
 
 PAPER_R2_PARAMETERS = {'acu.azimuth.pid.bandwidth': 8.75, 'acu.azimuth.pid.derivative': 0.0}
+"""Gains for the reading 0.4 rad/s."""
 
 PAPER_ALL_PARAMETERS = {'acu.azimuth.pid.bandwidth': 54.0, 'acu.azimuth.pid.derivative': 0.45,
                         'adu.azimuth.speed_loop.proportional': 1.5, 'adu.azimuth.speed_loop.integral': 7.0}
 """Gains that a search found, because the paper prints none.
 
 A position loop K e + D e' before a rate loop of type 1 falls short of the amplitude. The shortfall is (1 + 2 D) (w /
-K)^2 / 2, which is 0.2 % with paper-r1. A slow rate loop, tau = J / K_p, compensates tau w^2 / K of it.
+K)^2 / 2, which is 0.2 % with paper-r1. A slow rate loop, tau = J / K_p, compensates tau w^2 / K of it. K, D: bandwidth
+and derivative of the pid; e: position error; w: frequency of the sine; J: inertia; K_p: proportional gain of the speed
+loop.
 """
 
 DRIVE_PARAMETERS = {

@@ -10,8 +10,10 @@ With x = (angle, rate, acceleration), x+ = Phi x + U abar and the mean accelerat
 
     controllability (U, Phi U, Phi^2 U),        observability (H', (H Phi)', (H Phi^2)')'.
 
-`condition` is the condition of these matrices with T as the unit of time, in which the entries are of one size. In
-seconds the entries differ by up to 1 / T^2, and `condition_in_seconds` shows only this.
+Phi, U: transition over T and effect of the mean acceleration abar; H: measurement; ': transposed. The condition number
+is the largest over the smallest singular value of a matrix. `condition` is measured with T in place of the second as
+the unit of time, in which the entries are of one size. In seconds the entries differ by up to 1 / T^2, and
+`condition_in_seconds` shows only this.
 """
 import math
 
@@ -25,7 +27,7 @@ from pedestal_analysis.trials import monte_carlo
 from pedestal_common.graph.topics import AXES
 from pedestal_studies.papers.rate_measurement import ALPHA, ANGLE_SIGMA_RAD, differenced_rate, filtered
 from pedestal_studies.rigs import drawing, ensemble
-from pedestal_studies.rigs.ensemble import MEASUREMENT_PERIOD_S as T
+from pedestal_studies.rigs.ensemble import MEASUREMENT_PERIOD_S
 from pedestal_studies.rigs.rows import Result
 
 DEFAULT_RUNS, NOISE_SEED = 40, 1
@@ -64,7 +66,8 @@ def flight():
         E = atan2(h, rho),  E' = -v h x / (rho r^2),
         E'' = -v^2 h (1 / (rho r^2) - x^2 (3 rho^2 + h^2) / (rho^3 r^4)).
     """
-    t = FLIGHT_START_S + T * np.arange(round((FLIGHT_END_S - FLIGHT_START_S) / T) + 1)
+    n = round((FLIGHT_END_S - FLIGHT_START_S) / MEASUREMENT_PERIOD_S) + 1
+    t = FLIGHT_START_S + MEASUREMENT_PERIOD_S * np.arange(n)
     v, d, h, x = TARGET_SPEED_M_S, MIN_GROUND_DISTANCE_M, TARGET_HEIGHT_M, TARGET_SPEED_M_S * (t - CULMINATION_TIME_S)
     rho2 = x * x + d * d
     rho, r2 = np.sqrt(rho2), rho2 + h * h
@@ -81,7 +84,7 @@ def flight_record(axis, run):
     """
     t, target = flight()
     truth = target[axis]
-    nu, nu_rate = ensemble.normal_draws(NOISE_SEED + AXES.index(axis), run, 1, len(t))[:, 0]
+    nu, nu_rate = ensemble.normal_draws(NOISE_SEED + AXES.index(axis), first=run, count=1, n=len(t))[:, 0]
     y, y_rate = truth[:, 0] + ANGLE_SIGMA_RAD * nu, truth[:, 1] + RATE_SIGMA_RAD_S * nu_rate
     out = filtered(t, truth, y, y_rate, RATE_SIGMA_RAD_S * RATE_SIGMA_RAD_S)
     difference, _ = differenced_rate(y_rate, DIFFERENCE_STEPS)
@@ -123,6 +126,7 @@ def observability(Phi, H):
 
 def matrices():
     """Return {case: (matrix in seconds, matrix with T as the unit of time)}."""
+    T = MEASUREMENT_PERIOD_S
     Phi, U = model(T)
     unit = np.diag([1.0, T, T * T])         # (angle, rate T, acceleration T^2) of (angle, rate, acceleration)
     back = np.linalg.inv(unit)
@@ -150,7 +154,8 @@ def rows(errors):
 def remarks():
     """Return the sentences that explain the rows, with the matrices in seconds."""
     lines = ['Without the filter the acceleration is the difference of the measured rate over '
-             f'{DIFFERENCE_STEPS * T:g} s. The paper prints no error; it claims "smooth" and "does not diverge".']
+             f'{DIFFERENCE_STEPS * MEASUREMENT_PERIOD_S:g} s. The paper prints no error; it claims "smooth" and "does '
+             'not diverge".']
     for name, (matrix, _) in matrices().items():
         lines += [f'{name}, in seconds:', *('    ' + '  '.join(f'{value:11.4g}' for value in line) for line in matrix)]
     return lines
@@ -158,17 +163,19 @@ def remarks():
 
 def figures():
     """Return {name: function that draws it}: the paper's figures 1 to 4 and 5 to 8."""
-    return {'figures-1-to-4': lambda: axis_figure('azimuth', 1), 'figures-5-to-8': lambda: axis_figure('elevation', 5)}
+    return {'figures-1-to-4': lambda: axis_figure('azimuth', first_number=1),
+            'figures-5-to-8': lambda: axis_figure('elevation', first_number=5)}
 
 
-def axis_figure(axis, first):
+def axis_figure(axis, first_number):
     """Draw angle, a part of it, rate and acceleration of one flight, measured, filtered and true.
 
-    first: number of the first of the paper's four figures.
+    first_number: number of the first of the paper's four figures.
     """
     figure, axes = new_panels(4, height=9.0)
     t, target = flight()
-    measured, filtered = flight_record(axis, 0)
+    measured, filtered = flight_record(axis, run=0)
+    # The second panel is a window of the first, so both show column 0, the angle.
     for i, (panel, column) in enumerate(zip(axes[:, 0], (0, 0, 1, 2))):
         begin, end = ZOOM_WINDOWS_S[axis] if i == 1 else (FLIGHT_START_S, FLIGHT_END_S)
         shown = (t >= begin) & (t <= end)
@@ -179,7 +186,7 @@ def axis_figure(axis, first):
                    label='truth')
         name, unit = list(QUANTITY_UNITS.items())[column]
         panel.set_ylabel(f'{name} [{unit}]')
-        panel.set_title(f'{axis}: {name} (figure {first + i} of the paper)')
+        panel.set_title(f'{axis}: {name} (figure {first_number + i} of the paper)')
     axes[3, 0].set_ylim(*np.degrees(2.0 * np.abs(target[axis][:, 2]).max() * np.array((-1.0, 1.0))))
     return drawing.legend(figure)
 

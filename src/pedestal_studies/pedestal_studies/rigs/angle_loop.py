@@ -1,5 +1,8 @@
 """The angle loop of a phased array on one axis, on a grid of 1 ms: paper 002's loop, and a loop with a target filter.
 
+Symbols of paper 002: R, v: angle and rate that the loop predicts for the target; T: time between two updates; alpha,
+beta: gains of the error for R and for v T, beta follows from alpha (Benedict and Bordner).
+
 Each loop is one compiled kernel of the laws that the nodes run: the smoothing and the pattern of the receiver, the
 loop of the beam or a target filter, and the electronic beam. The grid, with h = GRID_STEP_S:
 
@@ -161,7 +164,8 @@ class FilterLoop:
 def _beam(delay, hold):
     """Return a Beam at rest at 0; delay, hold: in samples of the grid."""
     return Beam(electronic_beam.initial_state(0.0, 0.0),
-                electronic_beam.constants(GRID_STEP_S, delay * GRID_STEP_S, 2 * hold * GRID_STEP_S),
+                electronic_beam.constants(GRID_STEP_S, transport_delay=delay * GRID_STEP_S,
+                                          timeout=2 * hold * GRID_STEP_S),
                 np.zeros(1, electronic_beam.INPUTS_DTYPE),
                 np.zeros(1, electronic_beam.OUTPUTS_DTYPE))
 
@@ -176,6 +180,7 @@ def receiver_reading(offset, receiver):
     slope, beamwidth, lost_power_ratio = receiver
     if beamwidth == 0.0:
         return slope * offset
+    # One axis: no offset across the axis, and no cross-coupling (cos beta = 1, sin beta = 0).
     S, D, _ = monopulse.channels(offset / beamwidth, 0.0, slope * K_M, 1.0, 0.0)
     if S * S < lost_power_ratio:
         return math.nan

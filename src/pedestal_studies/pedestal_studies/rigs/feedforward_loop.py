@@ -78,8 +78,8 @@ STEP_RECORD = np.dtype([('miss', 'f8'), ('rate', 'f8'), ('acceleration', 'f8'), 
 def _follow(target, known, f, c, lead, M, normals, out):
     """Run the loop: target (n, 3), normals (runs, n) into STEP_RECORD records out (runs, n); M as of `rate_loop_step`.
 
-    known (n, 2): rate and acceleration to feed forward. If known is (0, 2), they are the estimates of the filter f, c,
-    `lead` [s] after its miss.
+    known (n, 2): rate and acceleration to feed forward. If known is (0, 2), they are the estimates of the filter with
+    state f and constants c, `lead` [s] after its miss. Step j is the step of the miss that arrives in step k.
     """
     R = MISS_SIGMA_RAD * MISS_SIGMA_RAD
     encoder = np.empty(len(target))
@@ -189,6 +189,7 @@ def measures(axis, steps):
     t, target, period = motion(axis)
     counts = t >= 0.5 * period
     second = round(1.0 / T)
+    # The rate counts as uniform from UNIFORM_RATE_DELAY_S after a rate below 99.9 % of that between the ends.
     reversing = np.convolve(np.abs(target[:, 1]) < 0.999 * S_MOTION_RATE_RAD_S,
                             np.ones(round(UNIFORM_RATE_DELAY_S / T)))[:len(t)] > 0.5
     miss, noise = steps['miss'][:, counts], (steps['rate'] - target[:, 1])[:, counts & ~reversing]

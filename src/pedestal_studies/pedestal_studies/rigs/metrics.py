@@ -37,6 +37,7 @@ def whole_periods(t, period, skip):
 
     Raises ValueError for a record without a whole period.
     """
+    # The small tolerances keep a last period or a first sample that rounding errors put just outside.
     t = t - t[0]
     whole = math.floor((t[-1] - skip) / period + 1e-6)
     if whole < 1:
@@ -47,19 +48,22 @@ def whole_periods(t, period, skip):
 def harmonic_fit(t, y, w):
     """Return (offset, a, b) of the least-squares fit y = offset + a sin(w t) + b cos(w t)."""
     basis = np.column_stack((np.ones_like(t), np.sin(w * t), np.cos(w * t)))
-    return np.linalg.lstsq(basis, y, rcond=None)[0]
+    coefficients, *_ = np.linalg.lstsq(basis, y, rcond=None)
+    return coefficients
 
 
 def amplitude_and_period(t, y, period):
     """Return amplitude and period of a sine fitted to y by least squares (Gauss-Newton); period: first guess."""
     w = 2.0 * math.pi / period
+    # With t from the middle on, an error of w hardly changes the fitted phase, so the search converges from afar.
     middle = 0.5 * (t[0] + t[-1])
     t = t - middle
     for _ in range(20):
         offset, a, b = harmonic_fit(t, y, w)
         sine, cosine = np.sin(w * t), np.cos(w * t)
         basis = np.column_stack((np.ones_like(t), sine, cosine, t * (a * cosine - b * sine)))
-        change = np.linalg.lstsq(basis, y - offset - a * sine - b * cosine, rcond=None)[0][3]
+        # The last of the four unknowns is the change of w; the others are refitted by the next harmonic_fit.
+        (*_, change), *_ = np.linalg.lstsq(basis, y - offset - a * sine - b * cosine, rcond=None)
         w += change
         if abs(change) < 1e-13 * w:
             break

@@ -46,9 +46,9 @@ def lags(done, title, seconds):
     for (label, by_smoothing), colour in zip(done.items(), LINE_COLOURS):
         for column, S in zip(axes.T, SMOOTHING_TITLES):
             for panel, error in zip(column, by_smoothing[S]):
-                first = round(seconds[0] / GRID_STEP_S), round(seconds[1] / GRID_STEP_S)
-                error = np.degrees(error[slice(*first)])
-                panel.plot(GRID_STEP_S * np.arange(*first), error, color=colour, linewidth=0.9, label=label)
+                window = round(seconds[0] / GRID_STEP_S), round(seconds[1] / GRID_STEP_S)
+                error = np.degrees(error[slice(*window)])
+                panel.plot(GRID_STEP_S * np.arange(*window), error, color=colour, linewidth=0.9, label=label)
     figure.suptitle(title)
     return drawing.legend(figure)
 
@@ -81,17 +81,17 @@ def filter_loop_errors(errors, seconds):
     figure, axes = new_panels(3, height=7.6, y='largest error [deg]', sharex=True)
     lines = {'paper': RAW_COLOUR, 'paper-delta': INK_COLOUR, 'type-2': MOTOR_2_COLOUR, 'tracked-10ms': MOTOR_1_COLOUR,
              'best': FILTERED_COLOUR}
-    first = slice(*(round(t / GRID_STEP_S) for t in seconds))
-    t = GRID_STEP_S * np.arange(first.start, first.stop)
+    window = slice(*(round(t / GRID_STEP_S) for t in seconds))
+    t = GRID_STEP_S * np.arange(window.start, window.stop)
     for panel, target, title in zip(axes[:, 0], ('ramp', 'sine', 'sway'),
                                     ('30 deg/s', 'sine of 30 deg/s and 10 deg/s2', 'sway of 10 deg in 8 s')):
         for loop, colour in lines.items():
             if target == 'sway' or loop != 'paper-delta':
-                panel.semilogy(t, envelope(np.degrees(np.abs(errors[f'{loop}/{target}'][first]))), color=colour,
+                panel.semilogy(t, envelope(np.degrees(np.abs(errors[f'{loop}/{target}'][window]))), color=colour,
                                linewidth=1.1, label=loop)
         panel.set_title(title, fontsize=10)
         panel.set_ylim(1e-5, 1.0)
-    axes[2, 0].semilogy(t, envelope(np.degrees(np.abs(errors['best/sway-ins'][first]))), color=TRUTH_COLOUR,
+    axes[2, 0].semilogy(t, envelope(np.degrees(np.abs(errors['best/sway-ins'][window]))), color=TRUTH_COLOUR,
                         linewidth=1.1, label='best with INS, 5 ms late')
     figure.suptitle('true error without noise, delay 20 ms (best has no error on the ramp)')
     return drawing.legend(figure)
@@ -105,9 +105,9 @@ def envelope(x, width=10):
 def loss(records, seconds):
     """Draw true errors {label: (n,) in beamwidths} of a loop that keeps the target and of a loop that loses it."""
     figure, axes = new_panels(1, height=3.6, y='true error [beamwidths]')
-    panel, first = axes[0, 0], slice(*(round(t / GRID_STEP_S) for t in seconds))
+    panel, window = axes[0, 0], slice(*(round(t / GRID_STEP_S) for t in seconds))
     for (label, error), colour in zip(records.items(), LINE_COLOURS):
-        panel.plot(GRID_STEP_S * np.arange(first.start, first.stop), error[first], color=colour, linewidth=1.0,
+        panel.plot(GRID_STEP_S * np.arange(window.start, window.stop), error[window], color=colour, linewidth=1.0,
                    label=label)
     for half in (-0.5, 0.5):
         panel.axhline(half, color=INK_COLOUR, linewidth=0.8, linestyle='--')

@@ -26,8 +26,7 @@ TURN_ACCELERATION_M_S2, TURN_DISTANCE_M = 3.0, 500.0
 TURN_SCHEDULE, ROLL_DURATION_S = {14.0: 1.0, 22.0: -1.0, 38.0: 1.0, 46.0: 0.0}, 1.0
 """{time of a roll [s]: turn after it, 0 for straight on}, and duration of a roll [s].
 
-The reference gives only the acceleration and the distance. With straight legs before and after the turns, cv and ca
-have the numbers of the reference.
+The requirement for this motion states the acceleration and the distance. The times are ours.
 """
 
 S_MOTION_STROKE_RAD, S_MOTION_RATE_RAD_S, S_MOTION_REVERSAL_S = math.radians(20.0), math.radians(3.5), 1.0

@@ -31,7 +31,7 @@ ERROR_TOPIC, MODE_TOPIC = 'tracking_receiver/angle_error', 'acu/mode'
 POWER_UP_CASES = ('late_tle', 'sidelobe')
 """Cases whose time begins at the start."""
 SIGNAL_LOSS_CASES = ('fade', 'blockage', 'manoeuvre_in_coast')
-"""Cases whose time begins at the loss of the signal."""
+"""Cases whose time begins at the loss of the signal. `pedestal scenarios` describes all scenarios."""
 
 TARGET_ELEVATION_RAD = 0.6
 """Elevation of the target of the search cases [rad]."""
@@ -50,6 +50,10 @@ CASE_NAMES = (*POWER_UP_CASES, *SIGNAL_LOSS_CASES, 'steptrack_geo', *(f'search-{
 
 MAX_FOUND_ERROR_BEAMWIDTHS = 0.2
 """Largest true error of a target that is in the beam [beamwidths]."""
+
+MAIN_LOBE_LOSS_DB = 12.0
+"""Level lost at one beamwidth off the axis of a parabolic main lobe [dB]. The loss grows with the square of the error,
+so it is 3 dB at half a beamwidth."""
 
 STEPTRACK_SETTLING_TIME_S = 90.0
 """Time after which step track is on its target [s]."""
@@ -71,7 +75,11 @@ def case_of(name, seed):
 
 
 def offset(pattern, rng, beamwidth=0.0175):
-    """Return (cross-elevation, elevation) [rad] of a random place in the full area of a pattern."""
+    """Return (cross-elevation, elevation) [rad] of a random place in the full area of a pattern.
+
+    beamwidth [rad]: that of the scenario sidelobe. The area of a spiral and of a square pattern is a circle, so a
+    place outside the circle is drawn again. The area of the other patterns is a rectangle.
+    """
     p = SearchParameters()
     while True:
         x, e = rng.uniform(-1.0, 1.0, 2) * p.full * beamwidth
@@ -89,13 +97,13 @@ def tracked_after(run, from_loss):
     tracked = (run[MODE_TOPIC] == Mode.AUTOTRACK) & np.isfinite(run[ERROR_TOPIC]['vector'][:, 0])
     if not tracked[-1]:
         return math.nan
-    bad = np.flatnonzero(~tracked)
-    first = np.flatnonzero(tracked)[0]
-    last = bad[-1] + 1 if bad.size else 0
+    untracked = np.flatnonzero(~tracked)
+    first_tracked = np.flatnonzero(tracked)[0]
+    tracked_since = untracked[-1] + 1 if untracked.size else 0
     if not from_loss:
-        return run.t[last]
-    lost = bad[bad > first]
-    return run.t[last] - run.t[lost[0]] if lost.size else math.nan
+        return run.t[tracked_since]
+    lost = untracked[untracked > first_tracked]
+    return run.t[tracked_since] - run.t[lost[0]] if lost.size else math.nan
 
 
 def off_axis(run):
@@ -116,7 +124,8 @@ def batch(item):
         off = off_axis(run)
         if name == 'steptrack_geo':
             settled = off[run.t > STEPTRACK_SETTLING_TIME_S]
-            values.append((math.sqrt(np.mean((12.0 * settled**2)**2)), settled.max()))
+            level_loss_db = MAIN_LOBE_LOSS_DB * settled**2
+            values.append((math.sqrt(np.mean(level_loss_db**2)), settled.max()))
         else:
             after = tracked_after(run, name in SIGNAL_LOSS_CASES)
             values.append((after, float(math.isfinite(after) and off[-1] < MAX_FOUND_ERROR_BEAMWIDTHS)))
@@ -133,14 +142,15 @@ def rows(values):
     """Return the rows of values {case: (runs, 2)} as of `batch`."""
     table = []
     for name, of_runs in values.items():
-        first, second = of_runs.T
         if name == 'steptrack_geo':
-            table += [row(name, 'level_loss_rms_db', first, 'dB', target='<= 0.25'),
-                      row(name, 'pointing_max_beamwidths', second, 'beamwidths')]
+            level_loss, largest_error = of_runs.T
+            table += [row(name, 'level_loss_rms_db', level_loss, 'dB', target='<= 0.25'),
+                      row(name, 'pointing_max_beamwidths', largest_error, 'beamwidths')]
             continue
-        found = second == 1.0
+        tracked_after_s, in_beam = of_runs.T
+        found = in_beam == 1.0
         if found.any():
-            table.append(row(name, 'tracked_after_s', first[found], 's'))
+            table.append(row(name, 'tracked_after_s', tracked_after_s[found], 's'))
         table += [row(name, 'found_percent', 100.0 * float(found.mean()), '%', target=FOUND_PERCENT_TARGET),
                   row(name, 'found_percent_low', 100.0 * least_share(int(found.sum()), len(found)), '%')]
     return table
@@ -159,7 +169,8 @@ def time_figure(values):
     figure, axes = new_panels(1, height=3.8, x='time until the target is tracked [s]')
     for name, of_runs in values.items():
         if name != 'steptrack_geo':
-            found = of_runs[of_runs[:, 1] == 1.0, 0]
+            tracked_after_s, in_beam = of_runs.T
+            found = tracked_after_s[in_beam == 1.0]
             axes[0, 0].plot(found, [name] * len(found), '|', color=FILTERED_COLOUR)
     axes[0, 0].invert_yaxis()
     axes[0, 0].set_xlim(left=0.0)

@@ -1,8 +1,11 @@
 """Frequency response of the current, speed and position loops, measured by multisine on the simulated plant.
 
-pedestal_analysis/tuning/frequency_response.py measures the loops. The dashed line of a figure is the design of the
-gains. It is w_c / s for the current, (K_p + K_i / s) / (J s) for the speed of a rigid drive, and K_p / s + K_i / s^2
-for the position. Sampling, delay and elasticity cause the difference between the design and the measurement.
+pedestal_analysis/tuning/frequency_response.py measures the open loop L. The dashed line of a figure is the design of
+the gains. Sampling, delay and elasticity cause the difference between the design and the measurement. The design is
+
+    w_c / s                     current; w_c: bandwidth
+    (K_p + K_i / s) / (J s)     speed of a rigid drive; K_p, K_i: proportional and integral gain; J: inertia
+    K_p / s + K_i / s^2         position; K_p, K_i: proportional and integral gain
 """
 import dataclasses
 import functools
@@ -59,6 +62,10 @@ structure-notch: a faster loop with a rigid load, with a flexible load, and with
 
 MARGIN_BAND_FACTOR = math.sqrt(10.0)
 """Band about crossover in which the margins are read: |L| within this factor of 1, +-10 dB."""
+
+
+MAX_DRAWN_DEVIATION = 0.2
+"""Relative standard deviation of a measured response above which a frequency is not drawn [-]."""
 
 
 def nonlinearity(measured, smaller):
@@ -155,7 +162,7 @@ def bode_figure(title, curves, design):
             gain.semilogx(f, decibel(x), color=INK_COLOUR, lw=0.8, ls='--', label='as designed')
             phase.semilogx(f, degrees(x), color=INK_COLOUR, lw=0.8, ls='--')
         for i, (label, (measured, colour)) in enumerate(curves.items()):
-            keep = measured.deviation < 0.2
+            keep = measured.deviation < MAX_DRAWN_DEVIATION
             f, x = measured.frequency[keep], (measured.closed_loop if column else measured.open_loop)[keep]
             width = 3.2 if i == 0 and len(curves) > 1 else 1.1
             gain.semilogx(f, decibel(x), color=colour, lw=width, alpha=0.6 if width > 2.0 else 1.0,

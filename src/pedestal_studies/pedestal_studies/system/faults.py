@@ -81,6 +81,14 @@ FINE_CHECK_STEPS, COARSE_CHECK_STEPS = 200, 20
 """Steps after the onset in which the reports are read in every step, and steps between two readings at other times."""
 
 
+class Report(typing.NamedTuple):
+    """An active alarm, or the diagnosis of a node, at a step. source: ALARM_SOURCE or the name of the node."""
+    step: int
+    source: str
+    level: int
+    text: str
+
+
 class FaultOutcome(typing.NamedTuple):
     """Outcome of a run with a fault.
 
@@ -97,7 +105,7 @@ class FaultOutcome(typing.NamedTuple):
 
 
 def run_of(mode, inject=''):
-    """Return (Run, reports [(step, source, level, text)]) of a mode with a text NODE.inject=...
+    """Return (Run, [Report]) of a mode with a text NODE.inject=...
 
     The reports are the active alarms and the diagnosis of every node, at each step at which they are read.
     """
@@ -111,8 +119,10 @@ def run_of(mode, inject=''):
         """Note the reports after `made` steps. Return the number of steps until the next call."""
         if made:
             alarms = loop.units['acu'].alarms
-            reports.extend((made - 1, ALARM_SOURCE, 0, ALARM_NAMES[i]) for i in report.order(alarms))
-            reports.extend((made - 1, name, *unit.diagnose()[:2]) for name, unit in loop.units.items())
+            reports.extend(Report(made - 1, ALARM_SOURCE, 0, ALARM_NAMES[i]) for i in report.order(alarms))
+            for name, unit in loop.units.items():
+                diagnosis = unit.diagnose()
+                reports.append(Report(made - 1, name, diagnosis.level, diagnosis.message))
         if made < onset:
             return min(COARSE_CHECK_STEPS, onset - made)
         return 1 if made < onset + FINE_CHECK_STEPS else COARSE_CHECK_STEPS
@@ -175,19 +185,18 @@ def sun_angles(t):
 def baseline_reports(mode):
     """Return {(source, level, text)} of the reports without a fault, from BASELINE_START_S on."""
     run, reports = run_of(mode)
-    return {(source, level, text) for step, source, level, text in reports if run.t[step] >= BASELINE_START_S}
+    return {(one.source, one.level, one.text) for one in reports if run.t[one.step] >= BASELINE_START_S}
 
 
 def fault_outcome(mode, inject, baseline):
     """Return the FaultOutcome of a fault; baseline: as of `baseline_reports`."""
     run, reports = run_of(mode, inject)
     onset = int(np.searchsorted(run.t, FAULT_ONSET_S - 1e-9))
-    new = [(step, source, text) for step, source, level, text in reports
-           if step >= onset and (source, level, text) not in baseline]
-    alarms = tuple(dict.fromkeys(text for _, source, text in new if source == ALARM_SOURCE))
+    new = [one for one in reports if one.step >= onset and (one.source, one.level, one.text) not in baseline]
+    alarms = tuple(dict.fromkeys(one.text for one in new if one.source == ALARM_SOURCE))
     error = errors(run, mode)
     largest = float(np.nanmax(error)) if np.isfinite(error).any() else 0.0
-    return FaultOutcome(new[0][0] - onset if new else None, '{}: {}'.format(*new[0][1:]) if new else '', alarms,
+    return FaultOutcome(new[0].step - onset if new else None, f'{new[0].source}: {new[0].text}' if new else '', alarms,
                         MODES[run['acu/mode'][-1]], largest, error)
 
 

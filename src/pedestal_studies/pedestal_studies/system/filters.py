@@ -45,7 +45,8 @@ SETTLING_TIME_S = 3.0
 
 NOISE_CASES = {f'{colour}-{sigma}': Noise(math.radians(sigma), bandwidth)
                for sigma in (0.03, 0.1) for colour, bandwidth in (('white', None), ('coloured', 5.0))}
-"""{name: Noise} with the rms [deg]; coloured noise passes a first-order lag of 5 Hz."""
+"""{name: Noise} with the rms [deg]; coloured noise passes a first-order lag of 5 Hz and has the
+same rms."""
 
 RATE_SIGMAS_RAD_S = {f'current_statistical-rate-{sigma}': math.radians(sigma) for sigma in (0.5, 0.1, 0.02)}
 """{filter with a rate measurement: standard deviation of the measured rate [rad/s]}."""
@@ -66,8 +67,9 @@ FILTERS = {**{kind: FilterParameters(kind=kind) for kind in FILTER_KINDS if kind
 UNTUNED_FILTERS = ('imm', 'imm-manoeuvre', 'imm-expecting', 'imm_ukf')
 """Filters that are not tuned."""
 
-RANGED_CASE = ('flyby-60m', 1.0)
-"""Profile on which imm_ukf is shown, and standard deviation of its measured range [m]."""
+RANGED_PROFILE, RANGE_SIGMA_M = 'flyby-60m', 1.0
+"""Profile on which imm_ukf is shown, and standard deviation of its measured range [m]. The other profiles are motions
+in one angle without a distance, which this Cartesian filter needs."""
 
 SHOWN_FILTERS = (*FILTERS, 'imm_ukf')
 """Filters of the figures and tables."""
@@ -149,10 +151,10 @@ def batch(item):
     for name, params in filters.items():
         sums = measured(params, profile, noise_of(noise, name), NOISE_SEED, first, count)
         sums_of[name] = settled(sums), ensemble.over_runs(sums[:, ::THINNING_STEPS])
-    if profile == RANGED_CASE[0]:
+    if profile == RANGED_PROFILE:
         t = times()
         sums = ensemble.unscented_moments(UkfParameters(), profiles.truth(profile, t), profiles.distance(profile, t),
-                                          NOISE_CASES[noise], RANGED_CASE[1], (NOISE_SEED, first, count))
+                                          NOISE_CASES[noise], RANGE_SIGMA_M, (NOISE_SEED, first, count))
         sums_of['imm_ukf'] = settled(sums), ensemble.over_runs(sums[:, ::THINNING_STEPS])
     return sums_of
 

@@ -2,7 +2,7 @@
 
 Every run is the closed loop of the scenario without ROS, with another seed. It is measured as its recording would be.
 Cases are <scenario>[-<variant>]; CASES gives the parameters that a variant changes. A ratio to another case is the
-ratio of two runs with the same seed.
+ratio of two runs with the same seed. The metrics are those of `pedestal run --explain`, and those of `extra_results`.
 """
 import math
 
@@ -30,8 +30,8 @@ NEAR_FLYBY_PARAMETERS = {'tracking_receiver.target.flyby.closest_distance': 60.0
 NOISELESS_PARAMETERS = {'tracking_receiver.receiver.cn0_dbhz': 120.0, 'acu.tracker.receiver.sigma_floor': 5e-4,
                         **{f'ins.{name}': 0.0 for name in ('tilt_noise', 'heading_noise', 'rate_noise', 'tilt_wander',
                                                            'heading_wander')}}
-"""Parameters of a receiver and an INS without noise. The filter assumes noise of 5e-4 rad; with less it would
-follow the smallest model error."""
+"""Parameters of a receiver and an INS without noise. The filter assumes noise of 5e-4 rad. With a smaller assumed
+noise the filter would follow the smallest error of its model of the motion."""
 
 CASES = {case.name: case for case in (
     Case('leo_pass', 'leo_pass'), Case('ship_pass', 'ship_pass'),
@@ -44,6 +44,8 @@ CASES = {case.name: case for case in (
 
 TRACKING_METRICS = ('pointing_rms_deg', 'pointing_max_deg', 'single_sample_noise_deg', 'pointing_to_noise', 'loss_s')
 ISOLATION_METRICS = ('isolation_db', 'isolation_limit_db')
+"""Isolation from the rotation of the ship, and the isolation that a perfect antenna would show with the noise and the
+length of the run."""
 NOISE_METRICS = ('noise_reduction_cross_elevation', 'noise_reduction_elevation')
 ALIGNMENT_METRICS = ('aligned_s', 'heading_sigma_at_alignment_deg', 'heading_error_rms_deg',
                      'autotrack_after_alignment_s')
@@ -75,7 +77,12 @@ EXTRA_METRIC_UNITS = {'loss_to_predicted': '', 'keyhole_loss_predicted_s': 's', 
 
 
 def extra_results(values, run):
-    """Return {name: value} of results that a recording does not give: slew through a keyhole, time after alignment."""
+    """Return {name: value} of results that a recording does not give.
+
+        keyhole_loss_predicted_s        time off the beam that the control unit predicts for a slew through a keyhole
+        loss_to_predicted               measured time off the beam over the predicted time
+        autotrack_after_alignment_s     time from the alignment of the INS to the first autotrack, NaN without it
+    """
     more = {}
     slew = run.units['acu'].parts['state']['guidance']['lookahead']['slew']
     if slew['loss'] > 0.0:
@@ -123,7 +130,7 @@ def run(progress, runs=DEFAULT_RUNS, pool=None) -> Result:
     """Run every case `runs` times; pool: monte_carlo.Pool, None for this process."""
     values = (pool or monte_carlo.Pool(1)).of_cases(batch, CASES, runs, BATCH_RUNS, progress)
     return Result(rows(values), {'pointing': lambda: pointing_figure(values), 'uav-flyby': flyby_figure},
-                  [f'Seeds {FIRST_SEED} to {FIRST_SEED + runs - 1}.',
+                  [f'Seeds {FIRST_SEED} to {FIRST_SEED + runs - 1}. The variants as commands for the nodes:',
                    *(f'{name}: {CASES[name].command()}' for name in ('ship_pass-late', 'uav_flyby-60m'))])
 
 
@@ -134,12 +141,13 @@ def flyby_figure():
     flown = tracking.read(MemoryRecording(case.loaded(), case.run()))
     middle = np.abs(flown.t - 0.5 * flown.t[-1]) <= 0.5
     true = np.column_stack((flown.cross_elevation, flown.elevation_error))
-    for panel, errors, title in ((axes[0, 0], (flown.measured[:, 0], flown.filtered[:, 0], true[:, 0]),
-                                  'error in cross-elevation (figures 7, 8)'),
-                                 (axes[1, 0], tuple(angles[:, 1] - true[:, 1] + flown.target_earth[:, 1] for angles in
-                                                    (flown.measured, flown.filtered, true)),
-                                  'elevation of the target (figures 9, 10)')):
-        for values, colour, label in zip(errors, (RAW_COLOUR, FILTERED_COLOUR, INK_COLOUR),
+    cross_elevations, elevation_errors = zip(*(errors.T for errors in (flown.measured, flown.filtered, true)))
+    # An elevation of the target is the true one plus the difference of an error to the true error.
+    _, target_elevation = flown.target_earth.T
+    elevations = [error - flown.elevation_error + target_elevation for error in elevation_errors]
+    for panel, curves, title in ((axes[0, 0], cross_elevations, 'error in cross-elevation (figures 7, 8)'),
+                                 (axes[1, 0], elevations, 'elevation of the target (figures 9, 10)')):
+        for values, colour, label in zip(curves, (RAW_COLOUR, FILTERED_COLOUR, INK_COLOUR),
                                          ('receiver', 'filtered', 'truth')):
             panel.plot(flown.t[middle], np.degrees(values[middle]), color=colour, label=label,
                        linewidth=0.6 if label == 'receiver' else 1.2)

@@ -26,8 +26,8 @@ CONSTANTS_DTYPE = np.dtype([
 STATE_DTYPE = np.dtype([
     ('t', 'f8'),                            # time since power-up [s]
     ('observer', extended_observer.STATE_DTYPE),
-    ('v1', 'f8', (2,)), ('v2', 'f8', (2,)),
-    ('first', 'f8', (2,)), ('second', 'f8', (2,)), ('count', 'i8'),     # slope of w_cE, w_cN
+    ('v1', 'f8', (2,)), ('v2', 'f8', (2,)),     # tracking differentiator: reference of velocity and of its rate
+    ('first', 'f8', (2,)), ('second', 'f8', (2,)), ('count', 'i8'),     # running sums of slope.added for w_cE, w_cN
     ('command', 'f8', (3,)), ('azimuth', 'f8'), ('azimuth_sigma', 'f8'), ('level_sigma', 'f8'),
 ], align=True)
 
@@ -37,7 +37,8 @@ def constants(k, p, h) -> np.ndarray:
     record = np.zeros((), CONSTANTS_DTYPE)
     record['w_o'], record['w_c'], record['start'] = p.observer, p.control, p.start
     g, r = float(k['gravity']), float(k['velocity_density']) / h
-    # One channel, command in the linear zone of fhan: v, x2, z1, z2, z3 under noise of the velocity and random walk.
+    # One channel with its command in the linear zone of fhan. The state is (v, x2, z1, z2, z3); the noises are the
+    # velocity and the random walk of the gyros. F, B: prediction of the observer; law: command of its state z.
     F = np.array([[1.0, h, 0.5 * h * h], [0.0, 1.0, h], [0.0, 0.0, 1.0]])
     B = np.array([0.5 * h * h, h, 0.0])
     law = -np.array([p.control**2, 2.0 * levelling.DAMPING_COEFFICIENT * p.control, 1.0])
@@ -54,6 +55,7 @@ def constants(k, p, h) -> np.ndarray:
     P = steady_state.covariance(A, Q)
     record['velocity_variance'] = P[0, 0]
     record['innovation_variance'] = np.sum(np.outer(innovation, innovation) * P) + r
+    # Response of the state to a swell of amplitude 1 at the slowest frequency; the innovation is v - z1 + swell.
     z = cmath.exp(1j * extended_observer.MIN_SWELL_FREQUENCY_RAD_S * h)
     state = solution(z * np.eye(5) - A, noise)
     record['swell'] = abs(state[0] / (state[0] - state[2] + 1.0))**2

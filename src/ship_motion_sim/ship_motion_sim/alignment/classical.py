@@ -74,7 +74,7 @@ def step(s, c, k, v_east, v_north, h):
     s.command[2] = min(max(c.K3 / k.earth_rate[1] * s.lagged, -MAX_AZIMUTH_RATE_RAD_S), MAX_AZIMUTH_RATE_RAD_S)
     # The loop corrects a steady az at az s0 / 2, except at 180 deg, which the envelope covers.
     s.residual += h * (s.command[2] - 0.5 * c.s0 * s.residual)
-    left = UNKNOWN_AZIMUTH_SIGMA_RAD * envelope(c.s0 * s.t)
+    transient = UNKNOWN_AZIMUTH_SIGMA_RAD * envelope(c.s0 * s.t)
     moving = max(s.residual**2 - 9.0 * c.residual**2, 0.0)      # beyond three sigma of its noise
-    s.azimuth_sigma = min(math.sqrt(c.azimuth_sigma**2 + moving + left**2), UNKNOWN_AZIMUTH_SIGMA_RAD)
-    s.level_sigma = c.level_sigma + left
+    s.azimuth_sigma = min(math.sqrt(c.azimuth_sigma**2 + moving + transient**2), UNKNOWN_AZIMUTH_SIGMA_RAD)
+    s.level_sigma = c.level_sigma + transient

@@ -79,6 +79,7 @@ def start(o, k, level_sigma, azimuth_sigma):
 @compiled
 def predict_covariance(o, k, h):
     """Predict the covariance o.p over h [s]: F p F^T + Q, with Q the effect of the random walk of the gyros on x2."""
+    # half: h^2 / 2; aij: elements of F p. F does not change p33.
     p, q, half = o.p, (k.gravity * k.gyro_noise)**2, 0.5 * h * h
     p11, p12, p13 = p[0], p[1], p[2]
     p22, p23, p33 = p[3], p[4], p[5]

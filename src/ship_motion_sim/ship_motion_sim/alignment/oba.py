@@ -84,6 +84,7 @@ def jacobi(m, v):
         moved = False
         for i in range(3):
             for j in range(i + 1, 4):
+                # A smaller element is below the rounding error of the diagonal.
                 if m[i, j] * m[i, j] > 1e-34 * abs(m[i, i] * m[j, j]):
                     moved = True
                     tau = (m[j, j] - m[i, i]) / (2.0 * m[i, j])

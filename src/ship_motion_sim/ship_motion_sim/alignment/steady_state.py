@@ -1,10 +1,17 @@
-"""Covariance of a stable linear loop under white noise: x+ = A x + noise of covariance Q."""
+"""Covariance of a stable linear loop under white noise: x+ = A x + noise of covariance Q.
+
+The covariance becomes a constant of a law. `reproducible.solution` therefore takes the place of numpy.linalg.solve,
+whose last bits differ between processors.
+"""
 import numpy as np
 
 from pedestal_common.reproducible import solution
 
 
 def covariance(A, Q):
-    """Return P = A P A^T + Q, all (n, n)."""
+    """Return the P that solves P = A P A^T + Q, all (n, n).
+
+    The equation is linear in the elements of P, stacked to a vector: (1 - kron(A, A)) P = Q.
+    """
     n = len(A)
     return np.reshape(solution(np.eye(n * n) - np.kron(A, A), Q.ravel()), (n, n))

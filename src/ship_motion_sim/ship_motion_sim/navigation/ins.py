@@ -120,7 +120,7 @@ def initial_state() -> np.ndarray:
 def wander(c, s, stamp_ns, normals):
     """Advance the slow errors [rad] to stamp_ns: first-order Gauss-Markov, exact for any step, stationary from the
     start; normals: three or more."""
-    kept = 0.0
+    kept = 0.0      # share of the last error in the new error
     if s.last_stamp_ns != NO_STAMP:
         kept = math.exp(-1e-9 * (stamp_ns - s.last_stamp_ns) / c.wander_time)
     fresh = math.sqrt(1.0 - kept * kept)

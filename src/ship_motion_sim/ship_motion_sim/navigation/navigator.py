@@ -160,7 +160,7 @@ def step_method(s, c, method, aid, h):
     east, north = aided_velocity(s, c, aid)
     if s.velocity_set == 0:
         v[0], v[1], s.velocity_set = east, north, 1
-    v[2] = 0.0
+    v[2] = 0.0      # Nothing aids the vertical velocity, so its error would grow without limit.
     v_east, v_north = v[0] - east, v[1] - north
     if method == METHOD_CLASSICAL:
         classical.step(s.classical, c.classical, k, v_east, v_north, h)
@@ -186,7 +186,7 @@ def attitude(s, c):
     """Return the estimated quaternion (x, y, z, w) deck -> earth."""
     q = s.strapdown.quaternion
     if c.method == METHOD_OBA and s.stage == STAGE_ALIGNING:
-        if s.oba.count < 2.0:
+        if s.oba.count < 2.0:       # One pair of vectors minus its own mean determines no rotation.
             return q[0], q[1], q[2], q[3]
         return oba.attitude(s.oba, c.conditions, q[0], q[1], q[2], q[3])
     return product((0.0, 0.0, math.sin(0.5 * s.azimuth), math.cos(0.5 * s.azimuth)), q)
@@ -260,6 +260,7 @@ def step(s, c, angle, force, dt, aid):
         strapdown.step(s.strapdown, angle, force, dt, s.zero_rate, s.zero_rate, 0.0)
     else:
         strapdown.step(s.strapdown, angle, force, dt, k.earth_rate, s.command, k.gravity)
+    # The tolerance of half an interval avoids a step that rounding errors delay by one interval.
     s.since_step += dt
     if s.since_step < c.step - 0.5 * dt:
         return

@@ -74,7 +74,7 @@ def _put_recorded(record, params):
     times, freedoms = recording.read(params)
     mean = float(np.mean(freedoms[:, YAW]))
     freedoms[:, YAW] -= mean
-    breaks, coefficients = recording.pieces(times, freedoms)
+    breaks, coefficients = recording.spline_with_ends(times, freedoms)
     count = len(coefficients)
     record['pieces'] = count
     record['breaks'][0, :count + 1] = breaks
@@ -89,6 +89,7 @@ def sin_cos(angle):
     Because the compiler vectorises it, unlike the functions of libm, it is four times as fast over an array. Reduction
     and polynomials of fdlibm (Sun Microsystems 1993: e_rem_pio2.c, k_sin.c, k_cos.c).
     """
+    # n quarter turns, subtracted as three parts of pi / 2, so that the remainder r has no rounding error.
     n = math.floor(angle * (2.0 / math.pi) + 0.5)
     r = angle - n * 1.57079632673412561417 - n * 6.07710050630396597660e-11 - n * 2.02226624879595063154e-21
     z = r * r
@@ -108,6 +109,7 @@ def sin_cos(angle):
 @compiled
 def sum_components(ship, t, freedoms):
     """Fill freedoms (3, 6) with the sum of all components at t and its first and second derivative."""
+    # Row 0 holds the sines, row 1 the cosines, in a loop of their own because the compiler vectorises it.
     wave = np.empty((2, WAVE_COMPONENT_COUNT))
     for i in range(WAVE_COMPONENT_COUNT):
         wave[0, i], wave[1, i] = sin_cos(ship.frequency[i] * t + ship.phase[i])

@@ -19,8 +19,8 @@ from pedestal_common.compiled import compiled
 from pedestal_common.geometry.interval import interval
 from pedestal_common.text_files import csv_table
 
-MAX_ROWS = 16384
-"""Largest number of rows of a recording."""
+MIN_ROWS, MAX_ROWS = 4, 16384
+"""Least number of rows of a recording, which a not-a-knot spline needs, and largest number."""
 MAX_PIECES = MAX_ROWS + 1
 """Largest number of pieces, those before and after the record included."""
 COEFFICIENTS_PER_PIECE = 6
@@ -39,7 +39,8 @@ def read(params):
 
     freedoms: surge, sway, heave [m], roll, pitch, yaw [rad], REP 103, yaw unwrapped.
     """
-    rows = csv_table.read(params.path, COLUMN_RANGES, 4, params.max_gap, 'ship.recorded.max_gap', DISPLACEMENT_RANGES)
+    rows = csv_table.read(params.path, COLUMN_RANGES, MIN_ROWS, params.max_gap, 'ship.recorded.max_gap',
+                          DISPLACEMENT_RANGES)
     if len(rows) > MAX_ROWS:
         raise csv_table.TableError(f'{params.path}: {len(rows)} rows, must be at most {MAX_ROWS}: shorten '
                                    'the file or reduce its rate')
@@ -55,7 +56,7 @@ def read(params):
         np.unwrap(np.radians(90.0 - column['heading_deg']))))
 
 
-def pieces(times, freedoms):
+def spline_with_ends(times, freedoms):
     """Return (breaks (n + 2,), coefficients (n + 1, 6, COEFFICIENTS_PER_PIECE)) of freedoms (n, 6) at times (n,), with
     the pieces that lead to rest."""
     from scipy.interpolate import BPoly, CubicSpline, PPoly  # slow to import, and only a recorded motion needs it
@@ -66,6 +67,7 @@ def pieces(times, freedoms):
     ends = [PPoly.from_bernstein_basis(BPoly.from_derivatives(*segment)) for segment in (
         ((first - COME_TO_REST_TIME_S, first), (np.array([at_first[0], rest, rest]), np.array(at_first))),
         ((last, last + COME_TO_REST_TIME_S), (np.array(at_last), np.array([at_last[0], rest, rest]))))]
+    # The pieces of the cubic spline have no terms of fifth and fourth power.
     inside = np.zeros((COEFFICIENTS_PER_PIECE, *spline.c.shape[1:]))
     inside[2:] = spline.c
     coefficients = np.concatenate((ends[0].c, inside, ends[1].c), axis=1)

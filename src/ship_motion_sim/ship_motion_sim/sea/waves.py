@@ -49,10 +49,12 @@ def band(tp):
 
 
 def _grid(tp):
+    """Return the frequencies [rad/s] at which a spectrum of peak period tp [s] is integrated."""
     return np.linspace(*band(tp), WAVE_COMPONENT_COUNT * _GRID_STEPS_PER_COMPONENT + 1)
 
 
 def _integral(x, y):
+    """Return the integral of y (n,) over x (n,) from x[0] to each x, by the trapezoidal rule."""
     return np.concatenate(((0.0,), np.cumsum(0.5 * (y[1:] + y[:-1]) * np.diff(x))))
 
 
@@ -146,6 +148,7 @@ def seaway(params: ShipParameters):
 
 
 def _plain(params: ShipParameters) -> Waves:
+    """Return the Waves of PlainParameters: a component for each freedom, with X = -j a of the motion a sin(w t)."""
     plain = params.plain
     sines = ((HEAVE, plain.heave_amplitude, plain.heave_period),
              (ROLL, math.radians(plain.roll_amplitude_deg), plain.roll_period),

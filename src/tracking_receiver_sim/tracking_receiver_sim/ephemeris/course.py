@@ -22,7 +22,7 @@ MAX_DURATION_S = 86400.0
 """Largest duration of a run [s]."""
 
 
-def of_orbit(ephemeris, target, duration, margin) -> Flight:
+def flight_of_orbit(ephemeris, target, duration, margin) -> Flight:
     """Return the Flight of a states.Ephemeris for a run of `duration` [s], with `margin` [s] more at both ends as far
     as the file goes; target: TargetParameters. Raises csv_table.TableError."""
     zero = ephemeris.begin + target.track_file.start
@@ -63,12 +63,13 @@ def _check_acceleration(ephemeris, spline, zero, limit):
                                    f'{limit:g} m/s2')
 
 
-def run_of_orbit(ephemeris, target, given):
+def run_parameters_of_orbit(ephemeris, target, given):
     """Return {parameter: value} of a run of the first pass that climbs above horizon.MIN_CULMINATION_DEG, from a whole
     second after its rise until it sets.
 
     given: names of the parameters that the scenario sets. Raises csv_table.TableError.
     """
+    # zero: time of stamp 0. A start at a rise is moved to a whole second; a given start and the file's begin stay.
     start_given = 'target.track_file.start' in given
     start = ephemeris.begin + target.track_file.start if start_given else None
     begin, end = horizon.passage(ephemeris, target.station, start)
@@ -80,7 +81,7 @@ def run_of_orbit(ephemeris, target, given):
             'receiver.reference_range': _upwards(np.nanmax(np.linalg.norm(r, axis=1)))}
 
 
-def of_directions(directions, target, _duration, _margin) -> Flight:
+def flight_of_directions(directions, target, _duration, _margin) -> Flight:
     """Return the Flight of all rows of a directions.Directions. Raises csv_table.TableError."""
     zero = directions.t[0] + target.track_file.start
     t = directions.t - zero
@@ -99,7 +100,7 @@ def of_directions(directions, target, _duration, _margin) -> Flight:
         f'{t[top]:.0f} s, at the range {target.angle.range / 1e3:g} km'), 0.0, target.angle.range)
 
 
-def run_of_directions(directions, target, _given):
+def run_parameters_of_directions(directions, target, _given):
     """Return {parameter: value} of a run from the first row, or from track_file.start, to the last row."""
     last = directions.t[-1] - directions.t[0] - target.track_file.start
     return {**_station(target), 'duration': max(0.1, min(MAX_DURATION_S, (math.ceil(10.0 * last) - 1) / 10.0)),
@@ -112,4 +113,5 @@ def _station(target):
 
 
 def _upwards(distance):
+    """Return a distance [m] rounded up to 10 m."""
     return max(10.0, 10.0 * math.ceil(0.1 * distance))

@@ -22,6 +22,8 @@ BARE_NAMES = 'time', 'azimuth', 'elevation'
 """Names of the columns of a table without names."""
 ANGLE_LIMITS_DEG = {'azimuth': (-720.0, 720.0), 'elevation': (-90.0, 90.0)}
 """{angle: (lowest, highest)} [deg]."""
+NUMBERS_PER_ROW = 4
+"""Numbers that a reader collects from a row: line, time, azimuth, elevation."""
 MIN_ROWS = 4
 """Least number of rows of a table."""
 MAX_STEP_DEG = 20.0
@@ -103,7 +105,7 @@ def read_table(path, _wanted='') -> Directions:
             rows.extend((table.line_num, clock.seconds(row),
                          table.number(azimuth, row[azimuth.name], *ANGLE_LIMITS_DEG['azimuth']),
                          table.number(elevation, row[elevation.name], *ANGLE_LIMITS_DEG['elevation'])))
-            if len(rows) > 4 * csv_table.MAX_CSV_ROWS:
+            if len(rows) > NUMBERS_PER_ROW * csv_table.MAX_CSV_ROWS:
                 raise csv_table.too_long(path, table.line_num)
         clock.check()
     described = f'{clock.described()}, {azimuth.described()}, {elevation.described()}'
@@ -111,7 +113,9 @@ def read_table(path, _wanted='') -> Directions:
 
 
 def _directions(path, rows, dated, form):
-    table = np.array(rows).reshape(-1, 4)
+    """Return the Directions of rows, flat: line, time [s], azimuth and elevation [deg] of each. Raises TableError."""
+    table = np.array(rows).reshape(-1, NUMBERS_PER_ROW)
+    # fresh: False for a row that repeats time, azimuth and elevation of the row before.
     fresh = np.append(True, (np.diff(table[:, 1:], axis=0) != 0.0).any(axis=1))[:len(table)]
     line, t, azimuth, elevation = table[fresh].T
     if len(line) < MIN_ROWS:

@@ -71,8 +71,10 @@ def passage(ephemeris, station, start=None):
     for at in range(0, len(t), PASS_SEARCH_BATCH_SIZE):
         some = slice(at, at + PASS_SEARCH_BATCH_SIZE)
         seen[some] = elevation(ephemeris, station, t[some])
+        # edges: by turns the first step of a pass and the first step after it.
         edges = np.flatnonzero(np.diff(np.concatenate(([False], seen > 0.0, [False]))))
         for i, j in zip(edges[::2], edges[1::2]):
+            # A pass at the end of the batch may continue in the next batch.
             ended = j < at + PASS_SEARCH_BATCH_SIZE or at + PASS_SEARCH_BATCH_SIZE >= len(t)
             if ended and np.degrees(seen[i:j].max()) >= MIN_CULMINATION_DEG and (start is None or t[j - 1] > start):
                 return _ends(ephemeris, station, t, seen, (i, j), start)
@@ -97,4 +99,5 @@ def _ends(ephemeris, station, t, seen, pass_of, start):
 
 
 def _crossing(ephemeris, station, before, after):
+    """Return the t between two steps at which the orbit crosses the horizon."""
     return brentq(lambda t: elevation(ephemeris, station, t)[0], before, after, xtol=1e-3)

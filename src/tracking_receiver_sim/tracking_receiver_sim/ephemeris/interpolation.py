@@ -12,6 +12,8 @@ from scipy.interpolate import KroghInterpolator
 def at(segment, t):
     """Return position [m] and velocity [m/s], (n, 3) each, in the frame of a states.Segment at times t (n,) [s] within
     the segment."""
+    # middles: mean time of each group of `nodes` consecutive states; first: index of the first state of the group
+    # whose middle is nearest to t.
     nodes = segment.nodes
     middles = np.convolve(segment.t, np.full(nodes, 1.0 / nodes), 'valid')
     after = np.searchsorted(middles, t).clip(1, max(len(middles) - 1, 1))

@@ -12,6 +12,9 @@ ENTRY_PATTERN = re.compile(r'([A-Z0-9_]+)( *= *)(.*)', re.ASCII)
 FILE_SIGNATURE = 'CCSDS_OEM_VERS'
 STATE_LIMITS = {**dict.fromkeys('xyz', (-2e6, 2e6)), **dict.fromkeys(('vx', 'vy', 'vz'), (-100.0, 100.0))}
 """{number in a line of data: (lowest, highest)} [km], [km/s]."""
+LINE_COLUMN, DAY_COLUMN, SECOND_COLUMN, FIRST_NUMBER_COLUMN = range(4)
+"""Columns of a row: line in the file, days since 1970, seconds of the day, first number of STATE_LIMITS."""
+COLUMN_COUNT = FIRST_NUMBER_COLUMN + len(STATE_LIMITS)
 MAX_SEGMENTS = 1000
 """Largest number of segments of a file."""
 REQUIRED_KEYWORDS = ('OBJECT_NAME', 'OBJECT_ID', 'CENTER_NAME', 'REF_FRAME', 'TIME_SYSTEM')
@@ -36,7 +39,7 @@ def read(path, wanted='') -> states.Ephemeris:
     for meta, rows in _blocks(path):
         names = meta['OBJECT_NAME'].upper(), meta['OBJECT_ID'].upper()
         if not objects:
-            midnight = instant.of_day(int(rows[0, 1]), 0.0) if len(rows) else 0.0
+            midnight = instant.of_day(int(rows[0, DAY_COLUMN]), 0.0) if len(rows) else 0.0
         objects.setdefault(names, []).append((meta, rows))
     if not objects:
         raise csv_table.TableError(f'{path}: META_START is missing')
@@ -59,7 +62,7 @@ def read(path, wanted='') -> states.Ephemeris:
 
 
 def _blocks(path):
-    """Yield ({keyword: _Entry}, table (n, 9)) of each segment; a row is line, day, second, numbers of STATE_LIMITS."""
+    """Yield ({keyword: _Entry}, table (n, COLUMN_COUNT)) of each segment."""
     meta, rows, begun, state, count = {}, array.array('d'), 0, 'header', 0
     for line, text in lines.read(path):
         word = text.split(None, 1)[0]
@@ -95,10 +98,12 @@ def _blocks(path):
 
 
 def _table(rows):
-    return np.array(rows).reshape(-1, 9)
+    """Return an array (n, COLUMN_COUNT) of the flat numbers of rows."""
+    return np.array(rows).reshape(-1, COLUMN_COUNT)
 
 
 def _row(path, line, text):
+    """Return the numbers of a line of data. The epoch is blanked in `rest`, so that errors name the right column."""
     epoch = text.split(None, 1)[0]
     at = text.index(epoch)
     rest = ' ' * (at + len(epoch)) + text[at + len(epoch):]
@@ -121,7 +126,7 @@ def _segment(path, meta, rows, midnight):
         try:
             return frames.instants(system, days, of_day) - midnight
         except ValueError as error:
-            [i] = error.args
+            [i] = error.args        # index of the row
             raise lines.wrong(path, int(line[i]), column, f'second 60: TIME_SYSTEM {system} has no leap second at the '
                               'end of this minute') from None
 
@@ -132,7 +137,9 @@ def _segment(path, meta, rows, midnight):
 
     span = [bound(name) if name in meta else None for name in ('USEABLE_START_TIME', 'USEABLE_STOP_TIME')]
     method, degree = _interpolation(path, meta)
-    table = np.column_stack((rows[:, 0], seconds(rows[:, 0], 1, rows[:, 1], rows[:, 2]), 1e3 * rows[:, 3:]))
+    lines_of_rows, metres = rows[:, LINE_COLUMN], 1e3 * rows[:, FIRST_NUMBER_COLUMN:]
+    times = seconds(lines_of_rows, 1, rows[:, DAY_COLUMN], rows[:, SECOND_COLUMN])
+    table = np.column_stack((lines_of_rows, times, metres))
     return states.segment(path, meta['line'], table, frame, method, degree, *span)
 
 
@@ -153,6 +160,7 @@ def _interpolation(path, meta):
 
 
 def _one_of(path, meta, name, allowed):
+    """Return the value of a keyword in capitals. Raises TableError unless it is one of the allowed values."""
     entry = meta[name]
     if entry.upper() not in allowed:
         raise lines.wrong(path, entry.line, entry.column, f'{name} = {entry!s:.40}: must be {" or ".join(allowed)}')

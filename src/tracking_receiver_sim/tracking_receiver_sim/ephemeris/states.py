@@ -70,14 +70,19 @@ class Ephemeris(typing.NamedTuple):
         return self.segments[-1].end
 
 
-def segment(path, place, table, frame, method, degree, begin=None, end=None) -> Segment:
+def has_velocities(table):
+    """Return True if a table of states, see `segment`, has velocities."""
+    return table.shape[1] == 8
+
+
+def segment(path, first_line, table, frame, method, degree, begin=None, end=None) -> Segment:
     """Return a Segment of a table (n, 8) of line, t, x, y, z [m], vx, vy, vz [m/s]; (n, 5) without velocities.
 
-    place: first line of the segment; method, degree: '' and None if the file gives none. Raises TableError if time
-    does not grow, a state is outside RADIUS_LIMITS_M, or the states are too few.
+    first_line: line in which the segment begins; method, degree: '' and None if the file gives none. Raises TableError
+    if time does not grow, a state is outside RADIUS_LIMITS_M, or the states are too few.
     """
     if not len(table):
-        raise csv_table.TableError(f'{path}: line {place}: the segment that begins here has no state')
+        raise csv_table.TableError(f'{path}: line {first_line}: the segment that begins here has no state')
     line, t, r = table[:, 0].astype(int), table[:, 1], table[:, 2:5]
     back = np.flatnonzero(~(np.diff(t) > 0.0))
     if back.size:
@@ -91,7 +96,7 @@ def segment(path, place, table, frame, method, degree, begin=None, end=None) -> 
         raise csv_table.TableError(f'{path}: line {line[i]}: {radius[i] / 1e3:g} km from the centre of the earth, '
                                    f'must be {RADIUS_LIMITS_M[0] / 1e3:g} to {RADIUS_LIMITS_M[1] / 1e3:g} km; check '
                                    'the unit')
-    v = table[:, 5:8] if table.shape[1] == 8 else None
+    v = table[:, 5:8] if has_velocities(table) else None
     chosen = (method or (DEFAULT_INTERPOLATION[0] if v is not None else 'LAGRANGE')).upper()
     result = Segment(line, t, r, v, frame, 'LAGRANGE' if chosen == 'LINEAR' else chosen, 1,
                      begin=max(t[0], t[0] if begin is None else begin),
@@ -101,6 +106,7 @@ def segment(path, place, table, frame, method, degree, begin=None, end=None) -> 
         degree = min(DEFAULT_INTERPOLATION[1], max(1, max_degree))
     result = result._replace(degree=1 if chosen == 'LINEAR' else degree)
     if len(t) < max(2, result.nodes):
-        raise csv_table.TableError(f'{path}: line {place}: {len(t)} states in the segment that begins here, must be '
-                                   f'at least {max(2, result.nodes)} for {result.method} of degree {result.degree}')
+        raise csv_table.TableError(f'{path}: line {first_line}: {len(t)} states in the segment that begins here, must '
+                                   f'be at least {max(2, result.nodes)} for {result.method} of degree '
+                                   f'{result.degree}')
     return result

@@ -35,6 +35,8 @@ EPOCH_PATTERN = re.compile(r'(\d{1,2}) ([a-z]{3})[a-z]* (\d{4}) (\d{1,2}):(\d\d)
 
 def read(path, _wanted='') -> states.Ephemeris:
     """Return the Ephemeris of an STK ephemeris file. Raises TableError."""
+    # head: {keyword: (line, column, value)}; limits: of the numbers of a state, None before the states begin; skipped:
+    # name of the block that is passed over.
     head: dict[str, tuple] = {}
     limits, rows, skipped = None, array.array('d'), ''
     for line, text in lines.read(path):
@@ -80,15 +82,17 @@ def _limits(path, head, with_velocity):
 
 
 def _ephemeris(path, head, table):
+    """Return the Ephemeris of the keywords {keyword: (line, column, value)} and a table as of states.segment, whose
+    times count from ScenarioEpoch. Raises TableError."""
     if 'scenarioepoch' not in head:
         raise csv_table.TableError(f'{path}: ScenarioEpoch is missing')
     begin, second = _epoch(path, *head['scenarioepoch'])
     _choice(path, head, 'centralbody', {'earth': ''}, 'earth')
     frame = _choice(path, head, 'coordinatesystem', FRAME_NAMES, 'fixed')
     method = _choice(path, head, 'interpolationmethod', METHOD_NAMES, 'lagrange')
-    if method == 'HERMITE' and table.shape[1] == 5:
-        place = head['interpolationmethod']
-        raise lines.wrong(path, place[0], place[1], 'InterpolationMethod = Hermite: must be Lagrange, because the '
+    if method == 'HERMITE' and not states.has_velocities(table):
+        line, column, _ = head['interpolationmethod']
+        raise lines.wrong(path, line, column, 'InterpolationMethod = Hermite: must be Lagrange, because the '
                           'states have no velocity')
     degree = _degree(path, head, method)
     table[:, 1] += second
@@ -120,6 +124,7 @@ def _epoch(path, line, column, text):
 
 
 def _choice(path, head, name, choices, default):
+    """Return choices[value] of a keyword. Raises TableError for a value that is no key of choices {text: result}."""
     line, column, text = head.get(name, (0, 0, default))
     if text.lower() not in choices:
         raise lines.wrong(path, line, column, f'{name} = {text!r:.40}: must be {" or ".join(choices)}')

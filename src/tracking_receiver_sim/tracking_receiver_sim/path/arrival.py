@@ -41,6 +41,7 @@ def refraction(N, elevation):
 def _bent(N, r, v):
     """Return a vector [m] and its velocity [m/s], ENU from the antenna, turned up by the refraction."""
     (e, n, u), (ve, vn, vu) = r, v
+    # h: horizontal distance; .._seen: after the rotation by R in the vertical plane, which keeps the azimuth.
     h = math.hypot(e, n)
     if h == 0.0:
         return r, v

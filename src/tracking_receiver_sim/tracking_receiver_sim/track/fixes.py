@@ -19,6 +19,16 @@ MIN_FIXES = 4
 """Least number of fixes of a track."""
 
 
+FIX_COLUMNS = ('line', 'aircraft', 'time', 'latitude', 'longitude', 'altitude')
+"""Numbers of a fix while a file is read; `aircraft` is Aircraft.number."""
+
+
+class Aircraft(typing.NamedTuple):
+    """An aircraft of a file. number: in the order of its first fix; names: all its names in the file."""
+    number: int
+    names: set
+
+
 class Log:
     """Description of a log, which its reader fills in.
 
@@ -56,30 +66,32 @@ def read(track, rows) -> Fixes:
     """Return the Fixes of the file of a TrackFileParameters; rows: reader of its format. Raises
     csv_table.TableError."""
     log, numbers = Log(), array.array('d')
-    names: dict[tuple, tuple[int, set]] = {}
+    aircraft_by_identity: dict[tuple, Aircraft] = {}
     for line, identities, *fix in rows(track.path, log):
-        if len(numbers) >= 6 * csv_table.MAX_CSV_ROWS:
+        if len(numbers) >= len(FIX_COLUMNS) * csv_table.MAX_CSV_ROWS:
             raise csv_table.too_long(track.path, line)
-        if len(names) > MAX_AIRCRAFT:
+        if len(aircraft_by_identity) > MAX_AIRCRAFT:
             raise csv_table.TableError(f'{track.path}: line {line}: must be at most {MAX_AIRCRAFT} aircraft')
-        number, known_as = names.setdefault(identities[:1], (len(names), set()))
-        known_as.update(identities)
-        numbers.extend((line, number, *fix))
-    table = np.array(numbers).reshape(-1, 6)
-    aircraft, number = _chosen(track, names)
-    line, time, latitude, longitude, altitude = _fresh(table[table[:, 1] == number][:, (0, 2, 3, 4, 5)], log).T
+        aircraft = aircraft_by_identity.setdefault(identities[:1], Aircraft(len(aircraft_by_identity), set()))
+        aircraft.names.update(identities)
+        numbers.extend((line, aircraft.number, *fix))
+    table = np.array(numbers).reshape(-1, len(FIX_COLUMNS))
+    label, number = _chosen_aircraft(track, aircraft_by_identity.values())
+    aircraft_column = FIX_COLUMNS.index('aircraft')
+    of_aircraft = np.delete(table[table[:, aircraft_column] == number], aircraft_column, axis=1)
+    line, time, latitude, longitude, altitude = _without_repetitions(of_aircraft, log).T
     if len(line) < MIN_FIXES:
         reason = f': {log.nothing}' if log.nothing and not len(line) else ''
         raise csv_table.TableError(f'{track.path}: {len(line)} fixes, must be at least {MIN_FIXES}{reason}'
                                    f'{_passed_over(log)}')
     fixes = Fixes(track.path, line.astype(int), time, latitude, longitude, altitude, log.dated,
-                  f'{pathlib.Path(track.path).name}: {log.form}{aircraft}'
+                  f'{pathlib.Path(track.path).name}: {log.form}{label}'
                   + ''.join(f', {remark}' for remark in log.remarks) + _passed_over(log))
     _check_order(fixes, track, log)
     return fixes
 
 
-def _fresh(table, log):
+def _without_repetitions(table, log):
     """Return the rows (line, time, place) without those that repeat time and place of the row before, which are
     counted."""
     repeated = np.append(False, (np.diff(table[:, 1:], axis=0) == 0.0).all(axis=1))[:len(table)]
@@ -88,34 +100,37 @@ def _fresh(table, log):
     return table[~repeated]
 
 
-def _chosen(track, names):
-    """Return (' of' its names, its number) of the aircraft that `track` names, or of the only one.
+def _chosen_aircraft(track, all_aircraft):
+    """Return (' of' its names, its number) of the Aircraft that `track` names, or of the only one.
 
-    names: {identity: (number, names)}. Raises TableError if no aircraft or several match.
+    Raises TableError if no aircraft or several match.
     """
     wanted = track.aircraft.strip().lower()
-    matches = [row for row in names.values() if not wanted or wanted in {name.lower() for name in row[1]}]
+    matches = [aircraft for aircraft in all_aircraft
+               if not wanted or wanted in {name.lower() for name in aircraft.names}]
     if len(matches) == 1:
-        number, known_as = matches[0]
-        label = _label(known_as)
-        return f' of {label}' if label else '', number
-    if not names:
+        label = _label(matches[0])
+        return f' of {label}' if label else '', matches[0].number
+    if not all_aircraft:
         return '', 0
-    labels = [_label(known_as) or 'aircraft without a name' for _, known_as in names.values()]
+    labels = [_label(aircraft) or 'aircraft without a name' for aircraft in all_aircraft]
     more = f' and {len(labels) - MAX_LISTED_AIRCRAFT} more' if len(labels) > MAX_LISTED_AIRCRAFT else ''
     raise csv_table.TableError(f'{track.path}: aircraft = {track.aircraft!r:.60}: must name one of the {len(labels)} '
                                f'in the file: {", ".join(labels[:MAX_LISTED_AIRCRAFT])}{more}')
 
 
-def _label(known_as):
-    return ' '.join(sorted(name[:40] for name in known_as if name)[:MAX_LISTED_AIRCRAFT])
+def _label(aircraft):
+    """Return the names of an Aircraft in one text, '' without a name."""
+    return ' '.join(sorted(name[:40] for name in aircraft.names if name)[:MAX_LISTED_AIRCRAFT])
 
 
 def _passed_over(log):
+    """Return a part of the description with the rows of a Log that were passed over."""
     return ''.join(f', passed over {count} x {kind}' for kind, count in sorted(log.passed_over.items()))
 
 
 def _check_order(fixes, track, log):
+    """Raise TableError, with the line, if the time of Fixes falls, stays or jumps by more than max_gap."""
     step = np.diff(fixes.time)
     wrong = ~((step > 0.0) & (step <= track.max_gap))
     if wrong.any():

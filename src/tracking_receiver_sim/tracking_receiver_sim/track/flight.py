@@ -55,7 +55,7 @@ def lay_out(fixes, track, station) -> Flight:
     spline = smoothed(time, enu, track) if track.smooth else CubicSpline(time, enu)
     speed, acceleration = _check_limits(kept, spline, track)
     at = _samples(spline.x)
-    at = at[at >= min(0.0, at[-1])]
+    at = at[at >= min(0.0, at[-1])]         # from stamp 0 on
     east, north, up = spline(at).T
     distance, elevation = np.hypot(np.hypot(east, north), up), arctan2(up, np.hypot(east, north))
     top = int(np.argmax(elevation))
@@ -92,6 +92,7 @@ def smoothed(time, enu, track):
 
 
 def _samples(breaks):
+    """Return SAMPLES_PER_PIECE times [s] of each piece of a spline, and its end."""
     return np.append((breaks[:-1, None] + np.diff(breaks)[:, None] * np.arange(SAMPLES_PER_PIECE)
                       / SAMPLES_PER_PIECE).ravel(), breaks[-1])
 
@@ -103,7 +104,7 @@ def _check_limits(fixes, spline, track):
     linear between the breaks, so its peak is at a break.
     """
     times = _samples(spline.x)
-    peaks = []
+    peaks = {}
     for name, limit, unit, at, order in (('acceleration', track.max_acceleration, 'm/s2', spline.x, 2),
                                          ('speed', track.max_speed, 'm/s', times, 1)):
         size = np.linalg.norm(spline(at, order), axis=1)
@@ -113,11 +114,12 @@ def _check_limits(fixes, spline, track):
             remedy = 'after smoothing' if track.smooth else 'or smoothed by smooth = true'
             raise csv_table.TableError(f'{fixes.path}: line {line}: {name} = {size[worst]:.4g} {unit} at this fix: '
                                        f'must be at most max_{name} = {limit:g} {unit} {remedy}')
-        peaks.append(size[worst])
-    return peaks[1], peaks[0]
+        peaks[name] = size[worst]
+    return peaks['speed'], peaks['acceleration']
 
 
 def _quantisation(fixes, speed):
+    """Return a part of the summary that states whether times and altitudes of Fixes are coarse; speed: peak [m/s]."""
     whole = bool((fixes.time == np.round(fixes.time)).all())
     steps = next((name for name, step in ALTITUDE_STEPS_M if len(np.unique(fixes.altitude)) >= 3 and
                   np.abs(fixes.altitude - step * np.round(fixes.altitude / step)).max() < ALTITUDE_TOLERANCE_M), None)
@@ -125,7 +127,8 @@ def _quantisation(fixes, speed):
             + (f', altitudes in steps of {steps}' if steps else ''))
 
 
-def _residual(apart):
-    size = np.linalg.norm(apart, axis=1)
+def _residual(difference):
+    """Return a part of the summary with the difference (n, 3) [m] of the smoothed track to its fixes."""
+    size = np.linalg.norm(difference, axis=1)
     return f', smoothed: off the fixes by {np.sqrt(np.mean(size**2)):.3g} m rms, {size.max():.3g} m at most'
 

@@ -37,7 +37,7 @@ def rows(path, log):
             points.parse_with(content.xml_parser(stream))
             while piece := stream.read(PARSE_CHUNK_BYTES):
                 points.parser.Parse(piece)
-                yield from points.take()
+                yield from points.taken_fixes()
             points.parser.Parse(b'', True)
     except expat.ExpatError as error:
         raise csv_table.TableError(f'{path}: line {error.lineno}: not well-formed XML'
@@ -55,7 +55,7 @@ def rows(path, log):
 
 
 class _Points:
-    """Handlers of expat, with the texts of the open point and the fixes since the last `take`."""
+    """Handlers of expat, with the texts of the open point and the fixes since the last `taken_fixes`."""
 
     def __init__(self, path, log):
         self.path, self.log = path, log
@@ -72,8 +72,8 @@ class _Points:
         self.parser.StartElementHandler, self.parser.EndElementHandler = self.start, self.end
         self.parser.CharacterDataHandler = self.text
 
-    def take(self):
-        """Return the fixes since the last call."""
+    def taken_fixes(self):
+        """Return the fixes since the last call, and forget them."""
         fixes, self.fixes = self.fixes, []
         return fixes
 

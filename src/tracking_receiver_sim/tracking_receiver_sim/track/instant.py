@@ -111,6 +111,7 @@ def utc_texts(begin, passed):
     first, last = (int(time.astype('M8[D]').astype(int)) for time in (begin, times[-1])) if len(times) else (0, 0)
     for day in range(first + 1, last + 1):
         if tai_offset(day) > tai_offset(day - 1):
+            # numpy has no second 60, so a leap second gets the text of the second before it with 60 in place of 59.
             after = times >= np.datetime64(day, 'D')
             times = np.where(after, times - np.timedelta64(1, 's'), times)
             texts = np.datetime_as_string(times)

@@ -43,10 +43,10 @@ def rows(path, log):
     for line, sentence in _sentences(path, log):
         if sentence.sentence_type == 'RMC':
             with contextlib.suppress(ValueError):
-                clock.read(_second_of_day(sentence), _day(sentence))
+                clock.advance(_second_of_day(sentence), _day(sentence))
             continue
         try:
-            time = clock.read(_second_of_day(sentence))
+            time = clock.advance(_second_of_day(sentence))
         except ValueError:
             raise csv_table.TableError(f'{path}: line {line}: time = {sentence.data[0]!r:.60}: must be hhmmss.ss, '
                                        '235960 only for a leap second') from None
@@ -127,14 +127,15 @@ class _Clock:
     def __init__(self, first=None):
         self.first, self.days, self.leaps, self._last = first, 0, 0, None
 
-    def read(self, second, day=None):
-        """Return the instant of a sentence (see track.instant), without a date the time since midnight [s].
+    def advance(self, second, day=None):
+        """Move on to a sentence. Return its instant (see track.instant), without a date the time since midnight [s].
 
         second: of the day; day: since 1970, if the sentence has a date. A date moves the time only forward. Raises
         ValueError for a leap second on a day that has none.
         """
         if self._last is not None:
             midnights = round((self._last - second) / SECONDS_PER_DAY)
+            # A last second of 86400 or more was a leap second.
             self.leaps += midnights > 0 and self._last >= SECONDS_PER_DAY
             self.days += midnights
         self._last = second
@@ -153,7 +154,7 @@ def _first_day(path):
     clock = _Clock()
     for _, sentence in _sentences(path, fixes.Log()):
         with contextlib.suppress(ValueError):
-            clock.read(_second_of_day(sentence))
+            clock.advance(_second_of_day(sentence))
             if sentence.sentence_type == 'RMC' and _day(sentence) is not None:
                 return _day(sentence) - clock.days
     return None

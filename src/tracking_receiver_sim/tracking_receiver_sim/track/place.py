@@ -37,6 +37,7 @@ def station_for(fixes, track) -> StationParameters:
     below = StationParameters(latitude_deg=float(fixes.latitude[middle]),
                               longitude_deg=float(fixes.longitude[middle]))
     spline = flight.lay_out(fixes, track, below)
+    # The constant terms of the pieces are the positions at the breaks; their first two columns are east and north.
     ground = spline.coefficients[3, :, :2]
     clearance = max(MIN_RANGE_M, spline.speed / MAX_AZIMUTH_RATE_RAD_S)
     along = ground[-1] - ground[0]
@@ -62,7 +63,7 @@ def _clear_of(along, across, clearance):
     return float(s)
 
 
-def run(fixes, target, given):
+def run_parameters(fixes, target, given):
     """Return {parameter: value} of Fixes for a TargetParameters. Raises csv_table.TableError.
 
     given: names of the parameters that the scenario sets; only those of the station matter here. The reference range

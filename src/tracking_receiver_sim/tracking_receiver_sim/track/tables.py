@@ -105,7 +105,8 @@ def rows(path, log):
 
 
 def _layout(table):
-    """Return the layout of a Table: the first that matches; else the one that its column of time names."""
+    """Return the layout of a Table: the first that matches, else the layout of an ADS-B log that its column of time
+    names. The error about a missing column then names the columns of that layout."""
     names = [name.lower() for name in table.fieldnames]
     return next((layout for layout in CSV_LAYOUTS if layout.matches(table)), None) or next(
         (layout for layout in CSV_LAYOUTS[1:] if layout.adsb and layout.time.label in names), CSV_LAYOUTS[-1])
