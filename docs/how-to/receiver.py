@@ -2,7 +2,7 @@
 
     python receiver.py 5005
 
-A datagram is 'CROSS_ELEVATION ELEVATION CN0' in rad, rad, dB-Hz; 'nan nan 20' says that it is not locked.
+A datagram is 'CROSS_ELEVATION ELEVATION CN0' in rad, rad, dB-Hz; 'nan nan 20' states that the receiver is not locked.
 """
 import math
 import socket
@@ -17,7 +17,7 @@ from pedestal_common.node import middleware
 
 
 class Receiver(Node):
-    """Publishes one error for each joint state of the drive, stamped with its time: the newest that has come."""
+    """Publisher of the newest error for each message on joint_states, with the stamp of that message."""
 
     def __init__(self, port):
         super().__init__('tracking_receiver')
@@ -34,7 +34,7 @@ class Receiver(Node):
         self.publisher.publish(error)
 
     def newest(self):
-        """The newest datagram as three numbers; no lock where none has come since the last step."""
+        """Return the newest datagram as three numbers; no lock if none has come since the last step."""
         text = b'nan nan 0'
         try:
             while True:

@@ -1,4 +1,9 @@
-"""ROS node of the antenna control unit: a rate command for each drive step, modes by service and by acu/command."""
+"""ROS node of the antenna control unit: a rate command for each drive step, modes by service and by acu/command.
+
+This file only starts the node. `unit_node.UnitNode` runs the unit `acu_tracker.unit.Acu`, whose law is
+`control_unit.step`; change the behaviour there. `entry` is imported first, so that a signal during the other imports
+ends the process without a message.
+"""
 import pedestal_common.entry  # noqa: F401
 
 # isort: split

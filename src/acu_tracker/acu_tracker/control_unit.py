@@ -6,7 +6,7 @@ the order of a step. Each part of the state is written by its own module; this m
 One-letter names in all functions:
 s, c, u, o   records of STATE_DTYPE, CONSTANTS_DTYPE, signals.INPUTS_DTYPE and OUTPUTS_DTYPE
 g, k, m      parts of s: guidance, tracking, mode
-t            s.stamp [s]
+t            s.stamp [s], also called t_k
 
 Other names:
 all_tables   the Tables
@@ -290,18 +290,17 @@ def _situation(s, c, u, all_tables, request, no_signal):
     # the fallback.
     chosen = m.fallback if m.fallback != Mode.AUTOTRACK or k.target.tracker.running else Mode.PROGRAM
     falls_back = m.now == Mode.SEARCH or (m.now == Mode.AUTOTRACK and track != Reason.NONE)
-    # The request; the running mode; the mode whose table was followed last; the mode to which the mode falls back.
     wanted = request, m.now, m.table if falls_back else m.now, chosen if falls_back else m.now
     program = tle = sun = Reason.NONE
     flags = flag = 0
     if unstable == Reason.NONE:
         if Mode.PROGRAM in wanted:
-            program, flags = reachability.table(k.attitude, c, u, Mode.PROGRAM, all_tables, t, g.azimuth)
+            program, flags = reachability.judge_table(k.attitude, c, u, Mode.PROGRAM, all_tables, t, g.azimuth)
         if Mode.TLE in wanted:
-            tle, flag = reachability.table(k.attitude, c, u, Mode.TLE, all_tables, t, g.azimuth)
+            tle, flag = reachability.judge_table(k.attitude, c, u, Mode.TLE, all_tables, t, g.azimuth)
             flags |= flag
         if Mode.SUN in wanted:
-            sun, flag = reachability.table(k.attitude, c, u, Mode.SUN, all_tables, t, g.azimuth)
+            sun, flag = reachability.judge_table(k.attitude, c, u, Mode.SUN, all_tables, t, g.azimuth)
             flags |= flag
     why = modes.Conditions(
         nothing=Reason.NONE, stow=reachability.outside(c, c.axis[0].p.stow, c.axis[1].p.stow),
@@ -350,7 +349,8 @@ def _move(s, c, u, o, program, no_signal, rested, dt):
         now, order = Instants(t, t + c.lead, dt), guidance.Order(m.now, m.begins, actual.azimuth.angle, t)
         motion = guidance.motion(g, k, c, order, bridge.way(g.bridge, program), no_signal, now)
         deck_rates = tracking.deck_rates(k, c, t, actual.azimuth.angle, actual.elevation.angle)
-        axes.follow(s.axis, c, u, o, motion, now, (k.error, deck_rates, m.now == Mode.AUTOTRACK))
+        beam = axes.BeamInputs(k.error, deck_rates, m.now == Mode.AUTOTRACK)
+        axes.follow(s.axis, c, u, o, motion, now, beam)
         mode_change.mark_started(m)
         limited = o.angle_limited[0] != 0 or o.angle_limited[1] != 0
         guidance.watch_beam(g, c, m.now, axes.now(s.axis), limited, now.t_m)
@@ -396,10 +396,11 @@ def _supervise(s, c, u, o, dt):
     ship = deck.stabilised and deck.history.count > 0
     # Autotrack is without signal, and no hidden sector or keyhole explains it.
     signal_lost = s.mode.reason == Reason.SIGNAL_LOST or (o.coasting and not _outage(s, c).permitted)
+    attitude_known, _ = attitude.at(deck, c.p, s.stamp + c.lead)
     facts = conditions.Facts(
-        0.0 if jumped else dt, dt if jumped else 0.0, dt > 1.5 * c.p.period, latched(s),
-        ship and not attitude.at(deck, c.p, s.stamp + c.lead)[0], ship and deck.jump.apart, signal_lost,
-        c.p.unasked_rate, c.p.tracker.receiver.beamwidth)
+        dt=0.0 if jumped else dt, gap=dt if jumped else 0.0, lost=dt > 1.5 * c.p.period, latched=latched(s),
+        attitude_lost=ship and not attitude_known, attitude_jumped=ship and deck.jump.apart, signal_lost=signal_lost,
+        unasked_rate=c.p.unasked_rate, beamwidth=c.p.tracker.receiver.beamwidth)
     mode = Mode.STANDBY if _rests(s, c, u) else s.mode.now
     conditions.take(s.supervision, mode, u, o, c.axis, s.unasked, facts)
     # The count of the changes of the alarm list.

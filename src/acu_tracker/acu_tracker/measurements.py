@@ -43,7 +43,7 @@ def take_attitude(s, p, u):
 def _wrong_level(s, u):
     """Return the flag of a message whose level must not be used by a mode that relies on the level, else 0.
 
-    The receiver may be locked or not.
+    The level is used whether the receiver is locked or not. s: ENCODERS_DTYPE.
     """
     if not u.error_came:
         return 0

@@ -6,11 +6,13 @@ from pedestal_common.compiled import compiled
 from pedestal_common.graph.modes import MODE_ROWS, MODES
 
 Mode = codes(MODES)
+"""Codes of the modes. The tables below hold a value for each mode, from its row of MODE_ROWS."""
 FOLLOWS_TARGET = tuple(row.follows for row in MODE_ROWS)
 USES_SIGNAL_LEVEL = tuple(row.by_level for row in MODE_ROWS)
 FOLLOWS_TABLE = tuple(row.table for row in MODE_ROWS)
 _ALLOWED_WHEN_PINNED = tuple(row.pinned for row in MODE_ROWS)
 NO_HANDOVER = -1
+"""Code for a mode without a hand-over."""
 _FALLBACK = tuple(MODES.index(row.fallback) if row.fallback else Mode.STANDBY for row in MODE_ROWS)
 
 FALLBACK_MODES = {'coast': Mode.AUTOTRACK, 'memory': Mode.STOP, 'program': Mode.PROGRAM, 'tle': Mode.TLE,
@@ -43,6 +45,7 @@ REASONS = tuple(REASON_TEXTS.values())
 Reason = codes(REASON_TEXTS)
 
 NO_REQUEST, REQUEST_REFUSED, REQUEST_ACCEPTED = -1, 0, 1
+"""Results of a request; NO_REQUEST is also the request of a step without one."""
 
 
 Conditions = namedtuple('Conditions', 'nothing stow pin preset direction program tle sun lock slope track level')
@@ -60,6 +63,7 @@ track      autotrack has its target
 level      the running mode, which uses the signal level, has neither failed nor lost its signal
 """
 
+# Index in Conditions of the condition that the entry of each mode needs, and of the condition whose loss ends it.
 _NEEDS, _ENDS = (tuple(Conditions._fields.index(name or 'nothing') for name in names)
                  for names in zip(*((row.needs, row.ends) for row in MODE_ROWS)))
 

@@ -128,8 +128,9 @@ class AcuParameters(SharedParameters):
     def reaction(self):
         """Reaction time [s] of an axis in front of a limit: e tau.
 
-        tau is the delay of a command plus two periods: one until it is measured, one until it is in force. A delayed
-        axis x' = -f(x(t - tau)) with f <= x / (e tau) does not overshoot.
+        e is Euler's number. tau is the delay of a command plus two periods: one until the command's effect is
+        measured, one until the next command is in force. An axis at a distance x from its limit, which moves by dx/dt
+        = -f(x(t - tau)) with f <= x / (e tau), does not overshoot.
         """
         return math.e * (self.command_delay + 2.0 * self.period)
 
@@ -160,6 +161,7 @@ class AcuParameters(SharedParameters):
         sectors(self.blockage)
         schedule('commands', self.commands, ACU_COMMANDS)
         points(self.points)
+        # A history holds HISTORY_LENGTH steps; four of them are a margin for stamps between and ahead of the steps.
         kept = ['receiver_latency', 'attitude_latency']
         # A beam keeps no history of its reference.
         if {self.azimuth.controller, self.elevation.controller} != {'beam'}:

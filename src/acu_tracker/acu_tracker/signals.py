@@ -25,6 +25,7 @@ published no state, topics.NO_TEXT_CODE, counts as ready.
 """
 
 INPUT_TOPICS = nodes.row('acu').reads
+"""Topics that the control unit reads."""
 
 INPUTS_DTYPE = np.dtype([
     *inputs.fields(INPUT_TOPICS),                                               # see the rows of topics.TOPICS

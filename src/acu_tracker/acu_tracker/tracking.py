@@ -92,7 +92,8 @@ def unstable(k, c, u, t):
     # Before the first attitude the state of the INS may not have arrived yet.
     if u.aligning and k.attitude.history.count > 0:
         return Reason.INS_ALIGNING
-    return Reason.NONE if attitude.at(k.attitude, c.p, t + c.lead)[0] else Reason.ATTITUDE_INVALID
+    known, _ = attitude.at(k.attitude, c.p, t + c.lead)
+    return Reason.NONE if known else Reason.ATTITUDE_INVALID
 
 
 @compiled

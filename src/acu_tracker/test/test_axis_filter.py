@@ -7,6 +7,7 @@ from scipy.linalg import block_diag, expm, solve_discrete_are, solve_discrete_ly
 from scipy.signal import lfilter
 
 from acu_tracker.estimation.filters import axis_filter, constant_gain
+from acu_tracker.estimation.filters.kalman import Symmetric
 from acu_tracker.estimation.filters.kinds import FILTER_KINDS
 from acu_tracker.estimation.filters.measurement import AxisMeasurement
 from acu_tracker.estimation.params import FilterParameters
@@ -186,7 +187,8 @@ def test_an_angle_that_walks_solves_the_riccati_equation_with_that_noise(kind):
     H, R = np.eye(n)[:1], np.array([[SIGMA**2]])
     P = solve_discrete_are(F.T, H.T, Q, R)
     P = P - P @ H.T @ np.linalg.solve(H @ P @ H.T + R, H @ P)
-    np.testing.assert_allclose([f['p'][0][0], f['p'][0][1], f['p'][0][3]], P[(0, 0, 1), (0, 1, 1)], rtol=1e-5)
+    p = Symmetric(*f['p'][0])
+    np.testing.assert_allclose([p.p11, p.p12, p.p22], P[(0, 0, 1), (0, 1, 1)], rtol=1e-5)
 
 
 @pytest.mark.parametrize('alpha', [0.05, 0.3, 0.8])
@@ -342,8 +344,8 @@ def test_outlook_and_variance_of_a_bank_are_those_of_a_draw_from_it():
     held = (rng.random(1_000_000) < 0.7).astype(int)
     X = np.empty((len(held), 3))
     for i in range(2):
-        p = f['p'][i]
-        P = np.array([[p[0], p[1], p[2]], [p[1], p[3], p[4]], [p[2], p[4], p[5]]])
+        p = Symmetric(*f['p'][i])
+        P = np.array([[p.p11, p.p12, p.p13], [p.p12, p.p22, p.p23], [p.p13, p.p23, p.p33]])
         X[held == i] = rng.multivariate_normal(f['x'][i], P, np.count_nonzero(held == i))
     holds = np.where(rng.random(len(held)) < expm(np.array([[-1, 1], [1, -1]]) / dwell * ahead)[0, 0], held, 1 - held)
     for j, (kind, g) in enumerate((('cv', (0, 1e-2, 0)), ('ca', (0, 0, 3e-2)))):

@@ -18,6 +18,11 @@ MANOEUVRES = {'imm.models': 'cv ca current_statistical', 'imm.dwell': 5.0, 'imm.
 """A bank for the axes that expects a manoeuvre any time, and so knows the rate worse than the Cartesian filter."""
 
 
+ANGLES, RATES, ELEVATION = [0, 3], [1, 4], 3
+"""Columns of an estimate, which is (angle, rate, acceleration) of azimuth and then of elevation: both angles, both
+rates, and the first column of elevation."""
+
+
 class Pass:
     """A straight pass at 60 m and 15 m/s, tracked from its beginning; the azimuth goes through south."""
 
@@ -49,8 +54,9 @@ class Pass:
             a, e, r = self.noise[k] * (SIGMA / math.cos(E), SIGMA, RANGE_SIGMA)
             distance = self.range[k] + r + range_offset if ranged else math.nan
             azimuth = (A + a + math.pi) % (2.0 * math.pi) - math.pi
-            outcomes.append(self.observe(self.t[k], azimuth, E + e, ((SIGMA / math.cos(E))**2, SIGMA**2), distance,
-                                         RANGE_SIGMA**2, 1.0)[0])
+            outcome, _ = self.observe(self.t[k], azimuth, E + e, ((SIGMA / math.cos(E))**2, SIGMA**2), distance,
+                                      RANGE_SIGMA**2, restart_gap=1.0)
+            outcomes.append(outcome)
             self.k += 1
             self.estimates[k] = self.now()
         return outcomes
@@ -65,7 +71,7 @@ class Pass:
 
     def rate_rms(self, start=5.0):
         rows = slice(round(start / T), self.k - 1)
-        return np.sqrt(np.mean((self.estimates[rows][:, [1, 4]] - self.rates[rows])**2, axis=0)) / DEG
+        return np.sqrt(np.mean((self.estimates[rows][:, RATES] - self.rates[rows])**2, axis=0)) / DEG
 
 
 def test_the_range_takes_the_geometry_out_of_the_rate():
@@ -83,14 +89,14 @@ def test_an_axis_of_another_kind_keeps_its_own_estimate():
     mixed, alone = Pass(('imm_ukf', 'cv')), Pass(('cv', 'cv'))
     for tracked in (mixed, alone):
         tracked.take(20.0)
-    assert mixed.estimates[:mixed.k, 3:].tobytes() == alone.estimates[:alone.k, 3:].tobytes()
+    assert mixed.estimates[:mixed.k, ELEVATION:].tobytes() == alone.estimates[:alone.k, ELEVATION:].tobytes()
     assert mixed.rate_rms()[0] < 0.5 * alone.rate_rms()[0]
 
 
 def largest_step(estimates):
     """Largest change (6,) of angles, rates, accelerations between neighbours, less what angles do by their rates."""
     steps = np.diff(estimates, axis=0)
-    for angle in (0, 3):
+    for angle in ANGLES:
         steps[:, angle] -= T * estimates[:-1, angle + 1]
     return np.abs(steps).max(axis=0)
 
@@ -105,11 +111,11 @@ def test_no_bump_when_the_first_range_comes():
         assert tracked.k < first + 100
     took = tracked.k
     tracked.take(3.0)
-    wander = np.ptp(tracked.estimates[first - 50:first, [1, 4]] - tracked.rates[first - 50:first], axis=0)
-    steps = largest_step(tracked.estimates[first - 1:tracked.k])[[1, 4]]
+    wander = np.ptp(tracked.estimates[first - 50:first, RATES] - tracked.rates[first - 50:first], axis=0)
+    steps = largest_step(tracked.estimates[first - 1:tracked.k])[RATES]
     print(f'in use {T * (took - first):.2f} s after the first range; largest step of the rates {steps / DEG} deg/s, '
           f'wander before {wander / DEG}')
-    error = tracked.estimates[took:tracked.k, [1, 4]] - tracked.rates[took:tracked.k]
+    error = tracked.estimates[took:tracked.k, RATES] - tracked.rates[took:tracked.k]
     assert np.all(steps < 1.5 * wander) and np.abs(error).max() < 0.2 * DEG
 
 
@@ -119,7 +125,7 @@ def test_no_bump_when_the_range_is_lost_or_the_kind_changes():
     before = tracked.now()
     for kinds in (BOTH, ('imm_ukf', 'imm'), ('ca', 'current_statistical')):
         tracked.put(kinds)
-        assert tracked.now()[[0, 1, 3, 4]] == pytest.approx(before[[0, 1, 3, 4]], abs=1e-12)
+        assert tracked.now()[ANGLES + RATES] == pytest.approx(before[ANGLES + RATES], abs=1e-12)
         # The axis that stays goes on with it, and it ends with the last one.
         assert tracked.filter('used').tolist() == [kinds[0] == 'imm_ukf', kinds == ('imm_ukf', 'imm_ukf')]
         assert tracked.filter('running') == ('imm_ukf' in kinds)
@@ -131,7 +137,7 @@ def test_no_bump_when_the_range_is_lost_or_the_kind_changes():
     lost.put(BOTH)
     lost.take(0.2, ranged=False)
     assert not lost.filter('used').any() and not lost.filter('running')
-    assert np.all(largest_step(lost.estimates[lost.k - 12:lost.k])[[1, 4]] < 0.1 * DEG)
+    assert np.all(largest_step(lost.estimates[lost.k - 12:lost.k])[RATES] < 0.1 * DEG)
     lost.params = TrackerParameters()
     lost.put(BOTH)
     lost.take(2.0)
@@ -150,7 +156,7 @@ def test_a_direction_is_compared_with_what_was_told_in_the_coast():
     (nu_a, S_a, *_), (nu_e, S_e, *_) = innovation.axis
     sigma = np.sqrt((S_a, S_e))
     assert sigma == pytest.approx(np.sqrt((azimuth.p11 + 1e-9, elevation.p11 + 1e-9)), rel=0.01)
-    assert np.abs([nu_a - (A - estimate[0]), nu_e - (E - estimate[3])]).max() < 0.05 * sigma.min()
+    assert np.abs([nu_a - (A - estimate[0]), nu_e - (E - estimate[ELEVATION])]).max() < 0.05 * sigma.min()
 
 
 @pytest.mark.parametrize('ranged', [True, False])
@@ -161,10 +167,10 @@ def test_a_cartesian_filter_that_is_nowhere_does_not_take_the_axes_along(ranged)
         tracked.state['filter']['cartesian'][name] = math.nan
     if not ranged:
         tracked.put(('imm_ukf', 'cv'))
-        assert np.isfinite(tracked.now()[3:]).all()
+        assert np.isfinite(tracked.now()[ELEVATION:]).all()
     tracked.take(5.0, ranged)
     assert tracked.filter('used').all() == ranged
-    error = tracked.now()[[0, 3]] - tracked.truth[tracked.k - 1]
+    error = tracked.now()[ANGLES] - tracked.truth[tracked.k - 1]
     assert np.abs((error + math.pi) % (2.0 * math.pi) - math.pi).max() < 3.0 * SIGMA
     assert set(tracked.take(1.0, ranged)) == {tracker.OUTCOME_ACCEPTED}
 
@@ -190,4 +196,4 @@ def test_bad_ranges_and_directions_are_not_believed():
     assert tracked.take(T, offset=1.0 * DEG) == [tracker.OUTCOME_GATED]
     outcomes = tracked.take(21 * T, offset=3.0 * DEG)
     assert tracker.OUTCOME_STARTED in outcomes and np.isfinite(tracked.now()).all()
-    assert abs(tracked.now()[3] - tracked.truth[tracked.k - 1, 1] - 3.0 * DEG) < 0.1 * DEG
+    assert abs(tracked.now()[ELEVATION] - tracked.truth[tracked.k - 1, 1] - 3.0 * DEG) < 0.1 * DEG

@@ -1,5 +1,6 @@
 """Slews through the keyhole against closed forms of a great circle and against scipy's own search."""
 import math
+import typing
 
 import numpy as np
 import pytest
@@ -7,7 +8,7 @@ from scipy.optimize import brentq, minimize_scalar
 
 from acu_tracker.geometry.azimuth_wrap import Travel
 from acu_tracker.lookahead import keyhole, slew
-from acu_tracker.lookahead.path import Path, complete
+from acu_tracker.lookahead.path import AZIMUTH_COLUMN, Path, complete
 
 W, RATE, ACCELERATION, HALF_BEAM = math.radians(0.87), math.radians(10.0), math.radians(20.0), math.radians(0.5)
 LIMIT, HIGHEST, CENTRE, ROWS, SPAN = 1.5 * math.pi, 1.66, 30.0, 2049, 60.0
@@ -26,14 +27,20 @@ def azimuth(t, E0):
     return math.atan2(math.sin(s), math.cos(s) * math.cos(E0))
 
 
+class Planned(typing.NamedTuple):
+    """Outcome of keyhole.plan and the planned slew."""
+    outcome: int
+    slew: np.void
+
+
 def planned(E0, turn=0.0, low=-LIMIT, high=LIMIT, rate=RATE, start=0.0, above=0.0, tilt=0.0):
-    """(outcome, plan); turn: whole turns of the axis at the start."""
+    """Return the Planned; turn: azimuth of the axis at the start, relative to the path [rad]."""
     path = Path(np.zeros((ROWS, 6)), start, H)
     path.rows[:, :3] = target(start + H * np.arange(ROWS), E0)
     complete(path, Travel(0.0, above))
     limits = np.array([(rate, ACCELERATION, low, high, HIGHEST, HALF_BEAM)], keyhole.SLEW_LIMITS_DTYPE)[0]
     slews = np.zeros(2, slew.SLEW_DTYPE)
-    return keyhole.plan(slews, path, path.rows[0, 3] + turn, limits, tilt), slews[0]
+    return Planned(keyhole.plan(slews, path, path.rows[0, AZIMUTH_COLUMN] + turn, limits, tilt), slews[0])
 
 
 @pytest.mark.parametrize('E0_deg, keyhole_ahead', [(80.0, False), (84.9, False), (85.1, True), (89.0, True)])
@@ -117,8 +124,8 @@ def test_the_limits_choose_the_side_and_the_other_way_costs_more():
     assert forced['cost'] == pytest.approx(free['other_cost'], rel=1e-2) and forced['loss'] > 1.2 * free['loss']
     assert forced['loss'] == pytest.approx(loss(forced['t1'], E0, -1.0), rel=0.02)
     # What the pass still travels once the path has ended needs its room too.
-    assert planned(E0, low=-5.5, above=LIMIT)[1]['long_way'] == 1
-    assert planned(E0, low=-1.5, high=0.5)[0] == keyhole.PLAN_NO_WRAP
+    assert planned(E0, low=-5.5, above=LIMIT).slew['long_way'] == 1
+    assert planned(E0, low=-1.5, high=0.5).outcome == keyhole.PLAN_NO_WRAP
 
 
 def test_over_the_top_either_way_is_as_good():
@@ -129,8 +136,8 @@ def test_over_the_top_either_way_is_as_good():
 
 def test_a_deck_that_tilts_by_more_than_the_beam_loses_all_of_the_slew():
     E0 = math.radians(88.0)
-    losses = [planned(E0, tilt=tilt)[1]['loss'] for tilt in (0.0, 0.1 * HALF_BEAM, HALF_BEAM, 10.0 * HALF_BEAM)]
-    plan = planned(E0)[1]
+    losses = [planned(E0, tilt=tilt).slew['loss'] for tilt in (0.0, 0.1 * HALF_BEAM, HALF_BEAM, 10.0 * HALF_BEAM)]
+    plan = planned(E0).slew
     assert losses[1] == pytest.approx(losses[0], rel=0.03) and losses[2] > losses[0]
     assert 0.85 < losses[3] / (plan['t2'] - plan['t1']) < 1.0
 
@@ -139,5 +146,5 @@ def test_begun_late_or_not_seen_to_its_end():
     E0 = math.radians(89.0)
     outcome, plan = planned(E0, start=CENTRE - 1.0)
     assert outcome == keyhole.PLAN_SLEW and plan['t1'] >= CENTRE - 1.0
-    assert planned(E0, start=CENTRE - SPAN + 3.0)[0] == keyhole.PLAN_BEYOND_PATH
-    assert planned(E0, start=CENTRE + 20.0)[0] == keyhole.PLAN_NO_KEYHOLE
+    assert planned(E0, start=CENTRE - SPAN + 3.0).outcome == keyhole.PLAN_BEYOND_PATH
+    assert planned(E0, start=CENTRE + 20.0).outcome == keyhole.PLAN_NO_KEYHOLE

@@ -1,5 +1,6 @@
 """Search and acquire as one law, on a dish with side lobes whose beam is where it is demanded."""
 import math
+from collections import namedtuple
 
 import numpy as np
 import pytest
@@ -92,15 +93,17 @@ def test_stages_of_a_search():
     acquisition.begin_search(s, p, B, 100.0, math.nan)
     small, full = (pattern.duration(acquisition.area(s, p, TAU, B, stage)) for stage in (False, True))
 
+    At = namedtuple('At', 'offset over')        # offset [beamwidths]; over: whether all rounds are over
+
     def at(t):
         point, over = acquisition.searched(s, p, TAU, B, 100.0 + p['wait'] + t)
-        return math.hypot(point.x, point.y) / B, over
+        return At(math.hypot(point.x, point.y) / B, over)
 
-    assert at(-0.1) == (0.0, False) and acquisition.waiting(s, p, 102.4) and not acquisition.waiting(s, p, 102.6)
-    assert at(small - 1e-3)[0] == pytest.approx(1.5 + 0.35, abs=0.01)
-    assert at(small + 1e-6)[0] == pytest.approx(0.0, abs=1e-6)
-    assert at(small + full - 1e-3)[0] == pytest.approx(5.0 + 0.35, abs=0.01)
-    assert not at(2.0 * (small + full) - 1e-3)[1] and at(2.0 * (small + full))[1]
+    assert at(-0.1) == At(0.0, False) and acquisition.waiting(s, p, 102.4) and not acquisition.waiting(s, p, 102.6)
+    assert at(small - 1e-3).offset == pytest.approx(1.5 + 0.35, abs=0.01)
+    assert at(small + 1e-6).offset == pytest.approx(0.0, abs=1e-6)
+    assert at(small + full - 1e-3).offset == pytest.approx(5.0 + 0.35, abs=0.01)
+    assert not at(2.0 * (small + full) - 1e-3).over and at(2.0 * (small + full)).over
 
 
 @pytest.mark.parametrize('sigma, radius', [(math.nan, 1.5), (0.5, 1.5), (1.5, 3.0), (9.0, 5.0)])

@@ -35,8 +35,8 @@ def test_rows_that_are_missing_are_a_gap(segments):
     assert not gap and until == 9.0 and piece.times[-1] == 9.0
     piece, gap, until = segments.at(9.0)
     assert gap and until == math.inf and piece.times[0] == 30.0
-    assert not segments.at(31.0)[1]
-    assert segments.at(99.0)[0].times[-1] == 34.0                       # past its end the last piece stays
+    assert not segments.at(31.0).in_gap
+    assert segments.at(99.0).piece.times[-1] == 34.0                       # past its end the last piece stays
 
 
 def test_a_segment_takes_the_place_of_what_follows_its_first_row(segments):
@@ -55,7 +55,7 @@ def test_a_segment_that_begins_now_is_another_program(segments):
 def test_what_is_over_is_forgotten(segments):
     for begin in range(10, 10000, 10):
         segments.append(*segment(float(begin), 10, azimuth=0.1 * begin), begin - 1.0, True)
-    assert len(segments.at(9998.0)[0].times) < 30
+    assert len(segments.at(9998.0).piece.times) < 30
 
 
 @pytest.mark.parametrize('begin, azimuth, rate, text', [
@@ -64,7 +64,7 @@ def test_what_is_over_is_forgotten(segments):
 def test_too_fast_a_turnaround_is_refused_while_the_track_is_followed(segments, begin, azimuth, rate, text):
     with pytest.raises(TurnaroundError, match=text):
         segments.append(*segment(begin, 5, azimuth=azimuth, rate=rate), 2.0, True)
-    assert segments.at(5.0)[0].times[-1] == 9.0                         # nothing is changed
+    assert segments.at(5.0).piece.times[-1] == 9.0                         # nothing is changed
     segments.append(*segment(begin, 5, azimuth=azimuth, rate=rate), 2.0, False)
 
 

@@ -1,4 +1,9 @@
-"""ROS node of the antenna drive unit: owns the time, publishes the encoders, executes rate commands."""
+"""ROS node of the antenna drive unit: owns the time, publishes the encoders, executes rate commands.
+
+The node runs the unit `adu_drive.unit.Adu`, whose law is `drive_unit.step`; change the drive there. The clock and the
+steps are in `timekeeper_node`; this file adds the state file. `entry` is imported first, so that a signal during the
+other imports ends the process without a message.
+"""
 import pedestal_common.entry  # noqa: F401
 
 # isort: split
@@ -34,7 +39,7 @@ class AduNode(Timekeeper):
             self.every(1.0, self.save)
 
     def save(self):
-        """Save the plant state.
+        """Save the plant state, and keep the reason of a failure for `diagnosed`.
 
         Because the end of a run disables the drive, `enabled` keeps its last value from before the end.
         """

@@ -57,15 +57,25 @@ def _uneven(p):
 
 
 def constants(p, h, varying=False):
-    """Return the hoisted constants of an axis (AxisParameters) for a plant sub-step h [s]: nested dictionary.
+    """Return the constants of an axis (AxisParameters) for a plant sub-step h [s], computed once: nested dictionary.
 
     varying: True if change_inertia sets the inertia, first before the first plant_step.
+
+    The laws document their constants. Names follow these rules:
+
+    per_X            1 / X; per_2N = 1 / (2 N)
+    h_X, h_R_L       h / X, h R / L; h_sigma_0 = h sigma_0; sigma_1_h = sigma_1 / h; h in h_J_shaft: speed-loop period
+    q_B              factor of an implicit step with viscous friction: 1 / (1 + h B / J)
+    K_iT             integral gain times the period of its loop
+    X_gain           share of the way to its input that a first-order lag moves in a period: 1 - exp(-period / lag)
+    rad, per_rad     angle of an encoder count [rad], counts per rad
+    X_hat            value in the controller; the true value has no suffix
     """
     per_rad = 2.0 ** p.encoder.load_bits / (2.0 * math.pi)
     motor_per_rad = 2.0 ** p.encoder.motor_bits / (2.0 * math.pi)
     N = p.gear_train.ratio
     J_shaft = 0.5 * (p.motor_1.inertia + p.motor_2.inertia + p.speed_loop.load_inertia / N ** 2)
-    T_b, out, per_fade = bias.line(p.bias)
+    T_b, out, per_fade = bias.schedule_constants(p.bias)
     J_dish, k_dish, c_dish = _dish(p)
     J_base = p.load.inertia - J_dish
     final, emergency, buffer = p.limits.switches
@@ -137,7 +147,7 @@ def initial_state(p, theta, external):
     T = -0.5 * external / p.gear_train.ratio
     observed = p.speed_loop.disturbance_observer > 0.0
     total = 0.0 if observed else T
-    T_b = bias.scheduled.py_func(T, *bias.line(p.bias))
+    T_b = bias.scheduled.py_func(T, *bias.schedule_constants(p.bias))
     return {'motor_1': _motor_at_rest(p.motor_1, p.gear_train, T + T_b, total, theta, per_rad),
             'motor_2': _motor_at_rest(p.motor_2, p.gear_train, T - T_b, total, theta, per_rad),
             'theta': theta, 'omega': 0.0, 'z': 0.0, 'h_J': 0.0, 'q_B': 0.0, 'h_J_dish': 0.0,
@@ -164,6 +174,7 @@ def _measured_speed(m, k):
 
 @inlined
 def _read_motor_sensors(m, k):
+    """Measure the speed of a motor and advance its thermal load by a speed-loop period; m, k: state and constants."""
     m.measured = _measured_speed(m, k)
     m.heat = thermal.load(m.heat, k.K_t * m.i_q, k.per_rated, k.heat_gain)
     m.count = encoder.counts(m.theta, k.per_rad)

@@ -59,7 +59,11 @@ def permitted(s):
 
 @compiled
 def condition(s):
-    """Return the code of adu/state, 0 for 'enabled'. It changes with every change of `state_text`."""
+    """Return the code of adu/state. It changes with every change of `state_text`.
+
+    Codes 0 to 3 are topics.ENABLED_STATES: bit 0 and bit 1 stand for an azimuth and an elevation with one motor.
+    Higher codes below len(STATE_TEXTS) are phases or the emergency stop; the others hold the fault words of both axes.
+    """
     if tripped(s):
         return (FAULT_BIT | (EMERGENCY_STOP_BIT if s.emergency else 0)
                 | s.azimuth.faults << AZIMUTH_FAULTS_SHIFT | s.elevation.faults << ELEVATION_FAULTS_SHIFT)
@@ -91,6 +95,7 @@ def is_moving(axis, c):
 
 @compiled
 def _next(s, c):
+    """Return the phase of the next period."""
     allowed = permitted(s)
     if faults.removes_torque(s.azimuth.faults) or faults.removes_torque(s.elevation.faults):
         return PHASE_DISABLED

@@ -87,6 +87,7 @@ def _record(values):
 
 
 def _constants(params, substeps):
+    """Return the record (1,) of `constants`, with a dtype object of its own."""
     h = axis.CURRENT_LOOP_PERIOD_S / substeps
     bodies = gimbal.constants(params)
     return _record({'azimuth': axis.constants(params.azimuth, h, bodies['rigid']),
@@ -102,6 +103,15 @@ def _constants(params, substeps):
 
 
 def _initial_state(params):
+    """Return the record (1,) of `initial_state`, with a dtype object of its own.
+
+    rate, torque, enable   ring of the commands
+    k                      number of the period
+    tick                   speed-loop period whose command is in force
+    late_ticks             injected delay in speed-loop periods
+    age, brake_age         periods since the last change of the phase and of the brakes
+    applied                1 while the brakes are commanded on
+    """
     axes, enabled = {}, params.initially_enabled and not (params.stow_pins and params.pins.initially_in)
     of_field = wind_field.initial_torques(params.wind.field, params.initial_azimuth, params.initial_elevation)
     for name, torque, field in zip(('azimuth', 'elevation'), wind.initial_torques(params.wind), of_field):
@@ -133,6 +143,7 @@ def initial_state(params: AduParameters) -> np.ndarray:
 
 @compiled
 def _plausible(x):
+    """Return True if an input is valid; NaN is not."""
     return abs(x) <= MAX_PLAUSIBLE_INPUT
 
 

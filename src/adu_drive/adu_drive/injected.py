@@ -34,7 +34,11 @@ def _clear_faults(s):
 
 @compiled
 def _apply_fault(m, fault, values):
-    """Apply a fault to the record of the drive (unit.RECORD_DTYPE)."""
+    """Apply a fault to the record of the drive (unit.RECORD_DTYPE).
+
+    values: the arguments of the fault in the order of its row of table.INJECTED_FAULTS. The first argument is the
+    axis, except for faults of the whole drive, such as `delay`.
+    """
     i = int(values[0])
     s, c = (m.state.azimuth, m.constants.azimuth) if i == 0 else (m.state.elevation, m.constants.elevation)
     message_faults.apply(m.injected.message_fault, DRIVE_MESSAGE_FAULT_CODES, fault, values)
@@ -76,7 +80,11 @@ def apply_due_faults(m, stamp):
 
 @compiled
 def corrupt_messages(e, stamp, outputs):
-    """Apply the active message faults to the messages of a step."""
+    """Apply the active message faults to the messages of a step.
+
+    The last argument of message_faults.numbers is the place of the first number among those that a frozen drive
+    repeats.
+    """
     joints, motors = outputs[JOINT_STATES_TOPIC], outputs[MOTOR_STATES_TOPIC]
     for i in range(2):
         joints.velocity[i] += e.bias[i]

@@ -1,7 +1,7 @@
 """Parameters of the drive.
 
-Sources: motor data of paper 000, table 1 (line values halved to phase values); all other values of reference/servo.md
-section 1.
+Source of the motor data: paper 000, table 1, line values halved to phase values. The other defaults are assumptions of
+this project for a pedestal with these motors.
 """
 import dataclasses
 import math

@@ -48,6 +48,7 @@ class Timekeeper(unit_node.UnitNode):
         self.commands = [port.named(port.unit.COMMAND) for port in self.ports]
         if self.graph.lockstep:
             self.follow(self.unit.trigger, latencies)
+            # The timer calls `start` once, after the executor of the node runs.
             self.timer = self.every(0.001, self.start)
         else:
             self.wait, self.guarded_step = 0.0, self._guarded(self.make_due_step)
@@ -94,6 +95,7 @@ class Timekeeper(unit_node.UnitNode):
         self.steps.take(self.unit.trigger, stamp + self.period_ns, (stamp + self.period_ns, ()))
 
     def _make(self, stamp, values):
+        """Make the step of a stamp [ns] with the messages of the previous step."""
         for port in self.ports:
             port.step(stamp, values)
         self.begin_step(stamp)
@@ -186,6 +188,7 @@ class Timekeeper(unit_node.UnitNode):
         super().close()
 
     def _outcome(self, made):
+        """Return the result of the run after a number of made steps."""
         wall = max(time.monotonic_ns() - self.begun, 1) * 1e-9
         return {'steps': self.k, 'wall_s': wall, 'realtime_factor': made * self.parameters.period / wall,
                 'lost_steps': int(self.lost_steps), 'missed_steps': int(self.missed_steps),

@@ -23,6 +23,8 @@ DRIVE_STATE_TOPIC, PIN_STATES_TOPIC, PIN_COMMAND_TOPIC = 'adu/state', 'adu/stow_
 
 INVALID_INPUT_TOPICS = ('', RATE_COMMAND_TOPIC, SHIP_TRUTH_TOPIC)
 """Topics that can hold an invalid input, by the number in `invalid` of LINK_DTYPE."""
+INVALID_COMMAND, INVALID_TRUTH = 1, 2
+"""Numbers of these topics; 0: none."""
 
 LINK_DTYPE = np.dtype([('stamp', 'i8'), ('command_stamp', 'i8'), ('truth_stamp', 'i8'), ('deck_rate', 'f8', (3,)),
                        ('timeout', 'i8'), ('period', 'i8'), ('stale', 'i8'), ('invalid', 'i8')])
@@ -89,7 +91,7 @@ def record_invalid_topic(u, m):
     """Store the topic with the invalid input."""
     deck = u.base_acceleration
     valid = max(abs(deck[0]), abs(deck[1]), abs(deck[2])) <= drive_unit.MAX_PLAUSIBLE_INPUT
-    m.invalid = 1 if valid else 2
+    m.invalid = INVALID_COMMAND if valid else INVALID_TRUTH
 
 
 @compiled
@@ -319,4 +321,5 @@ class Adu(Simulated):
     @staticmethod
     def idle(numbers):
         """Return the reason why a recording does not exercise the drive, '' if it does."""
-        return '' if (numbers[RATE_COMMAND_TOPIC][:, 2:4] != 0.0).any() else 'no rate was ever commanded'
+        rates = numbers[RATE_COMMAND_TOPIC][:, 2:4]     # After the two positions of a JointState.
+        return '' if (rates != 0.0).any() else 'no rate was ever commanded'

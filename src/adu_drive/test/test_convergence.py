@@ -53,7 +53,7 @@ def move(state, constants, volts, path):
         if n % (4 * axis.CURRENT_LOOP_STEP_COUNT) == 0:
             rate = K_p * (STEP - s.theta)
         if n % axis.CURRENT_LOOP_STEP_COUNT == 0:
-            axis.speed_control(s, c, rate, 0.0, 1, True, True)
+            axis.speed_control(s, c, rate, torque=0.0, enable=1, powered=True, free=True)
         axis.current_control(m1, c.motor_1)
         axis.current_control(m2, c.motor_2)
         volts[n, 0], volts[n, 1], volts[n, 2], volts[n, 3] = m1.v_d, m1.v_q, m2.v_d, m2.v_q

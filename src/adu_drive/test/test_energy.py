@@ -18,6 +18,10 @@ STEP, K_p = 0.174, 54.85
 """Of the move [rad], of the position loop around it [1/s]: paper 000's step, which takes all the torque there is."""
 
 COPPER, MOTOR_FRICTION, BEARING, VISCOUS, MESH = range(5)
+"""Places of the losses."""
+
+OMEGA, THETA, BRISTLE = 8, 9, 10
+"""Places of the rate, the angle and the bristle deflection of the load in a state; those of the motors are before."""
 
 
 def numbers(p):
@@ -34,7 +38,7 @@ def state_of(s, x):
     """i_d, i_q, omega, theta of both motors, then omega, theta, z of the load."""
     for j, m in ((0, s.motor_1), (4, s.motor_2)):
         x[j], x[j + 1], x[j + 2], x[j + 3] = m.i_d, m.i_q, m.omega, m.theta
-    x[8], x[9], x[10] = s.omega, s.theta, s.z
+    x[OMEGA], x[THETA], x[BRISTLE] = s.omega, s.theta, s.z
 
 
 @numba.njit
@@ -42,11 +46,11 @@ def stored(x, motors, gear, load):
     """Energy [J] in windings, rotors, load, meshes and bristles."""
     N, k, _, half_lash = gear
     J, _, sigma_0, _ = load
-    e = 0.5 * J * x[8] ** 2 + 0.5 * sigma_0 * x[10] ** 2
+    e = 0.5 * J * x[OMEGA] ** 2 + 0.5 * sigma_0 * x[BRISTLE] ** 2
     for j in range(2):
         i_d, i_q, w, theta = x[4 * j:4 * j + 4]
         e += 0.75 * motors[j, 1] * (i_d ** 2 + i_q ** 2) + 0.5 * motors[j, 2] * w ** 2
-        e += 0.5 * k * max(abs(theta / N - x[9]) - half_lash, 0.0) ** 2
+        e += 0.5 * k * max(abs(theta / N - x[THETA]) - half_lash, 0.0) ** 2
     return e
 
 
@@ -61,14 +65,14 @@ def dissipate(x0, x1, h, motors, gear, load, loss):
         i_d, i_q, w, theta = x[4 * j:4 * j + 4]
         loss[COPPER] += 1.5 * R * (i_d ** 2 + i_q ** 2) * h
         loss[MOTOR_FRICTION] += (T_c * math.tanh(w / v) + B_m * w) * w * h
-        delta, rate = theta / N - x[9], w / N - x[8]
+        delta, rate = theta / N - x[THETA], w / N - x[OMEGA]
         if abs(delta) > half_lash:
             spring = k * (delta - math.copysign(half_lash, delta))
             free = (spring + c * rate) * spring < 0.0       # the damper would pull: the spring swings out alone
             loss[MESH] += (-spring if free else c * rate) * rate * h
-    bristle = (x1[10] - x0[10]) / h
-    loss[BEARING] += (sigma_0 * x[10] * (x[8] - bristle) + sigma_1 * bristle * x[8]) * h
-    loss[VISCOUS] += B * x[8] ** 2 * h
+    bristle = (x1[BRISTLE] - x0[BRISTLE]) / h
+    loss[BEARING] += (sigma_0 * x[BRISTLE] * (x[OMEGA] - bristle) + sigma_1 * bristle * x[OMEGA]) * h
+    loss[VISCOUS] += B * x[OMEGA] ** 2 * h
 
 
 @numba.njit
@@ -86,7 +90,7 @@ def account(state, constants, external, motors, gear, load, log):
     for n in range(len(external)):
         if n % 4 == 0:
             rate = K_p * (STEP - s.theta)
-        axis.speed_control(s, c, rate, 0.0, 1, True, True)
+        axis.speed_control(s, c, rate, torque=0.0, enable=1, powered=True, free=True)
         for _ in range(axis.CURRENT_LOOP_STEP_COUNT):
             axis.current_control(s.motor_1, c.motor_1)
             axis.current_control(s.motor_2, c.motor_2)
@@ -97,7 +101,7 @@ def account(state, constants, external, motors, gear, load, log):
                 dissipate(x0, x1, c.h, motors, gear, load, loss)
                 for j, m in ((0, s.motor_1), (4, s.motor_2)):
                     electrical += 0.75 * (m.v_d * (x0[j] + x1[j]) + m.v_q * (x0[j + 1] + x1[j + 1])) * c.h
-                work += external[n] * (x1[9] - x0[9])
+                work += external[n] * (x1[THETA] - x0[THETA])
         log[n] = c.motor_1.K_t * s.motor_1.i_q, s.theta
     return electrical, work, loss, stored(x1, motors, gear, load) - before
 

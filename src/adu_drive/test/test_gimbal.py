@@ -41,6 +41,7 @@ def lagrange():
 
 @compiled
 def _torques(constants, x):
+    """Return the torques [Nm] on both axes at x: A, E, their rates and accelerations, w (3,), w' (3,)."""
     c = constants[0].bodies
     M_AA, M_AE = gimbal.inertia(c, x[1])
     h_A, h_E = gimbal.gyroscopic(c, (x[0], x[1]), (x[2], x[3]), x[6:9], x[9:12])

@@ -21,7 +21,7 @@ def test_own_exp_and_tanh_keep_their_stated_errors():
     ('off', [0.0, 0.0, 0.0, 0.0, 0.0]), ('constant', [12.0, 12.0, 12.0, 12.0, 12.0]),
     ('fade', [12.0, 12.0 * 31.0 / 45.0, 12.0 * 15.5 / 45.0, 0.0, 0.0]), ('hold_fade', [12.0, 12.0, 6.0, 0.0, 0.0])])
 def test_bias_schedules(schedule, expected):
-    line = bias.line(BiasParameters(schedule=schedule))
+    line = bias.schedule_constants(BiasParameters(schedule=schedule))
     for sign in (1.0, -1.0):
         assert [bias.scheduled(sign * T, *line) for T in (0.0, 14.0, 29.5, 45.0, 90.0)] == pytest.approx(expected)
 

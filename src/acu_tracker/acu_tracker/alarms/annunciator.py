@@ -1,7 +1,8 @@
 """Records of all alarms: delays, causes, first-out, and the commands of an operator.
 
-A consequence stands under its cause while the cause is listed: when either is raised within CAUSE_WINDOW_S of the
-other, or while the cause is there. Only an alarm that stands under no other is annunciated (see report).
+First-out marks the first alarm of a burst, which often shows the cause. A consequence stands under its cause while the
+cause is listed: when either is raised within CAUSE_WINDOW_S of the other, or while the cause is there. Only an alarm
+that stands under no other is annunciated (see report).
 """
 import numpy as np
 

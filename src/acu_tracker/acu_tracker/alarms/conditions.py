@@ -58,7 +58,8 @@ def initialise(s):
 def _of_motors(d, i, u, envelope, p, facts):
     """Return the bits of the alarms of axis i that its encoder, motors and commands show.
 
-    d: its detectors; envelope: uncommanded_motion.ENVELOPE_DTYPE; p: record of its AxisParameters.
+    The bit of an azimuth alarm, shifted left by i, is that of axis i. d: its detectors; envelope:
+    uncommanded_motion.ENVELOPE_DTYPE; p: record of its AxisParameters.
     """
     y, dy, high, low = u.position[i], u.velocity[i], envelope.high[i], envelope.low[i]
     bits, surge = 0, detectors.MAX_ACCELERATION_RATIO * p.limits.acceleration if facts.lost else 0.0
@@ -118,7 +119,9 @@ def _of_axes(s, mode, u, o, c, envelope, facts):
 def _of_drive(s, u):
     """Return the bits of the alarms that the drive reports itself by u.drive, a code of adu/state."""
     if u.drive_ready:
+        # The code of a drive that is ready is the bits of the axes with one motor (topics.ENABLED_STATES), or -1.
         s.ready, s.lost = u.stamp, max(u.drive, 0)
+    # Because the bit of the elevation follows that of the azimuth, the product sets the bits of the axes in s.lost.
     bits = s.lost * table.Bit.AZIMUTH_MOTOR_LOST
     if u.drive == signals.DRIVE_EMERGENCY_STOP:
         bits |= table.Bit.EMERGENCY_STOP

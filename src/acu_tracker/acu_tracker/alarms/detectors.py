@@ -59,7 +59,8 @@ FOLLOWING_ERROR_BEAMWIDTHS = 0.25
 """Following error that is too large [beamwidths]."""
 
 MIN_HALF_WAVE_AREA = 1e-4
-"""Smallest area of a half wave of the following error that counts [rad s]: 2 a / w, 1 mrad at 3 Hz."""
+"""Smallest area of a half wave of the following error that counts [rad s]: 2 a / w for an amplitude a of 1 mrad at an
+angular frequency w of 3 Hz."""
 
 OSCILLATION_WINDOW_S = 5.0
 """Time constant with which the count of half waves decays [s]."""
@@ -133,6 +134,7 @@ def immobile(d, dy, high, low):
     commands does not count as immobile. high, low: envelope of the commands (servo.uncommanded_motion).
     """
     threshold = 0.5 * MIN_COMMANDED_RATE_RAD_S if d.immobile else MIN_COMMANDED_RATE_RAD_S
+    # u: the recent command of least magnitude, if all have one sign.
     u = low if low > threshold else high
     if low <= threshold and high >= -threshold:
         d.immobile = 0

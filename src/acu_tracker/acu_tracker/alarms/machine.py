@@ -22,6 +22,7 @@ again. The other events are commands of the operator.
 EVENT_REFUSED = -1
 """Next state for an event that a state does not accept."""
 
+# The states in the order of ALARM_STATES, and x for an event that is refused.
 _N, _U, _A, _R, _LU, _LA, _SH, _SU, _x = (*range(len(ALARM_STATES)), EVENT_REFUSED)
 
 STATE_TRANSITIONS = np.array((

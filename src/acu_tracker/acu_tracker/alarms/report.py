@@ -7,6 +7,7 @@ MAX_ANNUNCIATED_ALARMS = 10
 """Largest number of alarms annunciated at once: those of the highest priority, the earliest first."""
 
 DIAGNOSTIC_LEVELS = {'critical': LEVEL_ERROR, 'high': LEVEL_ERROR, 'medium': LEVEL_WARN, 'low': LEVEL_WARN}
+"""{priority of an alarm: level of its DiagnosticStatus}."""
 
 
 def order(s):

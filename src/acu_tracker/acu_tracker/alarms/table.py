@@ -1,4 +1,8 @@
-"""Alarms of the control unit: a row each, every cause before its consequences."""
+"""Alarms of the control unit: a row each.
+
+Every cause stands before its consequences, because the annunciator looks for the parent of an alarm among the rows
+before it.
+"""
 import typing
 
 from pedestal_common.codes import bits
@@ -17,6 +21,7 @@ following: in a mode that follows a target.
 class Alarm(typing.NamedTuple):
     """Row of ALARMS.
 
+    name         text of the alarm in messages and commands
     priority     of ALARM_PRIORITIES
     on_delay     time for which the condition must last before the alarm is raised [s]
     off_delay    time for which the condition must be gone before the alarm clears [s]

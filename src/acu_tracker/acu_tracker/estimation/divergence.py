@@ -38,6 +38,7 @@ def restart(s):
 @compiled
 def take(s, innovation):
     """Add the Innovation of an error to the mean; NaN (no prediction) is ignored."""
+    # The comparison of x with itself is False for NaN.
     x = 0.5 * (innovation.axis[0].chi_square + innovation.axis[1].chi_square)
     if x == x:
         s.m += (min(x, MAX_COUNTED_ERROR) - s.m) / DIVERGENCE_ERROR_COUNT

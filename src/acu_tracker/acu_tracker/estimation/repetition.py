@@ -13,7 +13,7 @@ REPETITION_TRAVEL_RAD = 3e-3
 
 @compiled
 def take(s, u, at):
-    """Take an error of signals.INPUTS that was measured at a Pointing of the beam;
+    """Take an error u (record of signals.INPUTS_DTYPE) that was measured at a Pointing of the beam;
     return True if it is a repetition."""
     if u.cross_elevation != s.message[0] or u.elevation != s.message[1] or u.cn0_dbhz != s.message[2]:
         s.message[0], s.message[1], s.message[2] = u.cross_elevation, u.elevation, u.cn0_dbhz

@@ -2,10 +2,11 @@
 
     q = mean over the last errors of (nu_k - nu_k-1)^2 / 2R
 
-q is the mean of both axes, and 1 for white noise of the variance R. Slow changes cancel in the difference: a target
-that turns, a slope of the wrong sign, a bias. Because the filter ignores noisy errors, the part of such noise that
-passes the gate does not mislead it. Source: von Neumann, Distribution of the ratio of the mean square successive
-difference to the variance, Annals of Mathematical Statistics 12 (1941) 367.
+nu_k: innovation of error k [rad]; R: variance of an error by the receiver model. q is the mean of both axes, and 1 for
+white noise of the variance R. Slow changes cancel in the difference: a target that turns, a slope of the wrong sign, a
+bias. Because the filter ignores noisy errors, the part of such noise that passes the gate does not mislead it. Source:
+von Neumann, Distribution of the ratio of the mean square successive difference to the variance, Annals of Mathematical
+Statistics 12 (1941) 367.
 """
 import numpy as np
 
@@ -36,7 +37,7 @@ def take(s, innovation, m):
     for i in range(2):
         nu = innovation.axis[i].nu
         d = nu - s.nu[i]
-        x += 0.25 * d * d / m.axis[i].variance
+        x += 0.25 * d * d / m.axis[i].variance      # d^2 / 2R, half for each axis
         s.nu[i] = nu
     if x == x:  # not NaN
         s.q += (min(x, MAX_COUNTED_DIFFERENCE) - s.q) / ROUGHNESS_ERROR_COUNT

@@ -6,7 +6,8 @@ variance R of e are averaged:
 
     J+ = mean of (nu_b + nu_e)^2 / R,    J- = mean of (nu_b - nu_e)^2 / R
 
-Right slope: the beam is H z+, H the closed loop of type II, so that z- = (2 H - 1) z+. Except while H lags, z- is
+nu_b, nu_e: innovations of the lines of b and of e. Right slope: the beam is H z+, so that z- = (2 H - 1) z+. H is the
+transfer function of the closed loop, which follows a constant rate without error (type II). Except while H lags, z- is
 at least as rough as z+, however the target turns. Outliers and noise are in both alike. Reversed slope: the
 errors drive the beam away from a target that stays smooth in z-, while z+ moves away twice as fast. The
 comparison is a likelihood ratio of two hypotheses (Willsky, A survey of design methods for failure detection in
@@ -26,10 +27,11 @@ SLOPE_SIGN_DTYPE = np.dtype([('stamp', 'f8'), ('n', 'i8'), ('line', 'f8', (5, 2)
 unit vector (ENU) and of both errors [rad]; J: J+ and J- of both axes [-]."""
 
 LINE_ERROR_COUNT = 200
-"""Number of errors in the memory of a line. With so many the beam's travel counts before its speed does."""
+"""Number of errors in the memory of a line. The longer the memory, the more the travel of the beam counts, and the
+less its speed."""
 
 SLOPE_ERROR_COUNT = 100
-"""Number of errors in the means J; a reversal of the target is shorter than these means."""
+"""Number of errors in the means J. A target reverses its motion in a shorter time."""
 
 MIN_ERROR_COUNT = 60
 """Number of errors, after the begin of autotrack or the return of the signal, before the first verdict. Means of fewer
@@ -101,7 +103,10 @@ def _reversed(J, other):
 @compiled
 def take(s, t, beam, error, variance, gap):
     """Take an error (cross-elevation, elevation) [rad] of a variance [rad2], measured at t [s] from a Beam; return
-    True if a slope is reversed. The lines restart after more than a gap [s] without errors."""
+    True if a slope is reversed. The lines restart after more than a gap [s] without errors.
+
+    Lines 0 to 2 belong to the beam's unit vector, lines 3 and 4 to the two errors.
+    """
     T = t - s.stamp
     if T <= 0.0:
         return False

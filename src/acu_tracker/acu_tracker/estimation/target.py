@@ -2,6 +2,9 @@
 
 With a measured range the estimate is the line of sight of the INS, otherwise that of the antenna (`lever_arm`). Its
 angles are earth angles, near the zenith angles in a tilted frame (`estimate_frame`).
+
+g: record of TARGET_DTYPE; p, c: records of SharedParameters and of tracker.CONSTANTS_DTYPE; deck: record of
+ATTITUDE_DTYPE.
 """
 import math
 from collections import namedtuple
@@ -28,6 +31,7 @@ from pedestal_common.geometry import line_of_sight as pointing
 
 TARGET_DTYPE = np.dtype([('tracker', tracker.TRACKER_DTYPE), ('frame', estimate_frame.FRAME_DTYPE),
                          ('lever_arm', lever_arm.LEVER_ARM_DTYPE)], align=True)
+"""tracker: the filter with its gates; frame: the frame of the estimate; lever_arm: the arm from INS to antenna."""
 
 OUTCOME_GATED, OUTCOME_STALE, OUTCOME_NOISY = tracker.OUTCOME_GATED, tracker.OUTCOME_STALE, tracker.OUTCOME_NOISY
 OUTCOME_NO_ATTITUDE = OUTCOME_NOISY + 1
@@ -77,9 +81,8 @@ def take(g, p, c, deck, u, at, measured, restart_gap):
     Return (OUTCOME_STARTED, OUTCOME_ACCEPTED, OUTCOME_GATED, OUTCOME_STALE,
     OUTCOME_NOISY or OUTCOME_NO_ATTITUDE; the Innovation).
 
-    p, c: records of SharedParameters and of tracker.CONSTANTS_DTYPE; deck: record of ATTITUDE_DTYPE; at: Pointing of
-    the antenna when the error was measured; restart_gap: as in tracker.observe. `measured`: deck angles (azimuth,
-    elevation) [rad] of the target, which are the antenna's, displaced by the error.
+    at: Pointing of the antenna when the error was measured; restart_gap: as in tracker.observe. `measured`: deck
+    angles (azimuth, elevation) [rad] of the target, which are the antenna's, displaced by the error.
     """
     e = p.tracker.receiver
     t = u.error_stamp - e.age
@@ -96,7 +99,8 @@ def take(g, p, c, deck, u, at, measured, restart_gap):
     if math.isfinite(u.error_rate[0] + u.error_rate[1] + u.error_rate_sigma):
         azimuth_rate, elevation_rate = _measured_rates(g, deck.stabilised, now, u, at)
     R_cross = R_elevation = error_variance(u.cross_elevation, u.elevation, u.cn0_dbhz, e)
-    cos_el = max(math.cos(elevation), 0.01)
+    cos_el = max(math.cos(elevation), 0.01)     # This avoids a division by zero at the zenith.
+    # walk_cross, walk_elevation: growth of the variances by the wander of the attitude [rad2/s].
     walk_cross = walk_elevation = 0.0
     if deck.stabilised:
         verticals = estimate_frame.verticals(g.frame, azimuth, elevation)
@@ -148,7 +152,8 @@ def earth_outlook(g, c, t):
 def on_deck(g, p, deck, t, source):
     """Return the Motion on the deck (record of ATTITUDE_DTYPE) at t [s] of a Source; p: record of SharedParameters."""
     if source.framed and (g.frame.tilted or g.lever_arm.range != 0.0):
-        framed = estimate_frame.of_deck(g.frame, attitude.at(deck, p, t)[1])
+        _, now = attitude.at(deck, p, t)
+        framed = estimate_frame.of_deck(g.frame, now)
         return angles(lever_arm.to_antenna(g.lever_arm, deck_reference.on_deck(framed, line_of_sight(source.motion))))
     return attitude.on_deck(deck, p, t, source.motion)
 

@@ -1,6 +1,8 @@
 """The target tracker: a target filter behind one gate; lock, restarts, and coasting without measurements.
 
 Between accepted measurements the filter stays at the stamp of the last one; `outlook` and `read` predict from there.
+
+t: record of TRACKER_DTYPE; p: record of TrackerParameters; c: record of CONSTANTS_DTYPE; m: a Measurement.
 """
 import math
 
@@ -66,16 +68,13 @@ def reset_accepted_count(t):
 
 @compiled
 def transfer(t, p, c):
-    """Adopt constants that may have changed: a filter of another kind continues from the estimate of the old one.
-
-    p: record of TrackerParameters, here and below.
-    """
+    """Adopt constants that may have changed: a filter of another kind continues from the estimate of the old one."""
     target_filter.transfer(t.filter, c.filter, p.initial_rate, t.running)
 
 
 @compiled
 def move(t, c, motion):
-    """Change to a frame in which the target has this Motion now."""
+    """Move the filter to a frame in which the target has this Motion now."""
     target_filter.move(t.filter, c.filter, motion)
 
 
@@ -116,6 +115,7 @@ def observe(t, p, c, m, restart_gap):
     and then each of range and rates by itself. The filter restarts at gate_restart consecutive gated errors, and after
     restart_gap [s] without accepted ones.
     """
+    # T: time since the last accepted measurement [s]; f, k: state and constants of the filter.
     T = m.stamp - t.stamp
     if t.running and T <= 0.0:
         return OUTCOME_STALE, NO_INNOVATION

@@ -20,6 +20,9 @@ ATTITUDE_DTYPE = np.dtype([('stabilised', 'i8'), ('history', history_type(10)), 
 earth, w [rad/s], dw [rad/s2] of the last steps, after the correction of jumps. `sample`: the last q and w as received;
 aligned: whether the INS was aligned; jump: `attitude_jump`; error: `attitude_error`."""
 
+RATE_COLUMN, ACCELERATION_COLUMN = 4, 7
+"""First columns of w and of dw in a sample of the history; the quaternion is in the columns before."""
+
 MIN_TURN_RATE_RAD_S = 1e-6
 """Rate of the deck [rad/s] above which its attitude changes from one measurement to the next."""
 
@@ -82,10 +85,17 @@ def _repeats(s, q, w):
 
 
 @compiled
+def _vector(sample, column):
+    """Return the Vector in three columns of a sample, the first of which is `column`."""
+    return Vector(sample[column], sample[column + 1], sample[column + 2])
+
+
+@compiled
 def _correct_jump(s, row, last, T):
     """Correct the quaternion in a row of the history for jumps; row `last` is the sample T [s] before."""
     a, b = s.history.sample[last], s.history.sample[row]
-    predicted = rotated(a, (0.5 * T * (a[4] + b[4]), 0.5 * T * (a[5] + b[5]), 0.5 * T * (a[6] + b[6])))
+    w_a, w_b = _vector(a, RATE_COLUMN), _vector(b, RATE_COLUMN)
+    predicted = rotated(a, (0.5 * T * (w_a.x + w_b.x), 0.5 * T * (w_a.y + w_b.y), 0.5 * T * (w_a.z + w_b.z)))
     b[0], b[1], b[2], b[3] = attitude_jump.jump_corrected(s.jump, predicted, (b[0], b[1], b[2], b[3]), T)
 
 
@@ -116,11 +126,12 @@ def take(s, p, t_k, stamp, q, w, aligning):
     for i in range(4):
         h.sample[row, i] = q[i] / norm if dot >= 0.0 else -q[i] / norm
     for i in range(3):
-        h.sample[row, 4 + i] = w[i]
-        h.sample[row, 7 + i] = 0.0
+        h.sample[row, RATE_COLUMN + i] = w[i]
+        h.sample[row, ACCELERATION_COLUMN + i] = 0.0
         if T <= p.attitude_timeout:
-            h.sample[row, 7 + i] = smoothed_acceleration(
-                h.sample[last, 7 + i], w[i], h.sample[last, 4 + i], T, p.attitude_smoothing)
+            h.sample[row, ACCELERATION_COLUMN + i] = smoothed_acceleration(
+                h.sample[last, ACCELERATION_COLUMN + i], w[i], h.sample[last, RATE_COLUMN + i], T,
+                p.attitude_smoothing)
     if T <= p.attitude_timeout and s.aligned and not aligning:
         _correct_jump(s, row, last, T)
     else:
@@ -144,14 +155,14 @@ def at(s, p, t):
         return False, Attitude(Rotation(UNKNOWN_VECTOR, UNKNOWN_VECTOR, UNKNOWN_VECTOR), UNKNOWN_VECTOR,
                                UNKNOWN_VECTOR)
     if T >= 0.0:
-        dw = Vector(last[7], last[8], last[9])
-        rate = Vector(last[4] + T * dw.x, last[5] + T * dw.y, last[6] + T * dw.z)
-        x, y, z, w = rotated(last, (rotation_angle(last[4], last[7], T), rotation_angle(last[5], last[8], T),
-                                    rotation_angle(last[6], last[9], T)))
+        w_last, dw = _vector(last, RATE_COLUMN), _vector(last, ACCELERATION_COLUMN)
+        rate = Vector(w_last.x + T * dw.x, w_last.y + T * dw.y, w_last.z + T * dw.z)
+        x, y, z, w = rotated(last, (rotation_angle(w_last.x, dw.x, T), rotation_angle(w_last.y, dw.y, T),
+                                    rotation_angle(w_last.z, dw.z, T)))
     else:
         a, b = h.sample[i], h.sample[j]
-        dw = Vector(b[7], b[8], b[9])
-        rate = Vector(a[4] + f * (b[4] - a[4]), a[5] + f * (b[5] - a[5]), a[6] + f * (b[6] - a[6]))
+        w_a, w_b, dw = _vector(a, RATE_COLUMN), _vector(b, RATE_COLUMN), _vector(b, ACCELERATION_COLUMN)
+        rate = Vector(w_a.x + f * (w_b.x - w_a.x), w_a.y + f * (w_b.y - w_a.y), w_a.z + f * (w_b.z - w_a.z))
         x, y, z, w = a[0] + f * (b[0] - a[0]), a[1] + f * (b[1] - a[1]), a[2] + f * (b[2] - a[2]), \
             a[3] + f * (b[3] - a[3])
     norm = math.sqrt(x * x + y * y + z * z + w * w)

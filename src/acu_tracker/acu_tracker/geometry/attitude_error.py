@@ -28,7 +28,8 @@ def take(e, noise, walk):
 def expected(e, a):
     """Return ((noise of tilt, of heading) [rad2], (walk of tilt, of heading) [rad2/s]).
 
-    a: record of AttitudeModelParameters, whose slow Gauss-Markov errors walk by 2 sigma^2 / tau.
+    a: record of AttitudeModelParameters. Its slow errors are Gauss-Markov processes of standard deviation sigma and
+    correlation time tau, whose variance first grows by 2 sigma^2 / tau [rad2/s].
     """
     if e.published:
         return (e.noise[0], e.noise[1]), (e.walk[0], e.walk[1])

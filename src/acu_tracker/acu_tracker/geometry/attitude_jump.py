@@ -4,9 +4,10 @@
     b_k = c (x) q_k                 corrected attitude, q measured by the INS; c = 1 before any jump
     c = p_k (x) q_k*                after a jump: the angle between b_k and p_k exceeds MAX_UNEXPLAINED_ANGLE_RAD
 
-The quaternions rotate deck -> earth, so that c turns about axes of the earth. The angle of c then decays to 0 at
-JUMP_DECAY_RATE_RAD_S. A jump does not disturb tracking by the receiver, whatever its size, at its begin or at its end.
-A mode that points by the attitude moves to the new one so slowly that the operator can check it.
+(x) is the product of quaternions, q* the inverse of q, T the time of a step. The quaternions rotate deck -> earth, so
+that c turns about axes of the earth. The angle of c then decays to 0 at JUMP_DECAY_RATE_RAD_S. A jump does not disturb
+tracking by the receiver, whatever its size, at its begin or at its end. A mode that points by the attitude moves to
+the new one so slowly that the operator can check it.
 """
 import math
 

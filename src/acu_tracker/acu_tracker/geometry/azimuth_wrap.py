@@ -15,6 +15,8 @@ def nearest(azimuth, near, low, high, travel):
 
     If no wrap holds the whole travel, return one that holds the azimuth itself; otherwise the nearest.
     """
+    # Penalties, far above every distance, that rank the wraps: a wrap outside the limits, and a wrap whose travel
+    # leaves the limits.
     closest = near + wrap(azimuth - near)
     best, score = closest, math.inf
     for i in range(-2, 3):

@@ -1,7 +1,14 @@
 """The line of sight of an earth target in the axes of a rotating deck, and back.
 
-Exact: the unit vector is differentiated twice, with M'_dot = -[w x] M',
-u_d = M' u,    u_d' = M' u' - w x u_d,    u_d'' = M' u'' - w x (2 M' u' - w x u_d) - dw x u_d.
+Exact: the unit vector u to the target is differentiated twice. The suffix _dot is a time derivative.
+
+    M'_dot = -[w x] M',    u_d = M' u,    u_d_dot = M' du - w x u_d
+    u_d_dot_dot = M' ddu - w x (2 M' du - w x u_d) - dw x u_d
+
+    M, M'        rotation deck -> earth (or frame of the filter), its transpose
+    u, du, ddu   unit vector and its derivatives in that frame
+    u_d          the unit vector on the deck
+    w, dw        rate and angular acceleration of the deck, FLU
 """
 from collections import namedtuple
 
@@ -39,7 +46,7 @@ def fixed_rates(w, A, E):
 def earth_rates(attitude, u, du):
     """Return the rates (dA, dE) [rad/s] of the earth angles of a FLU unit vector u that moves by du [1/s] on the deck.
 
-    u_e' = M (u' + w x u).
+    The rate of the unit vector in the earth's frame is M (du + w x u).
     """
     wu = cross(attitude.w, u)
     du = Vector(du.x + wu.x, du.y + wu.y, du.z + wu.z)

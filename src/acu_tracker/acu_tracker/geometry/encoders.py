@@ -27,8 +27,8 @@ def take(s, stamp, position, velocity):
 @compiled
 def at(s, t):
     """Return (whether t [s] is among the last steps, the Pointing at t)."""
-    rows = bracket(s, t)
-    known = rows[0] >= 0
+    older, newer, fraction = bracket(s, t)
+    rows, known = (older, newer, fraction), older >= 0
     if not known:
         return known, Pointing(math.nan, math.nan, math.nan, math.nan)
     return known, Pointing(interpolated(s, rows, 0), interpolated(s, rows, 1), interpolated(s, rows, 2),

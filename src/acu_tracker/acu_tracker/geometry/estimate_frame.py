@@ -37,7 +37,7 @@ def tilt(f, u, du):
     if W > 0.0:
         along = Vector(du.x / W, du.y / W, du.z / W)
     else:
-        # The target stands still: any direction will do, so take east.
+        # Because a target at rest has no direction of motion, the equator is laid towards east.
         rho = math.sqrt(u.y * u.y + u.z * u.z)
         along = Vector(rho, -u.x * u.y / rho, -u.x * u.z / rho) if rho > 0.0 else Vector(0.0, 0.0, 0.0)
     up = cross(along, u)
@@ -79,6 +79,7 @@ def verticals(f, azimuth, elevation):
     """Return (across, along): components along the earth's vertical of the unit vectors in which azimuth and elevation
     of a direction in the frame grow; both angles [rad]. In a level frame they are 0 and the cosine of the elevation.
     """
+    # z: the earth's vertical in the frame.
     s, c, z = math.sin(azimuth), math.cos(azimuth), f.mat[2]
     return z[0] * c - z[1] * s, z[2] * math.cos(elevation) - (z[0] * s + z[1] * c) * math.sin(elevation)
 

@@ -1,6 +1,8 @@
 """The arm r from the INS to the antenna, used if the range is measured.
 
 The antenna of a rolling ship moves, so that a near target appears to move by r / range. Seen from the INS it does not.
+
+    R = |rho u + r|    R, rho: range of the target from the INS and from the antenna [m]; u: unit vector to the target
 """
 import math
 
@@ -24,9 +26,9 @@ def from_ins(s, r, measured, running, v):
 
     r: the arm, record x, y, z [m]; measured: range of the antenna [m], NaN for none; running: whether a filter runs.
 
-    With a range the estimate is the line of sight from the INS, which the deck's rotation does not move: R = |rho u +
-    r| is smoothed, and the arm is added. Only a filter that starts with a range does so. This avoids an estimate that
-    mixes both lines of sight.
+    With a range the estimate is the line of sight from the INS, which the deck's rotation does not move: R is
+    smoothed, and the arm is added. Only a filter that starts with a range does so. This avoids an estimate that mixes
+    both lines of sight.
     """
     along, r2 = v.x * r.x + v.y * r.y + v.z * r.z, r.x * r.x + r.y * r.y + r.z * r.z
     known = measured > 0.0

@@ -25,6 +25,7 @@ def line_of_sight(motion):
     A, dA, ddA = motion.azimuth
     E, dE, ddE = motion.elevation
     sA, cA, sE, cE = math.sin(A), math.cos(A), math.sin(E), math.cos(E)
+    # dh, ddh: derivatives of cos E, the horizontal part; ds, dds and dc, ddc: derivatives of sin A and of cos A.
     dh, ddh = -sE * dE, -cE * dE * dE - sE * ddE
     ds, dds = cA * dA, cA * ddA - sA * dA * dA
     dc, ddc = -sA * dA, -sA * ddA - cA * dA * dA

@@ -32,7 +32,7 @@ GUIDANCE_DTYPE = np.dtype([
 """State of the guidance.
 
 bridge           rotation of the program to the place where the target was last tracked
-azimuth          raw azimuth of the last reference [rad]
+azimuth          azimuth of the last reference, before the shaper [rad]
 target_angles    deck angles of the target of that reference [rad]
 pointing_offset  intended angle between beam and target [rad]
 turn             turn of the azimuth by whole revolutions

@@ -1,4 +1,7 @@
-"""A pass through the zenith of the deck, which needs more azimuth rate (W / cos E0) than the axis has.
+"""A pass near the zenith of the deck, on which the azimuth cannot follow the target.
+
+The pass needs the azimuth rate W / cos E0, and the axis does not have this rate. W: rate of the target along its great
+circle [rad/s]; E0: the highest elevation of the target [rad].
 
 The axis leaves the target at t1, slews at its limits, and meets the target again at t2 on the other side. For each
 direction t1 is chosen for the least loss of signal; t2 follows from it.
@@ -33,13 +36,18 @@ from which following is possible again [s]. `tilt`: rms tilt of the deck about o
 which a slew cannot follow.
 """
 
+Keyhole = namedtuple('Keyhole', 'first last needed')
+"""Rows of a path between which following is impossible, -1 for no keyhole; needed: largest azimuth rate there [rad/s].
+"""
+
 
 @compiled
 def _fit(slew, passage, turn, t1):
     """Fit a slew that leaves the target at t1 [s] and meets it at the first possible instant from passage.after on;
     return False if there is none.
 
-    turn: 1 clockwise, -1 counter-clockwise. azimuth1 is set within +-pi.
+    turn: 1 clockwise, -1 counter-clockwise. azimuth1 is set within +-pi. The instant t2 is tried at the end of the
+    path, then at passage.after, then by bisection between `early`, which is too early, and `late`, which is possible.
     """
     path, k = passage.path, passage.limits
     A1, v1 = paths.azimuth_at(path, t1, k.rate)
@@ -61,14 +69,16 @@ def _fit(slew, passage, turn, t1):
             early = t2
     slew.t1, slew.azimuth1, slew.rate1 = t1, A1, v1
     slew.peak, slew.acceleration = turn * v, k.acceleration
+    # `slew.azimuth_at` accelerates from both ends to the peak. A slew whose peak is below the rate
+    # at an end would have to decelerate first, and is rejected. The tolerance covers rounding.
     return v >= max(turn * v1, turn * slew.rate2) - 1e-6 * k.rate
 
 
 @compiled
 def _unwrap(slew, path, azimuth):
     """Put a fitted slew on the wrap of the axis, which is near `azimuth` [rad] at the first row of the path."""
-    first = path.rows[int((slew.t1 - path.t0) / path.h), 3]
-    revolutions = math.floor((azimuth - path.rows[0, 3]) / (2.0 * math.pi) + 0.5)
+    first = path.rows[int((slew.t1 - path.t0) / path.h), paths.AZIMUTH_COLUMN]
+    revolutions = math.floor((azimuth - path.rows[0, paths.AZIMUTH_COLUMN]) / (2.0 * math.pi) + 0.5)
     start = 2.0 * math.pi * revolutions + first + wrap(slew.azimuth1 - first)
     slew.azimuth2 += start - slew.azimuth1
     slew.azimuth1 = start
@@ -78,9 +88,11 @@ def _unwrap(slew, path, azimuth):
 def _fits(slew, path, low, high):
     """Return True if an unwrapped slew and the travel of the path after it stay inside low..high [rad]."""
     i = min(int((slew.t2 - path.t0) / path.h) + 1, len(path.rows) - 1)
-    end = slew.azimuth2 - path.rows[i, 3]
-    return (low <= min(slew.azimuth1, end + path.rows[i, 4])
-            and max(slew.azimuth1, end + path.rows[i, 5]) <= high)
+    met = path.rows[i]
+    # Difference of the wraps of the slew and of the path at the row where they meet.
+    offset = slew.azimuth2 - met[paths.AZIMUTH_COLUMN]
+    return (low <= min(slew.azimuth1, offset + met[paths.LEAST_AZIMUTH_COLUMN])
+            and max(slew.azimuth1, offset + met[paths.LARGEST_AZIMUTH_COLUMN]) <= high)
 
 
 @compiled
@@ -89,6 +101,10 @@ def _evaluate(slew, passage, samples):
 
     cost = integral of x^8 / (1 + x^8), x the pointing offset in half beamwidths. This smooth form of the loss also
     ranks slews without a loss.
+
+    loss = integral of the probability that the target is further than half a beamwidth off. The slew follows only the
+    `true_deck_share` of the deck's tilt. The rest is a normally distributed offset, which adds to x. The error
+    function of a normal distribution has the argument distance / (sqrt(2) standard deviation).
     """
     k = passage.limits
     T = (slew.t2 - slew.t1) / samples
@@ -102,8 +118,8 @@ def _evaluate(slew, passage, samples):
         cost += T * x8 / (1.0 + x8)
         worst = max(worst, offset)
         share = slews.true_deck_share(slew, t).angle
-        sigma = math.sqrt(2.0) * max(passage.tilt * (1.0 - share), 1e-9)
-        loss += T * (1.0 - 0.5 * (math.erf((k.half_beam - offset) / sigma) + math.erf((k.half_beam + offset) / sigma)))
+        scale = math.sqrt(2.0) * max(passage.tilt * (1.0 - share), 1e-9)     # 1e-9 avoids a division by zero.
+        loss += T * (1.0 - 0.5 * (math.erf((k.half_beam - offset) / scale) + math.erf((k.half_beam + offset) / scale)))
     slew.cost, slew.loss, slew.worst = cost, loss, worst
 
 
@@ -122,19 +138,18 @@ def _attempt(slew, passage, turn, t1, samples):
 
 @compiled
 def find(path, rate, acceleration):
-    """Return (first row, last row, largest rate [rad/s]) of the keyhole, in which following a path takes more than
-    rate [rad/s] or acceleration [rad/s2]; rows -1 for none. Two excesses further apart than the time of half a
-    revolution are two keyholes."""
+    """Return the first Keyhole of a path, in which following takes more than rate [rad/s] or acceleration [rad/s2].
+    Two excesses further apart than the time of half a revolution are two keyholes."""
     first, last, needed, before = -1, -1, 0.0, 0.0
     for i in range(1, len(path.rows)):
-        dA = (path.rows[i, 3] - path.rows[i - 1, 3]) / path.h
+        dA = (path.rows[i, paths.AZIMUTH_COLUMN] - path.rows[i - 1, paths.AZIMUTH_COLUMN]) / path.h
         if abs(dA) > rate or (i > 1 and abs(dA - before) > acceleration * path.h):
             if first >= 0 and (i - last) * path.h > math.pi / rate:
                 break
             first = i - 1 if first < 0 else first
             last, needed = i, max(needed, abs(dA))
         before = dA
-    return first, last, needed
+    return Keyhole(first, last, needed)
 
 
 @compiled
@@ -143,8 +158,9 @@ def plan(slew, path, azimuth, limits, tilt):
     PLAN_NO_WRAP or PLAN_BEYOND_PATH.
 
     slew: records (2,) of SLEW_DTYPE, the first for the best slew, the second for trials; other arguments as in
-    Passage. The effort is bounded: two directions, SLEW_CANDIDATE_COUNT + 9 REFINEMENT_COUNT slews of
-    SLEW_SAMPLE_COUNT samples each.
+    Passage. The effort is bounded. For each of the two directions, the first level takes SLEW_CANDIDATE_COUNT + 1
+    slews, and each of the next REFINEMENT_COUNT - 1 levels takes 9, all of SLEW_SAMPLE_COUNT samples. The last level
+    takes one slew of ten times as many samples.
     """
     first, last, needed = find(path, limits.rate, limits.acceleration)
     if first < 0:
@@ -152,15 +168,18 @@ def plan(slew, path, azimuth, limits, tilt):
     best, trial = slew[0], slew[1]
     t_in, t_out = path.t0 + first * path.h, path.t0 + last * path.h
     passage = Passage(path, azimuth, limits, t_out, tilt)
-    natural = path.rows[last, 3] - path.rows[first, 3]
+    own_travel = path.rows[last, paths.AZIMUTH_COLUMN] - path.rows[first, paths.AZIMUTH_COLUMN]
     # Leaving earlier than the time of a whole revolution has no advantage.
     width = min(t_in - path.t0, 2.0 * math.pi / limits.rate) / SLEW_CANDIDATE_COUNT
+    # least: cost of the better direction; other: cost of the other direction; feasible: the target's own direction
+    # (side 0) has a slew that meets the target within the path, inside the limits of the azimuth or not.
     feasible, least, other = False, math.inf, math.inf
     for side in range(2):
-        turn = math.copysign(1.0, natural) * (1.0 - 2.0 * side)
+        turn = math.copysign(1.0, own_travel) * (1.0 - 2.0 * side)
         centre, cost, step = t_in - 0.5 * SLEW_CANDIDATE_COUNT * width, math.inf, width
         for level in range(REFINEMENT_COUNT + 1):
-            # The whole interval, then finer about the best so far, finally the best alone with more samples.
+            # The whole interval, then finer about the best so far, finally the best alone with more samples. After the
+            # last level `trial` is therefore the best slew of this direction, with its most accurate cost.
             around = 0 if level == REFINEMENT_COUNT else SLEW_CANDIDATE_COUNT // 2 if level == 0 else 4
             middle = centre
             for k in range(-around, around + 1):
@@ -177,7 +196,7 @@ def plan(slew, path, azimuth, limits, tilt):
             return PLAN_BEYOND_PATH
         if cost < math.inf:
             other = max(least, cost)
-            # If both directions cost the same, the target's own is used.
+            # If both directions cost the same to 0.1 %, the target's own is used.
             if trial.cost < 0.999 * least:
                 least = trial.cost
                 trial.long_way = side
@@ -186,7 +205,8 @@ def plan(slew, path, azimuth, limits, tilt):
         return PLAN_NO_WRAP
     top = first
     for i in range(first, last + 1):
-        top = i if path.rows[i, 2] > path.rows[top, 2] else top
-    best.culmination, best.highest = path.t0 + top * path.h, math.asin(min(path.rows[top, 2], 1.0))
+        top = i if path.rows[i, paths.UP_COLUMN] > path.rows[top, paths.UP_COLUMN] else top
+    best.culmination = path.t0 + top * path.h
+    best.highest = math.asin(min(path.rows[top, paths.UP_COLUMN], 1.0))
     best.needed, best.other_cost = needed, other
     return PLAN_SLEW

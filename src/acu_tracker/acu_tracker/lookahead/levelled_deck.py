@@ -25,9 +25,10 @@ def take(s, stamp, q, mean_time, restart):
     mean = s.mean
     if restart or not s.latest > -math.inf:
         s.since = stamp
-        heading = math.hypot(q[2], q[3])
+        # The part (z, w) of the quaternion is its rotation about the vertical.
+        length = math.hypot(q[2], q[3])
         mean[0] = mean[1] = 0.0
-        mean[2], mean[3] = q[2] / heading, q[3] / heading
+        mean[2], mean[3] = q[2] / length, q[3] / length
         s.spread = 0.0
     else:
         T = stamp - s.latest
@@ -45,5 +46,6 @@ def take(s, stamp, q, mean_time, restart):
         # x, y: horizontal components of the difference of the vertical axes of the deck and the levelled deck.
         x = 2.0 * (q[0] * q[2] - q[3] * q[1] - mean[0] * mean[2] + mean[3] * mean[1])
         y = 2.0 * (q[1] * q[2] + q[3] * q[0] - mean[1] * mean[2] - mean[3] * mean[0])
+        # Until mean_time has passed, all attitudes have the same weight in the spread.
         s.spread += T / (min(stamp - s.since, mean_time) + T) * (x * x + y * y - s.spread)
     s.latest = stamp

@@ -9,11 +9,18 @@ from pedestal_common.compiled import compiled
 from pedestal_common.geometry.line_of_sight import wrap
 
 PATH_ROW_COUNT, PATH_COLUMN_COUNT = 1025, 6
-"""Size of the path of a look-ahead."""
+"""Largest number of rows of the path of a look-ahead, and number of its columns."""
+
+UP_COLUMN, AZIMUTH_COLUMN, LEAST_AZIMUTH_COLUMN, LARGEST_AZIMUTH_COLUMN = range(2, PATH_COLUMN_COUNT)
+"""Columns of a path: the upward component of its unit vector [-]; the unwrapped azimuth; the least and the largest
+azimuth from this row to the end [rad]."""
 
 Path = namedtuple('Path', 'rows t0 h')
-"""rows (n, 6), one every h [s] from t0 [s] on: the unit vector (FLU of the levelled deck), and three columns set by
-`complete`. They are the unwrapped azimuth, and the least and the largest azimuth from there to the end [rad]."""
+"""rows (n, 6), one every h [s] from t0 [s] on: the unit vector (FLU of the levelled deck), then the three columns of
+the azimuth, which `complete` sets."""
+
+MIN_ZENITH_DISTANCE_SQUARED = 1e-12
+"""Square of the horizontal part of a unit vector below which the rate of its azimuth is limited [-]."""
 
 
 @compiled
@@ -45,18 +52,21 @@ def complete(path, travel):
     """Fill the azimuth columns; travel: the Travel of the azimuth after the end of the path."""
     rows, n = path.rows, len(path.rows)
     before = math.atan2(-rows[0, 1], rows[0, 0])
-    rows[0, 3] = before
+    rows[0, AZIMUTH_COLUMN] = before
     for i in range(1, n):
         before += wrap(math.atan2(-rows[i, 1], rows[i, 0]) - before)
-        rows[i, 3] = before
-    rows[n - 1, 4], rows[n - 1, 5] = before + travel.below, before + travel.above
+        rows[i, AZIMUTH_COLUMN] = before
+    rows[n - 1, LEAST_AZIMUTH_COLUMN] = before + travel.below
+    rows[n - 1, LARGEST_AZIMUTH_COLUMN] = before + travel.above
     for i in range(n - 2, -1, -1):
-        rows[i, 4], rows[i, 5] = min(rows[i, 3], rows[i + 1, 4]), max(rows[i, 3], rows[i + 1, 5])
+        here, after = rows[i, AZIMUTH_COLUMN], rows[i + 1]
+        rows[i, LEAST_AZIMUTH_COLUMN] = min(here, after[LEAST_AZIMUTH_COLUMN])
+        rows[i, LARGEST_AZIMUTH_COLUMN] = max(here, after[LARGEST_AZIMUTH_COLUMN])
 
 
 @compiled
 def at(path, t):
-    """Return (u, du [1/s]) of the path at t [s], in straight lines between its rows."""
+    """Return (unit vector u, its rate du [1/s]) of the path at t [s], in straight lines between its rows."""
     i = min(max(int((t - path.t0) / path.h), 0), len(path.rows) - 2)
     f = (t - path.t0) / path.h - i
     a = Vector(path.rows[i, 0], path.rows[i, 1], path.rows[i, 2])
@@ -69,7 +79,7 @@ def at(path, t):
 def azimuth_at(path, t, rate):
     """Return (azimuth [rad], its rate within +-rate [rad/s]) of the path at t [s]."""
     u, du = at(path, t)
-    dA = (u.y * du.x - u.x * du.y) / max(u.x * u.x + u.y * u.y, 1e-12)
+    dA = (u.y * du.x - u.x * du.y) / max(u.x * u.x + u.y * u.y, MIN_ZENITH_DISTANCE_SQUARED)
     return math.atan2(-u.y, u.x), min(max(dA, -rate), rate)
 
 

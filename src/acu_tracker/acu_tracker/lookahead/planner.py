@@ -3,6 +3,8 @@
 Every LOOK_AHEAD_PERIOD_S the next `horizon` seconds of the target's path are laid out on the levelled deck. The path
 is the program track, which in autotrack is rotated to begin at the estimate. Without a program it is the great circle
 of the estimate. The levelled deck is the mean attitude of the ship; a planned slew keeps the deck it was planned on.
+
+h, c: records of PLANNER_DTYPE and of CONSTANTS_DTYPE.
 """
 import math
 
@@ -21,7 +23,8 @@ LOOK_AHEAD_PERIOD_S = 1.0
 """Time between two look-aheads [s]."""
 
 FORECAST_TEXTS = ('none', 'keyhole', 'no turn')
-"""Texts of the forecasts."""
+"""Texts of the forecasts: no keyhole ahead; a keyhole with a planned slew; a keyhole for which no azimuth wrap
+fits."""
 FORECAST_NONE, FORECAST_KEYHOLE, FORECAST_NO_WRAP = range(len(FORECAST_TEXTS))
 
 PLANNER_DTYPE = np.dtype([
@@ -34,11 +37,16 @@ PLANNER_DTYPE = np.dtype([
 """looked: time of the last look-ahead [s]; forecast: index in FORECAST_TEXTS; forecasts: number of forecasts so far.
 `slew`: while the forecast is FORECAST_KEYHOLE, on the levelled deck `level` (levelled deck -> earth); deck_motion: rms
 tilt of the deck from `level` at that time [rad]. `hidden`: begin and end [s] of the time in which a sector will hide
-the target, NaN for none; blockages: their number so far. `program`: key of the last program for `another_program`.
+the target, NaN for none; blockages: their number so far. `program`: key of the last program for `another_program`,
+namely the number of its last row, then time, azimuth and elevation of its first row and of its last row.
 `next_slew`, `next_level`, `rows`: work space of a look-ahead."""
 
 CONSTANTS_DTYPE = np.dtype([('horizon', 'f8'), ('notice', 'f8'), ('limits', keyhole.SLEW_LIMITS_DTYPE),
                             ('sectors', 'f8', (blockage.MAX_SECTORS, 3))], align=True)
+"""horizon, notice: parameters [s]; limits: of a slew; sectors: hidden sectors of the deck, as in `blockage`."""
+
+MIN_PATH_ROW_COUNT = 3
+"""Least number of rows of a path: the acceleration of the azimuth follows from three rows."""
 
 
 def constants(params) -> np.ndarray:
@@ -67,8 +75,8 @@ def clear_plan(h):
 
 @compiled
 def another_program(h, program):
-    """Return True if the program differs from that of the previous call, in its number of rows,
-    its first or its last row."""
+    """Keep the key of the program; return True if the program differs from that of the previous call, in its number of
+    rows, its first or its last row."""
     last = len(program.times) - 1
     same = h.program[0] == last
     h.program[0] = last
@@ -94,7 +102,7 @@ def look_along_program(h, c, t, azimuth, way):
     path, program = _begin(h, c, t), way.program
     count = paths.along_program(path, h.next_level, way)
     travel = Travel(0.0, 0.0)
-    if count >= 3 and t + count * path.h < program.times[-1]:
+    if count >= MIN_PATH_ROW_COUNT and t + count * path.h < program.times[-1]:
         travel = program_track.azimuth_travel(program, t + (count - 1) * path.h)
     _search(h, c, path, count, azimuth, travel)
 
@@ -124,11 +132,12 @@ def _search(h, c, path, count, azimuth, travel):
 
     A plan becomes final when its slew begins within `notice`. If no wrap of the azimuth fits, that is forecast now.
     """
-    if count < 3:
+    if count < MIN_PATH_ROW_COUNT:
         return
     path = paths.Path(path.rows[:count], path.t0, path.h)
     paths.complete(path, travel)
     _find_sectors(h, c.sectors, path)
+    # The spread belongs to the tilt about two horizontal axes; half of it belongs to one axis.
     outcome = keyhole.plan(h.next_slew, path, azimuth, c.limits, math.sqrt(0.5 * h.deck.spread))
     if outcome == keyhole.PLAN_SLEW and h.next_slew[0].t1 - path.t0 <= c.notice:
         h.slew = h.next_slew[0]

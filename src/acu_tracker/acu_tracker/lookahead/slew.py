@@ -26,6 +26,7 @@ direction, inf if the limits forbid it; long_way: 1 if the slew goes against the
 @compiled
 def azimuth_at(slew, t):
     """Return the AxisMotion of the azimuth at t1 <= t <= t2 [s]: accelerated, at its peak rate, decelerated."""
+    # begun, left: time since t1 and until t2; rise, fall: times of the acceleration and of the deceleration.
     sign = math.copysign(1.0, slew.peak)
     a = sign * slew.acceleration
     begun, left = t - slew.t1, slew.t2 - t
@@ -41,7 +42,11 @@ def azimuth_at(slew, t):
 @compiled
 def true_deck_share(slew, t):
     """Return the AxisMotion [1, 1/s, 1/s2] of the share to which a slew follows the true deck at t [s]: 1 at its ends,
-    0 in its middle."""
+    0 in its middle.
+
+    A slew is planned on the levelled deck. The target, which the slew leaves and meets, moves on the true deck. This
+    share of the difference between both decks is added to the slew (`motion_at`).
+    """
     T = slew.t2 - slew.t1
     x = 1.0 - 2.0 * (t - slew.t1) / T
     return AxisMotion(x**4, -8.0 * x**3 / T, 48.0 * x * x / (T * T))
@@ -53,7 +58,7 @@ def best_elevation(azimuth, sight):
     to a LineOfSight in FLU.
 
     An elevation beyond pi/2 is past the zenith. E = atan2(z, b), where b = x cos a - y sin a is the part of the
-    direction along the beam's azimuth.
+    direction along the beam's azimuth, and c = db/da.
     """
     a, da, dda = azimuth
     u, du, ddu = sight
@@ -71,6 +76,8 @@ def pointing_offset(azimuth, u, highest):
     """Return the angle [rad] between a target u (FLU) and the beam at a deck azimuth [rad], at the best elevation up
     to `highest` [rad]."""
     sa, ca = math.sin(azimuth), math.cos(azimuth)
+    # b, c: horizontal parts of u along and across the beam; p, q: parts of u along the beam at `highest`, and across
+    # it in the vertical plane.
     b, c = ca * u.x - sa * u.y, sa * u.x + ca * u.y
     if math.atan2(u.z, b) <= highest:
         return math.atan2(abs(c), math.hypot(b, u.z))
@@ -87,6 +94,7 @@ def motion_at(slew, t, target, level, highest):
     slew meets the target on the true deck; in its middle the true deck has no share in it. `highest`: the largest
     elevation [rad].
     """
+    # D: azimuth of the target on the true deck minus that on the levelled deck.
     azimuth, g = azimuth_at(slew, t), true_deck_share(slew, t)
     D = wrap(target.azimuth.angle - level.angle)
     dD, ddD = target.azimuth.rate - level.rate, target.azimuth.acceleration - level.acceleration

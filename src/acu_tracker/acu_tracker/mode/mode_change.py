@@ -72,7 +72,7 @@ def continue_in(m, mode):
 
 @compiled
 def set_outage_reason(m, reason):
-    """Set the reason of an outage; NONE: the outage is over."""
+    """Set the reason of an outage; NONE: the outage is over, which ends only a reason that this function has set."""
     if (reason != Reason.NONE or m.reason == Reason.BLOCKED or m.reason == Reason.KEYHOLE
             or m.reason == Reason.TURN):
         m.reason = reason

@@ -18,7 +18,7 @@ Outage = namedtuple('Outage', 'since coasting permitted')
 """Outage of the receiver at an instant.
 
 since      time [s] since the last accepted measurement, less the receiver's latency and the age of its errors
-coasting   whether that time is longer than coast_after
+coasting   whether that time is longer than coast_after, so that autotrack follows the prediction of the filter
 permitted  whether a keyhole, a turn or a hidden sector explains the outage, now or within the last coast_time
 """
 

@@ -22,7 +22,7 @@ def outside(c, A, E):
 
 
 @compiled
-def _followed(deck, c, track, t, azimuth):
+def _judge_track(deck, c, track, t, azimuth):
     """Return (NONE or the reason why the program cannot be followed, signals.Flag.PROGRAM for a bad program, else 0).
 
     Times and directions of the program are judged at the instant at which the next command is in force.
@@ -39,10 +39,10 @@ def _followed(deck, c, track, t, azimuth):
 
 
 @compiled
-def table(deck, c, u, mode, all_tables, t, azimuth):
+def judge_table(deck, c, u, mode, all_tables, t, azimuth):
     """Return (NONE or the reason why the table of a mode cannot be followed at t [s], signals.Flag.PROGRAM or 0).
 
-    The flag marks a bad program. deck: ATTITUDE_DTYPE; azimuth: raw azimuth of the last reference [rad].
+    The flag marks a bad program. deck: ATTITUDE_DTYPE; azimuth: azimuth of the last reference before the shaper [rad].
     """
     track = tables.of_mode(all_tables, mode)
     if mode != Mode.PROGRAM:
@@ -52,7 +52,7 @@ def table(deck, c, u, mode, all_tables, t, azimuth):
         if (program_track.status(track, t) == Reason.NONE
                 and program_track.motion_at(track, t).elevation.angle < 0.0):
             return Reason.BELOW_HORIZON, 0
-    obstacle, flag = _followed(deck, c, track, t, azimuth)
+    obstacle, flag = _judge_track(deck, c, track, t, azimuth)
     if mode == Mode.PROGRAM and u.gap and obstacle == Reason.BEFORE_PROGRAM:
         return Reason.PROGRAM_GAP, flag
     return obstacle, flag

@@ -1,6 +1,7 @@
 """Resumption of the mode that a silence interrupted.
 
-The mode is kept, and requested again when a restarted drive is ready.
+A silence is a time without steps, because the drive or the control unit did not run. The mode is kept, and requested
+again when a restarted drive is ready.
 """
 import math
 
@@ -43,7 +44,8 @@ def pending(s, stamp, ended, locked, before):
     """Return the request that is pending at `stamp` [s].
 
     ended: the drive was not ready and has ended the mode; locked: the receiver has the target; before: the request
-    that was pending.
+    that was pending. A kept mode whose time is over is discarded. Without a lock `program` is
+    requested in the place of autotrack, because it hands over to autotrack after lock.
     """
     if stamp > s.until:
         s.until = -math.inf

@@ -68,6 +68,7 @@ def advance(a, mode, c, u, way):
         acquisition.learn(a, p, u.cn0_dbhz, u.error_stamp)
     acquisition.take_level(a, p, u.cn0_dbhz, u.error_stamp, u.error_valid != 0)
     if mode == Mode.SEARCH and new:
+        # The receiver smooths the level, which therefore belongs to the offset one time constant ago.
         t = u.error_stamp - p.time_constant
         offset = _offset(a, mode, c, t, expected(a, way, t))
         acquisition.note_peak(a, (offset.x, offset.y))
@@ -78,9 +79,10 @@ def advance(a, mode, c, u, way):
         x, e = step_track.step(a.step_track, c.p.steptrack, beamwidth, p.time_constant, u.stamp,
                                u.cn0_dbhz if new else math.nan, present)
         acquisition.set_offset(a, x, e)
-    axis = side_lobe.expected(p.expected_dbhz, p.reference_range, p.range_exponent, u.range)
+    level_on_axis = side_lobe.expected(p.expected_dbhz, p.reference_range, p.range_exponent, u.range)
     judged = mode == Mode.PROGRAM or mode == Mode.AUTOTRACK
-    fair = not judged or not u.error_valid or not side_lobe.suspected(u.cn0_dbhz, axis)
+    # A level is fair if it is not suspected to be that of a side lobe.
+    fair = not judged or not u.error_valid or not side_lobe.suspected(u.cn0_dbhz, level_on_axis)
     acquisition.note_fair_level(a, u.stamp, fair)
     return mode == Mode.ACQUIRE and a.phase == acquisition.Phase.WRONG_SLOPE
 

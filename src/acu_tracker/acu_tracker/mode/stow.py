@@ -1,7 +1,7 @@
 """Stow and unstow: hold the axes at the stow angles and command the pins in, or command the pins out.
 
-A pin holds its axis by force. The axes get no command while a pin is not out or is commanded in. The pins keep the
-last request, in or out, across mode changes.
+A pin that is in locks its axis. The axes get a command only while both pins are out and no pin is commanded in. The
+pins keep the last request, in or out, across mode changes.
 """
 import math
 
@@ -11,22 +11,27 @@ from acu_tracker.modes import Mode, Reason
 from pedestal_common.compiled import compiled
 from pedestal_common.graph import topics
 
-STOW_DTYPE = np.dtype([('requested', 'i8'), ('since', 'f8'), ('off', 'f8')], align=True)
+STOW_DTYPE = np.dtype([('requested', 'i8'), ('since', 'f8'), ('not_stowed', 'f8')], align=True)
 """State of stow and unstow.
 
-requested  code of acu/stow_pins, NO_TEXT_CODE before the first request
-since      stamp of that request [s]
-off        last stamp at which the axes were not at rest at the stow angles [s]
+requested   code of acu/stow_pins, NO_TEXT_CODE before the first request
+since       stamp of that request [s]
+not_stowed  last stamp at which the axes were not at rest at the stow angles [s]
 """
 
 _REQUEST_TEXTS = topics.TOPIC_BY_NAME['acu/stow_pins'].texts
 REQUEST_PINS_OUT, REQUEST_PINS_IN = _REQUEST_TEXTS.index('out'), _REQUEST_TEXTS.index('in')
+"""Codes of acu/stow_pins, the requested position of both pins."""
+
+_PIN_OUT, _PIN_IN, _PIN_FAILED = (topics.PIN_STATE_TEXTS.index(state) for state in ('out', 'in', 'failed'))
+"""States of a pin."""
 
 _PIN_STATE_COUNT = len(topics.PIN_STATE_TEXTS)
-_PIN_OUT, _PIN_IN, _PIN_FAILED = (topics.PIN_STATE_TEXTS.index(state) for state in ('out', 'in', 'failed'))
-"""States of a pin; a code of adu/stow_pins is the azimuth's state times _PIN_STATE_COUNT plus the elevation's."""
+"""Number of states of a pin. A code of adu/stow_pins is (state of the azimuth) _PIN_STATE_COUNT + state of the
+elevation."""
 
 BOTH_PINS_OUT, BOTH_PINS_IN = _PIN_OUT * _PIN_STATE_COUNT + _PIN_OUT, _PIN_IN * _PIN_STATE_COUNT + _PIN_IN
+"""Codes of adu/stow_pins."""
 
 MAX_REST_RATE_RAD_S = 1e-3
 """Rate below which an axis is at rest [rad/s]."""
@@ -37,13 +42,15 @@ MIN_REST_TIME_S = 0.5
 
 def initialise(s):
     """Begin without a request; s: view of STOW_DTYPE."""
-    s['requested'], s['since'], s['off'] = topics.NO_TEXT_CODE, -math.inf, -math.inf
+    s['requested'], s['since'], s['not_stowed'] = topics.NO_TEXT_CODE, -math.inf, -math.inf
 
 
 @compiled
 def failed(code, i):
-    """Return True if a code of adu/stow_pins states that the pin of axis i has failed."""
-    return code >= 0 and (code // _PIN_STATE_COUNT if i == 0 else code % _PIN_STATE_COUNT) == _PIN_FAILED
+    """Return True if a code of adu/stow_pins states that the pin of axis i has failed; a code below 0 states
+    nothing."""
+    state = code // _PIN_STATE_COUNT if i == 0 else code % _PIN_STATE_COUNT
+    return code >= 0 and state == _PIN_FAILED
 
 
 @compiled
@@ -91,11 +98,12 @@ def step(s, c, u, mode):
         _request_pins(s, REQUEST_PINS_OUT, t)
     elif mode == Mode.STOW:
         if u.pins == BOTH_PINS_OUT and not _at_rest(c, u):
-            s.off = t
-        elif u.pins != BOTH_PINS_OUT or t - s.off >= MIN_REST_TIME_S:
+            s.not_stowed = t
+        elif u.pins != BOTH_PINS_OUT or t - s.not_stowed >= MIN_REST_TIME_S:
+            # A pin that is not out keeps the axes from moving to the stow angles, so there is no rest to wait for.
             _request_pins(s, REQUEST_PINS_IN, t)
     else:
-        s.off = t
+        s.not_stowed = t
     return mode == Mode.STOW and u.pins == BOTH_PINS_IN
 
 

@@ -68,7 +68,7 @@ def reaches_end(unit):
     Soon is within keyhole.notice at the present rate. Where there is a program track, `overtravel` shows what it leads
     to.
     """
-    outputs, state, program = unit.parts['outputs'], unit.parts['state'], unit.memory.tables[0].times
+    outputs, state, program = unit.parts['outputs'], unit.parts['state'], unit.memory.tables.program.times
     mode, covered = outputs['mode'], len(program) > 0 and program[0] <= state['stamp'] <= program[-1]
     return (modes.FOLLOWS_TARGET[mode] and not modes.FOLLOWS_TABLE[mode] and not covered
             and outputs['time_to_limit'][0] < unit.parameters.keyhole.notice)
@@ -107,8 +107,9 @@ def numbers(h):
                    ('keyhole_loss_s', f'{slew["loss"]:.3f}'), ('keyhole_worst_deg', f'{_deg(slew["worst"]):.3f}'),
                    ('keyhole_needed_deg_s', f'{_deg(slew["needed"]):.3g}'),
                    ('deck_motion_deg', f'{_deg(h["deck_motion"]):.3f}')]
-    if h['hidden'][0] == h['hidden'][0]:
-        values += [('hidden_from_s', f'{h["hidden"][0]:.1f}'), ('hidden_to_s', f'{h["hidden"][1]:.1f}')]
+    begin, end = h['hidden']
+    if not math.isnan(begin):
+        values += [('hidden_from_s', f'{begin:.1f}'), ('hidden_to_s', f'{end:.1f}')]
     return values
 
 

@@ -19,7 +19,7 @@ BRIDGE_DTYPE = np.dtype([('axis', 'f8', (3,)), ('cos', 'f8'), ('valid', 'i8')], 
 valid: 0 without a rotation."""
 
 Way = namedtuple('Way', 'program valid axis cos')
-"""A ProgramTrack, rotated if valid; fields as of BRIDGE_DTYPE."""
+"""Path to follow: a ProgramTrack, rotated if valid; the other fields as of BRIDGE_DTYPE."""
 
 MIN_PROGRAM_COSINE = math.cos(math.radians(3.0))
 """Cosine of the largest angle between program and estimate for which the program is used [-]."""
@@ -51,7 +51,10 @@ def way(b, program):
 
 @compiled
 def _rotated(w, v):
-    """Return an ENU Vector of the program after the rotation (Rodrigues)."""
+    """Return an ENU Vector v of the program after the rotation: v cos + a x v + a (a.v) / (1 + cos) (Rodrigues).
+
+    The length of the axis a is the sine of the angle.
+    """
     axis = w.axis
     d = cross(axis, v)
     k = dot(axis, v) / (1.0 + w.cos)

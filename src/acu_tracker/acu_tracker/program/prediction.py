@@ -28,7 +28,7 @@ TABLE_LEAD_TIME_S = 10.0
 """Time before the present at which a table begins [s]."""
 
 ROWS_PER_ORBIT = 5400
-"""Rows per revolution of a satellite: 1 s of a low one."""
+"""Number of rows for one revolution of a satellite; a row every second of a low satellite."""
 
 SUN_ROW_INTERVAL_S = 30.0
 """Time between two rows of the sun [s], in which it moves by 0.13 deg."""
@@ -93,14 +93,14 @@ class Predictor:
         return self._satellite.number
 
     @property
-    def _known(self):
+    def _utc_known(self):
         """True if UTC is known; in lockstep stamps count from 0."""
         return self.parameters.start_time != '' or self.epoch > 0
 
     def satellite(self, stamp) -> Predicted:
         """Return the Predicted of the satellite for a stamp [s]."""
-        if self._satellite is None or not self._known:
-            return Predicted(NO_TRACK, Reason.NO_ELEMENTS if self._known else Reason.NO_UTC)
+        if self._satellite is None or not self._utc_known:
+            return Predicted(NO_TRACK, Reason.NO_ELEMENTS if self._utc_known else Reason.NO_UTC)
         interval = max(round(2.0 * math.pi * 60.0 / self._satellite.no_kozai / ROWS_PER_ORBIT, 1), 1.0)
         if abs(self._age(stamp)) > self.parameters.oldest:
             return Predicted(NO_TRACK, Reason.TOO_OLD, stamp, stamp + TABLE_ROW_COUNT * interval)
@@ -108,14 +108,14 @@ class Predictor:
 
     def sun(self, stamp) -> Predicted:
         """Return the Predicted of the sun for a stamp [s]."""
-        if not self._known:
+        if not self._utc_known:
             return Predicted(NO_TRACK, Reason.NO_UTC)
         return _table(self._sun_angles, stamp, SUN_ROW_INTERVAL_S)
 
     def diagnostic_values(self, stamp):
         """Return [(key, text)] at a stamp [s]: azimuth and elevation of the sun, if UTC is known,
         and the elements, if any."""
-        sun_now = np.degrees(self._sun_angles(np.array([stamp]))[0]) if self._known else ()
+        sun_now = np.degrees(self._sun_angles(np.array([stamp]))[0]) if self._utc_known else ()
         lines = () if self._satellite is None else ('omm',) if self.parameters.omm else ('line_1', 'line_2')
         return [*((f'sun_{axis}_deg', f'{angle:.2f}') for axis, angle in zip(topics.AXES, sun_now)),
                 *((line, getattr(self.parameters, line)) for line in lines)]
@@ -175,6 +175,8 @@ def _table(angles_at, stamp, interval):
         angles = angles_at(times)
     except TargetError:
         return Predicted(NO_TRACK, Reason.NO_ELEMENTS)
+    # The table is replaced at its last row below the horizon between the middle and 19/20 of its rows. If there is
+    # none, the table is replaced at 19/20, so that a table is never followed to its end.
     late = np.arange(TABLE_ROW_COUNT // 2, TABLE_ROW_COUNT * 19 // 20)
     down = late[angles[late, 1] < 0.0]
     return Predicted(ProgramTrack(times, angles), Reason.NONE, float(times[0]),

@@ -15,7 +15,7 @@ from pedestal_common.geometry.line_of_sight import earth_direction, wrap
 MAX_PROGRAM_ROWS = 100_000
 """Largest number of rows of a program."""
 STEEP_ELEVATION_RAD = math.radians(80.0)
-"""Elevation of the rows above which directions are interpolated [rad]."""
+"""Elevation above which the unit vector is interpolated instead of the angles [rad]."""
 
 
 class ProgramTrack(typing.NamedTuple):
@@ -26,6 +26,7 @@ class ProgramTrack(typing.NamedTuple):
 
 
 NO_TRACK = ProgramTrack(np.zeros(0), np.zeros((0, 2)))
+"""ProgramTrack without a row."""
 
 
 class ProgramTrackError(ValueError):
@@ -66,6 +67,7 @@ def status(program, t):
 
 @compiled
 def _difference(program, i, axis):
+    """Return the change of an angle [rad] from row i to the next, of the azimuth (axis 0) the short way round."""
     difference = program.angles[i + 1, axis] - program.angles[i, axis]
     return wrap(difference) if axis == 0 else difference
 

@@ -1,5 +1,9 @@
-"""The program track in segments, as they are received: appended while it runs, with gaps where rows are missing."""
+"""The program track in segments, as they are received: appended while it runs, with gaps where rows are missing.
+
+A turnaround is the motion of the axes from the last row of one segment to the first row of the next.
+"""
 import math
+import typing
 
 import numpy as np
 
@@ -7,11 +11,23 @@ from acu_tracker.program.program_track import NO_TRACK, ProgramTrack, ProgramTra
 from pedestal_common.graph.topics import AXES
 
 MAX_GAP_INTERVALS = 3.0
-"""Largest gap between two segments that are joined, in row intervals [-]; the shorter interval of the two counts."""
+"""Largest gap between two segments that are joined [row intervals]. The row interval is the shorter one of the last
+interval of the earlier segment and the first interval of the later segment."""
 
 
 class TurnaroundError(ProgramTrackError):
     """A segment that begins where the axes cannot be in time; the message names axis, value and limit."""
+
+
+class DuePiece(typing.NamedTuple):
+    """The piece to follow at a stamp.
+
+    in_gap: True if rows are missing at the stamp, because the piece begins later; until: stamp [s] at which another
+    piece follows, inf for none.
+    """
+    piece: ProgramTrack
+    in_gap: bool
+    until: float
 
 
 class Segments:
@@ -35,6 +51,7 @@ class Segments:
         if new.times[0] <= now:
             self._pieces = [new]
             return
+        # A single row gives no path.
         kept = [rows for rows in (_rows(piece, now, new.times[0]) for piece in self._pieces) if len(rows.times) >= 2]
         if kept:
             if followed:
@@ -63,27 +80,28 @@ class Segments:
                                       f'{max_acceleration:g} rad/s2')
 
     def at(self, t):
-        """Return (the piece to follow at t [s], whether rows are missing at t,
-        stamp [s] at which another piece follows).
-
-        The piece is the first that has not ended, or the last.
-        """
+        """Return the DuePiece at t [s]: the first piece that has not ended, or the last piece."""
         for number, piece in enumerate(self._pieces):
             if t < piece.times[-1] or number + 1 == len(self._pieces):
                 more = number + 1 < len(self._pieces)
-                return piece, number > 0 and t < piece.times[0], piece.times[-1] if more else math.inf
-        return NO_TRACK, False, math.inf
+                return DuePiece(piece, number > 0 and t < piece.times[0], piece.times[-1] if more else math.inf)
+        return DuePiece(NO_TRACK, False, math.inf)
 
 
 def _rows(piece, begin, end):
     """Return the rows of a piece from three before `begin` [s], but at least its last three,
-    to `end` [s] (exclusive)."""
+    to `end` [s] (exclusive).
+
+    Because the slope at a row follows from its neighbours, three rows keep the path at `begin` as it was. Three rows
+    also give the slope at the end of a piece.
+    """
     first = max(min(int(np.searchsorted(piece.times, begin)), len(piece.times)) - 3, 0)
     last = int(np.searchsorted(piece.times, end))
     return ProgramTrack(piece.times[first:last], piece.angles[first:last])
 
 
 def _last_interval(piece):
+    """Return the time [s] between the last two rows of a piece."""
     return piece.times[-1] - piece.times[-2]
 
 

@@ -8,8 +8,10 @@ acquire returns to the peak and
     peaks           by the level at a step to either side of both axes, as step track does,
     checks          the sign of the slopes on a small circle, and goes to the direction of the errors.
 
-Every offset is relative to the expected place of the target, which the caller supplies. It is demanded at once; the
-shaper of each axis smooths the motion.
+Every offset is relative to the expected place of the target, which the caller supplies. An offset may jump, because
+the shaper of each axis smooths the motion.
+
+s: record of ACQUISITION_DTYPE; b, beamwidth: half-power beamwidth [rad]; z: level of the signal, C/N0 [dB-Hz].
 """
 import math
 
@@ -26,14 +28,14 @@ Phase = codes(ACQUISITION_PHASES)
 ACQUISITION_DTYPE = np.dtype([
     ('level', level.LEVEL_DTYPE), ('slopes', slope_check.SLOPES_DTYPE), ('step_track', step_track.STEP_TRACK_DTYPE),
     ('place', place.PLACE_DTYPE), ('began', 'f8'), ('radius', 'f8'), ('peak', 'f8'), ('centre', 'f8', (2,)),
-    ('phase', 'i8'), ('since', 'f8'), ('look', 'i8'), ('levels', 'f8', (1 + side_lobe.LOOK_AROUND_PLACES,)),
-    ('looks', 'i8'), ('peaks', 'i8'), ('wrong_slopes', 'i8'), ('fair', 'f8'),
+    ('phase', 'i8'), ('since', 'f8'), ('place_number', 'i8'), ('levels', 'f8', (1 + side_lobe.LOOK_AROUND_PLACES,)),
+    ('look_around_count', 'i8'), ('peak_count', 'i8'), ('wrong_slope_count', 'i8'), ('fair', 'f8'),
 ], align=True)
 """place: the expected one without a program; began: begin of search or acquire [s]; radius: of the small area [rad].
 `peak`: highest level so far [dB-Hz]; centre: offset of its place, in cross-elevation and elevation [rad]. `phase`: of
-acquire, entered at `since` [s]; look: number of the place in the phase; levels: at the places before it. `looks`,
-`peaks`: numbers of look-arounds and of peaks so far; wrong_slopes: number of wrong slope checks. `fair`: time at which
-the level of autotrack was last that of the main lobe [s]."""
+acquire, entered at `since` [s]; place_number: of the place in the phase, 0 for the centre; levels: at the places
+before it. `look_around_count`, `peak_count`: numbers of look-arounds and of peaks so far; wrong_slope_count: number of
+wrong slope checks. `fair`: time at which the level of autotrack was last that of the main lobe [s]."""
 
 LEVEL_SETTLING_LAGS = 4.0
 """Number of time constants after which a level is that of a new place."""
@@ -157,14 +159,15 @@ def peak_passed(s, p):
 @compiled
 def begin_acquire(s, t):
     """Start to acquire the signal at the centre at t [s]."""
-    s.began, s.looks, s.peaks, s.wrong_slopes = t, 0, 0, 0
+    s.began, s.look_around_count, s.peak_count, s.wrong_slope_count = t, 0, 0, 0
     s.levels[:] = -math.inf
     _enter(s, Phase.SETTLE, t)
 
 
 @compiled
 def _enter(s, phase, t):
-    s.phase, s.since, s.look = phase, t, 0
+    """Begin a phase of acquire at t [s]."""
+    s.phase, s.since, s.place_number = phase, t, 0
 
 
 @compiled
@@ -176,17 +179,17 @@ def acquire(s, p, beamwidth, t, distance):
         s.levels[0] = s.level.z
         axis = side_lobe.expected(p.expected_dbhz, p.reference_range, p.range_exponent, distance)
         main = p.expected_dbhz > 0.0 and not side_lobe.suspected(s.level.z, axis)
-        if main or s.looks >= MAX_LOOK_AROUND_COUNT:
+        if main or s.look_around_count >= MAX_LOOK_AROUND_COUNT:
             _peak(s, t)
         else:
             _enter(s, Phase.LOOK_AROUND, t)
-            s.look, s.looks = 1, s.looks + 1
+            s.place_number, s.look_around_count = 1, s.look_around_count + 1
     elif (s.phase == Phase.LOOK_AROUND or s.phase == Phase.PEAK) and settled:
-        s.levels[s.look] = s.level.z
-        s.look, s.since = s.look + 1, t
-        if s.phase == Phase.LOOK_AROUND and s.look > side_lobe.LOOK_AROUND_PLACES:
+        s.levels[s.place_number] = s.level.z
+        s.place_number, s.since = s.place_number + 1, t
+        if s.phase == Phase.LOOK_AROUND and s.place_number > side_lobe.LOOK_AROUND_PLACES:
             _go_to_best(s, beamwidth, t)
-        elif s.phase == Phase.PEAK and s.look >= len(PEAK_OFFSETS_BEAMWIDTHS):
+        elif s.phase == Phase.PEAK and s.place_number >= len(PEAK_OFFSETS_BEAMWIDTHS):
             _go_to_peak(s, beamwidth, t)
     elif s.phase == Phase.CHECK and t - s.since >= CIRCLE_TURN_COUNT * CIRCLE_PERIOD_S:
         _apply_verdict(s, t)
@@ -207,8 +210,9 @@ def _go_to_best(s, beamwidth, t):
 
 @compiled
 def _peak(s, t):
+    """Begin the steps to either side of the present place. Its level is known, so the first step is place 1."""
     _enter(s, Phase.PEAK, t)
-    s.look, s.peaks = 1, s.peaks + 1
+    s.place_number, s.peak_count = 1, s.peak_count + 1
 
 
 @compiled
@@ -219,7 +223,7 @@ def _go_to_peak(s, beamwidth, t):
         move = step_track.peak(s.levels[1 + 2 * i], s.levels[2 + 2 * i], PEAK_STEP_BEAMWIDTHS * beamwidth, beamwidth)
         far |= abs(move) > PEAK_STEP_BEAMWIDTHS * beamwidth
         s.centre[i] += min(max(move, -MAX_PEAK_MOVE_BEAMWIDTHS * beamwidth), MAX_PEAK_MOVE_BEAMWIDTHS * beamwidth)
-    if far and s.peaks < MAX_PEAK_COUNT:
+    if far and s.peak_count < MAX_PEAK_COUNT:
         _peak(s, t)
     else:
         _enter(s, Phase.CHECK, t)
@@ -237,11 +241,11 @@ def _apply_verdict(s, t):
         s.centre[1] += s.slopes.e[1]
         s.phase = Phase.CHECKED
     elif verdict == slope_check.VERDICT_WRONG:
-        s.wrong_slopes += 1
-        if s.wrong_slopes > 1:
+        s.wrong_slope_count += 1
+        if s.wrong_slope_count > 1:
             s.phase = Phase.WRONG_SLOPE
         else:
-            s.peaks = 0
+            s.peak_count = 0
             _peak(s, t)
 
 
@@ -250,10 +254,10 @@ def acquired(s, beamwidth, t):
     """Return the Point of the beam at t [s] in cross-elevation and elevation."""
     x, e = s.centre[0], s.centre[1]
     if s.phase == Phase.LOOK_AROUND:
-        aside, up = side_lobe.place(s.look, beamwidth)
+        aside, up = side_lobe.place(s.place_number, beamwidth)
         return Point(x + aside, e + up, 0.0, 0.0)
     if s.phase == Phase.PEAK:
-        aside, up = PEAK_OFFSETS_BEAMWIDTHS[s.look]
+        aside, up = PEAK_OFFSETS_BEAMWIDTHS[s.place_number]
         return Point(x + aside * beamwidth, e + up * beamwidth, 0.0, 0.0)
     if s.phase != Phase.CHECK:
         return Point(x, e, 0.0, 0.0)

@@ -4,9 +4,11 @@ Off target the level z has a mean m and a variance V, learnt over the last `lear
 
     w = max(1/n, T / learn_time),    d = z - m,    m += w d,    V = (1 - w) (V + w d^2)
 
-(Finch, Incremental calculation of weighted mean and variance, 2009, section 9). There are three thresholds above it
-(operations.md 2.2): detect = m + 4 sqrt(V), track = detect + 1 dB, loss = detect - 2 dB. The threshold loss is at
-least m + 2 sqrt(V), because below that the noise itself would hold the target.
+(Finch, Incremental calculation of weighted mean and variance, 2009, section 9). There are three thresholds above it:
+detect = m + 4 sqrt(V), track = detect + 1 dB, loss = detect - 2 dB. The threshold loss is at least m + 2 sqrt(V),
+because below that the noise itself would hold the target.
+
+s, p: records of LEVEL_DTYPE and of AcquisitionParameters.
 """
 import math
 from collections import namedtuple

@@ -7,8 +7,8 @@ from pedestal_common.parameters import ParameterError, Parameters, choice, param
 
 @dataclasses.dataclass(frozen=True)
 class StepTrackParameters(Parameters):
-    """Parameters of mode steptrack: the step of the GD 7200, with a shorter cycle, for faster targets,
-    and a smaller deadband."""
+    """Parameters of mode steptrack: the step of the antenna controller GD 7200, with a shorter cycle, for faster
+    targets, and a smaller deadband."""
 
     cycle: float = parameter(20.0, 1.0, 3600.0, 's', 'period of the climbs; 120 s in the GD 7200')
     step: float = parameter(0.08, 0.01, 0.3, 'beamwidths', 'step of the beam to either side')

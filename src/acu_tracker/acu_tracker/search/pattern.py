@@ -5,7 +5,8 @@ of a pitch. The beam moves at a constant speed
 
     v <= b / (4 tau)
 
-along its path, so that the target is within the beam for about four time constants of the level (operations.md 2.2).
+along its path, so that the target is within the beam for about four time constants of the level. b: beamwidth [rad];
+tau: time constant with which the receiver smooths the level [s].
 The beam starts from rest in SPEED_RISE_TIME_S, and rests for an instant in each corner: offset and rate have no jump.
 """
 import math
@@ -105,6 +106,7 @@ def _on_spiral(area, t):
     length, rate = v * (t - 0.5 * SPEED_RISE_TIME_S), v
     if t < SPEED_RISE_TIME_S:
         length, rate = 0.5 * v * t * t / SPEED_RISE_TIME_S, v * t / SPEED_RISE_TIME_S
+    # First value of theta: the length is k theta near the centre, and k theta^2 / 2 far from it.
     theta = min(length / k, math.sqrt(2.0 * length / k))
     for _ in range(6):
         theta -= (spiral_length(theta, area.pitch) - length) / (k * math.sqrt(1.0 + theta * theta))
@@ -151,6 +153,7 @@ def _alternating(n):
 
 @compiled
 def _leg_length(area, i):
+    """Return the distance [rad] from corner i - 1 to corner i."""
     x0, y0 = vertex(area, i - 1)
     x1, y1 = vertex(area, i)
     return math.hypot(x1 - x0, y1 - y0)

@@ -1,9 +1,9 @@
 """Detection of a signal in a side lobe of the beam, and search of the main lobe.
 
-The first side lobe of a dish is 18 to 25 dB down at 1.5 to 2 b. It has a false null of the difference channels,
-which an antenna can track all day (anchors.md section 5). It is detected by a level that range and gain do not
-explain. If these are unknown, the beam looks around at six places 1.2 b off; seen from the side lobe one of them
-is within the main lobe.
+The first side lobe of a dish is 18 to 25 dB below the main lobe, at 1.5 to 2 b from its axis (b: beamwidth). The side
+lobe has a false null of the difference channels, which an antenna can track for as long as the signal lasts. It is
+detected by a level that range and gain do not explain. If range and gain are unknown, the beam looks around at six
+places 1.2 b off. Seen from the side lobe one of these places is within the main lobe.
 """
 import math
 

@@ -5,9 +5,12 @@ averages the level z there. The main lobe is a parabola in decibels, 12 (theta/b
 
     theta0 = (z+ - z-) b^2 / (48 d)
 
-from the place of the beam. The beam moves there by one step at most, and stays if theta0 is within the deadband. Step,
-cycle and deadband of the GD 7200 (operations.md 2.2) are 8 % of the beamwidth, 2 min, and as large as the step.
+from the place of the beam. theta: angle from the axis of the beam; z+, z-: levels on the two sides; b: beamwidth. The
+beam moves there by one step at most, and stays if theta0 is within the deadband. For comparison: the antenna
+controller GD 7200 has a step of 8 % of the beamwidth, a cycle of 2 min, and a deadband as large as the step.
 """
+import math
+
 import numpy as np
 
 from pedestal_common.compiled import compiled
@@ -20,6 +23,7 @@ their number; plus: the mean on the plus side."""
 
 STEP_PHASES = ('cross-elevation plus', 'cross-elevation minus', 'elevation plus', 'elevation minus', 'rest')
 REST_PHASE = len(STEP_PHASES) - 1
+"""Phases of a cycle, in order: an even phase is the plus side, and two phases belong to each axis."""
 
 STEP_SETTLING_LAGS = 5.0
 """Number of time constants after which a level is that of a new place."""
@@ -35,6 +39,7 @@ def start(s, t, x, e):
 
 @compiled
 def _enter(s, phase, t):
+    """Begin a phase at t [s]."""
     s.phase, s.since, s.sum, s.samples = phase, t, 0.0, 0
 
 
@@ -60,7 +65,7 @@ def step(s, p, beamwidth, tau, t, z, present):
         s.began = t
         _enter(s, 0, t)
     settled = STEP_SETTLING_LAGS * tau
-    if z == z and t - s.since > settled:
+    if not math.isnan(z) and t - s.since > settled:
         s.sum += z
         s.samples += 1
     if t - s.since >= settled + p.dwell and s.samples > 0:

@@ -1,5 +1,13 @@
 """Active disturbance rejection: TD, ESO and NLC of paper 001, equations (7) to (11), for a drive with a rate loop.
 
+    TD, ESO, NLC   tracking differentiator, extended state observer, nonlinear control law
+    y, u           encoder angle [rad], rate command [rad/s]
+    v1, v2, v3     angle, rate, acceleration of the shaped reference
+    z1, z2, z3     observed angle [rad], rate [rad/s], disturbance [rad/s2]
+    w_c, w_o       poles of the feedback and of the observer [rad/s]
+    h              time since the previous step [s]
+    fhan, fal      nonlinear functions of Han 2009
+
 The model of the drive is of second order. Its rate loop is a lag of bandwidth w_s (b0 = w_s), and the torque fed
 forward gives it the acceleration v3 of the reference:
 
@@ -26,6 +34,8 @@ def observer_gains(w_o, w_s, h):
 
     For w_s -> 0 they are 1 - p^3, 1.5 (1 - p)^2 (1 + p) / h, (1 - p)^3 / h^2.
     """
+    # p: wanted pole; a, g: decay of the rate y' over h, and the integral of exp(-w_s t) over h; k1, k2: sums of gains
+    # in the characteristic polynomial of the observer.
     p, a = math.exp(-w_o * h), math.exp(-w_s * h)
     g = -math.expm1(-w_s * h) / w_s
     k1 = 2.0 + a - 3.0 * p
@@ -40,6 +50,7 @@ def observed(z, y, u, v3, w_o, w_s, h):
     """Return z = (z1, z2, z3) [rad, rad/s, rad/s2] after the encoder angle y [rad], h [s] after z (3,), with u [rad/s]
     and v3 [rad/s2] in force meanwhile."""
     z1, z2, z3 = z[0], z[1], z[2]
+    # settled: rate that the drive would reach at constant u, v3 and z3.
     g = -math.expm1(-w_s * h) / w_s
     settled = u + (v3 + z3) / w_s
     z1 += h * settled + g * (z2 - settled)
@@ -52,6 +63,9 @@ def observed(z, y, u, v3, w_o, w_s, h):
 @compiled
 def rate(z, v1, v2, v2_m, w_c, w_s):
     """Return the rate command [rad/s] from z (3,) towards v1 [rad], v2 [rad/s] at t_k;
-    v2_m [rad/s] at t_m is fed forward."""
+    v2_m [rad/s] at t_m is fed forward.
+
+    t_k: stamp of the step; t_m: middle of the interval in which the command is in force.
+    """
     u0 = w_c * w_c * (v1 - z[0]) + 2.0 * w_c * (v2 - z[1])
     return v2_m + (z[1] - v2) + (u0 - z[2]) / w_s

@@ -2,10 +2,16 @@
 
 c, u, o: records of control_unit.CONSTANTS_DTYPE, of signals.INPUTS_DTYPE and OUTPUTS_DTYPE.
 """
+from collections import namedtuple
+
 from acu_tracker.geometry.motion import Motion
 from acu_tracker.servo import floor, position_loop, reference
 from acu_tracker.servo.position_loop import Feedback
 from pedestal_common.compiled import compiled
+
+BeamInputs = namedtuple('BeamInputs', 'error deck_rates closed')
+"""Inputs of an electronic beam: receiver error [rad] and rate of the deck [rad/s] of each axis; closed: whether the
+beam closes its own loop."""
 
 
 @compiled
@@ -35,11 +41,11 @@ def start_from_actual(axis, c, u, immobile, begins, silence):
 
 @compiled
 def follow(axis, c, u, o, motion, now, beam):
-    """Run the position loops of both axes towards a Motion; now: the Instants. beam: of each axis the error [rad] and
-    the rate of the deck [rad/s], and whether its own loop is closed."""
-    (error, V, closed), now_ends = beam, floor.ends(c, u, motion.azimuth.angle)
+    """Run the position loops of both axes towards a Motion; now: the Instants; beam: the BeamInputs."""
+    now_ends = floor.ends(c, u, motion.azimuth.angle)
     for i in range(2):
-        feedback = Feedback(u.position[i], u.velocity[i], error[i], V[i], closed, now_ends[i])
+        feedback = Feedback(y=u.position[i], dy=u.velocity[i], error=beam.error[i], V=beam.deck_rates[i],
+                            closed=beam.closed, ends=now_ends[i])
         _write(o, i, position_loop.follow(axis[i], c.axis[i], motion[i], feedback, now))
 
 

@@ -1,5 +1,9 @@
 """The angle loop of an electronically steered beam: the beam of the next interval from the receiver's error.
 
+    R, v         angle of the beam [rad], its rate [rad/s]; R(k/k-1): R at step k, predicted from step k - 1
+    alpha, beta  gains on the angle and on the rate; T: time of a step [s]
+    y            angle of the target: beam + error of the receiver [rad]
+
 type_1 is paper 002's loop (eq. 3, with the compensation of eq. 6). Its first line is read as R(k/k-1) = R + v T, and
 s(k/k-1) of eq. 6 as R(k/k-1). The receiver compares the target with the beam R(k-1/k-1), but the filter compares y
 with R(k/k-1). Therefore error = v T in the steady state, whatever alpha, delay and smoothing are. In type_2 the beam
@@ -13,6 +17,7 @@ import math
 from pedestal_common.compiled import compiled
 
 LOOP_FORMS = ('tracked', 'type_1', 'type_2')
+"""Forms of the loop, see the module."""
 FORM_TRACKED, FORM_TYPE_1, FORM_TYPE_2 = range(len(LOOP_FORMS))
 
 

@@ -1,7 +1,12 @@
 """Feed-forward of rate, acceleration, torque and friction of the shaped reference, with a PI on the remaining error.
 
     u = k_v v(t_m) + k_a a(t_m) + K_p e + I,    tau = J a(t_m) + Tc tanh(v(t_m) / v_s)
-    e at t_k, t_m = middle of the command
+
+    u, tau      rate command [rad/s], torque on the load [Nm]
+    v, a        rate [rad/s] and acceleration [rad/s2] of the shaped reference
+    e, I        error [rad] at t_k, the stamp of the step; its integral [rad/s]
+    t_m         middle of the interval in which the command is in force
+    J, Tc, v_s  inertia [kg m2], Coulomb friction [Nm], rate at which tanh has 76 % of it [rad/s]
 
 k_v + k_a s are the first terms of 1 / W(s). W is the rate loop of the drive without the delay, which t_m already
 contains:

@@ -42,6 +42,7 @@ def points(text):
         rows = [(float(azimuth), float(elevation)) for azimuth, elevation in parts]
     except ValueError:
         raise ParameterError(f'floor = {text!r}: must be azimuth elevation [rad], separated by semicolons') from None
+    # A: azimuths; f: elevations of the floor there.
     A, f = zip(*rows) if rows else ((), ())
     if rows and not (all(a < b for a, b in zip(A, A[1:])) and A[-1] - A[0] < 2.0 * math.pi
                      and all(abs(a) <= 2.0 * math.pi and abs(e) <= 0.5 * math.pi for a, e in rows)):
@@ -98,6 +99,7 @@ def of_azimuth(floor, limits, A, E):
     floor at A is above E already, the azimuth may leave."""
     if not floor.given or above(floor, A, E):
         return Ends(limits.low, limits.high)
+    # first, last: outermost cells up to which the floor is not above E; CELL_COUNT cells are a whole turn.
     first = last = _cell(A)
     while (last - first < CELL_COUNT and floor.highest[(first - 1) % CELL_COUNT] <= E
            and first * CELL_WIDTH_RAD > limits.low):

@@ -1,6 +1,8 @@
 """Detection of a drive that repeats its measurements while its axes are commanded to move.
 
-    x' = u    while every measurement equals that of the step before, else x = 0
+    dx/dt = u    while every measurement equals that of the step before, else x = 0
+
+x: travel [rad] of an axis by its rate commands u [rad/s] while its measurements repeat.
 
 A drive that moves has noise in its currents and steps in its encoders, so that its measurements are constant only at
 rest. If all of them repeat while the commands add up to a travel x, the motion is not measured, and the loop around

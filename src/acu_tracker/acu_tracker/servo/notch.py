@@ -2,6 +2,8 @@
 
 N(s) = (s^2 + 2 depth width w s + w^2) / (s^2 + 2 width w s + w^2), `depth` at w and 1 far from it;
 bilinear, prewarped to w.
+
+w: centre [rad/s]; width: damping ratio of the denominator.
 """
 import math
 

@@ -1,6 +1,8 @@
 """PID on the raw target at t_k (paper 000): no shaper, no feed-forward.
 
-u = K_p e + I + K_d D,    dI/dt = K_i e,    D = e' through a lag of derivative_time.
+u = K_p e + I + K_d D,    dI/dt = K_i e,    D = de/dt through a lag of derivative_time.
+
+u: rate command [rad/s]; e: error at t_k, the stamp of the step [rad]; I: integral [rad/s]; D: filtered derivative.
 """
 from pedestal_common.compiled import compiled
 

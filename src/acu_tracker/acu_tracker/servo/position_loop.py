@@ -3,6 +3,8 @@
 `pid` acts on the raw target at t_k. `feedforward` and `adrc` act on the shaped reference as planned for t_k, and feed
 the reference of t_m forward. `beam` steers an electronic beam, which has no dynamics. Its command is the raw target at
 t_m or, in autotrack of the forms type_1 and type_2, the beam of paper 002's loop on the receiver's error.
+
+t_k: stamp of the step; t_m: middle of the interval in which the command of the step is in force.
 """
 import dataclasses
 from collections import namedtuple
@@ -184,6 +186,7 @@ def _step(axis, c, target, feedback, now):
     reference.commanded(r, axis.command)
     if (axis.command - u) * e < 0.0:
         axis.integral = integral
+    # Far from the ends `ends.inside` allows more than limits.rate; a command at limits.rate is limited by the rate.
     angle_limited |= kept != u and abs(kept) < p.limits.rate
     return Command(axis.command, torque, v, angle_limited, rate_limited or rate_cut,
                    acceleration_limited or acceleration_cut)
@@ -214,7 +217,10 @@ def _control_law(axis, p, e, v):
 
 @compiled
 def _transfer(axis, p, e, v, feedback, t_k):
-    """Start the controller so that its first command equals the last one."""
+    """Start the controller so that its first command equals the last one.
+
+    The difference goes into the disturbance z3 of adrc, or into the integral. The notch starts in its steady state.
+    """
     axis.controller = p.controller
     axis.error, axis.derivative = e, v.rate - feedback.dy
     _initialise_feedback(axis, t_k, feedback.y, feedback.dy)

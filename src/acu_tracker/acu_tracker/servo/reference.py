@@ -16,8 +16,8 @@ REFERENCE_DTYPE = np.dtype([('angle', 'f8'), ('rate', 'f8'), ('acceleration', 'f
 """angle, rate, acceleration: the shaped reference at its newest stamp [rad, rad/s, rad/s2]; planned: history, at t_m,
 of the reference and the rate command [rad/s]."""
 
-COMMAND_COLUMN = 3
-"""Column of the rate command in the history."""
+ANGLE_COLUMN, RATE_COLUMN, ACCELERATION_COLUMN, COMMAND_COLUMN = range(4)
+"""Columns of the history: angle, rate, acceleration of the reference; rate command."""
 
 
 @compiled
@@ -36,7 +36,8 @@ def put(r, motion):
 def _plan(r, stamp, command):
     """Put the reference into the history at the stamp [s] at which the encoder is compared with it."""
     row = r.planned.sample[push(r.planned, stamp)]
-    row[0], row[1], row[2], row[COMMAND_COLUMN] = r.angle, r.rate, r.acceleration, command
+    row[ANGLE_COLUMN], row[RATE_COLUMN], row[ACCELERATION_COLUMN] = r.angle, r.rate, r.acceleration
+    row[COMMAND_COLUMN] = command
 
 
 @compiled
@@ -84,13 +85,14 @@ def planned(r, t):
     i, j, f = rows = _around(r.planned, t)
     a, b = r.planned.sample[i], r.planned.sample[j]
     T = r.planned.stamp[j] - r.planned.stamp[i]
-    d, m0, m1 = b[0] - a[0], T * a[1], T * b[1]
-    return AxisMotion(a[0] + f * (m0 + f * (3.0 * d - 2.0 * m0 - m1 + f * (m0 + m1 - 2.0 * d))),
-                      interpolated(r.planned, rows, 1), interpolated(r.planned, rows, 2))
+    # d: change of the angle; m0, m1: slopes at the ends, times T.
+    d, m0, m1 = b[ANGLE_COLUMN] - a[ANGLE_COLUMN], T * a[RATE_COLUMN], T * b[RATE_COLUMN]
+    return AxisMotion(a[ANGLE_COLUMN] + f * (m0 + f * (3.0 * d - 2.0 * m0 - m1 + f * (m0 + m1 - 2.0 * d))),
+                      interpolated(r.planned, rows, RATE_COLUMN), interpolated(r.planned, rows, ACCELERATION_COLUMN))
 
 
 @compiled
 def in_force(r, t):
     """Return (rate command [rad/s], acceleration [rad/s2] of the reference) at t [s]."""
     rows = _around(r.planned, t)
-    return interpolated(r.planned, rows, COMMAND_COLUMN), interpolated(r.planned, rows, 2)
+    return interpolated(r.planned, rows, COMMAND_COLUMN), interpolated(r.planned, rows, ACCELERATION_COLUMN)

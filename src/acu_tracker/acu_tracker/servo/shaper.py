@@ -1,7 +1,8 @@
 """On-line command shaper: a reference that the axis can follow, within rate, acceleration and jerk.
 
-Han's fhan acts on shaped minus raw; the raw rate and acceleration are fed forward. Therefore a raw reference within
-the limits is followed without lag, and a jump is made in minimum time without overshoot.
+Han's fhan, the time-optimal acceleration of a double integrator in discrete time (Han 2009), acts on shaped minus raw;
+the raw rate and acceleration are fed forward. Therefore a raw reference within the limits is followed without lag, and
+a jump is made in minimum time without overshoot.
 """
 import math
 
@@ -47,7 +48,8 @@ def shape(before, raw, dt, limits):
     """
     p, v, a = before
     h = dt / SUB_STEP_COUNT
-    # The acceleration of the target itself is not available for closing the gap.
+    # The acceleration of the target itself is not available for closing the gap; at least a fifth always closes it.
+    # p, v, a: shaped angle, rate, acceleration; e, de: shaped minus raw; back: time from a sub-step to the end of dt.
     r = max(limits.acceleration - abs(raw.acceleration), 0.2 * limits.acceleration)
     rate_limited = acceleration_limited = False
     for i in range(SUB_STEP_COUNT):

@@ -2,6 +2,9 @@
 
     h_k = max(u_k, h_k-1 + a (u_k - h_k-1)),    l_k = min(u_k, l_k-1 + a (u_k - l_k-1))
 
+    u_k        rate command of step k [rad/s]
+    h_k, l_k   upper and lower end of the envelope [rad/s]
+
 a = dt / tau after the time for which a command may stay in force, and 0 before. Because an axis may lag behind its
 commands and overshoot them, any rate between 0 and the envelope is allowed, and a part of the envelope's width beyond.
 """

@@ -34,7 +34,7 @@ RECORD_DTYPE = np.dtype([('state', electronic_beam.STATE_DTYPE), ('constants', e
 
 
 class Memory(typing.NamedTuple):
-    """Memory of a beam."""
+    """Memory of a beam; record: (1,) of RECORD_DTYPE."""
     record: np.ndarray
 
 
@@ -163,5 +163,5 @@ class Beam(Unit):
     @staticmethod
     def idle(numbers):
         """Return the reason why a recording does not exercise a beam, '' if it does."""
-        angles = numbers[REFERENCE_TOPIC][:, :2]
+        angles = numbers[REFERENCE_TOPIC][:, :2]        # The positions stand before the rates.
         return '' if len(angles) and np.ptp(angles, axis=0).any() else 'the beam was never steered'

@@ -23,6 +23,7 @@ STATE_DTYPE = np.dtype([('ring_stamp_ns', 'i8', (BEAM_RING_SIZE,)), ('ring_posit
                         ('released', 'i8'), ('command_stamp_ns', 'i8'), ('position', 'f8', (2,))], align=True)
 """State of a beam.
 
+ring_stamp_ns, ring_position    stamps [ns] and angles (azimuth, elevation) [rad] of the commands within the delay
 written, released    numbers of commands put into and taken out of the ring since the start
 command_stamp_ns     stamp of the newest valid command [ns]
 position             active beam (azimuth, elevation) [rad]

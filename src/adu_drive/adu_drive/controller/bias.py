@@ -1,16 +1,18 @@
 """Bias torque against backlash: opposite on the two motors, zero at a high torque demand.
 
-Paper 000 section 1.3 leaves the schedule open. hold_fade is from reference/servo.md section 3. The bias is full up to
-a torque demand `hold`, because a pinion would lose contact without it. It is zero from `out` on, which leaves the peak
-torque for acceleration.
+Paper 000 section 1.3 leaves the schedule of the bias over the torque demand open. The schedules are those of
+BiasParameters.schedule: `off`; `constant`; `fade`, a straight line from the full bias at demand 0 to zero at `out`;
+`hold_fade`, full up to the demand `hold` and then a straight line to zero at `out`. A pinion would lose contact
+without the bias at a low demand. A bias of zero from `out` on leaves the peak torque for acceleration.
 """
 import math
 
 from pedestal_common.compiled import inlined
 
 
-def line(p):
-    """Return T_b, out, per_fade of BiasParameters for `scheduled`."""
+def schedule_constants(p):
+    """Return T_b, out, per_fade of BiasParameters for `scheduled`: full bias [Nm], demand with zero bias [Nm], and the
+    slope of the line between [1/Nm]. An infinite `out` makes the bias constant; a full bias of 0 switches it off."""
     if p.schedule == 'off':
         return 0.0, p.out, 1.0
     if p.schedule == 'constant':

@@ -1,4 +1,11 @@
-"""Current control of one motor in rotor coordinates: i_d = 0, decoupled, inside the voltage circle."""
+"""Current control of one motor in rotor coordinates: i_d = 0, decoupled, inside the voltage circle.
+
+    i_d, i_q        currents along and across the magnets [A]; i_q makes the torque
+    v_d, v_q        voltages of the same axes [V]; the voltage circle is v_d^2 + v_q^2 <= v_max^2
+    sum_d, sum_q    integral parts of the two PI controllers [V]
+    R, L, psi       phase resistance [ohm], inductance [H], flux linkage [Wb] of the motor
+    w, T            bandwidth of the loop [rad/s], its period [s]; K_iT = K_i T
+"""
 import math
 
 from adu_drive.controller import pi
@@ -9,8 +16,8 @@ from pedestal_common.compiled import inlined
 def voltages(i_d, i_q, i_ref, omega_e, sum_d, sum_q, K_p, K_iT, L, psi, v_max):
     """Return the phase voltages v_d, v_q [V], the two new integral parts, and True if the voltages were limited.
 
-    K_p = w L and K_i = w R cancel the pole of the winding: each axis closes as w / (s + w). The electrical speed is
-    omega_e [rad/s], the reference of the torque-making current i_ref [A].
+    K_p = w L and K_i = w R cancel the pole of the winding: each axis closes as w / (s + w). The terms with omega_e,
+    the electrical speed [rad/s], decouple the axes. i_ref: reference of i_q [A].
     """
     e_d, e_q = -i_d, i_ref - i_q
     u_d = K_p * e_d + sum_d - omega_e * L * i_q

@@ -1,6 +1,7 @@
 """Observer of the disturbance torque on the mean motor shaft, in parallel to the speed loop.
 
-Model per motor with rigid load and gears: J domega/dt = T + d. T is the torque of the motors, including feed-forward
+Model per motor with rigid load and gears: J domega/dt = T + d. J is the inertia per motor, omega the mean speed, d the
+disturbance, w_o the bandwidth of the observer and h its period. T is the torque of the motors, including feed-forward
 and limits. So a commanded acceleration is no disturbance, and a limit cannot wind up the estimate. Linear extended
 state observer, Gao, American Control Conference 2003: both poles at -w_o; here at p = exp(-w_o h).
 """

@@ -41,6 +41,7 @@ AXIS_FAULTS = (
 Bit = bits([fault.name for fault in AXIS_FAULTS])
 MOTORS_LOST_BITS = Bit.MOTOR_1_LOST | Bit.MOTOR_2_LOST
 ALL_FAULT_BITS = (1 << len(AXIS_FAULTS)) - 1
+# Faults at which an axis cannot or must not be stopped by its motors, and faults on which the drive stops.
 _TORQUE_OFF_BITS = Bit.OVERCURRENT | Bit.FINAL_LIMIT | Bit.EMERGENCY_LIMIT
 _STOP_BITS = sum(1 << i for i, fault in enumerate(AXIS_FAULTS) if fault.stops)
 

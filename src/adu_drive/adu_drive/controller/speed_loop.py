@@ -11,7 +11,7 @@ from pedestal_common.compiled import inlined
 
 @inlined
 def torque(error, total, K_p, feed_forward):
-    """Return the torque demand per motor [Nm] from a speed error [rad/s] on the motor shaft."""
+    """Return the torque demand per motor [Nm] from a speed error [rad/s] on the motor shaft; total: integral part."""
     return K_p * error + total + feed_forward
 
 

@@ -11,8 +11,9 @@ MAX_RETURN_RATE_RAD_S = 0.1
 def approach_rate(distance, K, a):
     """Return the largest rate [rad/s] towards an end of travel at a distance [rad].
 
-    Beyond the end the rate is negative, at most MAX_RETURN_RATE_RAD_S. Far from the end the rate allows braking at
-    a [rad/s2], close to the end it is proportional with K [1/s]; value and slope agree at a / K^2.
+    Beyond the end the rate is negative, at most MAX_RETURN_RATE_RAD_S. Far from the end the rate allows braking at a
+    [rad/s2], close to the end it is proportional with K [1/s]. The two parts agree in value and slope at the distance
+    a / K^2.
     """
     if distance * K < -MAX_RETURN_RATE_RAD_S:
         return -MAX_RETURN_RATE_RAD_S

@@ -6,5 +6,8 @@ from pedestal_common.compiled import inlined
 
 @inlined
 def braked(omega, h_T_J):
-    """Return the shaft speed [rad/s] after a sub-step with the brake on: reduced by h T / J, but not reversed."""
+    """Return the shaft speed [rad/s] after a sub-step h with the brake on: reduced by h T / J, but not reversed.
+
+    T: torque of the brake [Nm]; J: inertia of the motor [kg m2].
+    """
     return math.copysign(max(abs(omega) - h_T_J, 0.0), omega)

@@ -8,7 +8,8 @@ from pedestal_common.compiled import inlined
 def mesh_torque(delta, rate, k, c, half_lash):
     """Return the torque [Nm] of a pinion on the load; delta = theta_m / N - theta [rad], rate its derivative.
 
-    The dead zone is +-half_lash; a flank pushes and never pulls.
+    theta_m, theta: angles of the motor and of the load; N: gear ratio; k, c: stiffness [Nm/rad] and damping [Nms/rad]
+    of the mesh. The dead zone is +-half_lash; a flank pushes and never pulls.
     """
     if delta > half_lash:
         return max(k * (delta - half_lash) + c * rate, 0.0)

@@ -1,11 +1,20 @@
 """Two axes on a moving deck: inertia about azimuth at an elevation, and gyroscopic torques of rigid bodies.
 
-    Q = M(E) (A'', E'') + h(A, E, A', E', w, w')       Q: torques on azimuth and elevation, w: rate of the deck
+    Q = M(E) (A'', E'') + h(A, E, A', E', w, w')       Q: torques on azimuth and elevation [Nm]
+
+    A, E      angles of the axes; a prime is a time derivative
+    w, w'     rate and angular acceleration of the deck, in FLU (x forward, y to port, z up)
+    M         inertia; M_AA of azimuth, M_EE of elevation, M_AE of the coupling between both
+    h         torques at A'' = E'' = 0: those of the rates, and those of the deck's angular acceleration
+    R(A)      rotation from the deck to the yoke, the part that turns with the azimuth only
+    C(E)      rotation from the yoke to the elevating part
+    I, J_yoke inertia matrix of the elevating part in its frame; inertia of the yoke about the azimuth axis
 
 The equations are those of Newton and Euler. In its own frame (x along the beam, y to port, z up) the elevating part
-turns with omega = C(E) (R(A) w + (0, -E', -A')). The torque on it is I omega' + omega x I omega. The rest of the load
-turns about the azimuth axis only. Bodies turn about the intersection of the axes; gravity acts by the unbalance of an
-axis. The test has Lagrange's equations of the same bodies.
+turns with omega = C(E) (R(A) w + (0, -E', -A')). Both signs are negative, because azimuth grows clockwise, against z,
+and elevation lifts the beam, against y. The torque on the elevating part is I omega' + omega x I omega. The yoke turns
+with the azimuth only, so that of its inertia only J_yoke counts. Bodies turn about the intersection of the axes;
+gravity acts by the unbalance of an axis. The test has Lagrange's equations of the same bodies.
 """
 import math
 
@@ -16,7 +25,11 @@ from pedestal_common.geometry.line_of_sight import cross
 
 
 def constants(p):
-    """Return the constants of the bodies from AduParameters: nested dictionary."""
+    """Return the constants of the bodies from AduParameters: nested dictionary.
+
+    rigid: 1 if the inertia of the elevating part is given, so that this module is used. per_period: reciprocal of the
+    control period [1/s], with which `drive_unit` makes accelerations of the rates of two periods.
+    """
     e, I_y = p.elevating, p.elevation.load.inertia
     inertia = np.array([[e.about_beam, -e.product_xy, -e.product_xz], [-e.product_xy, I_y, -e.product_yz],
                         [-e.product_xz, -e.product_yz, e.about_lift]])
@@ -26,6 +39,7 @@ def constants(p):
 
 @compiled
 def _times(m, x, y, z):
+    """Return the product of a matrix (3, 3) and a vector (x, y, z)."""
     return (m[0, 0] * x + m[0, 1] * y + m[0, 2] * z, m[1, 0] * x + m[1, 1] * y + m[1, 2] * z,
             m[2, 0] * x + m[2, 1] * y + m[2, 2] * z)
 
@@ -33,6 +47,7 @@ def _times(m, x, y, z):
 @compiled
 def inertia(c, E):
     """Return (M_AA, M_AE) [kg m2] at an elevation; M_EE is the inertia of the elevation axis."""
+    # (-s, 0, -k): azimuth axis, in the direction of growing azimuth, in the frame of the elevating part.
     s, k = math.sin(E), math.cos(E)
     x, y, z = _times(c.I, -s, 0.0, -k)
     return -s * x - k * z + c.J_yoke, -y
@@ -48,12 +63,14 @@ def _on_elevating(A, E, x, y, z):
 @compiled
 def gyroscopic(c, angles, rates, w, w_dot):
     """Return h [Nm] on azimuth and elevation; w, w_dot (3,): rate [rad/s], acceleration [rad/s2] of the deck, FLU."""
+    # Vectors in the frame of the elevating part: (wx, wy, wz) is w; (ax, ay, az) the rate of the azimuth axis; (x, y,
+    # z) omega; (nx, ny, nz) the torque.
     (A, E), (A_dot, E_dot) = angles, rates
     wx, wy, wz = _on_elevating(A, E, w[0], w[1], w[2])
     ax, ay, az = -math.sin(E) * A_dot, 0.0, -math.cos(E) * A_dot
     x, y, z = wx + ax, wy - E_dot, wz + az
-    # In the frame of the elevating part, a vector fixed to the deck turns with the negative rates of both axes, and
-    # the azimuth axis with the negative rate of elevation.
+    # A vector v has, in a frame that turns with the rate r against it, the derivative v x r. Against a vector fixed to
+    # the deck the frame turns with the rates of both axes; against the azimuth axis it turns with that of elevation.
     ux, uy, uz = cross(wx, wy, wz, ax, ay - E_dot, az)
     vx, vy, vz = cross(ax, ay, az, 0.0, -E_dot, 0.0)
     bx, by, bz = _on_elevating(A, E, w_dot[0], w_dot[1], w_dot[2])

@@ -4,7 +4,12 @@
     L di_q/dt = v_q - R i_q - omega_e (L i_d + psi)
     J_m domega/dt = K_t i_q - T_c tanh(omega / v) - B omega - T_load
 
-omega_e = p omega is the electrical speed.
+omega_e = p omega is the electrical speed, p the number of pole pairs, omega the speed of the shaft [rad/s].
+
+    i_d, i_q, v_d, v_q  currents [A] and voltages [V] along and across the magnets; i_q makes the torque K_t i_q
+    R, L, psi           phase resistance [ohm], inductance [H], flux linkage of the magnets [Wb]
+    J_m, T_c, v, B      inertia [kg m2], Coulomb friction [Nm] and its rate [rad/s], viscous friction [Nms/rad]
+    h                   sub-step [s]; per_v = 1 / v
 """
 import math
 

@@ -32,6 +32,7 @@ def _tilt(forward, starboard):
 
 def constants(p):
     """Return the constants of MountParameters: nested dictionary."""
+    # true: 1 for a mount without errors, whose beam has the angles of the axes.
     lean, off = p.non_perpendicularity, p.collimation
     return {'true': int(p.tilt_forward == p.tilt_starboard == lean == off == p.sag == 0.0),
             'tilt': _tilt(p.tilt_forward, p.tilt_starboard), 'sin_lean': math.sin(lean), 'cos_lean': math.cos(lean),
@@ -58,6 +59,7 @@ def beam(c, A, E, A_dot, E_dot):
     cos_A, sin_A = math.cos(A), math.sin(A)
     x, y = x * cos_A + y * sin_A, y * cos_A - x * sin_A
     vx, vy = vx * cos_A + vy * sin_A + A_dot * y, vy * cos_A - vx * sin_A - A_dot * x
+    # x, y, z and vx, vy, vz: unit vector along the beam and its rate; T: rotation by the tilt.
     T = c.tilt
     x, y, z = (T[0, 0] * x + T[0, 1] * y + T[0, 2] * z, T[1, 0] * x + T[1, 1] * y + T[1, 2] * z,
                T[2, 0] * x + T[2, 1] * y + T[2, 2] * z)

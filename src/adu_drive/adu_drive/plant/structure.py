@@ -20,7 +20,8 @@ def spring_and_damper(inertia, frequency, damping):
 def swing(dish, omega_dish, theta, omega, torque, k, c, h, h_J):
     """Return angle and rate of the dish one sub-step h later under a torque [Nm], and its torque on the base.
 
-    theta, omega: angle [rad] and rate [rad/s] of the base; h_J = h / inertia of the dish.
+    dish, omega_dish: angle [rad] and rate [rad/s] of the dish; theta, omega: those of the base; k, c: stiffness and
+    damping as of `spring_and_damper`; h_J = h / inertia of the dish.
     """
     twist = k * (dish - theta) + c * (omega_dish - omega)
     omega_dish += h_J * (torque - twist)

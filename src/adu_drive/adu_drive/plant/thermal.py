@@ -3,7 +3,8 @@
     tau dx/dt = (T / T_rated)^2 - x        x = 1: steady state at rated torque; torque and current are proportional
     R = R_20 (1 + alpha dT x)              copper: alpha = 0.00393 / K, dT the rise at rated torque
 
-Because x follows the true torque of the motor, a trip by x represents a sensor in the winding.
+T: torque of the motor [Nm]; tau: time constant of the winding [s]; R_20: resistance at 20 degrees C [ohm]. Because x
+follows the true torque of the motor, a trip by x represents a sensor in the winding.
 """
 from pedestal_common.compiled import inlined
 
@@ -16,7 +17,7 @@ WARNING_THERMAL_LOAD = 0.8
 
 @inlined
 def load(x, torque, per_rated, gain):
-    """Return the thermal load one period later under a torque [Nm]; gain = 1 - exp(-h / tau)."""
+    """Return the thermal load one period h later under a torque [Nm]; gain = 1 - exp(-h / tau)."""
     relative = torque * per_rated
     return x + gain * (relative * relative - x)
 

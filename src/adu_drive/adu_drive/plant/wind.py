@@ -3,6 +3,8 @@
 A spectral gust is the sum of SPECTRAL_LINE_COUNT cosines with random phases, one for each of SPECTRAL_LINE_COUNT equal
 steps of log f. So v(t) has the given spectrum (Shinozuka and Deodatis, Applied Mechanics Reviews 44 (1991) 191), and
 equal times give equal torques. Drag grows with the square of the speed of the wind: torque = mean (1 + v / V)^2.
+
+f: frequency [Hz]; V: mean speed of the wind [m/s]; v, sigma_v: turbulence along the wind and its standard deviation.
 """
 import math
 import types

@@ -2,12 +2,18 @@
 
     W = V ((1 + u) along + v across + w up),    T = rho / 2 |W|^2 A D C,    C = c_1 sin alpha + c_2 sin 2 alpha
 
-alpha is the angle between the beam and the direction of the wind source; a positive C turns the beam to the lee. The
-square law with a torque coefficient for A D is that of wind tunnels: Gawronski, Modeling and Control of Antennas and
-Telescopes (2008), section on wind disturbances. C is a measured curve there (JPL memo CP-6, 1964), of which c_1 and
-c_2 are the first harmonics. The defaults have its size and shape: the largest value is 0.12, with the wind from behind
-at 130 deg. The components v and w have 0.78 and 0.55 of the intensity of u (ESDU 85020) and, for simplicity, the von
-Karman spectrum of u. Gusts smaller than the dish cancel over it: aerodynamic admittance
+    V, W     mean speed of the wind [m/s], its velocity
+    u, v, w  turbulence along the wind, across and up, divided by V; f: its frequency [Hz]
+    rho      density of the air [kg/m3]
+    A, D     area [m2] and diameter [m] of the dish
+    alpha    angle between the beam and the direction of the wind source
+    C        torque coefficient; a positive C turns the beam to the lee
+
+The square law with a torque coefficient for A D is that of wind tunnels: Gawronski, Modeling and Control of Antennas
+and Telescopes (2008), section on wind disturbances. C is a measured curve there (JPL memo CP-6, 1964), of which c_1
+and c_2 are the first harmonics. The defaults have its size and shape: the largest value is 0.12, with the wind from
+behind at 130 deg. The components v and w have 0.78 and 0.55 of the intensity of u (ESDU 85020) and, for simplicity,
+the von Karman spectrum of u. Gusts smaller than the dish cancel over it: aerodynamic admittance
 1 / (1 + (2 f sqrt(A) / V)^(4/3)) (Vickery 1965).
 """
 import math

@@ -5,7 +5,10 @@ Each kind is a bank of motion models; a single filter is a bank of one model.
 The state stays at the last accepted measurement; `predict` and `outlook` extrapolate from there.
 
 The noise of the angle may be coloured by a first-order lag. The filter then uses the differences y_k - rho y_k-1,
-whose noise is white (Bryson, Henrikson 1968; kalman.update_correlated).
+whose noise is white (Bryson, Henrikson 1968; kalman.update_correlated). y_k: angle of measurement k; rho: correlation
+of the noise of two successive angles.
+
+f, c: records of FILTER_DTYPE and of CONSTANTS_DTYPE.
 """
 import math
 
@@ -20,13 +23,18 @@ from acu_tracker.geometry.motion import AxisMotion
 from pedestal_common.compiled import compiled
 
 BANK_SIZE = len(MODEL_NAMES)
+"""Largest number of models in a bank."""
+
+P11_COLUMN, P33_COLUMN = Symmetric._fields.index('p11'), Symmetric._fields.index('p33')
+"""Columns of the variances of angle and acceleration in a row of `p`."""
 
 CONSTANTS_DTYPE = np.dtype([('count', 'i8'), ('bank', 'i8'),
                             ('models', motion_models.MOTION_MODEL_DTYPE, (BANK_SIZE,)), ('states', 'i8'),
                             ('dwell', 'f8'), ('alpha', 'f8'), ('beta', 'f8'), ('gamma', 'f8'),
                             ('rate_measurement', 'i8'), ('noise_bandwidth', 'f8')], align=True)
 """count: number of models in use, the first of `models`; bank: number that identifies their set; states: the
-most states of any of them. `alpha`: 0 except for constant gains; noise_bandwidth: bandwidth of the noise of the
+most states of any of them. `dwell`: mean time for which a model holds [s]; alpha, beta, gamma: constant gains, alpha 0
+for a Kalman filter. `rate_measurement`: 1 if measured rates are used; noise_bandwidth: bandwidth of the noise of the
 angle [rad/s], 0 for white noise."""
 
 FILTER_DTYPE = np.dtype([('bank', 'i8'), ('count', 'i8'), ('states', 'i8'), ('T', 'f8'),
@@ -78,6 +86,18 @@ def _put(x, p, j, g):
 
 
 @compiled
+def _gaussian(x, p):
+    """Return the Gaussian of a row of `x` and a row of `p`."""
+    return Gaussian(AxisMotion(x[0], x[1], x[2]), Symmetric(p[0], p[1], p[2], p[3], p[4], p[5]))
+
+
+@compiled
+def _previous_angle(row):
+    """Return the PreviousAngle of a row of `past`."""
+    return PreviousAngle(row[0], row[1], row[2], row[3], row[4])
+
+
+@compiled
 def _fill(f, c, g):
     """Give every model of the constants the same Gaussian and probability."""
     f.bank, f.count, f.states = c.bank, c.count, c.states
@@ -90,7 +110,7 @@ def _fill(f, c, g):
 def _reset_acceleration_variance(f, c, rate_sigma):
     """Set the variance of the acceleration to that at the start."""
     for j in range(c.count):
-        f.p[j, 5] = motion_models.initial_variance(c.models[j], rate_sigma)
+        f.p[j, P33_COLUMN] = motion_models.initial_variance(c.models[j], rate_sigma)
 
 
 @compiled
@@ -143,9 +163,9 @@ def predict(f, c, T):
         model = motion_models.discretised(c.models[j], g.x.acceleration, T)
         _put(f.x_prior, f.p_prior, j, Gaussian(kalman.predicted_mean(g.x, model.mean, T),
                                                kalman.predicted_covariance(g.P, model.F, model.Q, T)))
-        f.p_prior[j, 0] += f.drift_variance_rate * T
-        o, past = f.past[j], kalman.past(g, model.F, T)
-        o[0], o[1], o[2], o[3], o[4] = past
+        f.p_prior[j, P11_COLUMN] += f.drift_variance_rate * T
+        row = f.past[j]
+        row[0], row[1], row[2], row[3], row[4] = kalman.past(g, model.F, T)
 
 
 @compiled
@@ -178,15 +198,16 @@ def innovation(f, c, m):
     """Return the AxisInnovation of an AxisMeasurement against the prediction; y_k - rho y_k-1 replaces the angle."""
     rho = _correlation(f, c)
     x, P = expected(f)
-    # u, U: mean and variance of the predicted difference; p12: its covariance with the rate; o: x1, p11, c1, c2, c3.
+    # u, U: mean and variance of the predicted difference y_k - rho y_k-1; p12: its covariance with the rate. d1, d2:
+    # distances of a model from the means.
     u = U = p12 = 0.0
     for j in range(c.count):
-        u += f.mu_prior[j] * (f.x_prior[j, 0] - rho * f.past[j, 0])
+        u += f.mu_prior[j] * (f.x_prior[j, 0] - rho * _previous_angle(f.past[j]).x1)
     for j in range(c.count):
-        w, p, o = f.mu_prior[j], f.p_prior[j], f.past[j]
-        d1, d2 = f.x_prior[j, 0] - rho * o[0] - u, f.x_prior[j, 1] - x.rate
-        U += w * (p[0] - 2.0 * rho * o[2] + rho * rho * o[1] + d1 * d1)
-        p12 += w * (p[1] - rho * o[3] + d1 * d2)
+        w, g, o = f.mu_prior[j], _gaussian(f.x_prior[j], f.p_prior[j]), _previous_angle(f.past[j])
+        d1, d2 = g.x.angle - rho * o.x1 - u, g.x.rate - x.rate
+        U += w * (g.P.p11 - 2.0 * rho * o.c1 + rho * rho * o.p11 + d1 * d1)
+        p12 += w * (g.P.p12 - rho * o.c2 + d1 * d2)
     nu, nu_rate, S = m.angle - rho * f.last_angle - u, m.rate - x.rate, U + (1.0 - rho * rho) * m.variance
     nu_rate_given_angle = nu_rate - p12 / S * nu
     return AxisInnovation(nu, S, nu * nu / S, nu_rate, nu_rate_given_angle * nu_rate_given_angle
@@ -197,19 +218,19 @@ def innovation(f, c, m):
 def correct(f, c, m):
     """Correct the prediction with an AxisMeasurement."""
     rho = _correlation(f, c)
+    # The part of the noise that is not correlated with the last angle.
     own = (1.0 - rho * rho) * m.variance
-    # x, p: prediction of a model; o: x1, p11, c1, c2, c3 of its PreviousAngle.
     for j in range(c.count):
-        x, p, o = f.x_prior[j], f.p_prior[j], f.past[j]
-        g = Gaussian(AxisMotion(x[0], x[1], x[2]), Symmetric(p[0], p[1], p[2], p[3], p[4], p[5]))
-        nu, S = m.angle - rho * f.last_angle - (x[0] - rho * o[0]), p[0] - 2.0 * rho * o[2] + rho * rho * o[1] + own
+        g, o = _gaussian(f.x_prior[j], f.p_prior[j]), _previous_angle(f.past[j])
+        nu = m.angle - rho * f.last_angle - (g.x.angle - rho * o.x1)
+        S = g.P.p11 - 2.0 * rho * o.c1 + rho * rho * o.p11 + own
         f.weights[j] = kalman.log_likelihood(nu, S)
         # Constant gains are used where the Kalman gain p11 / S is below alpha. After a start or a gap the Kalman gain
         # is larger, and is used.
         if g.P.p11 < c.alpha * S:
             g = kalman.update_with_gain(g, nu, m.variance, constant_gain.gain(c.alpha, c.beta, c.gamma, f.T))
         elif rho > 0.0:
-            g = kalman.update_correlated(g, PreviousAngle(o[0], o[1], o[2], o[3], o[4]), rho, nu, S)
+            g = kalman.update_correlated(g, o, rho, nu, S)
         else:
             g = kalman.update(g, nu, m.variance)
         if not math.isnan(m.rate):
@@ -228,7 +249,7 @@ def outlook(f, c, T):
     stay, switch = imm.switching(T, c.dwell, c.count)
     for j in range(c.count):
         mu = imm.mix(f.mu, c.count, stay, switch, j, f.weights)
-        x = kalman.predicted_mean(imm.mean(f.weights, f.x, c.count), motion_models.of_mean(c.models[j], T), T)
+        x = kalman.predicted_mean(imm.mean(f.weights, f.x, c.count), motion_models.mean_transition(c.models[j], T), T)
         angle += mu * x.angle
         rate += mu * x.rate
         acceleration += mu * x.acceleration

@@ -1,6 +1,6 @@
 """Filters of constant gain: X += (alpha, beta / T, gamma / (2 T^2)) nu, predicted at constant rate or acceleration.
 
-alpha determines beta and gamma by a relation.
+alpha determines beta and gamma by a relation. nu: innovation of the angle [rad]; T: time between measurements [s].
 """
 import math
 

@@ -4,6 +4,8 @@ Paper 003, eq. 5 to 11, with two corrections. The mixing before the prediction i
 probabilities, and the spread of the models is added. In the printed equation the second factor has the
 reversed sign, which would subtract the spread. Probabilities are weighted by logarithms of likelihoods, so that even a
 measurement far from all models ranks them.
+
+mu (n,): probabilities of the models; cbar_j: probability of model j before the measurement.
 """
 import math
 
@@ -86,6 +88,7 @@ def combine(weights, x, p, count):
 def weigh(mu_prior, log_likelihoods, count, mu):
     """Set mu[j] to the probability of model j after the measurement (eq. 9),
     from the logarithms of its likelihoods."""
+    # The largest logarithm is subtracted. This avoids that all exponentials are 0.
     best = -math.inf
     for j in range(count):
         mu[j] = math.log(mu_prior[j]) + log_likelihoods[j]

@@ -4,6 +4,8 @@ the angle is measured, and the rate if a sensor measures it.
 The covariance is kept as its upper triangle, symmetric by construction, and every product of 3 x 3 matrices
 is written out. Two measurements of one instant are taken one after the other, which is exact because their
 errors are independent.
+
+H: row that selects the measured state; nu, S: innovation and its variance; R: variance of the measurement; K: gain.
 """
 import math
 from collections import namedtuple

@@ -28,33 +28,35 @@ class Kind(typing.NamedTuple):
     cartesian: bool = False
 
 
-def _alpha_beta(params):
+def _bank_of_alpha_beta(params):
     alpha = params.alpha_beta.alpha
     return Bank(motion_models.constants('cv', params.cv, noise=0.0),
                 gains=(alpha, constant_gain.benedict_bordner(alpha), 0.0))
 
 
-def _alpha_beta_gamma(params):
+def _bank_of_alpha_beta_gamma(params):
     alpha = params.alpha_beta_gamma.alpha
     return Bank(motion_models.constants('ca', params.ca, noise=0.0), gains=(alpha, *constant_gain.kalata(alpha)))
 
 
-def _alone(name, params):
+def _bank_of_one(name, params):
     return Bank(motion_models.constants(name, getattr(params, name)))
 
 
-def _interacting(params):
+def _bank_of_several(params):
     models = [motion_models.constants(name, getattr(params.imm, name)) for name in named_models(params.imm.models)]
     return Bank(np.concatenate(models), params.imm.dwell)
 
 
 FILTER_KINDS = {
-    'alpha_beta': Kind('constant gains on the model cv', _alpha_beta),
-    'alpha_beta_gamma': Kind('constant gains on the model ca', _alpha_beta_gamma),
-    **{model.name: Kind(f'Kalman filter: {model.doc}', functools.partial(_alone, model.name)) for model in MODEL_ROWS},
-    'imm': Kind('interacting models, those of `imm.models`', _interacting),
+    'alpha_beta': Kind('constant gains on the model cv', _bank_of_alpha_beta),
+    'alpha_beta_gamma': Kind('constant gains on the model ca', _bank_of_alpha_beta_gamma),
+    **{model.name: Kind(f'Kalman filter: {model.doc}', functools.partial(_bank_of_one, model.name))
+       for model in MODEL_ROWS},
+    'imm': Kind('interacting models, those of `imm.models`', _bank_of_several),
     'imm_ukf': Kind('interacting unscented filters of the position where the range is measured, otherwise `imm`',
-                    _interacting, cartesian=True)}
+                    _bank_of_several, cartesian=True)}
+"""{name of a kind: its Kind}."""
 
 
 def named_models(names) -> tuple:

@@ -1,4 +1,7 @@
-"""Inputs and outputs of a target filter: measurement, innovation, estimate. Index 0 is azimuth, 1 elevation."""
+"""Inputs and outputs of a target filter: measurement, innovation, estimate. Index 0 is azimuth, 1 elevation.
+
+nu, S: innovation and its variance, or its covariance for several numbers.
+"""
 import math
 from collections import namedtuple
 
@@ -27,6 +30,7 @@ Estimate = namedtuple('Estimate', 'motion variances')
 
 _NONE = AxisInnovation(math.nan, math.nan, math.nan, math.nan, math.nan)
 NO_INNOVATION = Innovation((_NONE, _NONE), math.nan, math.nan)
+"""Innovation where nothing was compared."""
 
 
 @compiled
@@ -36,6 +40,7 @@ def error_variance(cross_elevation, elevation, cn0_dbhz, receiver):
     It is the sum of a floor and of thermal noise, which grows with the distance from the beam's axis. receiver: record
     of ReceiverModelParameters.
     """
+    # slope [1/rad]: monopulse slope; offset [-]: difference over sum of the receiver at this error.
     slope = receiver.slope / receiver.beamwidth
     offset = slope * math.hypot(cross_elevation, elevation)
     thermal = (1.0 + offset * offset) / (slope * slope * 2.0 * 10.0**(0.1 * cn0_dbhz) * receiver.integration)
@@ -48,7 +53,7 @@ def attitude_variances(verticals, tilt, heading):
     attitude, in their unit.
 
     tilt: about every horizontal axis; heading: about the vertical. A turn about one axis of the direction moves it
-    along the other. verticals: of estimate_frame.
+    along the other. verticals: (across, along) of estimate_frame.verticals.
     """
     across, along = verticals
     return tilt + along * along * (heading - tilt), tilt + across * across * (heading - tilt)
@@ -71,4 +76,5 @@ def with_rate(a, rate):
 @compiled
 def nis(i):
     """Return the normalised innovation squared of an AxisInnovation: of the angle, and of the rate if it was used."""
+    # The comparison of a rate with itself is False for NaN.
     return i.chi_square + i.rate_chi_square if i.rate == i.rate else i.chi_square

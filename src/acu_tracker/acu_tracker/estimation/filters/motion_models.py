@@ -1,12 +1,19 @@
 """Motion models of a target: F and Q of one axis, X = (angle, rate, acceleration).
 
+    F = [[1, T, f13], [0, 1, f23], [0, 0, f33]]    transition over T [s]; a Transition is its third column
+    Q                                              process noise over T: covariance that is added to F P F'
+    alpha                                          reciprocal of the duration of an acceleration [1/s]; x = alpha T
+    abar, sigma_a                                  mean of the acceleration, and its standard deviation [rad/s2]
+
 In cv the third state stays 0; current_statistical is paper 000, eq. 2, 4, 5. A further model needs a row of
 MODEL_ROWS, a law that `discretised` selects, its group in params.py, and its name in topics.MOTION_MODELS,
 a column of acu/filter.
 
-Corrections to the print of paper 000: q22 has 1/(2 alpha^3); sigma_a^2 contains the square. For small x = alpha T the
-closed forms of Q lose all digits (q11 is a difference of terms of about 1 and of size x^5). Below MAX_SERIES_ARGUMENT
-the power series is used:
+The print of paper 000 has two errors, which are corrected here. Its factor of q22 is 1/(2 alpha^2); correct is
+1/(2 alpha^3). Its sigma_a^2 (eq. 5) contains a_max - abar; correct is the square (a_max - abar)^2.
+
+For small x the closed forms of Q = 2 alpha sigma_a^2 q lose all digits, because q11 is of size x^5 and a difference of
+terms of about 1. Below MAX_SERIES_ARGUMENT the power series is used:
     q = int_0^T g(s) g(s)' ds,  g = (s^2/2 - alpha s^3/6 + ..., s - alpha s^2/2 + ..., e^(-alpha s)).
 """
 import math
@@ -22,7 +29,8 @@ from pedestal_common.compiled import compiled, inlined
 class MotionModel(typing.NamedTuple):
     """A row of MODEL_ROWS. doc: motion of the target; states: 2 for a model without an acceleration, else 3.
     `initial_sigma`: function of its parameters that returns the standard deviation of the acceleration [rad/s2] at the
-    start; NaN: that of the rate, per second."""
+    start. NaN stands for the number of the initial standard deviation of the rate: in one second the rate may change
+    by as much as it is uncertain."""
     name: str
     doc: str
     states: int
@@ -68,23 +76,30 @@ _TERMS = range(14)
 
 
 def _coefficients(first, count):
-    """Return c_k of the series sum c_k (-x)^k of one q: n! (n + 1) c_k = count(n),
-    a sum of binomials, n = k + first."""
+    """Return the coefficients c_k of q = T^(first + 1) sum c_k (-x)^k, for one element of q.
+
+    The product of two elements of g has the terms count(n) s^n (-alpha)^k / n!, n = k + first. count(n) is the sum of
+    the binomials of n that occur in the product. The integral over s gives c_k = count(n) / (n! (n + 1)).
+    """
     return tuple(count(k + first) / (math.factorial(k + first) * (k + first + 1)) for k in _TERMS)
 
 
 _G1 = tuple(1.0 / math.factorial(k + 2) for k in _TERMS)
 _G2 = tuple(1.0 / math.factorial(k + 1) for k in _TERMS)
+"""Coefficients of the first two elements of g(T), divided by T^2 and T."""
+
 _Q11 = _coefficients(4, lambda n: 2**n - 2 * n - 2)
 _Q12 = _coefficients(3, lambda n: 2**n - n - 2)
 _Q13 = _coefficients(2, lambda n: 2**n - n - 1)
 _Q22 = _coefficients(2, lambda n: 2**n - 2)
 _Q23 = _coefficients(1, lambda n: 2**n - 1)
 _Q33 = _coefficients(0, lambda n: 2**n)
+"""Coefficients of the elements of q."""
 
 
 @compiled
 def _series(c, x):
+    """Return sum c_k (-x)^k."""
     total = 0.0
     for k in range(len(c) - 1, -1, -1):
         total = c[k] - x * total
@@ -134,7 +149,7 @@ def acceleration_variance(abar, a_max, floor):
 
 
 @inlined
-def of_mean(m, T):
+def mean_transition(m, T):
     """Return the Transition of the mean over T [s] of a record of MOTION_MODEL_DTYPE."""
     if m.kind == MODEL_CV:
         return Transition(0.0, 0.0, 0.0)
@@ -146,14 +161,14 @@ def of_mean(m, T):
 @inlined
 def cv(m, T):
     """Return the Discrete of constant rate over T [s]."""
-    F, k = of_mean(m, T), m.noise * m.noise
+    F, k = mean_transition(m, T), m.noise * m.noise
     return Discrete(F, F, Symmetric(k * T * T * T / 3.0, k * T * T / 2.0, 0.0, k * T, 0.0, 0.0))
 
 
 @inlined
 def ca(m, T):
     """Return the Discrete of constant acceleration over T [s]."""
-    F, k, T2 = of_mean(m, T), m.noise * m.noise, T * T
+    F, k, T2 = mean_transition(m, T), m.noise * m.noise, T * T
     return Discrete(F, F, Symmetric(k * T2 * T2 * T / 20.0, k * T2 * T2 / 8.0, k * T2 * T / 6.0, k * T2 * T / 3.0,
                                     k * T2 / 2.0, k * T))
 
@@ -176,10 +191,12 @@ def singer(m, T):
 def current_statistical(m, abar, T):
     """Return the Discrete over T [s] of an acceleration about its mean abar [rad/s2], the estimate.
 
-    The mean moves by Phi X + U abar = Phi1 X, Phi1 that of constant acceleration (paper 000, eq. 6, 11).
+    The paper predicts the mean by Phi X + U abar (eq. 6): Phi is the F of `fading`, U abar the effect of the mean
+    acceleration. Because abar is the estimated acceleration (eq. 11), this sum equals F X with the F of constant
+    acceleration. The covariance moves with Phi.
     """
     F, Q = _fading_acceleration(m.alpha, acceleration_variance(abar, m.a_max, m.floor), T)
-    return Discrete(of_mean(m, T), F, Q)
+    return Discrete(mean_transition(m, T), F, Q)
 
 
 @inlined

@@ -4,6 +4,8 @@ and a range is measured.
 The Cartesian filter starts with the first range from the estimate of the axes' filters. It is used once its standard
 deviation of the rate is half of theirs. The axes' filters keep running beside it, and take over from its estimate when
 it has lost the range. Measured rates go to the axes' filters only.
+
+f, c: records of FILTER_DTYPE and of CONSTANTS_DTYPE; m: a Measurement.
 """
 import math
 
@@ -83,6 +85,7 @@ def innovation(f, c, m):
 
 @compiled
 def _chosen_innovation(used, own, cartesian):
+    """Return the AxisInnovation of the Cartesian filter if it is used, otherwise that of the axis's own filter."""
     if not used:
         return own
     return AxisInnovation(cartesian.nu, cartesian.S, cartesian.chi_square, math.nan, own.rate_chi_square)

@@ -22,10 +22,14 @@ from pedestal_common.compiled import assign, compiled
 from pedestal_common.geometry.line_of_sight import earth_angles, wrap
 
 N = 9
+"""Number of states n."""
 MODE_MODELS = motion_models.MODEL_CV, motion_models.MODEL_CA
+"""Motion models of mode 0 (CV, constant velocity) and mode 1 (CA, constant acceleration)."""
 ALPHA, BETA, KAPPA = 1.0, 2.0, 3.0 - N
+"""Parameters of Merwe's points [-]."""
 LAMBDA = ALPHA**2 * (N + KAPPA) - N
 SIGMA_POINT_SCALE = math.sqrt(N + LAMBDA)
+"""Distance of a point from the centre, in columns L_k [-]."""
 SIGMA_POINT_WEIGHT = 0.5 / (N + LAMBDA)
 """Weight of each of the six points that move the position [-]."""
 CENTRE_COVARIANCE_WEIGHT = 1.0 - 6.0 * SIGMA_POINT_WEIGHT + 1.0 - ALPHA**2 + BETA
@@ -105,6 +109,7 @@ def start(s, c, estimate, r, R_range):
     assign(s.p[1], p)
     for i in range(6, N):
         s.p[1, i, i] = c.initial_acceleration * c.initial_acceleration
+    # Only CA has the acceleration of the Estimate, so that CA alone continues from it.
     s.mu[0], s.mu[1] = 0.0, 1.0
 
 
@@ -336,6 +341,9 @@ def variances(s):
     _mixed(s.x_prior, s.p_prior, s.mu_prior, s.mean, s.covariance)
     x, p = s.mean, s.covariance
     e, n, u, de, dn, du = x[0], x[1], x[2], x[3], x[4], x[5]
+    # A, E, R: gradients of azimuth, elevation and range by the position; A_rate, E_rate: gradients of their rates by
+    # the position. The gradient of a rate by the velocity equals that of its angle by the position. rho: horizontal
+    # range; its lower limit avoids a division by zero at the zenith.
     rho2 = max(e * e + n * n, 1e-12 * u * u)
     rho, r2 = math.sqrt(rho2), rho2 + u * u
     drho = (e * de + n * dn) / rho
