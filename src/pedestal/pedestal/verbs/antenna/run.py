@@ -3,8 +3,8 @@
 Starts a process for each node, records every topic in a new bag, and prints the results.
 
 Exit code 0: the run is complete. 1: the run failed, or the recording is not complete. 3: a realtime run ended early,
-or its drive lost more than 1 % of its steps, without the 5 s after each death of a node. 130: the run was stopped,
-for example by Ctrl-C.
+or its drive lost more than 1 % of its steps (steps in the 5 s after a node died are not counted). 130: the run was
+stopped, for example by Ctrl-C.
 """
 import argparse
 import pathlib

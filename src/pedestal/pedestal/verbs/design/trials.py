@@ -1,7 +1,8 @@
 """run a scenario many times with varied parameters, and print statistics and the worst trials
 
-Each trial has its own seed and the results of `pedestal run`. A trial runs all nodes in one process, without ROS. For
-each of the worst trials a `pedestal run` command is printed, which runs separate nodes and gives the same numbers.
+Each trial has its own seed. It yields the same kinds of results as `pedestal run`. A trial runs all nodes in one
+process, without ROS. For each of the worst trials a `pedestal run` command is printed, which runs separate nodes and
+gives the same numbers.
 
 --vary NODE.KEY=DISTRIBUTION draws a parameter from uniform(low, high), normal(mean, sigma) or choice(a, b, ...). With
 an x after the distribution, as in normal(1, 0.1)x, the drawn number is a factor of the value of the scenario. The
