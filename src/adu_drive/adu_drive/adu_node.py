@@ -1,4 +1,10 @@
-"""ROS node of the antenna drive unit: owns the time, publishes the encoders, executes rate commands."""
+"""ROS node of the antenna drive unit: owns the time, publishes the encoders, executes rate commands.
+
+The unit adu_drive.unit.Adu with its law drive_unit.py is the drive and its plant: change their behaviour there. The
+base class in timekeeper_node.py makes the steps. This module adds the state file only.
+
+The module imports `entry` before anything else, so that a signal during the other imports ends the process cleanly.
+"""
 import pedestal_common.entry  # noqa: F401
 
 # isort: split

@@ -1,6 +1,11 @@
 """ROS node of an electronically steered array.
 
 The node sets the time of the graph, publishes the beams that are active, and points each beam to its references.
+
+The unit adu_drive.array.beam_unit.Beam is the law of one beam: change its behaviour there. The base class in
+timekeeper_node.py makes the steps. This module runs a unit for each beam and joins their diagnostics.
+
+The module imports `entry` before anything else, so that a signal during the other imports ends the process cleanly.
 """
 import pedestal_common.entry  # noqa: F401
 

@@ -1,4 +1,10 @@
-"""ROS node of the ship: its truth and the data of its IMU at every step of the drive; NMEA for other equipment."""
+"""ROS node of the ship: its truth and the data of its IMU at every step of the drive; NMEA for other equipment.
+
+The unit ship_motion_sim.ship_unit.ShipMotion makes the motion and the data of the IMU: change them there. This module
+adds the NMEA datagrams only.
+
+The module imports `entry` before anything else, so that a signal during the other imports ends the process cleanly.
+"""
 import pedestal_common.entry  # noqa: F401
 
 # isort: split

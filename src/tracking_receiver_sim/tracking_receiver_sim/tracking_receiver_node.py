@@ -1,4 +1,10 @@
-"""ROS node of the tracking receiver: publishes the channels of the receiver for each direction of the beam."""
+"""ROS node of the tracking receiver: publishes the channels of the receiver for each direction of the beam.
+
+pedestal_common.node.unit_node runs the unit tracking_receiver_sim.unit.TrackingReceiver, as row `tracking_receiver` of
+pedestal_common.graph.nodes states. To change what the receiver measures, change the unit and its law receiver.py.
+
+The module imports `entry` before anything else, so that a signal during the other imports ends the process cleanly.
+"""
 import pedestal_common.entry  # noqa: F401
 
 # isort: split

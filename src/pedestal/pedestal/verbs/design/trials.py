@@ -61,12 +61,12 @@ def main(options: argparse.Namespace) -> int:
     console.check_json(options.json)
     folder = options.output or pathlib.Path('trials', plans[0].name)
     with contextlib.ExitStack() as stack:
-        tables = [stack.enter_context(ensemble.table(plan, folder, name))
+        tables = [stack.enter_context(ensemble.open_table(plan, folder, name))
                   for plan, name in zip(plans, ('trials', 'against'))]
         pool = stack.enter_context(monte_carlo.Pool(options.workers, options.scheduler))
         progress = stack.enter_context(console.progress_of_trials())
         try:
-            ensemble.make(plans, tables, pool, progress)
+            ensemble.run_missing_trials(plans, tables, pool, progress)
         except KeyboardInterrupt:
             print(f'pedestal: {sum(len(table.rows) for table in tables)} of {sum(plan.runs for plan in plans)} trials '
                   f'are in {folder}; the same command continues', file=sys.stderr)
