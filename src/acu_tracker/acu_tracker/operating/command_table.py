@@ -43,7 +43,8 @@ ALARM_COMMANDS = (
         Argument('reason', 'reason for shelving'))),
     CommandDefinition('unshelve', 'end the shelving of an alarm', (_ALARM_ARGUMENT,)),
     CommandDefinition('reset', 'reset latched alarms; also cancel the initial mode, or a mode to be resumed, that has '
-                      'not been entered yet; refused while the cause of a latched alarm is still present'))
+                      'not been entered yet; refused while the cause of a latched alarm is still present; in realtime '
+                      'the control unit also requests the reset of a drive in fault'))
 ALARM_COMMAND_NAMES = tuple(command.name for command in ALARM_COMMANDS)
 
 ACU_COMMANDS = (
