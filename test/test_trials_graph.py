@@ -23,15 +23,15 @@ CASES = {
 def test_the_graph_gives_the_numbers_of_the_trial(start_run, tmp_path, name):
     duration, period, vary = CASES[name]
     made = plan(name, 2, vary, [f'adu.period={period}'], seed=11, duration=duration)
-    with ensemble.table(made, tmp_path) as table:
-        ensemble.make([made], [table], monte_carlo.Pool(1))
+    with ensemble.open_table(made, tmp_path) as table:
+        ensemble.run_missing_trials([made], [table], monte_carlo.Pool(1))
     _, _, *arguments = shlex.split(made.command(1))
     run = start_run(*arguments)
     done = run.finish()
     assert done.returncode == 0, done.stderr
     told = {(row['case'], row['metric']): row['value'] for row in json.loads(run.json.read_text())['rows']}
     measured = set()
-    for column in table.there:
+    for column in table.measured_results:
         beam, _, metric = column.rpartition('/')
         value, ours = told.pop((f'{name}/{beam}'.rstrip('/'), metric)), table.column(column)[1]
         assert value == ours or value is None and np.isnan(ours), column

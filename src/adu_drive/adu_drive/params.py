@@ -442,7 +442,7 @@ class AduNodeParameters(RunParameters, AduParameters):
     def check(self):
         """Raise ParameterError for an invalid `inject`."""
         super().check()
-        table.due('adu', self.inject)
+        table.scheduled_commands('adu', self.inject)
 
     def check_graph(self, beams, lockstep):
         """Raise ParameterError for a fault that does not exist in the pacing of the graph."""

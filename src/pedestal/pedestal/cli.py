@@ -3,7 +3,7 @@
 A verb is a module in `verbs`. Its docstring is the help, `add_arguments(parser)` adds its arguments, and
 `main(options)` does the work and returns the exit code.
 """
-from pedestal import stop
+from pedestal import stop  # first, because a signal during the imports below must end the process with its message
 
 # isort: split
 import argparse
@@ -44,7 +44,7 @@ def main(args: Sequence[str] | None = None) -> int:
     """
     options = _parser().parse_args(args)
     options.command = shlex.join(('pedestal', *(sys.argv[1:] if args is None else args)))
-    stop.on_stop(signal.default_int_handler)
+    stop.on_stop(signal.default_int_handler)     # from here on a signal raises KeyboardInterrupt
     json_on_stdout = getattr(options, 'json', None) == STDOUT_PATH
     try:
         with contextlib.redirect_stdout(sys.stderr) if json_on_stdout else contextlib.nullcontext():
@@ -64,8 +64,10 @@ def main(args: Sequence[str] | None = None) -> int:
 
 
 class Parser(argparse.ArgumentParser):
-    """Parser of options whose values may be any negative number: argparse takes only plain ones, not -1e-2 or
-    -33.9,18.4,10."""
+    """Parser of options whose values may be any negative number.
+
+    argparse takes -1 and -0.5 for values, but -1e-2 and -33.9,18.4,10 for unknown options.
+    """
 
     def parse_known_args(self, args=None, namespace=None):  # type: ignore[no-untyped-def,override]
         """Return (namespace, unknown arguments), with each negative number joined to the option before it."""

@@ -34,8 +34,8 @@ def trials(scenario: Scenario, runs: int = 100, vary: Mapping[str, str] | None =
     plan = plans.plan(scenario.source, runs, [f'{name}={text}' for name, text in (vary or {}).items()],
                       scenario.overrides, scenario.given_seed, scenario.given_duration, sobol)
     with tempfile.TemporaryDirectory() as temporary:
-        with ensemble.table(plan, folder or temporary) as table, monte_carlo.Pool(workers) as pool:
-            ensemble.make([plan], [table], pool)
+        with ensemble.open_table(plan, folder or temporary) as table, monte_carlo.Pool(workers) as pool:
+            ensemble.run_missing_trials([plan], [table], pool)
     return Trials(plan, table)
 
 
@@ -46,15 +46,15 @@ class Trials(Mapping[str, np.ndarray]):
         self._plan, self._table = plan, table
 
     def __getitem__(self, result: str) -> np.ndarray:
-        if result not in self._table.there:
-            raise KeyError(f'no trial has {result!r}; must be one of {", ".join(self._table.there)}')
+        if result not in self._table.measured_results:
+            raise KeyError(f'no trial has {result!r}; must be one of {", ".join(self._table.measured_results)}')
         return self._table.column(result)
 
     def __iter__(self) -> Iterator[str]:
-        return iter(self._table.there)
+        return iter(self._table.measured_results)
 
     def __len__(self) -> int:
-        return len(self._table.there)
+        return len(self._table.measured_results)
 
     @property
     def seeds(self) -> np.ndarray:

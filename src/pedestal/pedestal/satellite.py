@@ -87,6 +87,7 @@ class PassSelection:
             line = (f'{where}: rises {p.rise:%Y-%m-%d %H:%M:%S} UTC in azimuth {_azimuth(p.rise_azimuth)}, highest '
                     f'{p.elevation:.1f} deg at {p.top:%H:%M:%S}, sets {p.set:%H:%M:%S} in azimuth '
                     f'{_azimuth(p.set_azimuth)}{", under way now" if p.under_way and p.begin == self.now else ""}')
+            # Whole seconds from the start to the set, rounded up: the negative of the floor of the negative.
             duration = duration or -((start - (p.set or start)) // datetime.timedelta(seconds=1))
         return [f'tracking_receiver.target.leo_pass.start_time="{start.isoformat()}Z"'], duration, line
 

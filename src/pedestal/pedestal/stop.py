@@ -20,9 +20,10 @@ def on_stop(handler: Callable[[int, types.FrameType | None], object]) -> None:
 
 
 def _end_at_once(_number: int, _frame: types.FrameType | None) -> None:
+    """End the process with the usual message, without Python's buffers and exit functions."""
     os.write(2, f'{STOP_MESSAGE}\n'.encode())
     os._exit(STOP_EXIT_CODE)
 
 
-if os.path.basename(sys.argv[0]) in ('pedestal', 'cli.py'):
+if os.path.basename(sys.argv[0]) in ('pedestal', 'cli.py'):     # the command line, by its script or as a module
     on_stop(_end_at_once)

@@ -98,7 +98,7 @@ HEARD_BY_ACU = (ERROR, 'tracking_receiver/angle_rate', 'tracking_receiver/range'
     (['recorder'], {topic.name for topic in topics.TOPICS} | {OTHER.name}),
     ([], {topic.name for topic in topics.TOPICS} | {OTHER.name})])
 def test_a_node_gets_what_it_reads_and_no_node_under_test_writes(tmp_path, nodes, expected):
-    assert set(playlist.select(write(tmp_path / 'bag', ROWS), nodes, [])) == expected
+    assert set(playlist.selected_topics(write(tmp_path / 'bag', ROWS), nodes, [])) == expected
 
 
 REFUSED = {

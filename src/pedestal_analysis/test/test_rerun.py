@@ -118,13 +118,13 @@ def recorded(tmp_path):
 
 def test_the_scenario_comes_back_from_the_recording(recorded):
     chosen = scenario.load('leo_pass', ['acu.azimuth.feedforward.bandwidth=12'], seed=3, duration=4.0)
-    assert rerun.configured(recorded(chosen)) == chosen
+    assert rerun.scenario_of_recording(recorded(chosen)) == chosen
 
 
 def test_a_default_that_has_changed_since_is_set_as_it_was(recorded):
     chosen = scenario.load('leo_pass')
     changed = {'azimuth.feedforward.bandwidth': 19.0}
-    again = rerun.configured(recorded(chosen, lambda values: values['acu'].update(changed)))
+    again = rerun.scenario_of_recording(recorded(chosen, lambda values: values['acu'].update(changed)))
     values = {**chosen.values, 'acu': {**chosen.values['acu'], **changed}}
     assert again == dataclasses.replace(chosen, values=values)
 
@@ -134,17 +134,17 @@ def test_a_topic_that_the_recording_could_not_have_is_not_there(recorded):
         for node, name in (('ins', 'error_told'), ('acu', 'ins_error'), ('recorder', 'ins_error')):
             del values[node][name]
     chosen = scenario.load('ship_pass', ['ins.error_told=false'])
-    again = rerun.configured(recorded(scenario.load('ship_pass'), older, scenario='ship_pass'))
+    again = rerun.scenario_of_recording(recorded(scenario.load('ship_pass'), older, scenario='ship_pass'))
     assert all(again.node_parameters(node) == chosen.node_parameters(node) for node in ('ins', 'acu', 'recorder'))
 
 
 def test_what_cannot_be_made_again_is_refused(tmp_path, recorded):
     with pytest.raises(bag.BagError, match='a_0.mcap: contains no configuration, so it cannot be rerun'):
-        rerun.configured(write(tmp_path / 'a', rows()))
+        rerun.scenario_of_recording(write(tmp_path / 'a', rows()))
     with pytest.raises(bag.BagError, match="by a version with other parameters: acu: unknown parameter 'gone'"):
-        rerun.configured(recorded(scenario.load('leo_pass'), lambda values: values['acu'].update(gone=1.0)))
+        rerun.scenario_of_recording(recorded(scenario.load('leo_pass'), lambda values: values['acu'].update(gone=1.0)))
 
 
 def test_a_realtime_recording_is_refused(recorded):
     with pytest.raises(bag.BagError, match='pacing is realtime; must be lockstep to rerun'):
-        rerun.configured(recorded(scenario.load('leo_pass', pacing='realtime'), pacing='realtime'))
+        rerun.scenario_of_recording(recorded(scenario.load('leo_pass', pacing='realtime'), pacing='realtime'))

@@ -126,7 +126,7 @@ def test_a_table_continues_after_its_last_complete_row(tmp_path):
     with open(table.file, 'ab') as stream:
         stream.write(b'2,3,0.77')
     with open_table() as table:
-        assert table.column(INERTIA).tolist() == [0.1 + 0.2, 0.5] and table.there == ['loss_s']
+        assert table.column(INERTIA).tolist() == [0.1 + 0.2, 0.5] and table.measured_results == ['loss_s']
         table.append([[2, 3, 0.7, 2.0, None]])
         assert np.array_equal(table.column('loss_s'), [1e-300, math.nan, 2.0], equal_nan=True)
     assert table.file.read_text().splitlines()[-2:] == ['1,2,0.5,nan,', '2,3,0.7,2.0,']
@@ -135,8 +135,8 @@ def test_a_table_continues_after_its_last_complete_row(tmp_path):
 
 
 def make(made, folder, pool):
-    with ensemble.table(made, folder) as table:
-        ensemble.make([made], [table], pool)
+    with ensemble.open_table(made, folder) as table:
+        ensemble.run_missing_trials([made], [table], pool)
         return table
 
 
@@ -150,7 +150,7 @@ def test_the_same_numbers_whoever_works_and_a_plan_that_goes_on(tmp_path):
         with monte_carlo.Pool(scheduler=cluster.scheduler_address) as pool:
             assert make(made, tmp_path / 'dask', pool).file.read_bytes() == expected.file.read_bytes()
     values = results.measured(results.of_bag(memory_recording.record(made.scenario(5))))
-    assert {name: expected.column(name)[5] for name in expected.there} == {name: value
+    assert {name: expected.column(name)[5] for name in expected.measured_results} == {name: value
                                                                          for name, (value, _) in values.items()}
 
 
@@ -279,7 +279,7 @@ def test_a_table_of_a_ship_against_another_setting(pedestal, tmp_path):
 def test_every_beam_has_its_own_results(tmp_path):
     made = plan('phased_array_four', 1, duration=3.0, overrides=['acu.tracker.lock_count=20'])
     table = make(made, tmp_path, monte_carlo.Pool(1))
-    assert {name.partition('/')[0] for name in table.there} == {f'beam_{i}' for i in range(1, 5)}
+    assert {name.partition('/')[0] for name in table.measured_results} == {f'beam_{i}' for i in range(1, 5)}
     cases = {row['case'] for row in statistics.of_results('four', table)}
     assert cases == {f'four/beam_{i}' for i in range(1, 5)}
     assert statistics.ranked_by(table) == 'beam_1/pointing_rms_deg'

@@ -79,19 +79,19 @@ def test_a_server_that_dies_is_started_again_until_it_has_died_too_often(graph_o
         capfd.readouterr()
         for number in range(1, attempts + 1):
             graph.kill('rotctld')
-            supervised.look(100.0)
+            supervised.check_processes(100.0)
             output = capfd.readouterr()
             assert output.err == (f'pedestal: rotctld died by signal SIGKILL: starting it again, {number} of '
                                   f'{attempts} within 60 s\n')
-            supervised.look(159.0)
+            supervised.check_processes(159.0)
             while not output.out:
                 time.sleep(0.05)
-                supervised.look(159.0)
+                supervised.check_processes(159.0)
                 output = capfd.readouterr()
             assert output.out == 'rotctld: 127.0.0.1:4533\nrotctld, again\n'
         graph.kill('rotctld')
         for _ in range(2):
-            supervised.look(159.0)
+            supervised.check_processes(159.0)
         assert capfd.readouterr().err == (f'pedestal: rotctld died by signal SIGKILL, after {attempts} starts within '
                                           '60 s: it stays off\n')
         assert supervised.restarts.count == 0

@@ -38,7 +38,7 @@ def test_no_attempts_means_never():
 
 def test_a_node_is_silent_once_it_was_heard():
     silence = Silence()
-    silence.look(0.0)
+    silence.note_check(0.0)
     assert silence.longer_than(5.0, 100.0) == []
     silence.note('acu', 100.0)
     assert silence.longer_than(5.0, 105.0) == []
@@ -56,13 +56,13 @@ def test_a_node_that_died_is_not_silent():
 
 def test_nobody_is_silent_because_the_listener_slept():
     silence = Silence(gap=1.0)
-    silence.look(0.0)
+    silence.note_check(0.0)
     silence.note('acu', 0.0)
-    silence.look(0.5)
-    silence.look(40.5)
+    silence.note_check(0.5)
+    silence.note_check(40.5)
     assert silence.longer_than(5.0, 40.5) == []
     for now in (41.0, 42.0, 43.0, 44.0, 45.0):
-        silence.look(now)
+        silence.note_check(now)
     assert silence.longer_than(5.0, 45.0) == []
     assert silence.longer_than(5.0, 45.1) == ['acu']
 

@@ -12,15 +12,18 @@ from pedestal_common import law_cache
 from pedestal_common.law import Law
 
 
-def done(kind, form='') -> pathlib.Path | None:
-    """Return the file that marks the laws of a class, in a form of them, as cached; None without a law cache."""
-    folder = law_cache.folder(kind)
-    return pathlib.Path(folder, f'{kind.__module__}.{kind.__name__}{form}.done') if folder else None
+def done_file(owner, form='') -> pathlib.Path | None:
+    """Return the file that exists once the laws of a class are cached; None without a law cache.
+
+    owner: the class; form: text that distinguishes several sets of laws of one class, '' for a single set.
+    """
+    folder = law_cache.folder(owner)
+    return pathlib.Path(folder, f'{owner.__module__}.{owner.__name__}{form}.done') if folder else None
 
 
 def is_compiled(unit) -> bool:
     """Return True if the laws of a unit, which its memory identifies, are in the cache."""
-    mark = done(type(unit.memory))
+    mark = done_file(type(unit.memory))
     return mark is not None and mark.exists()
 
 
@@ -28,7 +31,7 @@ def is_compiled(unit) -> bool:
 def compiled_once(unit):
     """Hold the lock around the first call of the laws of a unit. Of the processes that start with a cold cache one
     compiles the laws; the others wait and find them in the cache, so four beams start as fast as one."""
-    mark = done(type(unit.memory))
+    mark = done_file(type(unit.memory))
     if mark is None or mark.exists():
         yield
         return
@@ -38,7 +41,7 @@ def compiled_once(unit):
 
 
 def _law(law, **options):
-    if numba.config.DISABLE_JIT:
+    if numba.config.DISABLE_JIT:     # for a debugger: the laws run as plain Python
         return law
     dispatcher = Law(law, targetoptions={'nopython': True, 'error_model': 'numpy', **options})
     dispatcher.enable_caching()

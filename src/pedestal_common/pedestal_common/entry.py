@@ -1,8 +1,8 @@
-"""Signal handlers for the start of a node; an executable imports this module before anything else.
+"""Signal handlers for the start of a node. The module of each node imports this module before anything else.
 
-The other imports take half a second and more. A signal that arrives meanwhile ends the process at once, without a
-message. `shell.main` then sets handlers of its own. A process that imports an executable as a module keeps its
-handlers.
+The other imports take half a second and more. Without these handlers a Ctrl-C in that time would print a traceback.
+With these handlers a signal ends the process at once, without a message. `shell.main` later sets handlers of its own.
+A process that imports the module of a node, and is no node itself, keeps its handlers.
 """
 import os
 import pathlib

@@ -6,8 +6,11 @@ from pedestal_common.compiled import compiled
 
 @compiled
 def fhan(x1, x2, r, h0):
-    """Return the time-optimal acceleration within +-r that brings x1'' = u to rest at 0, linear within h0 of it (Han
-    2009)."""
+    """Return the time-optimal acceleration u within +-r that brings x1'' = u to rest at x1 = 0 (Han 2009).
+
+    x1: error; x2: its rate; h0: time [s]. Close to rest, within what u = r reaches in h0, the law is linear, which
+    avoids chattering. d, a0, y, a are the names of Han's formula.
+    """
     d = r * h0 * h0
     a0 = h0 * x2
     y = x1 + a0

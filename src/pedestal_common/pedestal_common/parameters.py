@@ -19,8 +19,11 @@ class ParameterError(ValueError):
 
 def parameter(default: float, low: float, high: float, unit: str, doc: str,
               grid: tuple[float, float, int] | None = None) -> typing.Any:
-    """Declare a number (float or int, as annotated) between low and high inclusive. grid: (lowest, highest, points),
-    spaced evenly in the logarithm, at which a search for its best value begins; None: no search."""
+    """Declare a number (float or int, as annotated) between low and high inclusive.
+
+    grid: (lowest value, highest value, number of values), spaced evenly in the logarithm, of the values at which
+    `pedestal tune` begins its search for the best value; None: the parameter is not tuned.
+    """
     return dataclasses.field(default=default, metadata={'low': low, 'high': high, 'unit': unit, 'doc': doc,
                                                         'grid': grid})
 
@@ -62,7 +65,7 @@ class Parameters:
 
     def check_graph(self, beams: int, lockstep: bool) -> None:
         """Raise ParameterError where parameters do not fit the graph; overridden where there are such parameters.
-        beams: as in nodes.links; lockstep: its pacing."""
+        beams: as in nodes.links; lockstep: True if the pacing of the graph is lockstep."""
 
 
 _P = typing.TypeVar('_P', bound=Parameters)
@@ -166,7 +169,10 @@ def build(cls: type[_P], values: Mapping[str, typing.Any], prefix: str = '') -> 
 
 
 def check_each(cls: type[Parameters], values: Mapping[str, typing.Any]) -> None:
-    """Raise ParameterError for the first of {dotted name: value} that `build` would refuse by itself."""
+    """Raise ParameterError for the first of {dotted name: value} that `build` would refuse whatever the others are.
+
+    Each value is checked alone. `Parameters.check`, which compares fields with each other, is not called.
+    """
     known = dict(flatten(cls))
     _check_names(known, values)
     for name, value in values.items():
@@ -181,7 +187,7 @@ def _check_names(known: Mapping[str, dataclasses.Field], values: Iterable[str]) 
 
 
 def typed(field: dataclasses.Field, value: typing.Any) -> typing.Any:
-    """Return the value of a field, a whole number as a float where the field is one."""
+    """Return the value of a field; a whole number for a field of type float is returned as a float."""
     return float(value) if field.type is float and type(value) is int else value
 
 
@@ -229,7 +235,9 @@ def _record_values(instance: Parameters, cls: type[Parameters]) -> tuple:
 
 
 def record(instance: Parameters, cls: type[Parameters] | None = None) -> np.ndarray:
-    """Return an instance as a record array of shape (1,), the form of the compiled steps. cls: only the fields of this
-    base class, where the instance has more."""
+    """Return an instance as a record array of shape (1,), the form of the compiled steps.
+
+    cls: base class of the instance, whose fields alone are in the record; None: all fields of the instance.
+    """
     cls = cls or type(instance)
     return np.array([_record_values(instance, cls)], record_type(cls))

@@ -41,7 +41,7 @@ def test_every_node_of_the_table_hears_and_tells_of_its_faults():
     ('soon encoder_jump', 'AT in seconds')))
 def test_a_wrong_text_is_refused_with_name_value_and_range(text, said):
     with pytest.raises(ParameterError, match='inject = ') as refused:
-        table.due('adu', text)
+        table.scheduled_commands('adu', text)
     assert said in str(refused.value)
 
 

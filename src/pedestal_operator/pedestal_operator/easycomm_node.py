@@ -1,4 +1,9 @@
-"""ROS node that serves the EasyComm protocol over TCP and a serial device."""
+"""ROS node that serves the EasyComm protocol over TCP and a serial device.
+
+In the folder rotator, easycomm.py reads the lines and controller.py turns them into commands.
+
+The module imports `entry` before anything else, so that a signal during the other imports ends the process cleanly.
+"""
 import pedestal_common.entry  # noqa: F401
 
 # isort: split

@@ -1,4 +1,9 @@
-"""ROS node for RViz: the model of the pedestal on `robot_description`, its frames on `tf`."""
+"""ROS node for RViz: the model of the pedestal on `robot_description`, its frames on `tf`.
+
+In the folder viewers, frames.py computes the frames, and the folder files holds the model.
+
+The module imports `entry` before anything else, so that a signal during the other imports ends the process cleanly.
+"""
 import pedestal_common.entry  # noqa: F401
 
 # isort: split

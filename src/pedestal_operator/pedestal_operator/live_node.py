@@ -1,4 +1,9 @@
-"""ROS node for Foxglove and Lichtblick: the messages of the graph, byte by byte, over a WebSocket."""
+"""ROS node for Foxglove and Lichtblick: the messages of the graph, byte by byte, over a WebSocket.
+
+In the folder viewers, on_demand.py subscribes to the topics that a viewer shows.
+
+The module imports `entry` before anything else, so that a signal during the other imports ends the process cleanly.
+"""
 import pedestal_common.entry  # noqa: F401
 
 # isort: split

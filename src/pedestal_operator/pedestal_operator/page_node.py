@@ -1,4 +1,10 @@
-"""ROS node that serves the page of the operator to browsers."""
+"""ROS node that serves the page of the operator to browsers.
+
+In the folder page, page_server.py serves the browsers, page_state.py makes the content, page_requests.py executes the
+commands.
+
+The module imports `entry` before anything else, so that a signal during the other imports ends the process cleanly.
+"""
 import pedestal_common.entry  # noqa: F401
 
 # isort: split

@@ -1,4 +1,9 @@
-"""ROS node that serves the rotctld protocol over TCP to clients of Hamlib and to gpredict."""
+"""ROS node that serves the rotctld protocol over TCP to clients of Hamlib and to gpredict.
+
+In the folder rotator, rotctld.py reads the lines and controller.py turns them into commands.
+
+The module imports `entry` before anything else, so that a signal during the other imports ends the process cleanly.
+"""
 import pedestal_common.entry  # noqa: F401
 
 # isort: split

@@ -35,11 +35,11 @@ def test_who_is_served(access):
     assert status(access) == status(access, host='LOCALHOST:8080') == status(access, host='[::1]:8080') == 200
     for host in ('', '127.0.0.1', '127.0.0.1:80', 'evil.example:8080', '127.0.0.1:8080.evil.example', '127.1:8080'):
         assert status(access, host=host) == 400, host
-    assert status(access, origin='http://127.0.0.1:8080', asks=True) == 200
+    assert status(access, origin='http://127.0.0.1:8080', changes_state=True) == 200
     for origin in ('http://evil.example', 'null', 'https://127.0.0.1:8080', 'http://127.0.0.1:8081',
                    'http://localhost:8080'):
-        assert status(access, origin=origin) == status(access, origin=origin, asks=True) == 403, origin
-    assert status(access, asks=True) == 403                                    # a web socket says where it is from
+        assert status(access, origin=origin) == status(access, origin=origin, changes_state=True) == 403, origin
+    assert status(access, changes_state=True) == 403      # a web socket says where it is from
     for cookie in ('', 'a', f'{access.cookie}=', f'{access.cookie}=\udcff', 'other=' + access.tokens['operator'],
                    'x' * 100_000):
         assert status(access, cookie=cookie) == 401, cookie[:50]

@@ -1,4 +1,9 @@
-"""ROS node that records every topic of the graph in a bag, byte by byte, and reports each lost message."""
+"""ROS node that records every topic of the graph in a bag, byte by byte, and reports each lost message.
+
+This module receives the messages; writer.py writes them.
+
+The module imports `entry` before anything else, so that a signal during the other imports ends the process cleanly.
+"""
 import pedestal_common.entry  # noqa: F401
 
 # isort: split
@@ -142,7 +147,8 @@ class RecorderNode(shell.Shell):
         if self.graph.lockstep:
             profile = middleware.qos(topic.rate)
             profile.history = HistoryPolicy.KEEP_ALL
-            self.create_subscription(middleware.message_class(topic.type), topic.name, subscriptions.pair(take),
+            self.create_subscription(middleware.message_class(topic.type), topic.name,
+                                     subscriptions.two_argument_callback(take),
                                      profile, raw=True)
         else:
             subscriptions.subscribe(self, topic, topic.name, take, 'recorded')

@@ -141,7 +141,7 @@ class ShipMotionParameters(Parameters):
 
     def check(self):
         """Raise ParameterError if `inject` is not a list of faults of ship_motion."""
-        table.due('ship_motion', self.inject)
+        table.scheduled_commands('ship_motion', self.inject)
 
     def check_graph(self, beams, lockstep):
         """Raise ParameterError if `inject` holds a fault that the pacing of the graph excludes."""
@@ -219,7 +219,7 @@ class InsParameters(Parameters):
     def check(self):
         """Raise ParameterError if the method cannot use a GNSS velocity before it knows the heading, or if `inject` is
         not a list of faults of the INS."""
-        table.due('ins', self.inject)
+        table.scheduled_commands('ins', self.inject)
         if self.aid.source == 'gnss' and self.method not in ('model', 'oba'):
             raise ParameterError(f"aid.source = 'gnss': must be none or log with method = {self.method}, because only "
                                  'oba uses a velocity in ENU before the heading is known')

@@ -188,7 +188,7 @@ class TrackingReceiverNodeParameters(TrackingReceiverParameters):
     def check(self):
         """Raise ParameterError if `inject` is not a list of faults of the receiver."""
         super().check()
-        table.due('tracking_receiver', self.inject)
+        table.scheduled_commands('tracking_receiver', self.inject)
 
     def check_graph(self, beams, lockstep):
         """Raise ParameterError if `inject` holds a fault that the pacing of the graph excludes."""

@@ -38,15 +38,15 @@ MODE_ARGUMENTS = {
 _ALARM_ARGUMENT = Argument('alarm', 'name of the alarm, with _ or blanks')
 
 ALARM_COMMANDS = (
-    CommandDefinition('acknowledge', 'acknowledge an alarm and all alarms under it',
+    CommandDefinition('acknowledge', 'acknowledge an alarm and all alarms that are its consequences',
                       (_ALARM_ARGUMENT._replace(doc='name of the alarm; default: every alarm', default=''),)),
     CommandDefinition('shelve', 'shelve an alarm for a time', (
         _ALARM_ARGUMENT, Argument('seconds', 'time until the alarm returns', 1.0, MAX_SHELVING_TIME_S, 's'),
         Argument('reason', 'reason for shelving'))),
     CommandDefinition('unshelve', 'end the shelving of an alarm', (_ALARM_ARGUMENT,)),
-    CommandDefinition('reset', 'reset latched alarms and cancel a mode that waits for entry (initial mode, mode to '
-                      'resume); refused while a cause remains; in realtime the control unit also requests the reset '
-                      'of a drive in fault'))
+    CommandDefinition('reset', 'reset latched alarms; also cancel the initial mode, or a mode to be resumed, that has '
+                      'not been entered yet; refused while the cause of a latched alarm is still present; in realtime '
+                      'the control unit also requests the reset of a drive in fault'))
 ALARM_COMMAND_NAMES = tuple(command.name for command in ALARM_COMMANDS)
 
 ACU_COMMANDS = (
@@ -57,7 +57,7 @@ ACU_COMMANDS = (
     CommandDefinition('offset', 'shift the table of `program`, `tle` and `sun`, also while the antenna follows it', (
         Argument('time', 'delay of the table; positive: follow it later', -3600.0, 3600.0, 's', default=0.0),
         *_of_axes('offset of the angle', -1.0, 1.0, 'rad', 0.0))),
-    CommandDefinition('take', 'take control: commands of other clients are refused, except `standby` and `stop`', (
+    CommandDefinition('take', 'take control; other clients can then send only `stop` and `standby`', (
         Argument('role', 'role of the client; a supervisor takes control from any holder', options=CONTROL_ROLES,
                  default='operator'),)),
     CommandDefinition('release', 'release control'),

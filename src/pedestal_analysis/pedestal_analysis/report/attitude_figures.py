@@ -19,6 +19,7 @@ def attitude(data):
     """Return the figure of the heading and level errors of the INS [deg] and their stated standard deviations."""
     known = data.attitude
     figure, panels = new_panels(2, y='error [deg]', sharex=True)
+    # known.sigma is (n, 2): level per axis, heading. Both level axes together have sqrt(2) times the sigma of one.
     for axes, name, error, sigma in zip(panels[:, 0], ('heading', 'level, both axes'),
                                         (np.abs(known.heading), known.level),
                                         (known.sigma[:, 1], np.sqrt(2.0) * known.sigma[:, 0])):

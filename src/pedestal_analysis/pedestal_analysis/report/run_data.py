@@ -34,7 +34,7 @@ class RunData:
     attitude: typing.Any = None
 
     def lacks(self, needs):
-        """Return the reasons why a figure with these needs (keys of _NEEDS) cannot be drawn, else ''."""
+        """Return the reasons why a figure with these needs (keys of _NEEDS) cannot be drawn, '' if it can be drawn."""
         reasons = [_NEEDS[need](self) for need in needs]
         return '; '.join(dict.fromkeys(filter(None, reasons)))
 

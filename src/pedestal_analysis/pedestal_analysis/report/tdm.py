@@ -34,6 +34,9 @@ PARTICIPANT_PATTERN = re.compile(r'[ -~]{1,80}')
 TLE_DESIGNATOR_PATTERN = re.compile(r'(\d\d)(\d{3})([A-Z]{1,3}) *')
 """Pattern of the international designator of a TLE."""
 
+TLE_DESIGNATOR_COLUMNS = slice(9, 17)
+"""Columns of the international designator in line 1 of a TLE."""
+
 TOPIC_COLUMNS = {'joint_states': ('azimuth.position', 'elevation.position'),
                  'tracking_receiver/angle_error': ('x', 'y', 'z'),
                  'ship/imu/data': tuple(f'orientation.{axis}' for axis in 'xyzw'),
@@ -86,7 +89,7 @@ def _files(bag, output, overwrite):
         files = {output: views[0]}
     else:
         name = bag.path.resolve().stem
-        files = {output / f'{".".join(filter(None, (name, view.beam[:-1])))}.tdm': view for view in views}
+        files = {output / f'{".".join(filter(None, (name, view.beam.removesuffix("/"))))}.tdm': view for view in views}
     for file in files:
         if file.exists() and not overwrite:
             raise FileExistsError(f'{file} exists already; --overwrite replaces the file')
@@ -94,16 +97,20 @@ def _files(bag, output, overwrite):
 
 
 class _Tracks:
-    """The exported steps of a bag of one beam, at most `rate` a second."""
+    """The exported steps of a bag of one beam, at most `rate` a second.
+
+    bag.start is the stamp of the time 0 of the scenario [ns]; utc_of_zero is the UTC of the same time.
+    """
 
     def __init__(self, bag, rate):
-        self.bag, self.begin = bag, _utc_of_zero(bag)
+        self.bag, self.utc_of_zero = bag, _utc_of_zero(bag)
         rows = {topic: bag.rows(topic) for topic in TOPIC_COLUMNS if topic in bag.topics}
         self.rows = {topic: of for topic, of in rows.items() if of.size}
         missing = [name for name in ('joint_states', 'tracking_receiver/angle_error') if name not in self.rows]
         if missing:
             raise bags.BagError(f'{bag.path}: no message of {missing[0]} in the bag')
         stamps = np.unique(self.rows['joint_states'].stamp)
+        # Of the steps in each interval of 1 / rate, the first is exported.
         _, first = np.unique((stamps - stamps[:1]) * rate // 1e9, return_index=True)
         self.stamps = stamps[first]
 
@@ -115,11 +122,13 @@ class _Tracks:
             attitude = self._at('ship/imu/data', stamps) if 'ship/imu/data' in self.rows else None
             angles = np.degrees(measured_direction.earth_angles(beam, error[:, :2], attitude))
             mode = tracking.modes(self.bag, (stamps - self.bag.start) / 1e9)
-            there = np.isfinite(angles).all(axis=1) & ((mode == 'autotrack') | ('acu/mode' not in self.bag.topics))
-            if there.any():
-                passed = np.round((stamps[there] - self.bag.start) / 1e3).astype('m8[us]')
-                yield (instant.utc_texts(self.begin, passed), angles[there],
-                       1e-3 * self._at('tracking_receiver/range', stamps)[there, 0], error[there, 2])
+            # Without lock the receiver errors, and so the angles, are NaN. A bag without acu/mode states no mode.
+            exported = np.isfinite(angles).all(axis=1) & ((mode == 'autotrack') | ('acu/mode' not in self.bag.topics))
+            if exported.any():
+                passed = np.round((stamps[exported] - self.bag.start) / 1e3).astype('m8[us]')
+                range_m, cn0_dbhz = self._at('tracking_receiver/range', stamps)[:, 0], error[:, 2]
+                yield (instant.utc_texts(self.utc_of_zero, passed), angles[exported], 1e-3 * range_m[exported],
+                       cn0_dbhz[exported])
 
     def _at(self, topic, stamps):
         """Return the TOPIC_COLUMNS (n, k) of a topic at stamps (n,) [ns]; NaN where no message has the stamp."""
@@ -140,7 +149,9 @@ class _Tracks:
 def _utc_of_zero(bag):
     """Return the UTC of the time 0 of a bag of one beam, datetime64[us].
 
-    It is that of a target with a date, else that of the clock of the recording. Raises bag.BagError without both.
+    It is the UTC that the receiver publishes for a target with a date (a satellite, a dated flight). For another
+    target it is the start stamp of a realtime recording, which is UTC. A lockstep recording starts at stamp 0, which
+    is no date. Raises bag.BagError without both.
     """
     date = bag.last_values(f'{bag.beam}tracking_receiver').get('stamp_0_utc', '')
     if date:
@@ -165,12 +176,13 @@ def _participants(bag, names):
     """Return (name of the station, name of the target)."""
     receiver = bag.configuration['parameters'].get('tracking_receiver', {})
     target = str(receiver.get('target.kind', 'TARGET')).upper()[:80]
-    launch = TLE_DESIGNATOR_PATTERN.fullmatch(str(receiver.get('target.leo_pass.line_1', ''))[9:17])
+    launch = TLE_DESIGNATOR_PATTERN.fullmatch(str(receiver.get('target.leo_pass.line_1', ''))[TLE_DESIGNATOR_COLUMNS])
     elements = receiver.get('target.leo_pass.omm', '')
     if target == 'LEO_PASS' and elements:
         target = json.loads(elements).get('OBJECT_ID', target)
     elif target == 'LEO_PASS' and launch:
         year, number, piece = launch.groups()
+        # Two digits of the year: from 57, the year of the first satellite, in 19xx, otherwise in 20xx.
         target = f'{1900 + int(year) + 100 * (int(year) < 57)}-{number}{piece}'
     return (*names, *(DEFAULT_STATION_NAME, target
                       if PARTICIPANT_PATTERN.fullmatch(target) else 'TARGET')[len(names):])

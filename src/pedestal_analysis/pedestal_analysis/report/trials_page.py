@@ -49,6 +49,7 @@ class Trials:
 def read(plan, table, by, sides, command, count=10) -> Trials:
     """Return the Trials of a plan and its table; run the worst and the median trial again for their signals."""
     places = statistics.ranking(by, table.column(by)).tolist()
+    # Trials without the result rank as the worst, so the median is that of the trials that have the result.
     known = [i for i in places if math.isfinite(table.column(by)[i])] or places
     chosen = {'worst': places[0], 'median': known[len(known) // 2]}
     beam = nodes.beam_of(by)
@@ -71,7 +72,8 @@ def _varying(table, names):
 
 def histograms(trials):
     """Return the figure of the histograms of the results, two in a row; dashed: the median."""
-    shown = _varying(trials.table, [name for name in trials.table.there if nodes.plain(name) in HISTOGRAM_RESULTS])
+    shown = _varying(trials.table, [name for name in trials.table.measured_results
+                                    if nodes.plain(name) in HISTOGRAM_RESULTS])
     rows = max(1, -(-len(shown) // 2))
     figure, panels = new_panels(rows, 2, height=0.5 + 1.7 * rows, x='')
     for axes, (name, values) in zip(panels.flat, shown):

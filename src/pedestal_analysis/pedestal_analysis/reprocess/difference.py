@@ -142,6 +142,7 @@ def compare(topic, was: Output, now: Output, tolerance=Tolerance(), data=None, t
     data, template: recorded CDR messages and a message that the node makes, to compare the content without numbers.
     """
     difference = TopicDifference(topic, len(was.stamps), len(now.stamps), _order(was.stamps, now.stamps), [])
+    # Pair the messages by stamp: was.values[here[k]] and now.values[there[k]] have the same stamp.
     _, here, there = np.intersect1d(was.stamps, now.stamps, return_indices=True)
     stamps = was.stamps[here]
 
@@ -213,8 +214,10 @@ def compare_messages(name, was, now):
     if pairs:
         a, b = pairs[0]
         return MessageDifference(name, len(old), len(new), len(pairs), (a or b)[0], _changes(a, b, kinds))
-    if kinds[0] != kinds[1]:
-        return MessageDifference(name, len(old), len(new), 0, 0, [f'type {kinds[0]} -> {kinds[1]}'])
+    old_type, new_type = kinds
+    if old_type != new_type:
+        return MessageDifference(name, len(old), len(new), different=0, first=0,
+                                 changes=[f'type {old_type} -> {new_type}'])
     return None
 
 
@@ -223,7 +226,9 @@ def compare_order(was, now):
     for old, new in zip(was.raw(), now.raw()):
         if old != new:
             change = f'position in the file; the new file has {new[0]} at {new[1] / 1e9:.6f} s there'
-            return MessageDifference(old[0], was.rows(old[0]).size, now.rows(old[0]).size, 0, old[1], [change])
+            topic, log = old[:2]
+            return MessageDifference(topic, was.rows(topic).size, now.rows(topic).size, different=0, first=log,
+                                     changes=[change])
     return None
 
 

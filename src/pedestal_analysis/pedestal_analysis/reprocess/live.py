@@ -29,6 +29,8 @@ ANSWER_TIMEOUT_S = 20.0
 """Time allowed for the answer of the node to a step [s]."""
 STOP_TIMEOUT_S = 10.0
 """Grace period between SIGINT and SIGKILL [s]."""
+NODE_DISCOVERY_TIME_S = 0.5
+"""Time for the node to discover the feeder, after the feeder has discovered the node [s]."""
 
 
 class Feeder(Operator):
@@ -46,12 +48,16 @@ class Feeder(Operator):
         row = nodes.row(node)
         self.replies = []
         if row.obeys:
-            self.asks = self._publisher(self.links[row.obeys])
+            self.command_publisher = self._publisher(self.links[row.obeys])
             self.create_subscription(middleware.message_class(self.links[row.replies].type), row.replies,
                                      self.replies.append, middleware.qos(self.links[row.replies].rate), raw=True)
 
     def stand_in(self, names):
-        """Make nodes of these names, which are in the node list of the process, as subscribers of its outputs."""
+        """Make nodes of these names, which are in the node list of the process, as subscribers of its outputs.
+
+        Because a lockstep node waits until the named nodes have subscribed, each needs a stand-in. The stand-in of the
+        recorder keeps the outputs; the others drop them.
+        """
         for reader in names:
             if reader not in (self.node, self.name):
                 self.readers.append(rclpy.create_node(reader))
@@ -90,7 +96,7 @@ class Live:
         """
         deadline = time.monotonic() + limit
         while not condition():
-            if self.process.poll() not in (None, 0):
+            if self.process.poll() not in (None, 0):     # 0: the node has reached its end, its last messages may come
                 raise RunError(f'{self.feeder.node} exited with code {self.process.returncode}: '
                                f'{" ".join(self.log.read_text(errors="replace").split())}')
             if time.monotonic() > deadline:
@@ -101,7 +107,7 @@ class Live:
         """Send a Command by its service or by the command topic, and wait for the reply."""
         if command.verb not in self.services:
             before = len(self.feeder.replies)
-            self.feeder.asks.publish(messages.serialize(commands.message(command)))
+            self.feeder.command_publisher.publish(messages.serialize(commands.message(command)))
             self.until(lambda: len(self.feeder.replies) > before, ANSWER_TIMEOUT_S, lambda: f'reply to {command}')
             return
         service = command.verb
@@ -130,7 +136,10 @@ def outputs(recording, done, params):
 
 
 def _graph(recording, unit):
-    """Return the node list of the process: the node, the recorder, and nodes that determine its inputs."""
+    """Return the node list of the process: the node, the recorder, and nodes that determine its inputs.
+
+    The recorder takes part because it reads every output, so the process sends each of them.
+    """
     optional = [node.name for node in nodes.NODES if (node.optional or node.name == 'operator')
                 and any(topic in unit.NODE.reads and recording.has(topic) for topic in node.writes)]
     return (unit.NODE.name, 'recorder', *optional)
@@ -155,7 +164,8 @@ def _run(recording, done, params, folder):
             live.until(lambda: all(publisher.get_subscription_count() for publisher in feeder.publishers_of.values())
                        and feeder.count_publishers('diagnostics'), NODE_START_TIMEOUT_S,
                        lambda: 'subscriber of its inputs')
-            time.sleep(0.5)  # time for the node to discover the feeder
+            # Because DDS discovers each direction separately, the node may not know the feeder yet.
+            time.sleep(NODE_DISCOVERY_TIME_S)
             steps = _feed(recording, done, live)
         finally:
             process.send_signal(signal.SIGINT)
@@ -199,7 +209,7 @@ def _feed(recording, done, live):
 
 
 def _due(done, name):
-    """Return the number of messages of a topic that are due by each step (n,)."""
+    """Return the number of messages of a topic that are due by each step (n,), that of the step included."""
     if records.is_text(name):
         return np.searchsorted(done.outputs[name].stamps, done.feed.stamps, side='right')
     return np.cumsum(done.steps[name]['stamp'] != records.NO_STAMP)

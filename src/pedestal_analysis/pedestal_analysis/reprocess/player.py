@@ -13,6 +13,7 @@ from pedestal_analysis.reprocess.terminal import RIGHT_ARROW_CODES, StatusLine
 from pedestal_common.graph import nodes
 from pedestal_common.graph.steps import NS_PER_SECOND, GraphError
 from pedestal_common.node import middleware, shell
+from pedestal_common.wire import messages
 from pedestal_recording import bag as bags
 
 ANSWER_TOPICS = {node.name: (None if node.reads[0] in node.writes else node.reads[0], node.answer)
@@ -41,6 +42,9 @@ SUBSCRIBER_EXIT_TIMEOUT_S = 5.0
 
 A subscriber that ends is known at once. Fast DDS waits 20 s for a killed one and then drops its messages.
 """
+
+MAX_SPIN_PAUSE_S = 0.01
+"""Largest time between two spins of the node during the replay [s]."""
 
 ANSWER_QUIET_S, STOPPED_ARRIVAL_TIMEOUT_S = 0.5, 1.0
 """Time without an answer that ends the wait for a node under test; time a stopped replay waits for acknowledgement
@@ -151,7 +155,7 @@ class Player(Node):
         self.spinner = middleware.make_executor()
         self.spinner.add_node(self)
         self.position = playlist.first
-        self._next_look = self._next_readers = self._spun = 0.0
+        self._next_refresh = self._next_subscriber_check = self._last_spin = 0.0    # monotonic [s]
 
     def _publisher(self, name, type_name):
         topic = self.graph.get(name)
@@ -170,7 +174,7 @@ class Player(Node):
 
         def take(data):
             if node is not None:
-                seconds, nanoseconds = _stamp_of(data, 4)
+                seconds, nanoseconds = _stamp_of(data, messages.CDR_HEADER_BYTES)
                 node.answered = max(node.answered, seconds * NS_PER_SECOND + nanoseconds)
                 node.answers += 1
         profile = QoSProfile(history=HistoryPolicy.KEEP_ALL, depth=1, reliability=ReliabilityPolicy.RELIABLE)
@@ -178,7 +182,7 @@ class Player(Node):
 
     def _spin(self, seconds):
         self.spinner.spin_once(timeout_sec=seconds)
-        self._spun = time.monotonic()
+        self._last_spin = time.monotonic()
 
     def _other_writers(self, name):
         """Return the other publishers of a topic; of a topic of all nodes, those with messages in the recording."""
@@ -203,7 +207,8 @@ class Player(Node):
     def connect(self):
         """Wait until each topic has its subscribers; return True, or False if stopped meanwhile.
 
-        Raises GraphError if a topic already has a publisher, or has no subscriber after the deadline.
+        Raises GraphError if a topic already has a publisher, or has no subscriber after the deadline. A publisher
+        whose node is not discovered yet counts only after the deadline, because it may be one of this node.
         """
         begun = settled = time.monotonic()
         while not self._ended():
@@ -286,10 +291,12 @@ class Player(Node):
             if self._ended():
                 return False
             now = time.monotonic()
-            self._look(now)
-            wait = self._wait(stamp, now, since)
+            self._show_position(now)
+            self._check_subscribers(now)
+            wait = self._time_to_wait(stamp, now, since)
             if wait <= 0.0:
-                if now - self._spun > 0.01:
+                # At a high rate no wait spins the node, and the answers would not be received.
+                if now - self._last_spin > MAX_SPIN_PAUSE_S:
                     self._spin(0)
                 return True
             self._spin(min(wait, KEYBOARD_POLL_S))
@@ -297,7 +304,7 @@ class Player(Node):
     def _ended(self):
         return self.pace.quit or self.stopped()
 
-    def _wait(self, stamp, now, since):
+    def _time_to_wait(self, stamp, now, since):
         """Return the time to wait for the messages of a stamp [s]; since: start of the wait.
 
         Raises GraphError if an answer is missing after the deadline.
@@ -310,17 +317,21 @@ class Player(Node):
         return KEYBOARD_POLL_S
 
     def _late(self, stamp=-1):
+        """Return the first node under test that owes an answer before the messages of a stamp, None without one."""
         return next((node for node in self.under_test if node.owes(stamp)), None)
 
-    def _look(self, now):
-        if now >= self._next_look:
-            self._next_look = now + POSITION_REFRESH_S
+    def _show_position(self, now):
+        if now >= self._next_refresh:
+            self._next_refresh = now + POSITION_REFRESH_S
             start, end = self.playlist.origin, self.playlist.end
             position, length = (self.position - start) / NS_PER_SECOND, (end - start) / NS_PER_SECOND
             self.status.show(f'{position:.3f} / {length:.3f} s  {self.pace}'
-                             + (f'   {KEY_HELP}' if self.keyboard.there else ''))
-        if now >= self._next_readers:
-            self._next_readers = now + SUBSCRIBER_POLL_S
+                             + (f'   {KEY_HELP}' if self.keyboard.available else ''))
+
+    def _check_subscribers(self, now):
+        """Raise GraphError if a topic has lost a subscriber."""
+        if now >= self._next_subscriber_check:
+            self._next_subscriber_check = now + SUBSCRIBER_POLL_S
             unread = self._unread()
             if unread:
                 name, missing = unread

@@ -29,27 +29,27 @@ def latched(graph, name):
     return name in graph and topics.QOS_BY_RATE[graph[name].rate].latched
 
 
-def select(bag, of, names):
+def selected_topics(bag, input_nodes, names):
     """Return the topics of a bag.Bag to publish.
 
-    They are the topics in names, else the inputs of the nodes `of` that none of these nodes publishes, else all
-    topics. Raises BagError for a topic that is not in the bag, an unknown node, or a node without inputs in the bag.
+    They are the topics in names, else the inputs of input_nodes that none of these nodes publishes, else all topics.
+    Raises BagError for a topic that is not in the bag, an unknown node, or a node without inputs in the bag.
     """
     if names:
         return bags.chosen_topics(bag, names)
-    if not of:
+    if not input_nodes:
         return list(bag.topics)
     chosen, graph, known = [], bag.graph, nodes.members(nodes.NODE_NAMES, bag.beams)
-    for node in of:
+    for node in input_nodes:
         if node not in known:
             raise bags.BagError(f'--node {node}: unknown node;{did_you_mean(node, known)} must be one of '
                                 f'{", ".join(known)}')
-        of_node = [name for name in bag.topics
-                   if reads(graph, node, name) and not any(writes(graph, other, name) for other in of)]
-        if not of_node:
+        inputs = [name for name in bag.topics
+                  if reads(graph, node, name) and not any(writes(graph, other, name) for other in input_nodes)]
+        if not inputs:
             wanted = ', '.join(name for name in graph if reads(graph, node, name))
             raise bags.BagError(f'{bag.path}: no input of node {node} in the bag; its inputs are {wanted}')
-        chosen += of_node
+        chosen += inputs
     return list(dict.fromkeys(chosen))
 
 
@@ -67,6 +67,7 @@ class Playlist:
     def __init__(self, bag, names, start, duration):
         self.bag, self.names = bag, names
         where, stamps, ranks = [], [], []
+        # The rank of a latched topic is negative, so latched topics come first among equal stamps.
         rank = {name: number - len(bag.graph) * latched(bag.graph, name) for number, name in enumerate(bag.graph)}
         for name in names:
             rows = bag.where(name)
@@ -82,6 +83,7 @@ class Playlist:
         self.end = int(stamps[-1])
         begin = self.origin + round(start * NS_PER_SECOND)
         stop = begin + round(duration * NS_PER_SECOND) if duration is not None else self.end
+        # The last message of each latched topic before the beginning is moved to the first stamp.
         before = np.flatnonzero((ranks < 0) & (stamps < begin))
         held = np.array([before[ranks[before] == topic][-1] for topic in np.unique(ranks[before])], int)
         inside = np.flatnonzero((stamps >= begin) & (stamps <= stop))

@@ -7,8 +7,8 @@ lockstep   Stamps assign inputs to steps, so the same version on the same machin
 realtime   A step receives the messages published (in a foreign recording: recorded) before the next step began. These
            are the inputs of the node, except for messages in transit at that moment.
 both       Commands and services are repeated before the step at which the node replied. For a node without recorded
-           replies, a change of adu/state that the unit does not make by itself is requested at that step. A parameter
-           changed during the run leaves no trace.
+           replies, a change of acu/mode or adu/state that the unit does not make by itself is requested at that step.
+           A parameter changed during the run leaves no trace.
            A recording that begins in the middle of a run starts from the initial state, so its outputs differ until
            the filter has converged.
 """
@@ -85,6 +85,7 @@ class Recording:
         They are publish times by the clock of the machine; in a foreign recording, places in the file.
         """
         rows = self.rows(topic)
+        # A place is the number of a chunk and the offset in the unpacked chunk, which is far below 2^40 bytes.
         return rows.publish if 'pacing' in self.bag.metadata else (rows.chunk << 40) + rows.start
 
     def data(self, topic):

@@ -34,8 +34,8 @@ def main(options):
 
     Raises ValueError for an option that does not fit the bag, RunError if a live node does not answer.
     """
-    recording = recompute.Recording(options.bag, {None: None, 'lockstep': True}.get(options.pacing, False),
-                                    options.beam)
+    lockstep = None if options.pacing is None else options.pacing == 'lockstep'     # None: as the bag states
+    recording = recompute.Recording(options.bag, lockstep, options.beam)
     given = recompute.file_parameters(options.params_file, recording.bag.beam) if options.params_file else None
     nodes = recompute.chosen(recording, options.node, given)
     changes = recompute.overrides(options.param, nodes)

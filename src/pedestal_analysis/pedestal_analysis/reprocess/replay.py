@@ -8,7 +8,7 @@ import time
 import rclpy
 
 from pedestal_analysis.reprocess.player import ANSWER_TOPICS, Player, answer_of
-from pedestal_analysis.reprocess.playlist import Playlist, select, writes
+from pedestal_analysis.reprocess.playlist import Playlist, selected_topics, writes
 from pedestal_analysis.reprocess.terminal import Keyboard
 from pedestal_common.graph import nodes
 from pedestal_common.graph.steps import NS_PER_SECOND
@@ -90,14 +90,15 @@ def replay(path, options, ready=lambda: None) -> ReplayResult:
     GraphError for a graph that does not fit.
     """
     bag = bags.read(path)
-    chosen = select(bag, options.nodes, options.names)
+    chosen = selected_topics(bag, options.nodes, options.names)
     if options.rate is None:
         _check_lockstep(options.nodes, chosen, bag.graph)
+    # The clock is published as a companion: simulated nodes may need it, and no node of the replay publishes it.
     written = 'clock' in chosen or any(writes(bag.graph, node, 'clock') for node in options.nodes)
     companion = 'clock' if 'clock' in bag.topics and not written else None
     playlist = Playlist(bag, [*chosen, *filter(None, [companion])], options.start, options.duration)
     keyboard = Keyboard()
-    if options.paused and not keyboard.there:
+    if options.paused and not keyboard.available:
         raise ValueError('--paused: standard input must be a terminal, because a key ends the pause')
     middleware.initialise([])
     try:

@@ -24,6 +24,9 @@ PAGE_FRAME_PERIOD_S, SLOW_FRAME_PERIOD_S = 0.1, 1.0
 MIN_REPLAY_RATE, MAX_REPLAY_RATE = 0.05, 50.0
 """Limits of the replay rate [times real time]."""
 
+MAX_PAGES = 32
+"""Largest number of pages that show the recording at a time."""
+
 MAX_EVENT_MESSAGES = 5000
 """Largest number of messages of a topic for the event log, from the beginning."""
 
@@ -143,26 +146,27 @@ class Player:
     def __init__(self, recording, port, options):
         self._recording, self._lock = recording, threading.Lock()
         self._playing, self._rate = not options.paused, options.rate
-        self._coming = UpcomingPasses()
+        self._upcoming_passes = UpcomingPasses()
         recording.move(options.start)
-        self._server = PageServer('127.0.0.1', port, (), 32, self._past)
+        self._server = PageServer('127.0.0.1', port, names=(), most=MAX_PAGES, history=self._past)
         self.url = self._server.access.url(PAGE_ROLES[0])
 
     def play(self, stopped):
         """Serve the page until stopped() is true."""
-        before, slow = time.monotonic(), -math.inf
+        before, last_slow = time.monotonic(), -math.inf
         while not stopped():
             now = time.monotonic()
             with self._lock:
                 moved = self._receive()
                 if self._playing:
                     self._go(self._recording.position + self._rate * (now - before))
-                self._show(moved or now - slow >= SLOW_FRAME_PERIOD_S)
-            slow = now if moved or now - slow >= SLOW_FRAME_PERIOD_S else slow
+                slowly = moved or now - last_slow >= SLOW_FRAME_PERIOD_S
+                self._show(slowly)
+            last_slow = now if slowly else last_slow
             before = now
             time.sleep(PAGE_FRAME_PERIOD_S)
         self._server.close()
-        self._coming.close()
+        self._upcoming_passes.close()
 
     def _go(self, position):
         self._recording.move(position)
@@ -187,11 +191,13 @@ class Player:
             if _number(wanted.get('rate')):
                 self._rate = min(max(float(wanted['rate']), MIN_REPLAY_RATE), MAX_REPLAY_RATE)
             if isinstance(wanted.get('playing'), bool):
+                # At its end, a recording plays again from its beginning.
                 again = wanted['playing'] and self._recording.position >= self._recording.length
                 self._go(0.0 if again else self._recording.position)
                 self._playing, moved = wanted['playing'], moved or again
 
     def _show(self, slowly):
+        """Send the state to the pages; slowly: with the sections that change slowly."""
         recording = self._recording
         sections = {'now': page_state.now(recording), 'status': page_state.status_section(recording),
                     'alarms': page_state.alarms(recording), 'log': recording.lines(),
@@ -202,7 +208,7 @@ class Player:
             for frame in self._frames(SLOW_FRAME_PERIOD_S):
                 past.add(frame['t'], frame['beam'])
             sections |= {'fixed': page_state.fixed(recording), 'past': past.places,
-                         'sky': page_state.sky(recording, self._coming.look(recording))}
+                         'sky': page_state.sky(recording, self._upcoming_passes.look(recording))}
         self._server.publish(sections)
 
     def _past(self):

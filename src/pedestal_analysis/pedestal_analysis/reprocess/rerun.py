@@ -1,4 +1,8 @@
-"""Rerun a run from the configuration in its recording, and compare bytes, then messages, then metadata."""
+"""Scenario of a recorded run, and the comparison of its recording with the recording of the rerun.
+
+`pedestal rerun` (pedestal/verbs/recordings/rerun.py) makes the run between these two. The comparison covers the bytes,
+then the messages, then the metadata.
+"""
 import dataclasses
 import pathlib
 
@@ -36,7 +40,10 @@ class RerunResult:
 
     @property
     def cut(self):
-        """True if the old recording ends before the run did and is equal up to its end."""
+        """True if the old recording only lacks messages at its end, and is equal up to there.
+
+        On such a topic the number of different messages is the number of missing messages.
+        """
         return all(topic.was < topic.now == topic.was + topic.different for topic in self.topics)
 
     @property
@@ -75,7 +82,7 @@ def _short(text):
     return text if len(text) < 60 and '\n' not in text else f'a text of {len(text)} characters'
 
 
-def configured(bag):
+def scenario_of_recording(bag):
     """Return the Scenario of a recording; parameters with a changed default are set to their recorded values.
 
     Raises bag.BagError for a recording that cannot be rerun.
@@ -92,8 +99,10 @@ def configured(bag):
         if node not in chosen.nodes:
             raise bags.BagError(f'{bag.file}: contains parameters of {node}, which is no node of its scenario')
         now = parameters.as_dict(chosen.node_parameters(node))
+        # A key that this version does not know is kept on purpose, so that node_parameters below refuses it by name.
         values[node].update({key: value for key, value in then.items() if key not in now or now[key] != value})
-        # Because the version of the recording did not have a topic without a recorded flag, its flags are false.
+        # A recording without the flag of an optional topic was made by a version that did not have this topic.
+        # Because the rerun must not have the topic either, its flags are set to false.
         values[node].update({key: False for _, *flags in scenario.MEASUREMENT_FLAGS for key in flags
                              if key in now and key not in then})
     changed = dataclasses.replace(chosen, values=values)
@@ -112,10 +121,13 @@ def result(was, now) -> RerunResult:
         old, new = (bag.metadata_records.get(record, {}) for bag in (was, now))
         metadata[record] = {key: (old.get(key), new.get(key)) for key in dict.fromkeys((*old, *new))
                             if old.get(key) != new.get(key)}
-    topics = [difference.compare_messages(name, was, now) for name in dict.fromkeys((*was.topics, *now.topics))]
+    compared = [difference.compare_messages(name, was, now) for name in dict.fromkeys((*was.topics, *now.topics))]
+    differences = [topic for topic in compared if topic is not None]
     before, sha256 = (files.sha256(bag.file) for bag in (was, now))
-    if not any(topics) and before != sha256:
-        topics = [difference.compare_order(was, now)]
-    return RerunResult(now.path, sorted(filter(None, topics), key=lambda topic: topic.first),
+    if not differences and before != sha256:
+        # The messages of each topic are equal, so only their order among the topics can differ.
+        order = difference.compare_order(was, now)
+        differences = [] if order is None else [order]
+    return RerunResult(now.path, sorted(differences, key=lambda topic: topic.first),
                        {record: changes for record, changes in metadata.items() if changes},
                        int(was.index.log.max(initial=0)), sha256, before == sha256)

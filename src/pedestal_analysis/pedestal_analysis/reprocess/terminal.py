@@ -30,25 +30,25 @@ def _in_foreground():
 class Keyboard:
     """Keyboard without waiting for Enter; Ctrl-C remains a signal. Use as a context.
 
-    `there` is False, and there are no keys, if standard input is no terminal or belongs to another process.
+    `available` is False, and there are no keys, if standard input is no terminal or belongs to another process.
     """
 
     def __init__(self):
-        self.there = sys.stdin is not None and not sys.stdin.closed and sys.stdin.isatty() and _in_foreground()
+        self.available = sys.stdin is not None and not sys.stdin.closed and sys.stdin.isatty() and _in_foreground()
 
     def __enter__(self):
-        if self.there:
+        if self.available:
             self._before = termios.tcgetattr(sys.stdin)
             tty.setcbreak(sys.stdin)
         return self
 
     def __exit__(self, *_):
-        if self.there:
+        if self.available:
             termios.tcsetattr(sys.stdin, termios.TCSADRAIN, self._before)
 
     def pressed(self):
         """Return [bytes of a key] of the keys pressed since the last call."""
-        if not self.there or not select.select([sys.stdin], [], [], 0)[0]:
+        if not self.available or not select.select([sys.stdin], [], [], 0)[0]:
             return []
         return _KEY.findall(os.read(sys.stdin.fileno(), 1024))
 

@@ -7,8 +7,7 @@ sample, cross-elevation and elevation together.
 motion    Motion of the direction to the target on the deck because the ship rotates about its mean attitude: the angle
           between the direction and the direction on a deck in the mean attitude.
 coherent  Part of the true pointing error that a linear law of the ship's rotation explains. It is the least-squares
-fit
-          of each axis to nine series: rotation of the deck from its mean attitude, angular velocity and angular
+          fit of each axis to nine series: rotation of the deck from its mean attitude, angular velocity and angular
           acceleration, without their means, each in the axes of the beam (cross-elevation, elevation, along). The
           velocity is a quarter period from both rotation and acceleration, so leads and lags are included. The axes
           are those of the beam because a wrong attitude, a delay or friction acts there while the target crosses the
@@ -95,8 +94,9 @@ def measure(dt, error, target, attitude, deck_rate) -> Isolation:
     weight = np.sum(np.abs(np.fft.fft(basis, axis=0))**2, axis=1) / n
     power = np.sum(np.abs(np.fft.fft(error - basis @ explained, axis=0))**2, axis=1) / n
     width = 2 * round(SMOOTHING_HALF_WIDTH_HZ * n * dt) + 1
-    power, left = (ndimage.uniform_filter1d(x, width, mode='wrap') for x in (power, 1.0 - weight))
-    power /= np.maximum(left, 0.1)
+    power, remaining_share = (ndimage.uniform_filter1d(x, width, mode='wrap') for x in (power, 1.0 - weight))
+    power /= np.maximum(remaining_share, 0.1)
+    # Each rms is per axis, so the sum of the squares of both axes is halved.
     return Isolation(math.sqrt(np.mean(moved**2) / 2.0), math.sqrt(np.sum(explained**2) / (2 * n)),
                      math.sqrt(np.sum(power * weight) / (2 * n)))
 

@@ -62,7 +62,7 @@ def read(bag):
     from scipy.spatial.transform import Rotation  # slow to import, and most runs are ashore
     t, true = t[both], Rotation.from_quat(true[both])
     error = (Rotation.from_quat(reported[both]) * true.inv()).as_rotvec() * (1.0, 1.0, -1.0)
-    # x stands for both level axes.
+    # The INS states equal variances for roll and pitch, so x stands for both level axes; z is the heading.
     sigma = np.sqrt(np.column_stack([table[f'orientation_variance.{axis}'] for axis in 'xz'])[both])
     return KnownAttitude(t, error, sigma, _aligned(bag, t[0]))
 

@@ -56,6 +56,7 @@ def _view_from_beam(beam, attitude, known_attitude, estimate, filtered, beam_ear
 
 @compiled
 def _interval_start_error(beam, error, out):
+    """Fill `out` (n, 2) as interval_start_error states."""
     for k in range(1, len(beam)):
         azimuth, elevation = line_of_sight.displaced(beam[k - 1, 0], beam[k - 1, 1], error[k - 1, 0], error[k - 1, 1])
         x, y, z = line_of_sight.direction(azimuth, elevation)
@@ -90,7 +91,8 @@ class Tracking:
     filtered                        (n, 2) estimate seen from the beam
     beam_earth, target_earth, range (n, 2) earth angles of both; (n,) distance to the target [m]
     mode                            (n,) texts
-    tracking, since                 (n,) bool: settled autotrack, which is the evaluated part; from its first step on
+    tracking                        (n,) bool: the evaluated part, which is settled autotrack
+    since                           (n,) bool: all steps from the first evaluated step on, in any mode
     beamwidth                       NaN if the bag does not state it
     begun                           (n, 2) true error of an electronic beam at the beginning of the interval that ends
                                     at the stamp, else NaN

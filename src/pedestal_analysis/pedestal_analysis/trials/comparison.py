@@ -4,8 +4,8 @@ gain   improvement of the mean of A over that of B, [%] of B:
 
            100 (1 - mean a / mean b),       for a result with larger values preferred 100 (mean a / mean b - 1),
 
-       with the interval of its jackknife (Efron and Stein, Annals of Statistics 9 (1981) 586)
-wins   share of the pairs in which A is better, by Clopper and Pearson; equal values are no win
+       with a 95 % interval by the jackknife (Efron and Stein, Annals of Statistics 9 (1981) 586)
+wins   share of the pairs in which A is better, with a 95 % interval by Clopper and Pearson; equal values are no win
 """
 import typing
 
@@ -30,7 +30,7 @@ class Sides(typing.NamedTuple):
     @property
     def results(self):
         """Names of the results that both sides have."""
-        return [name for name in self.a.there if name in self.b.there]
+        return [name for name in self.a.measured_results if name in self.b.measured_results]
 
     def pairs(self, result):
         """Return the values a, b (n,) of a result in the trials in which both sides have the result."""
@@ -46,12 +46,14 @@ def names(plan_a, plan_b):
 
 
 def gain(a, b, larger):
-    """Return (gain, low, high) [%] of a over b (n,), both above 0; larger: True if larger values are better."""
-    def of(sum_a, sum_b):
+    """Return (gain, low, high) [%] of a over b (n,), neither below 0; larger: True if larger values are better."""
+    def gain_of_sums(sum_a, sum_b):
         return 100.0 * (sum_a / sum_b - 1.0 if larger else 1.0 - sum_a / sum_b)
 
-    n, whole = len(a), of(a.sum(), b.sum())
-    _, low, high = interval(n * whole - (n - 1) * of(a.sum() - a, b.sum() - b))
+    n, whole = len(a), gain_of_sums(a.sum(), b.sum())
+    # Pseudo-values of the jackknife: n times the gain of all pairs, minus n - 1 times the gain without one pair.
+    pseudo_values = n * whole - (n - 1) * gain_of_sums(a.sum() - a, b.sum() - b)
+    _, low, high = interval(pseudo_values)
     return whole, low, high
 
 
@@ -63,7 +65,8 @@ def wins(a, b, larger):
 def has_gain(result, a, b):
     """Return True if a gain in percent of b is meaningful.
 
-    It needs a ratio scale, at least two pairs, and at least two values of b above 0.
+    A gain needs at least two pairs, and at least two values of b above 0. There is no gain for dB or negative values,
+    because a ratio has no meaning on these scales.
     """
     return len(a) > 1 and statistics.unit(result) != 'dB' and min(a.min(), b.min()) >= 0.0 and np.sum(b > 0.0) > 1
 
@@ -89,10 +92,11 @@ def sentence(sides, by):
     a, b = sides.pairs(by)
     if len(a) < 2:
         return f'{sides.case}: {by} was measured in {len(a)} pairs, which are too few for a comparison.'
-    larger, unit = statistics.larger_is_better(by), '%'
-    value, low, high = gain(a, b, larger) if has_gain(by, a, b) else interval(a - b if larger else b - a)
-    if not has_gain(by, a, b):
-        unit = statistics.unit(by)
+    larger = statistics.larger_is_better(by)
+    if has_gain(by, a, b):
+        (value, low, high), unit = gain(a, b, larger), '%'
+    else:
+        (value, low, high), unit = interval(a - b if larger else b - a), statistics.unit(by)
     half = 0.5 * (high - low)
     share, least, most = wins(a, b, larger)
     pairs = f'{by}, {len(a)} pairs, 95 % interval'

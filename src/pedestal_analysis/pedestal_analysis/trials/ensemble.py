@@ -1,8 +1,8 @@
-"""Make the trials of plans and write their rows, with the same numbers for any workers and after any interruption.
+"""Run the trials of plans and write their rows, with the same numbers for any workers and after any interruption.
 
 The row of a trial contains the results of `pedestal run` for each beam. They are measured on the closed loop without
 ROS, which has the same data as the lockstep recording of the trial's command. Trials ashore run side by side
-(pedestal_bringup.loop.side_by_side).
+(pedestal_bringup.loop.side_by_side); trials on a ship or with an array run one after the other.
 """
 import contextlib
 import functools
@@ -18,7 +18,7 @@ from pedestal_common.wire import records
 MIN_BATCH_TRIALS = 4
 """Smallest number of trials in a batch of a worker.
 
-Without side-by-side trials it is the number in a batch, so a killed worker loses at most this many trials.
+Where trials cannot run side by side, a batch has this number of trials. A killed worker then loses at most this many.
 """
 
 TRIAL_RESULTS = tuple(result.name for result in results.RESULTS if result.part not in ('run', 'supervised'))
@@ -26,15 +26,19 @@ TRIAL_RESULTS = tuple(result.name for result in results.RESULTS if result.part n
 
 MEASURED_TOPICS = ('joint_states', 'adu/truth', 'tracking_receiver/angle_error', 'target/truth', 'acu/rate_command',
                    'acu/estimate', 'acu/reference', 'acu/filter', 'acu/mode')
-"""Topics that the results ashore need; the stamps of acu/mode are those of acu/rate_command."""
+"""Topics that the results ashore need.
+
+acu/rate_command is in the list although no result reads its numbers: a change of acu/mode has the stamp of the
+acu/rate_command of its step (pedestal_common.node.unit.announced).
+"""
 
 
 class TrialError(ValueError):
     """A trial cannot be run; one line that names the trial."""
 
 
-def table(plan, folder, name='trials') -> Table:
-    """Return the table.Table of the trials of a plan.Plan in a folder."""
+def open_table(plan, folder, name='trials') -> Table:
+    """Return the table.Table of the trials of a plan.Plan in a folder; its context opens the files."""
     prefixes = plan.scenario(0).prefixes
     heads = [f'{prefix}{result}' for prefix in prefixes for result in TRIAL_RESULTS]
     return Table(folder, name, {**plan.identity, 'sources': monte_carlo.sources()}, plan.varied, heads)
@@ -59,7 +63,7 @@ def _memory(trials, steps):
 
 
 def _batch(plan):
-    """Return the results of each trial of a short Plan: the work of a worker.
+    """Return the results of each trial of the part of a Plan that one worker gets.
 
     The order is that of TRIAL_RESULTS for each beam; None for a missing result.
     """
@@ -72,6 +76,7 @@ def _batch(plan):
         for i, chosen in enumerate(scenarios):
             with _trial(plan, i):
                 loops.append(closed_loop.Loop(chosen, beam))
+        # Single loops run one by one when `next` asks for them, so only one Run is in memory.
         runs = (iter(side_by_side.runs(loops, MEASURED_TOPICS, _memory(len(loops), loops[0].steps)))
                 if side_by_side.can_run_parallel(loops) else (loop.run() for loop in loops))
         for i, chosen in enumerate(scenarios):
@@ -86,25 +91,26 @@ def _batch_size(plan):
     return max(MIN_BATCH_TRIALS, side_by_side.max_parallel_trials(plan.scenario(0), MEASURED_TOPICS))
 
 
-def make(plans, tables, pool, progress=lambda done, total: None):
-    """Make the trials of plans that their tables lack, and append the rows; several plans advance together.
+def run_missing_trials(plans, tables, pool, progress=lambda done, total: None):
+    """Run the trials of plans that their tables lack, and append the rows; several plans advance together.
 
     pool: monte_carlo.Pool. progress(trials done, all trials) is called after each batch. Raises TrialError.
     """
     pieces, size = [], min(map(_batch_size, plans))
     for first in range(0, max(plan.runs for plan in plans), size):
-        for plan, rows in zip(plans, tables):
-            numbers = range(max(first, len(rows.rows)), min(first + size, plan.runs))
+        for plan, table in zip(plans, tables):
+            numbers = range(max(first, len(table.rows)), min(first + size, plan.runs))
             if numbers:
-                pieces.append((plan, rows, numbers))
+                pieces.append((plan, table, numbers))
     total = sum(plan.runs for plan in plans)
     done = total - sum(len(numbers) for *_, numbers in pieces)
     progress(done, total)
     found = pool.map(_batch, [plan.part(numbers) for plan, _, numbers in pieces])
-    for (plan, rows, numbers), values in zip(pieces, found):
-        rows.append([[i, plan.seed + i, *(column[i] for column in plan.varied.values()), *own]
-                     for i, own in zip(numbers, values)])
+    for (plan, table, numbers), values in zip(pieces, found):
+        table.append([[i, plan.seed + i, *(column[i] for column in plan.varied.values()), *own]
+                      for i, own in zip(numbers, values)])
         done += len(numbers)
         progress(done, total)
-    for plan, rows in zip(plans, tables):
-        rows.rows = rows.rows[:plan.runs]
+    # An earlier, longer call may have left more rows in the file than this plan has trials.
+    for plan, table in zip(plans, tables):
+        table.rows = table.rows[:plan.runs]

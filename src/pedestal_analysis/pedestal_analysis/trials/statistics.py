@@ -86,7 +86,7 @@ def case_of(case, name):
 def of_results(case, table):
     """Return the rows of mean, smallest value, percentiles and largest value of each result of a table.Table."""
     found = []
-    for name in table.there:
+    for name in table.measured_results:
         values = table.column(name)
         values = values[np.isfinite(values)]
         own, metric = case_of(case, name)
@@ -103,7 +103,7 @@ def of_results(case, table):
 def of_questions(case, table):
     """Return the rows of the rates of TRIAL_QUESTIONS over a table.Table."""
     found = []
-    for name in table.there:
+    for name in table.measured_results:
         own, metric = case_of(case, name)
         for question in TRIAL_QUESTIONS:
             if question.result == metric:
@@ -120,7 +120,7 @@ def of_sensitivity(case, table):
     """
     found = []
     varied = {name: table.column(name) for name in table.varied}
-    for name in table.there:
+    for name in table.measured_results:
         own, metric = case_of(case, name)
         values = table.column(name)
         known = np.isfinite(values)
@@ -150,8 +150,9 @@ def ranked_by(table, result=None):
     Raises ValueError if no trial has the result.
     """
     for name in (result,) if result else ('pointing_rms_deg', 'azimuth_following_rms_deg'):
-        for column in table.there:
+        for column in table.measured_results:
             if name in (column, nodes.plain(column)) and (result or np.isfinite(table.column(column)).any()):
                 return column
-    raise ValueError(f'--by {result}: no trial has this result;{did_you_mean(result or "", table.there)} must be one '
-                     f'of {", ".join(table.there)}')
+    known = table.measured_results
+    raise ValueError(f'--by {result}: no trial has this result;{did_you_mean(result or "", known)} must be one '
+                     f'of {", ".join(known)}')

@@ -61,7 +61,7 @@ class Table:
         """Read the complete rows of the file, or begin a new file."""
         self._stream.seek(0)
         content = self._stream.read()
-        whole = content[:content.rfind(b'\n') + 1]
+        whole = content[:content.rfind(b'\n') + 1]     # without an incomplete last line of a killed process
         if whole:
             self._compare()
             self.rows = list(csv.reader(io.StringIO(whole.decode())))[1:]
@@ -113,7 +113,7 @@ class Table:
             return np.array([places[cell] for cell in cells])
 
     @property
-    def there(self):
+    def measured_results(self):
         """Names of the results that at least one trial has."""
         first = len(LEADING_COLUMNS) + len(self.varied)
         return [name for i, name in enumerate(self.results, first) if any(row[i] for row in self.rows)]

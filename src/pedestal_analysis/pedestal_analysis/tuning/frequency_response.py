@@ -66,13 +66,13 @@ class Sweep:
         return np.tile(self.peak / np.abs(one).max() * one, self.dropped + self.kept)
 
 
-CURRENT_SWEEP = Sweep(0.1, 10.0, 4000.0, 60, 5, 5, 1.5)
+CURRENT_SWEEP = Sweep(period=0.1, lowest=10.0, highest=4000.0, points=60, dropped=5, kept=5, peak=1.5)
 """Sweep of the current loop; peak in A."""
 
-SPEED_SWEEP = Sweep(1.0, 1.0, 900.0, 120, 2, 4, 0.015)
+SPEED_SWEEP = Sweep(period=1.0, lowest=1.0, highest=900.0, points=120, dropped=2, kept=4, peak=0.015)
 """Sweep of the speed loop; peak in rad/s of the load: 6 Nm of a motor, less than the bias torque."""
 
-POSITION_SWEEP = Sweep(8.0, 0.25, 95.0, 300, 2, 3, 0.012)
+POSITION_SWEEP = Sweep(period=8.0, lowest=0.25, highest=95.0, points=300, dropped=2, kept=3, peak=0.012)
 """Sweep of the position loop, up to nearly half of 1 / 5 ms; peak in rad/s.
 
 The peak is half of the value that opens the teeth at the 5 Nm of bias torque of the paper.
@@ -110,7 +110,7 @@ def _inner_loops(s, c, substeps, rate, current, speed, wanted, made):
     m1, m2, k1, k2 = s.motor_1, s.motor_2, c.motor_1, c.motor_2
     axis.begin_period(s, c, False)        # brakes off; the windings stay cold
     for n in range(len(rate)):
-        axis.speed_control(s, c, rate[n], 0.0, 1, True, True)
+        axis.speed_control(s, c, rate[n], 0.0, 1, True, True)    # feed-forward torque, enable, powered, no brake
         speed[n] = c.per_2N * (m1.measured + m2.measured)
         i_1, i_2 = m1.i_ref, m2.i_ref
         for k in range(n * axis.CURRENT_LOOP_STEP_COUNT, (n + 1) * axis.CURRENT_LOOP_STEP_COUNT):
@@ -204,6 +204,7 @@ def margins(measured):
     gain, from_minus_one = np.log(np.abs(L)), np.angle(-L)
     crossover, margin = _crossings(f, gain, from_minus_one)
     margin = np.abs(np.angle(np.exp(1j * margin)))
+    # Points of L on the negative real axis, by the logarithm of their gain; a gain above 1 (log above 0) is left out.
     near = np.where(np.abs(from_minus_one) < 0.5 * math.pi, from_minus_one, np.nan)
     _, at_minus = _crossings(f, near, gain)
     at_minus = at_minus[at_minus < 0.0]

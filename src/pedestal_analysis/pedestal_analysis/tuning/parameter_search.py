@@ -44,6 +44,7 @@ def tuned(params, criterion, searched=None):
     searched = names(params) if searched is None else tuple(searched)
     given = parameters.as_dict(params)
     fields = dict(parameters.flatten(type(params)))
+    # The logarithm of 0 does not exist, so a range that begins at 0 is searched from 1e-9 on.
     bounds = [(math.log(fields[name].metadata['low'] or 1e-9), math.log(fields[name].metadata['high']))
               for name in searched]
 
@@ -62,6 +63,7 @@ def tuned(params, criterion, searched=None):
     if len(grids) <= 2 and all(grids):
         points = itertools.product(*(np.linspace(math.log(low), math.log(high), n) for low, high, n in grids))
         start = min([start, *points], key=cost)
+    # Each further corner of the first simplex has one parameter doubled: exp(0.7) is about 2.
     corners = np.vstack((start, np.asarray(start) + 0.7 * np.eye(len(start))))
     options = {'initial_simplex': corners, 'xatol': LOG_TOLERANCE, 'fatol': math.inf, 'maxfev': 100 * len(start)}
     optimum = minimize(cost, start, method='Nelder-Mead', bounds=bounds, options=options)

@@ -83,6 +83,8 @@ def _mean(values):
 class RecordedSource:
     """A recording on which filters are tuned. criterion: the negative mean log-density of the innovations.
 
+    searched, reserved: masks of the steps of the pieces for the search and for the validation.
+
     of_beams: True for several beams. Their nodes are `beam_1/acu`, ..., so that only pedestal resolves `acu`.
     Raises TuneError for too few receiver errors.
     """
@@ -104,8 +106,9 @@ class RecordedSource:
             raise TuneError(f'{path}: no receiver error to compare the filter with')
         counted = compared & (t >= t[compared][0] + CONVERGENCE_TIME_S)
         even = np.floor(t / PIECE_LENGTH_S).astype(int) % 2 == 0
-        self.parts = counted & even, counted & ~even
-        if not all(part.any() for part in self.parts):
+        # Every second piece is searched, the others are reserved.
+        self.searched, self.reserved = counted & even, counted & ~even
+        if not (self.searched.any() and self.reserved.any()):
             raise TuneError(f'{path}: receiver errors span {np.ptp(t[compared]):.3g} s; must be at least '
                             f'{CONVERGENCE_TIME_S + 2.0 * PIECE_LENGTH_S:g} s')
 
@@ -121,7 +124,7 @@ class RecordedSource:
     def criterion(self, params):
         """Return the criterion (2,) of AcuParameters on the searched pieces."""
         innovation, sigma, _ = self._innovations(self._run(params)[1])
-        return _mean(-log_density(innovation, sigma)[self.parts[0]])
+        return _mean(-log_density(innovation, sigma)[self.searched])
 
     def score(self, params) -> Score:
         """Return the Score of AcuParameters."""
@@ -129,8 +132,13 @@ class RecordedSource:
         innovation, sigma, nis = self._innovations(steps)
         density = log_density(innovation, sigma)
         numbers = what_if.numbers(self.recording.bag, [recompute.outputs_of(unit, self.feed, steps)])
-        return Score(_mean(-density[self.parts[0]]), _mean(-density[self.parts[1]]), _mean(nis[self.parts[1]]),
-                     {name: (numbers[name][0][0], numbers[name][1]) for name in ESTIMATE_ERRORS if name in numbers})
+        pointing = {}
+        for name in ESTIMATE_ERRORS:
+            if name in numbers:
+                [value], unit = numbers[name]
+                pointing[name] = value, unit
+        return Score(searched=_mean(-density[self.searched]), kept=_mean(-density[self.reserved]),
+                     nis=_mean(nis[self.reserved]), pointing=pointing)
 
 
 class SimulatedSource:
@@ -170,7 +178,8 @@ class SimulatedSource:
 
     def criterion(self, params):
         """Return the criterion (2,) [deg] of AcuParameters on the searched seeds."""
-        return np.degrees(np.sqrt(_mean(self.runs(params, self.seeds)[1]['error']**2)))
+        _, truth = self.runs(params, self.seeds)
+        return np.degrees(np.sqrt(_mean(truth['error']**2)))
 
     def score(self, params) -> Score:
         """Return the Score of AcuParameters."""
@@ -197,6 +206,7 @@ def filters(source, kind, axes, progress):
     def counted(criterion, part):
         nonlocal count
         count += 1
+        # The number of trials is not known in advance, so the bar of an axis approaches its end ever slower.
         progress((part + 1.0 - math.exp(-count / 40.0)) / len(axes), f'{axes[part]}: {count} tried')
         return criterion
 
@@ -332,6 +342,7 @@ def _remarks(source, old, new, axes, settings):
     fields = dict(parameters.flatten(AcuParameters))
     for name, value in settings.items():
         meta = fields[name].metadata
+        # Within 5 % of an end of its range; 0 switches a parameter off and is no end of a search.
         if 'low' in meta and not 1.05 * meta['low'] < value < 0.95 * meta['high'] and value > 0.0:
             doubts.append(f'{name} is at the end of its range: the optimum may be outside the range')
     return doubts

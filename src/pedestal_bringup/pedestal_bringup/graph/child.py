@@ -1,9 +1,16 @@
 """Node as a child of this process, with its log as output: a copy of this process where possible, else a new
 interpreter.
 
-A copy already has the imports of every node, which take half a second of a core. A copy is possible while no thread of
-this process would be lost in a fork, so until the import of rclpy, whose libraries start threads. OpenBLAS ends its
-own threads at a fork.
+A copy (os.fork without exec) already has the imports of every node, which take half a second of a core. A fork copies
+only the thread that calls it, so a copy is possible only while this process has no other thread that is needed.
+
+- Threads of Python: threading.active_count() counts them.
+- Threads of rclpy: its libraries start threads in C++, which Python does not count. Because of these threads no copy
+  is made after the import of rclpy.
+- Threads of OpenBLAS (numpy): OpenBLAS ends its own threads at a fork, so they need no care.
+
+A held child has its process, its imports and its laws, but runs only after `begin`. The nodes of a run therefore load
+at the same time, and start together.
 """
 import contextlib
 import ctypes
@@ -21,6 +28,21 @@ import time
 import traceback
 
 PR_SET_PDEATHSIG, PR_SET_NAME, PR_SET_MM, PR_SET_MM_MAP = 1, 15, 35, 14
+"""Operations of prctl(2)."""
+
+PRCTL_MM_MAP = struct.Struct('=12QIi')
+"""struct prctl_mm_map of <linux/prctl.h>: 12 addresses, the size of the auxiliary vector, a file descriptor.
+
+The addresses are: start_code, end_code, start_data, end_data, start_brk, brk (end of the heap), start_stack,
+arg_start, arg_end (command line), env_start, env_end (environment), auxv (auxiliary vector).
+"""
+
+NO_AUXILIARY_VECTOR, NO_AUXILIARY_SIZE, NO_FILE = 0, 0, -1
+"""Values of a PRCTL_MM_MAP that leave the auxiliary vector and the executable as they are."""
+
+CODE_FIELDS, STACK_FIELDS, DATA_AND_HEAP_FIELDS, ENVIRONMENT_FIELDS = (26, 28), (28, 29), (45, 48), (50, 52)
+"""Ranges [first, end) of the fields of /proc/self/stat with these addresses, numbered from 1 as in proc(5)."""
+
 BLOCKED_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 _libc = ctypes.CDLL(None)
 _libc.sbrk.restype = _libc.malloc.restype = ctypes.c_void_p
@@ -30,8 +52,9 @@ class Child:
     """Process that is held until `begin` and then runs as `python -m` would; otherwise like a subprocess.Popen.
 
     command: [interpreter, '-m', module, arguments ...]; output: descriptor of its log; rehearse: function that a copy
-    calls while it is held, whose errors are ignored. The child heads a session of its own, and the kernel sends it
-    SIGTERM when this process ends.
+    calls while it is held, to load what the node needs later (its laws). Its errors are ignored, because the node
+    meets the same error again and reports it. The child heads a session of its own, and the kernel sends it SIGTERM
+    when this process ends.
     """
 
     def __init__(self, command, output, rehearse):
@@ -40,14 +63,16 @@ class Child:
         self.returncode = None
         parent = os.getpid()
         if copy:
-            gc.freeze()
+            gc.freeze()     # this avoids that a garbage collection in the child writes to, and so copies, shared pages
         mask = signal.pthread_sigmask(signal.SIG_BLOCK, BLOCKED_SIGNALS)
         try:
             self.pid = os.fork()
             if not self.pid:
                 def run():
                     held = _settle(parent, output, gate, mask)
-                    become = _as_copy if copy and _take_name(command) else _as_interpreter
+                    # A copy that cannot show its own command line would look like a second `pedestal run`, and a
+                    # user who kills that name would kill the node too. A new interpreter has its own command line.
+                    become = _as_copy if copy and _set_command_line(command) else _as_interpreter
                     return become(command, held, rehearse)
                 _run_child(run)
         except OSError:
@@ -108,11 +133,11 @@ def _run_child(run):
 
 def _settle(parent, output, gate, mask):
     """Detach the child from the resources of its parent; return the new descriptor of the gate."""
-    # Where the parent has no standard input, a descriptor may have the number of one of the standard streams.
+    # Move both above 2: where the parent has no standard input, a descriptor may have the number of a standard stream.
     output, gate = (fcntl.fcntl(descriptor, fcntl.F_DUPFD, 3) for descriptor in (output, gate))
     os.setsid()
     _libc.prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
-    if os.getppid() != parent:
+    if os.getppid() != parent:     # the parent ended before the signal was set
         os._exit(1)
     os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
     os.dup2(output, 1)
@@ -145,7 +170,9 @@ def _as_copy(command, gate, rehearse):
                               for descriptor, buffering in ((1, -1), (2, 1)))
     module = command[2]
     sys.argv = [importlib.util.find_spec(module).origin, *command[3:]]
-    # The module of the node imports `entry` first, which sets its signal handlers by the name of this process.
+    # The module of the node imports `entry` first, which sets the signal handlers if sys.argv[0] is a node. The parent
+    # may have imported `entry` under its own name. Because an import executes a module only once, `entry` is removed
+    # so that it is executed again.
     sys.modules.pop('pedestal_common.entry', None)
     main = importlib.import_module(module).main
     with contextlib.suppress(Exception):
@@ -154,22 +181,26 @@ def _as_copy(command, gate, rehearse):
     return main()
 
 
-def _take_name(command):
-    """Return True if this process now has a command line of its own, as ps, pgrep and killall show it."""
+def _set_command_line(command):
+    """Give this process its own command line, as ps, pgrep and killall show it. Return True if the kernel has done
+    so."""
     with contextlib.suppress(OSError, ValueError, struct.error):
-        return _named(command)
+        return _try_to_set_command_line(command)
     return False
 
 
-def _named(command):
+def _try_to_set_command_line(command):
+    """Copy the command line into new memory, and tell the kernel its addresses; see _set_command_line."""
     _libc.prctl(PR_SET_NAME, os.path.basename(command[0]).encode())
     line = b''.join(os.fsencode(argument) + b'\0' for argument in command)
     begin = _libc.malloc(len(line))
     ctypes.memmove(begin, line, len(line))
     with open('/proc/self/stat') as stream:
-        # proc(5) counts its fields from 1; the second, a name in brackets, may contain any character.
+        # proc(5) counts its fields from 1, so a place for field 0 is added. Field 2, a name in brackets, may contain
+        # any character, so the fields are counted from the last bracket on.
         fields = [0, 0, 0, *stream.read().rpartition(')')[2].split()]
-    code, data, stack, environment = (map(int, fields[a:b]) for a, b in ((26, 28), (45, 48), (28, 29), (50, 52)))
-    memory = struct.pack('=12QIi', *code, *data, _libc.sbrk(0), *stack, begin, begin + len(line), *environment,
-                         0, 0, -1)
+    code, stack, data_and_heap, environment = (map(int, fields[first:end]) for first, end in (
+        CODE_FIELDS, STACK_FIELDS, DATA_AND_HEAP_FIELDS, ENVIRONMENT_FIELDS))
+    memory = PRCTL_MM_MAP.pack(*code, *data_and_heap, _libc.sbrk(0), *stack, begin, begin + len(line), *environment,
+                               NO_AUXILIARY_VECTOR, NO_AUXILIARY_SIZE, NO_FILE)
     return _libc.prctl(PR_SET_MM, PR_SET_MM_MAP, memory, len(memory), 0) == 0

@@ -41,12 +41,12 @@ def misspelt_arguments(names):
             if name not in known and (meant := parameters.did_you_mean(name, known))]
 
 
-def _number(given, name, kind, what):
+def _number(given, name, number_type, description):
     """Return a number among the given texts; None where it is empty. Raises ValueError."""
     try:
-        return kind(given[name]) if given[name] else None
+        return number_type(given[name]) if given[name] else None
     except ValueError:
-        raise ValueError(f'{name}:={given[name]}: must be {what}') from None
+        raise ValueError(f'{name}:={given[name]}: must be {description}') from None
 
 
 def load_scenario(given):
@@ -75,14 +75,16 @@ def _port(name, text):
 
 
 def prepare(given, chosen):
-    """Make the laws of a Scenario and the folder of its logs; return (ROS 2 parameter file of all nodes, the scenario
-    as a file). Raises ValueError, RunError."""
+    """Compile the laws of a Scenario for realtime, and make the folder of its logs.
+
+    Return (ROS 2 parameter file of all nodes, the scenario as a file). Raises ValueError, RunError.
+    """
     graph.read_files(Plan(chosen))
     bag = graph.new_bag(given['bag'], chosen.name)
     if chosen.header.pacing == 'realtime':
         supervisor.prepare(chosen)
-    made = Graph(chosen, bag)
-    made.write(parameters_of_all(chosen, bag, begins(chosen)))
-    whole = made.log / f'{chosen.name}.yaml'
-    whole.write_text(chosen.as_yaml())
-    return made.file, whole
+    files = Graph(chosen, bag)     # only its folder and its file are used: launch starts the processes
+    files.write(parameters_of_all(chosen, bag, begins(chosen)))
+    scenario_file = files.log / f'{chosen.name}.yaml'
+    scenario_file.write_text(chosen.as_yaml())
+    return files.file, scenario_file

@@ -7,6 +7,9 @@ from rclpy.executors import SingleThreadedExecutor
 from pedestal_bringup.graph.processes import RunError, exit_description
 from pedestal_common.graph import nodes
 
+ACCUSATION_TIME_S = 0.5
+"""Time in which the other nodes can end and name the node that they waited for [s]."""
+
 SELF_ENDING_NODES = (nodes.DRIVE_NODE, 'recorder')
 """Nodes that end by themselves at the end of the run."""
 
@@ -18,7 +21,7 @@ def watch(graph, operator, tracks, progress):
     executor = SingleThreadedExecutor()
     executor.add_node(operator)
 
-    def stuck(names):
+    def stuck_nodes(names):
         return operator.stuck(names, executor)
 
     while graph.ended().get(nodes.DRIVE_NODE) != 0:
@@ -26,22 +29,26 @@ def watch(graph, operator, tracks, progress):
         sent = sent or operator.send_to(graph.scenario.nodes, tracks)
         progress(operator.time)
         if any(code != 0 or node not in SELF_ENDING_NODES for node, code in graph.ended().items()):
-            raise failure(graph, stuck, operator.silent(header.deadline))
-        mute = operator.silent(2.0 * header.deadline)
-        if mute:
-            raise failure(graph, stuck, mute)
+            raise failure(graph, stuck_nodes, operator.silent(header.deadline))
+        # Twice the deadline, because a node that waits in vain ends by itself after one deadline and names the node
+        # that it waits for.
+        silent = operator.silent(2.0 * header.deadline)
+        if silent:
+            raise failure(graph, stuck_nodes, silent)
     progress(header.duration)
     if not graph.stop():
-        raise failure(graph, stuck)
+        raise failure(graph, stuck_nodes)
 
 
-def failure(graph, stuck, unheard=None):
-    """Return the error of a run in which a node has ended too early, or the node `unheard` is silent.
+def failure(graph, stuck_nodes, without_diagnostics=None):
+    """Return the error of a run in which a node has ended too early, or a node is without diagnostics for too long.
 
-    stuck(names) -> nodes that do not answer. A node may accuse a node that itself waits for the stuck node. Once the
-    drive has ended, all other nodes get a signal to end, so only an exit code other than 0 counts as too early.
+    stuck_nodes(names) -> nodes that do not answer. A node may accuse a node that itself waits for the stuck node. Once
+    the drive has ended, all other nodes get a signal to end, so only an exit code other than 0 counts as too early.
+    The node that the error names is found in this order: a node killed by a signal, the stuck or accused node, a node
+    that ended.
     """
-    time.sleep(0.5)
+    time.sleep(ACCUSATION_TIME_S)
     ended = graph.ended()
     ending = graph.processes if ended.get(nodes.DRIVE_NODE) == 0 else SELF_ENDING_NODES
     early = {node: code for node, code in ended.items() if code != 0 or node not in ending}
@@ -49,12 +56,12 @@ def failure(graph, stuck, unheard=None):
     accused = {name for node in early for name in graph.result(node).get('silent', ())}
     killed = [node for node, code in early.items() if code < 0]
     silent = [node for node in graph.processes if node in accused and node not in early] or [
-        node for node in (unheard,) if node is not None and node not in early]
+        node for node in (without_diagnostics,) if node is not None and node not in early]
     if silent and not killed:
-        mute = stuck([node for node in graph.processes if node not in early])
+        stuck = stuck_nodes([node for node in graph.processes if node not in early])
         # A node that waits for the recorder's acknowledgement does not answer either; the recorder waits for no node.
-        silent = [node for node in mute if node == 'recorder'] or [
-            node for node in silent if node in mute] or mute or silent
+        silent = [node for node in stuck if node == 'recorder'] or [
+            node for node in silent if node in stuck] or stuck or silent
     culprit = (killed or silent or list(early))[0]
     if culprit in killed:
         reason = exit_description(early[culprit])

@@ -19,9 +19,12 @@ SERVICE_TIMEOUT_S = 2.0
 
 
 class Operator(Shell):
-    """Node that sends the program tracks to a graph of `beams` (nodes.links) and receives the diagnostics of its
-    nodes: on_diagnostics(status, monotonic time [s]) is called for each DiagnosticStatus. names: nodes whose
-    diagnostics count."""
+    """Node that sends the program tracks to a graph of `beams` (nodes.links), and receives its diagnostics.
+
+    names: nodes whose diagnostics count. on_diagnostics(status, monotonic time [s]) is called for each of their
+    DiagnosticStatus. time: of the graph, by the newest diagnostics [s]; latest: {node: monotonic time of its newest
+    diagnostics [s]}.
+    """
 
     def __init__(self, beams=0, names=()):
         super().__init__('operator', parameters.Parameters)
@@ -30,29 +33,29 @@ class Operator(Shell):
         self.time = 0.0
         self.latest = {}
         self.on_diagnostics = lambda status, now: None
-        self._writers = {}
-        self.message_reader('diagnostics', self._take)
+        self._publish_by_topic = {}     # {topic: function that publishes bytes}
+        self.message_reader('diagnostics', self._note_diagnostics)
 
     def send(self, tracks):
         """Publish the program tracks {topic: message}, latched."""
-        self._open(tracks)
+        self._open_publishers(tracks)
         for topic, message in tracks.items():
-            self._writers[topic](messages.serialize(message))
+            self._publish_by_topic[topic](messages.serialize(message))
 
     def send_to(self, names, tracks):
         """Publish the program tracks once all their subscribers are present, and return True if they are published.
         Otherwise a short run might end before its recorder receives them."""
-        self._open(tracks)
+        self._open_publishers(tracks)
         if any(self._missing(publisher, nodes.readers(link, names))
                for link, publisher in self.publishers_by_link.items()):
             return False
         self.send(tracks)
         return True
 
-    def _open(self, names):
+    def _open_publishers(self, names):
         for name in names:
-            if name not in self._writers:
-                self._writers[name] = self.writer(name)
+            if name not in self._publish_by_topic:
+                self._publish_by_topic[name] = self.writer(name)
 
     def check_domain_free(self):
         """Raise RunError when the nodes of another graph are on this domain, because they would receive the messages
@@ -64,7 +67,7 @@ class Operator(Shell):
                 raise another_graph(self.context.get_domain_id())
             time.sleep(0.02)
 
-    def _take(self, array):
+    def _note_diagnostics(self, array):
         for status in array.status:
             if status.name in self._names:
                 self.time = max(self.time, messages.nanoseconds(array.header.stamp) * 1e-9)
@@ -77,7 +80,10 @@ class Operator(Shell):
         return last if last is not None and time.monotonic() - self.latest[last] > limit else None
 
     def stuck(self, names, executor):
-        """Return the nodes among these whose process does not even answer a parameter service."""
+        """Return the nodes among these whose process does not even answer a parameter service.
+
+        rclpy answers this service in the same thread as the steps, so a node without an answer is stuck in its code.
+        """
         answers = self._get_parameters(names, GetParameters.Request(), executor)
         return [node for node in names if node not in answers]
 

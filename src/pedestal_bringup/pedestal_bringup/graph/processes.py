@@ -23,6 +23,7 @@ RESERVED_LOG_BYTES = 64 * 1024
 """Disk space that a log reserves in advance, so that the cause of an end is stored even on a full disk [bytes]."""
 
 FALLOC_FL_KEEP_SIZE = 1
+"""Flag of fallocate(2): the reserved space does not count in the size of the file."""
 
 SERVER_START_TIMEOUT_S = 60.0
 """Longest time from the start of a server to its announcement [s]."""
@@ -76,11 +77,15 @@ def _load_laws(scenario, node):
 
 
 class Graph:
-    """Processes of one run and their logs, beside the bag. Use it as a context, in which they are held until `begin`;
-    its end stops all processes that still run.
+    """Processes of one run and their logs, beside the bag.
 
-    They do not outlive `pedestal run`, however that ends: the kernel sends them SIGTERM, and a reaper process kills
-    any node that ignores it. Raises RunError when the folder beside the bag cannot be written.
+    Use it as a context, in which the nodes are held until `begin` (child.Child). The end of the context stops all
+    processes that still run. No process outlives `pedestal run`, however `pedestal run` ends: the kernel sends the
+    processes SIGTERM, and a reaper process kills any node that ignores SIGTERM.
+
+    Beside the bag, the folder `log` holds NODE.log for each process, parameters.yaml, and NODE.state files with the
+    last angles of a drive. The logs and states of an earlier run of the same name are deleted. Raises RunError when
+    the folder cannot be written.
     """
 
     def __init__(self, scenario, bag, servers=None):
@@ -93,8 +98,8 @@ class Graph:
         self._log_starts = {}
         with self._disk_errors_named():
             self.log.mkdir(parents=True, exist_ok=True)
-            for left in (*self.log.glob('*.log'), *self.log.glob('*.state')):
-                left.unlink()
+            for old_file in (*self.log.glob('*.log'), *self.log.glob('*.state')):
+                old_file.unlink()
 
     @contextlib.contextmanager
     def _disk_errors_named(self):
@@ -107,7 +112,7 @@ class Graph:
         self._reaper = subprocess.Popen([sys.executable, '-m', 'pedestal_bringup.graph.reaper'], stdin=subprocess.PIPE,
                                         start_new_session=True)
         for node in self.scenario.nodes:
-            if node != 'operator':
+            if node != 'operator':     # the operator runs in this process (watch)
                 self._hold(node)
         return self
 
@@ -117,7 +122,10 @@ class Graph:
         self._reaper.wait()
 
     def start_servers(self):
-        """Start the servers, and wait until each is announced. Raises RunError for a server that ends instead."""
+        """Start the servers, and wait until each is announced. Raises RunError for a server that ends instead.
+
+        A server announces that it serves by the lines `NAME: address` at the beginning of its log.
+        """
         for name in self.servers:
             self.start(name)
         deadline = time.monotonic() + SERVER_START_TIMEOUT_S
@@ -152,11 +160,12 @@ class Graph:
                 process.begin()
 
     def start(self, node):
-        """Start a node again; it appends to its log."""
+        """Start a server, or start a node again; the process appends to its log."""
         self._hold(node)
         self.processes[node].begin()
 
     def _hold(self, node):
+        """Make the process of a node or server, held until its `begin`, and report it to the reaper."""
         with open(self._log_of(node), 'ab') as output:
             self._log_starts[node] = size = output.seek(0, os.SEEK_END)
             _libc.fallocate(output.fileno(), FALLOC_FL_KEEP_SIZE, ctypes.c_long(size),
@@ -192,7 +201,7 @@ class Graph:
         for process in processes:
             if process.poll() is None:
                 process.send_signal(signal.SIGTERM)
-                process.send_signal(signal.SIGCONT)
+                process.send_signal(signal.SIGCONT)     # because a suspended process receives SIGTERM only after it
         deadline = time.monotonic() + NODE_STOP_TIMEOUT_S
         for process in processes:
             try:

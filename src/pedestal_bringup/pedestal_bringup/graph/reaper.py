@@ -1,4 +1,5 @@
-"""End nodes that a killed `pedestal run` left behind and that ignore SIGTERM, because they hang or are stopped.
+"""End nodes that a killed `pedestal run` left behind and that ignore SIGTERM, because they hang or are suspended
+(SIGSTOP).
 
 When `pedestal run` dies, the kernel sends each node SIGTERM (processes.Graph), and the node ends in order, the drive
 with a ramp. This process reads the process numbers of the nodes from its standard input, one per line, and holds a
@@ -22,10 +23,11 @@ def main():
         signal.signal(number, signal.SIG_IGN)
     nodes = []
     for line in sys.stdin:
+        # OSError: the node has ended already. AttributeError: this Python or its system has no pidfds.
         with contextlib.suppress(OSError, AttributeError):
             nodes.append(os.pidfd_open(int(line)))
     deadline = time.monotonic() + GRACE_PERIOD_S
-    _signal(nodes, signal.SIGCONT)
+    _signal(nodes, signal.SIGCONT)     # because a suspended node receives the SIGTERM of the kernel only after it
     while nodes and time.monotonic() < deadline:
         ended, _, _ = select.select(nodes, (), (), deadline - time.monotonic())
         nodes = [node for node in nodes if node not in ended]

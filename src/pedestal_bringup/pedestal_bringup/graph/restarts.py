@@ -1,4 +1,7 @@
-"""Rules of restarts: the time of a restart, and the limit of the number of deaths. No processes here, and no clock."""
+"""Rules of restarts: the time of a restart, and the limit of the number of deaths. No processes here, and no clock.
+
+The death of a node is the end of its process before the end of the run, for any cause.
+"""
 import collections
 import math
 
@@ -38,38 +41,41 @@ class Restarts:
 
 
 class Losses:
-    """Steps that the drive lost outside the RECOVERY after a death, from the number that it publishes, on the same
-    clock."""
-    RECOVERY = 5.0
-    """Time after a death in which lost steps are its effect [s]. A graph recovers within 2.3 s
+    """Number of steps that the drive lost outside the recovery time after a death, on the same clock.
+
+    The drive publishes the number of steps that it has lost since its start.
+    """
+    RECOVERY_TIME_S = 5.0
+    """Time after a death in which lost steps count as an effect of the death [s]. A graph recovers within 2.3 s
     (docs/reliability.md)."""
 
     def __init__(self):
         self.count = 0
-        self._last, self._until = 0, -math.inf
+        self._last_number, self._recovered_at = 0, -math.inf
 
     def note_death(self, now):
         """Note the death of a node."""
-        self._until = now + self.RECOVERY
+        self._recovered_at = now + self.RECOVERY_TIME_S
 
     def note(self, number, now):
         """Note the number of steps that the drive has lost; a restarted drive begins at 0."""
-        if now > self._until:
-            self.count += number - (self._last if number >= self._last else 0)
-        self._last = number
+        if now > self._recovered_at:
+            restarted = number < self._last_number
+            self.count += number - (0 if restarted else self._last_number)
+        self._last_number = number
 
 
 class Silence:
     """Times since the last diagnostics of the nodes, on the same clock.
 
-    Diagnostics that this process could not receive do not count: a gap longer than `gap` [s] between two calls of
-    `look` is a stall of this process.
+    A gap longer than `gap` [s] between two calls of `note_check` is a stall of this process. Because this process
+    could not receive diagnostics in that time, the gap does not count as silence.
     """
 
     def __init__(self, gap=1.0):
         self._gap = gap
         self._latest = {}
-        self._looked = None
+        self._last_check = None
 
     def note(self, node, now):
         """Note diagnostics of a node at the time now [s]."""
@@ -83,9 +89,9 @@ class Silence:
         """Return the nodes whose last diagnostics are older than limit [s]."""
         return [node for node, time in self._latest.items() if now - time > limit]
 
-    def look(self, now):
+    def note_check(self, now):
         """Note a check at the time now [s]; called before `longer_than`."""
-        if self._looked is not None and now - self._looked > self._gap:
-            lost = now - self._looked
-            self._latest = {node: time + lost for node, time in self._latest.items()}
-        self._looked = now
+        if self._last_check is not None and now - self._last_check > self._gap:
+            stall = now - self._last_check
+            self._latest = {node: time + stall for node, time in self._latest.items()}
+        self._last_check = now

@@ -1,4 +1,7 @@
-"""Send the program track of a scenario beside its nodes: python -m pedestal_bringup.graph.send_program SCENARIO."""
+"""Send the program track of a scenario beside its nodes: python -m pedestal_bringup.graph.send_program SCENARIO.
+
+pedestal.launch.py starts this module; users call `pedestal program`. watch.send_program does the work.
+"""
 import sys
 
 from pedestal_bringup.graph import watch

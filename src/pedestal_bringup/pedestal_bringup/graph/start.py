@@ -41,8 +41,10 @@ def parameters_of_all(scenario, bag, start):
     shared = {'graph.pacing': scenario.header.pacing, 'graph.nodes': names, 'graph.beams': scenario.header.graph_beams,
               'graph.deadline': scenario.header.deadline, 'graph.start': start,
               'graph.priority': scenario.header.priority}
+    # The operator runs in this process and reads no parameter file.
     sections = {node: {**scenario.given(node), **shared} for node in scenario.nodes if node != 'operator'}
     sections['recorder'].update(bag=str(bag), **configuration.recorder_parameters(scenario))
+    # In realtime a drive that is started again continues at its last angles; an array has no angles to keep.
     if start and not scenario.header.beam:
         sections[nodes.DRIVE_NODE].setdefault('state_file', str(log_folder(bag) / f'{nodes.DRIVE_NODE}.state'))
     return parameter_file.text(sections)

@@ -47,7 +47,8 @@ def prepare(scenario):
     finally:
         for process in processes.values():
             if process.poll() is None:
-                os.killpg(process.pid, signal.SIGKILL)      # with its second process, which also compiles
+                # Because a second process of its group compiles too (prepare.compile_unit), the whole group is killed.
+                os.killpg(process.pid, signal.SIGKILL)
             process.wait()
             process.stderr.close()
 
@@ -63,8 +64,8 @@ class Supervisor:
         self.restarts, self._server_restarts = (
             Restarts(self._limits.attempts, self._limits.within, self._limits.delay) for _ in range(2))
         self._silence, self.losses = Silence(), Losses()
-        self._called = set()
-        self._dead = set()
+        self._reported_silent = set()
+        self._dead = set()      # nodes whose restart is due, and servers that stay off
         operator.on_diagnostics = self._note
 
     def watch(self, tracks, progress):
@@ -78,7 +79,7 @@ class Supervisor:
         while self._is_running():
             executor.spin_once(timeout_sec=0.1)
             progress(min(max(time.time_ns() - self._start, 0), self._end - self._start) / NS_PER_SECOND)
-            self.look(time.monotonic())
+            self.check_processes(time.monotonic())
 
     def _is_running(self):
         """Return True until the drive ends at the end of the run, at the latest until SHUTDOWN_GRACE_S after it. A
@@ -91,20 +92,20 @@ class Supervisor:
     def _is_nearly_over(self):
         return time.time_ns() > self._end - RESTART_CUTOFF_S * NS_PER_SECOND
 
-    def look(self, now):
+    def check_processes(self, now):
         """Start dead nodes again, and kill nodes that were silent for too long. now: monotonic [s]."""
-        self._silence.look(now)
+        self._silence.note_check(now)
         for node in self._silence.longer_than(min(MAX_SILENCE_S, self._limits.silence or MAX_SILENCE_S), now):
-            if node not in self._called:
-                self._called.add(node)
+            if node not in self._reported_silent:
+                self._reported_silent.add(node)
                 report(f'{node} is silent')
-        if self._limits.silence:
+        if self._limits.silence:     # 0: a silent node is reported, but not killed
             for node in self._silence.longer_than(self._limits.silence, now):
                 self._graph.kill(node)
         for node, code in self._graph.ended().items():
             if node not in self._dead and not self._is_nearly_over():
                 self._handle_exit(node, code, now)
-        with contextlib.suppress(OSError):
+        with contextlib.suppress(OSError):     # because a closed terminal does not end the run
             self._graph.announce()
         for node in (*self.restarts.due(now), *self._server_restarts.due(now)):
             self._dead.discard(node)
@@ -116,15 +117,15 @@ class Supervisor:
         A server that died too often stays off.
         """
         limits = self._limits
-        reason = ('was silent and was killed' if node in self._called and code == -signal.SIGKILL
+        reason = ('was silent and was killed' if node in self._reported_silent and code == -signal.SIGKILL
                   else exit_description(code))
         self._dead.add(node)
-        self._called.discard(node)
+        self._reported_silent.discard(node)
         self._silence.remove(node)
         server = node in self._graph.servers
         if not server:
             self.losses.note_death(now)
-        number = (self._server_restarts if server else self.restarts).note_death(node, now)
+        number = (self._server_restarts if server else self.restarts).note_death(node, now)     # 0: too many deaths
         if not number and server:
             report(f'{node} {reason}{self._graph.cause(node, code)}, after {limits.attempts} starts within '
                    f'{limits.within:g} s: it stays off')
@@ -136,14 +137,15 @@ class Supervisor:
                f'within {limits.within:g} s')
 
     def _note(self, status, now):
+        """Note a DiagnosticStatus that arrived at the time now [s]."""
         node = status.name
         self._silence.note(node, now)
         if node == nodes.DRIVE_NODE:
             for value in status.values:
                 if value.key == 'lost_steps' and (lost := count(value.value)) is not None:
                     self.losses.note(lost, now)
-        if node in self._called:
-            self._called.discard(node)
+        if node in self._reported_silent:
+            self._reported_silent.discard(node)
             report(f'{node} publishes diagnostics again')
 
 

@@ -14,8 +14,10 @@ from pedestal_common.wire import messages
 
 
 def run(graph, tracks, progress):
-    """Start the held nodes of a graph, watch them to their end or until Ctrl-C, and return the Outcome. tracks:
-    {topic: program track}. Raises RunError."""
+    """Start the held nodes of a graph (child.Child), watch them to their end or until Ctrl-C, and return the Outcome.
+
+    tracks: {topic: program track}. Raises RunError.
+    """
     middleware.initialise([])
     try:
         operator = Operator(graph.scenario.header.graph_beams, graph.scenario.nodes)

@@ -31,7 +31,7 @@ STEP_DTYPE = records.of(*(topic.name for topic in topics.TOPICS
 TRUTH_DTYPE = np.dtype([('bias', 'f8', 2), ('error', 'f8', 2)])
 """Numbers of t_k that no topic holds: bias torques [Nm], true error of the beam (cross-elevation, elevation) [rad]."""
 
-# A Memory holds state, inputs and outputs of a unit's compiled step.
+# Compiled code finds the law of a unit by the type of its Memory, which holds state, inputs and outputs of its step.
 _LAWS = {memory: law for node in nodes.UNIT_NODES for memory, (law, _) in node.unit_type().LAWS.items()}
 
 
@@ -177,7 +177,8 @@ class Loop:
         """Return the first step after `first` that needs `before_step`."""
         due = min((first * self.period_ns // NS_PER_SECOND + 1) * NS_PER_SECOND,
                   *(unit.next_due for unit in self.units.values()))
-        return min(-(-due // self.period_ns), self.steps)
+        step_not_before_due = -(-due // self.period_ns)
+        return min(step_not_before_due, self.steps)
 
     def run(self, injected=None, watch=None) -> Run:
         """Make every step of the scenario; to be called once.

@@ -31,7 +31,7 @@ class MemoryRecording:
         self.path, self.beams = scenario.name, int(scenario.header.beam)
         self.metadata = {'beamwidth': str(receiver.antenna.beamwidth)}
         self.configuration = {'parameters': {'tracking_receiver': as_dict(receiver)}}
-        self._run, self.start, self.end = run, 0, run.t[-1]      # [s]
+        self._run, self.start, self.end = run, 0, run.t[-1]      # time 0 of the scenario, time of the last step [s]
         self._tables = {}
         self._keyholes = [(stamp, values) for stamp, values in run.forecasts if KEYHOLE_ENTRY in values]
 

@@ -1,4 +1,4 @@
-"""Compile laws that are not in the cache, so that their callers start warm.
+"""Compile laws that are not in the law cache, so that the processes that use the laws start at once.
 
 `python -m pedestal_bringup.loop.prepare` compiles the laws of every node on all cores, then those of the closed loop;
 `... NAME` those of the nodes of COMPILED_UNITS in the scenario NAME; `... NODE NAME` those of one node of the scenario
@@ -12,7 +12,7 @@ import time
 
 from pedestal_bringup.loop import closed_loop, side_by_side
 from pedestal_bringup.scenario import scenario
-from pedestal_common.compiled import compiled_once, done, is_compiled
+from pedestal_common.compiled import compiled_once, done_file, is_compiled
 
 COMPILED_UNITS = (('leo_pass', 'acu'), ('leo_pass', 'adu'), ('leo_pass', 'tracking_receiver'), ('ship_pass', 'ins'),
                   ('ship_pass', 'ship_motion'), ('phased_array_sway', 'adu'))
@@ -26,8 +26,9 @@ COMPILE_RUN_S = 0.1
 """Length of the run that compiles a closed loop [s]."""
 
 
-def of_node(unit):
+def compile_unit(unit):
     """Compile the laws of a unit, in two processes, which is faster than in one."""
+    # compiled_once lets only one process compile the same unit, also where several runs start at the same time.
     with compiled_once(unit):
         ahead = multiprocessing.get_context('fork').Process(target=unit.prepare_ahead)
         ahead.start()
@@ -35,18 +36,19 @@ def of_node(unit):
         ahead.join()
 
 
-def _unit(name, node):
+def _unit_of_scenario(name, node):
     return scenario.load(name).unit(node)
 
 
 def _compile_unit(name, node):
     begun = time.perf_counter()
-    of_node(_unit(name, node))
+    compile_unit(_unit_of_scenario(name, node))
     return f'{node} of {name}', time.perf_counter() - begun
 
 
 def _loop_done(name, count):
-    return done(closed_loop.Loop, f'.{name}.{count}')
+    """Return the path of the file that marks a closed loop as compiled; None if laws are not cached."""
+    return done_file(closed_loop.Loop, f'.{name}.{count}')
 
 
 def _compile_loop(name, count):
@@ -65,7 +67,7 @@ def _compile_loop(name, count):
 def compile_cold(units, loops):
     """Compile the laws that are not cached, of parts of COMPILED_UNITS and COMPILED_LOOPS, and print a line for
     each."""
-    units = [part for part in units if not is_compiled(_unit(*part))]
+    units = [part for part in units if not is_compiled(_unit_of_scenario(*part))]
     loops = [part for part in loops if (mark := _loop_done(*part)) is None or not mark.exists()]
     if not units and not loops:
         return
@@ -85,7 +87,7 @@ def main():
         case [name]:
             compile_cold([part for part in COMPILED_UNITS if part[0] == name], ())
         case [node, name]:
-            of_node(scenario.parse(name, sys.stdin.read()).unit(node))
+            compile_unit(scenario.parse(name, sys.stdin.read()).unit(node))
     return 0
 
 

@@ -152,6 +152,7 @@ def runs(loops, names, kept=None):
     period_ns, count = loops[0].period_ns, loops[0].steps
     steps = records.empty(STEP_DTYPE, 2 * len(loops)).reshape(2, len(loops))
     kept = np.empty((len(loops), count), records.of(*names)) if kept is None else kept
+    # A record whose words are their own indices: its kept topics give the indices of the kept words.
     all_words = np.arange(STEP_DTYPE.itemsize // lanes.WORD_BYTES).view(STEP_DTYPE)
     words = all_words[list(names)].astype(kept.dtype).view(np.int64)
     keeps = KeptSteps(words, _words(steps), _words(kept))

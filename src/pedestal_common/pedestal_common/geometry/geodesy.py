@@ -25,6 +25,7 @@ class StationParameters(Parameters):
 def geocentric(latitude, longitude, height):
     """Return earth-fixed x, y, z [m], (..., 3), of WGS84 latitude, longitude [rad] and height [m], arrays or
     numbers."""
+    # e2: eccentricity squared; N: radius of curvature in the prime vertical.
     e2 = EARTH_FLATTENING * (2.0 - EARTH_FLATTENING)
     N = EARTH_RADIUS_M / np.sqrt(1.0 - e2 * sin(latitude)**2)
     return np.stack([(N + height) * cos(latitude) * cos(longitude),
@@ -35,6 +36,7 @@ def geocentric(latitude, longitude, height):
 def station_frame(station):
     """Return the earth-fixed position (3,) [m] and the rotation (3, 3) earth-fixed -> ENU of a StationParameters."""
     latitude, longitude = math.radians(station.latitude_deg), math.radians(station.longitude_deg)
+    # sp, cp: sine and cosine of the latitude (phi); sl, cl: of the longitude (lambda).
     sp, cp, sl, cl = math.sin(latitude), math.cos(latitude), math.sin(longitude), math.cos(longitude)
     to_enu = np.array([[-sl, cl, 0.0], [-sp * cl, -sp * sl, cp], [cp * cl, cp * sl, sp]])
     return geocentric(latitude, longitude, station.height), to_enu

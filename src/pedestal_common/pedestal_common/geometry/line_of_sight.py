@@ -1,4 +1,8 @@
-"""Line-of-sight geometry between beam, deck and earth. Angles in rad; frames as in the package docstring."""
+"""Line-of-sight geometry between beam, deck and earth. Angles in rad; frames as in the package docstring.
+
+b, c, e are the components of a vector along the beam, in cross-elevation and in elevation; db, dc, de are their time
+derivatives. A leading s or c of an angle is its sine or cosine: sa, ca of the azimuth, se, ce of the elevation.
+"""
 import math
 
 import numpy as np
@@ -75,6 +79,7 @@ def offsets(azimuth, elevation, x, y, z):
     across = math.hypot(c, e)
     if across == 0.0:
         return 0.0, 0.0
+    # scale: angle between beam and direction, divided by the length of the direction across the beam.
     scale = math.atan2(across, b) / across
     return scale * c, scale * e
 
@@ -99,6 +104,7 @@ def offset_rates(beam, beam_rate, r, v):
     across = math.hypot(c, e)
     if across == 0.0:
         return dc / b, de / b
+    # theta: angle between beam and direction; scale: as in `offsets`; rise: time derivative of scale.
     theta = math.atan2(across, b)
     across_rate = (c * dc + e * de) / across
     scale = theta / across

@@ -96,6 +96,7 @@ def passes_after(satrec, station, begin, days=SEARCH_DAYS) -> list[Pass]:
     if heights[-1] > 0.0:
         after, above = _until_below(elevation, times[-1], SEARCH_STEP_S)
         times, heights = np.append(times, after), np.append(heights, above)
+    # +1 at the first step above the horizon, -1 at the first step below it again.
     edges = np.diff(np.concatenate(([False], heights > 0.0, [False])).astype(int))
     found = []
     for i, j in zip(np.flatnonzero(edges > 0), np.flatnonzero(edges < 0) - 1):

@@ -148,6 +148,7 @@ def _names(field: Field, row: topics.Topic) -> tuple[str, ...]:
     """Return the text for {} of each column of a field."""
     if field.components is None:
         return row.names
+    # A digit is the index of a diagonal element of a covariance (3, 3), stored by rows: 0, 4 and 8 belong to x, y, z.
     return tuple('xyz'[int(c) // 4] if c.isdigit() else c for c in field.components)
 
 

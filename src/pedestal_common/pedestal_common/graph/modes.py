@@ -68,13 +68,13 @@ MODE_ROWS = (
         'prediction of the filter',
         'receiver locked, filter converged',
         'to the chosen fallback after `coast_time` without an accepted receiver error, or when the uncertainty of the '
-        'estimate reaches half a beamwidth; to the last table after divergence; to `acquire` in a side lobe; to '
-        '`standby` if the next mode cannot be entered',
+        'estimate reaches half a beamwidth; after divergence back to the predicted track that was followed last '
+        '(`program`, `tle` or `sun`); to `acquire` in a side lobe; to `standby` if the next mode cannot be entered',
         needs='lock', ends='track', follows=True, fallback='program'),
     Row('search', 'search around the expected place of the target in three stages: last place, small area, full area',
         'refused while the alarm `diverged` is latched',
-        'to `acquire` after the level has passed a peak; after `search.rounds` to the last table, or to `standby` '
-        'without a table',
+        'to `acquire` after the level has passed a peak; after `search.rounds` back to the predicted track that '
+        'was followed last (`program`, `tle` or `sun`), or to `standby` without such a track',
         needs='slope', ends='level', follows=True, by_level=True, fallback='program', handover='acquire'),
     Row('acquire', 'go to the place of the highest level, scan around it for the main lobe, then check the slopes of '
         'the receiver errors on a small circle', 'refused while the alarm `diverged` is latched',

@@ -112,9 +112,9 @@ TOPICS = (
           '`azimuth_motor_1` ... `elevation_motor_2`: shaft angle [rad], rate [rad/s], torque [Nm]', names=MOTOR_NAMES,
           frame='base_link'),
     Topic('adu/state', 'std_msgs/msg/String', 'change',
-          'the drive follows commands: `enabled`, or `enabled: azimuth motor lost` with one motor of a pair. The '
-          'drive does not follow commands: `stopping`, `engaging brakes`, `disabled`, `releasing brakes`, `emergency '
-          'stop`, or `fault: azimuth overspeed, ...`',
+          'values while the drive follows commands: `enabled`, or `enabled: azimuth motor lost` while one motor of a '
+          'pair is lost. Values while it does not: `stopping`, `engaging brakes`, `disabled`, `releasing brakes`, '
+          '`emergency stop`, or `fault: azimuth overspeed, ...`',
           texts=(*ENABLED_STATES, 'stopping', 'engaging brakes', 'disabled', 'releasing brakes', 'emergency stop'),
           inputs={'code': 'drive'}),
     Topic('adu/stow_pins', 'std_msgs/msg/String', 'change',
@@ -137,9 +137,10 @@ TOPICS = (
           'never publishes this topic; the ACU then takes the INS as aligned',
           texts=('aligning', 'aligned')),
     Topic('ins/error', 'sensor_msgs/msg/JointState', 'step',
-          '`roll`, `pitch`, `heading`: 1-sigma of the error of `ship/imu/data` with the same stamp, without a '
-          'constant part; position: white noise of each sample [rad]; velocity: random walk [rad/sqrt(s)]. All six '
-          'must be finite. They are valid until the next message',
+          '`roll`, `pitch`, `heading`: accuracy of the attitude in the message of `ship/imu/data` with the same '
+          'stamp, without a constant error. The field `position` holds the 1-sigma of the white noise of a sample '
+          '[rad], `velocity` the random walk of the error [rad/sqrt(s)]. All six numbers must be finite. They are '
+          'valid until the next message',
           names=('roll', 'pitch', 'heading'), frame='base_link',
           units={f'{angle}.velocity': 'rad/sqrt(s)' for angle in ('roll', 'pitch', 'heading')},
           measured='error_told', flag='ins_error', holds=True, only=('position', 'velocity'),
@@ -152,8 +153,9 @@ TOPICS = (
           inputs={'came': 'error_came', 'stamp': 'error_stamp',
                   'vector': ('cross_elevation', 'elevation', 'cn0_dbhz')}),
     Topic('tracking_receiver/angle_rate', 'geometry_msgs/msg/Vector3Stamped', 'step',
-          'x cross-elevation, y elevation: rate of the error [rad/s], NaN while unlocked; z: 1-sigma [rad/s] of the '
-          'sum of this rate and the tachometer rate of the antenna; delayed by `latency`', frame='beam',
+          "x cross-elevation, y elevation: rate of the error [rad/s], NaN while unlocked; z: 1-sigma [rad/s] of the "
+          "target rate that the ACU forms (this rate plus the antenna's rate on `joint_states`); delayed by `latency`",
+          frame='beam',
           units={'x': 'rad/s', 'y': 'rad/s', 'z': 'rad/s'}, measured='receiver.rate.measured',
           flag='receiver_rate', latency='receiver_latency',
           inputs={'vector': ('error_rate', 'error_rate', 'error_rate_sigma')}),
@@ -197,7 +199,7 @@ TOPICS = (
           'name = command, hardware_id = client, message = number of the request, values = arguments; see commands'),
     Topic('acu/command_result', 'diagnostic_msgs/msg/DiagnosticStatus', 'reply',
           'every command that was accepted or refused, by topic, service or schedule, with `granted` and `reply`; an '
-          'accepted command takes effect in the next step that the ACU answers'),
+          'accepted command takes effect in the next step for which the ACU publishes a rate command'),
     *(topic for node in ('ship_motion', 'ins', 'tracking_receiver', 'adu') for topic in (
         Topic(f'{node}/inject', 'diagnostic_msgs/msg/DiagnosticStatus', 'command',
               'command to inject a fault: name = fault, values = its arguments; see the faults that can be injected'),

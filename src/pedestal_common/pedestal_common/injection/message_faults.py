@@ -24,13 +24,13 @@ def clear(e):
 
 
 def codes(node):
-    """Return the codes of the faults of every message of a node: drop, freeze, nan, noise."""
+    """Return the codes of the faults that every message of a node can have: drop, freeze, nan, noise."""
     return tuple(table.code(node, name) for name in ('drop', 'freeze', 'nan', 'noise'))
 
 
 @compiled
 def apply(e, codes, fault, values):
-    """Apply a fault of every message; other faults change nothing."""
+    """Apply a fault with its `values` if it is one of `codes`; other faults change nothing here."""
     drop, freeze, nan, noise = codes
     if fault == drop:
         e.drop = 1

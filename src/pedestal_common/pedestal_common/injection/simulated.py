@@ -12,7 +12,7 @@ class Simulated(Unit):
 
     def schedule(self):
         """Return [(at [ns], Command)] of the parameter `inject`."""
-        return table.due(self.NODE.name, self.parameters.inject)
+        return table.scheduled_commands(self.NODE.name, self.parameters.inject)
 
     def execute(self, command, arguments):
         """Inject a fault from the next step; the Reply states the stamp of the step before."""

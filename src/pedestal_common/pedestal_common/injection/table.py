@@ -10,10 +10,13 @@ from pedestal_common.wire.commands import Argument, CommandDefinition, schedule
 
 
 class Fault(typing.NamedTuple):
-    """Fault that can be injected into a simulated node: a commands.CommandDefinition.
+    """Fault that can be injected into a simulated node.
+
+    The first three fields are those of a commands.CommandDefinition, so a Fault also defines its command.
 
     lockstep: True if a lockstep graph can have the fault. A fault that deletes a message or changes its stamp would
-    stop a lockstep graph, because every node would wait for the message.
+    stop a lockstep graph, because every node would wait for the message. The faults `drop` and `delay` of the drive
+    are allowed: each command arrives in its step, and the law of the drive then ignores or delays its content.
     """
     name: str
     doc: str
@@ -120,19 +123,19 @@ CLEAR_COMMAND = CommandDefinition('clear', 'end all injected faults of the node'
 INJECT_COMMANDS = {node: (*faults, CLEAR_COMMAND) for node, faults in INJECTED_FAULTS.items()}
 """{node: its commands on `NODE/inject`}."""
 
-MAX_FAULT_VALUES = max(len(fault.arguments) for faults in INJECTED_FAULTS.values() for fault in faults) - 1
-"""Largest number of arguments of a fault, without its duration."""
+MAX_FAULT_VALUES = max(len(fault.arguments) - 1 for faults in INJECTED_FAULTS.values() for fault in faults)
+"""Largest number of arguments of a fault, without its last argument `duration`."""
 
 INJECT_DOC = "faults injected at times [s]: 'AT FAULT argument=value ... duration=s; ...'; empty: none"
 """Meaning of the parameter `inject`."""
 
 
 def code(node, name) -> int:
-    """Return the number of a fault among those of its node, for compiled laws."""
+    """Return the code of a fault for compiled laws: its index among the faults of its node."""
     return [fault.name for fault in INJECTED_FAULTS[node]].index(name)
 
 
-def due(node, text) -> list:
+def scheduled_commands(node, text) -> list:
     """Return [(at [ns], Command)] of the parameter `inject` of a node, in order of time. Raise ParameterError for a
     text that is no schedule."""
     return schedule('inject', text, INJECT_COMMANDS[node])
@@ -140,9 +143,10 @@ def due(node, text) -> list:
 
 def check_pacing(node, text, lockstep):
     """Raise ParameterError where `inject` of a node contains a fault that a lockstep graph cannot have."""
-    refusals = [refused_in_lockstep(node, command.verb) for _, command in due(node, text)] if lockstep else ()
-    for refusal in filter(None, refusals):
-        raise ParameterError(f'inject: {refusal}')
+    for _, command in scheduled_commands(node, text) if lockstep else ():
+        refusal = refused_in_lockstep(node, command.verb)
+        if refusal:
+            raise ParameterError(f'inject: {refusal}')
 
 
 def refused_in_lockstep(node, name) -> str:

@@ -353,10 +353,11 @@ class Shell(Node):
         replay."""
         if not wanted:
             return []
-        there = self.get_subscriptions_info_by_topic(publisher.topic_name)
-        names = {node_of(info, self._root) for info in there}
+        subscribers = self.get_subscriptions_info_by_topic(publisher.topic_name)
+        names = {node_of(info, self._root) for info in subscribers}
         missing = [name for name in wanted if name not in names and nodes.REPLAY_NODE not in names]
-        return missing or (list(wanted) if publisher.get_subscription_count() < len(there) else [])
+        # The graph may list a subscriber to which the publisher is not connected yet.
+        return missing or (list(wanted) if publisher.get_subscription_count() < len(subscribers) else [])
 
     def spin(self, executor):
         """Take one turn of the executor; overridden by a node that makes steps of its own."""
@@ -418,6 +419,7 @@ def main(make_node, args=None):
         name = node.get_name()
         executor = middleware.make_executor()
         executor.add_node(node)
+        # This avoids that each garbage collection, in the middle of a step, visits all imported modules.
         gc.freeze()
         node.get_logger().info(f'ready, waits for {node.awaits}')
         while not (_stop or node.finished) or node.draining():

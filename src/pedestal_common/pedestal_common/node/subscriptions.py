@@ -31,7 +31,7 @@ MAX_RECENT_MESSAGES = 100
 """Number of messages that a topic with two subscriptions remembers, to drop the copy from its second subscription."""
 
 
-def pair(function):
+def two_argument_callback(function):
     """Return function(data, info) as a callback of a subscription. EventsExecutor (rclpy 7.1.6) passes one pair to a
     callback of two arguments, SingleThreadedExecutor passes two arguments."""
     def call(data, info=None):
@@ -48,8 +48,8 @@ def subscribe(node, link, ros_name, take, role):
     second subscription. A latched publisher matches both; the second copy of its message is dropped.
     """
     def open_with(profile, callback, **events):
-        return node.create_subscription(middleware.message_class(link.type), ros_name, pair(callback), profile,
-                                        raw=True, **events)
+        return node.create_subscription(middleware.message_class(link.type), ros_name,
+                                        two_argument_callback(callback), profile, raw=True, **events)
     latched = middleware.qos(link.rate, role)
     if not topics.QOS_BY_RATE[link.rate].unlatched:
         return [open_with(latched, take)]

@@ -5,6 +5,7 @@ One class runs every unit. A node of its own kind adds tasks that are no law: th
 (adu_drive.timekeeper_node), the ship publishes NMEA.
 """
 import collections
+import collections.abc
 import dataclasses
 import time
 
@@ -20,6 +21,20 @@ from pedestal_common.wire import commands, messages, records
 
 REPLAY_POLL_S = 0.2
 """Time between two searches for another replay [s]."""
+
+LOCKSTEP_POLL_S, TRIGGER_POLL_S = 0.2, 0.05
+"""Time between two checks for a step that waits too long in lockstep, and for a silent trigger in realtime [s]."""
+
+SETTLING_POLL_S = 0.001
+"""Time after which the messages queued at start-up count as processed [s]."""
+
+
+@dataclasses.dataclass
+class LastText:
+    """Last published text of a text topic: its code, its text, and the function that publishes the next."""
+    publish: collections.abc.Callable
+    code: int = topics.NO_TEXT_CODE
+    text: object = ''
 
 
 class Port:
@@ -45,8 +60,7 @@ class Port:
         self._initial = unit.memory.record.copy()
         self._encoders = [(records.Encoder(name, message, unit.outputs), self._writers[name])
                           for name, message in unit.messages.items() if name in self._writers]
-        self._texts = {name: [writer, topics.NO_TEXT_CODE, ''] for name, writer in self._writers.items()
-                       if records.is_text(name)}
+        self._texts = {name: LastText(writer) for name, writer in self._writers.items() if records.is_text(name)}
         self._epoch, self._last = 0, None
 
     def named(self, topic):
@@ -95,12 +109,12 @@ class Port:
         outputs = self.unit.outputs[0]
         for name, last in self._texts.items():
             code = outputs[name]
-            if code != last[1]:
-                last[1] = code
+            if code != last.code:
+                last.code = code
                 text = self.unit.encode(name, int(code))
-                if text != last[2]:
-                    last[2] = text
-                    self._announce(last[0], messages.String(data=text) if isinstance(text, str)
+                if text != last.text:     # different codes may have the same text
+                    last.text = text
+                    self._announce(last.publish, messages.String(data=text) if isinstance(text, str)
                                    else self._stamped(text))
 
     def _stamped(self, message):
@@ -132,6 +146,7 @@ class UnitNode(shell.Shell):
         self.unit = self.ports[0].unit
         self.steps = None
         self.refused = ''
+        # Topics of rate `once` without a message, and the first steps, which wait for these messages.
         self._waiting_for_once, self._held = set(), collections.deque()
         self._settled, self._settling = not self.graph.lockstep, None
         self._urgent = [port.unit.urgent for port in self.ports]
@@ -227,14 +242,14 @@ class UnitNode(shell.Shell):
         for name in (trigger, *latencies):
             if nodes.plain(name) not in self.row.writes:
                 self.reader(name, decoding(decoders[name]), self._step_taker(name))
-        self._progress = (None, time.monotonic())
+        self._watched_step, self._watched_since = None, time.monotonic()
         self._replayed = next(name for name in (trigger, *latencies) if nodes.plain(name) not in self.row.writes)
         self.every(REPLAY_POLL_S, self._look_for_replay)
         if self.graph.lockstep:
-            self.every(0.2, self._watch)
+            self.every(LOCKSTEP_POLL_S, self._watch_pending_step)
         else:
             self._answered = self._watched = self._begun = time.monotonic_ns()
-            self.every(0.05, self._watch_trigger)
+            self.every(TRIGGER_POLL_S, self._watch_trigger)
 
     def _look_for_replay(self):
         """Begin again if another replay than the one before publishes the first input of the steps."""
@@ -249,7 +264,7 @@ class UnitNode(shell.Shell):
         self._replay_left = bool(self._replays) and not replays
 
     def _begin_again(self):
-        """Forget all steps and messages, as a node that starts."""
+        """Discard all steps and messages, so that the node continues like a node that starts."""
         self.get_logger().info('begins again, for another replay')
         for port in self.ports:
             unit = type(port.unit)(self.parameters, port.unit.reads)
@@ -287,7 +302,7 @@ class UnitNode(shell.Shell):
             return
         self._held.append((stamp, values))
         if self._settling is None:
-            self._settling = self.every(0.001, self._settle)
+            self._settling = self.every(SETTLING_POLL_S, self._settle)
 
     def answer(self, stamp, values):
         """Answer the step of a stamp [ns]. values: {topic: (stamp, numbers) or None}."""
@@ -339,11 +354,12 @@ class UnitNode(shell.Shell):
             if silent:
                 self.diagnose_now()
 
-    def _watch(self):
+    def _watch_pending_step(self):
+        """Raise GraphError in lockstep if the same step has waited for its inputs for the deadline."""
         pending = self.steps.pending_stamp
-        if pending is None or self._progress[0] != pending or self._replay_left:
-            self._progress = (pending, time.monotonic())
-        elif time.monotonic() - self._progress[1] > self.graph.deadline:
+        if pending is None or self._watched_step != pending or self._replay_left:
+            self._watched_step, self._watched_since = pending, time.monotonic()
+        elif time.monotonic() - self._watched_since > self.graph.deadline:
             waiting = self.steps.waiting_for
             silent = [writer for name in waiting for writer in self._link(name)[0].writers]
             raise shell.GraphError(f'no {", ".join(waiting)} for step {pending / NS_PER_SECOND:.6f} s after '
@@ -352,6 +368,7 @@ class UnitNode(shell.Shell):
     def _service(self, name):
         """Return the callback of a service, which commands every unit between two steps and answers with the reply."""
         def serve(_request, response):
+            # Each port receives the same commands, so all give the same reply.
             [reply] = {port.command(commands.Command(name, commands.SERVICE_CLIENT)) for port in self.ports}
             if name.endswith('/reset_faults') and reply.granted:
                 self.refused = ''

@@ -130,6 +130,8 @@ class Table:
         lines.seek(sum(map(len, before)))
         self.separator = separator or _separator(begin, sample)
         self._rows = csv.reader(lines, delimiter=self.separator, skipinitialspace=True)
+        # _passed: lines before the table; _decimal: {decimal sign: first cell with it}; _again: a first line that is a
+        # row and not names, which the iteration yields again.
         self._passed, self._decimal, self._again = len(before), {}, None
         first = self._cells() or []
         self.fieldnames = tuple(first)
@@ -155,6 +157,7 @@ class Table:
             self.line_num = self._passed + self._rows.line_num
             if cells and cells[0].strip() == HORIZONS_MARKS[1]:
                 return None
+            # JPL Horizons separates its parts by lines of asterisks.
             if cells and not cells[0].lstrip().startswith((*COMMENT_MARKS, HORIZONS_MARKS[0])) and any(
                     map(str.strip, cells)) and set(''.join(cells)) != {'*'}:
                 return [cell.strip() for cell in cells]
@@ -215,6 +218,7 @@ def _beginning(lines):
         return before[:horizons], before[horizons], ''
     for i, line in enumerate(before):
         bare = line.strip()
+        # `sep=` with one character, which is the separator and may be a blank or a tab.
         if bare.lower().startswith('sep=') and len(line.strip('\r\n').lstrip()) == 5:
             separator = line.strip('\r\n').lstrip()[4]
         elif bare and not bare.startswith(COMMENT_MARKS) and not _is_title(bare, before[i + 1:]):

@@ -7,7 +7,7 @@ import struct
 
 from rosbags.interfaces import Nodetype
 
-from pedestal_common.wire.messages import ROS_TYPESTORE
+from pedestal_common.wire.messages import CDR_HEADER_BYTES, ROS_TYPESTORE
 
 _SIZES = {'bool': 1, 'byte': 1, 'char': 1, 'int8': 1, 'uint8': 1, 'int16': 2, 'uint16': 2, 'int32': 4, 'uint32': 4,
           'int64': 8, 'uint64': 8, 'float32': 4, 'float64': 8}
@@ -15,16 +15,15 @@ _DTYPES = {'bool': 'u1', 'byte': 'u1', 'char': 'u1', **{name: f'{name[0]}{size}'
                                                        if name[0] in 'iuf'}}
 
 STAMPED_TYPES = {'rosgraph_msgs/msg/Clock'}
-"""Types whose bytes 4 to 12 are their stamp."""
 STAMPED_TYPES.update(name for name, (_, fields) in ROS_TYPESTORE.fielddefs.items()
                      if fields and fields[0] == ('header', (Nodetype.NAME, 'std_msgs/msg/Header')))
-"""Types whose bytes 4 to 12 are their stamp."""
+"""Types whose first field is their stamp."""
 
 MAX_MESSAGE_NUMBERS = 400_000
 """Largest number of numbers in one message; a program track of a whole day has 350,000."""
 
 PADDING_LIMIT_BYTES = 4
-"""Number of bytes [bytes] that DDS adds behind a message, always less than this."""
+"""Limit of the padding that DDS adds behind a message: always less than this [bytes]."""
 
 
 class Places:
@@ -36,12 +35,12 @@ class Places:
     """
 
     def __init__(self, data, type_name):
-        if len(data) < 4:
+        if len(data) < CDR_HEADER_BYTES:
             raise ValueError(f'{len(data)} bytes are no {type_name}')
         self.data = data
-        self.order = '<' if data[1] & 1 else '>'
-        self.stop = 4
-        self.numbers, self.texts, self.fixed = [], {}, [(0, 4)]
+        self.order = '<' if data[1] & 1 else '>'     # the header states the order of the bytes
+        self.stop = CDR_HEADER_BYTES
+        self.numbers, self.texts, self.fixed = [], {}, [(0, CDR_HEADER_BYTES)]
         try:
             self._fields(type_name, '')
         except (struct.error, KeyError, UnicodeDecodeError) as error:
@@ -53,7 +52,7 @@ class Places:
 
     def _take(self, size, alignment, path):
         """Return the start of the next `size` bytes."""
-        self.stop += -(self.stop - 4) % alignment
+        self.stop += -(self.stop - CDR_HEADER_BYTES) % alignment     # CDR aligns numbers from the end of the header
         start, self.stop = self.stop, self.stop + size
         if self.stop > len(self.data):
             raise struct.error(f'{path} is missing')

@@ -52,6 +52,7 @@ def taking(names):
     """Return the function take(u, inputs) for laws, which copies the records of these topics into the inputs u."""
     made = {}
     lines = [line for topic in names if topics.TOPIC_BY_NAME[topic].inputs for line in _lines(topic)]
-    exec('\n'.join(('def take(u, inputs):', *lines)), made)    # static, because numba needs the names of the fields
+    # Because numba needs the names of the fields in the source, the function is made as text.
+    exec('\n'.join(('def take(u, inputs):', *lines)), made)
     overload(made['take'], inline='always')(lambda u, inputs: made['take'])
     return made['take']

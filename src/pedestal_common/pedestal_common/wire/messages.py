@@ -15,6 +15,9 @@ ROS_TYPESTORE = get_typestore(Stores.ROS2_JAZZY)
 _TYPES = ROS_TYPESTORE.types
 _STAMP = struct.Struct('<iI')
 
+CDR_HEADER_BYTES = 4
+"""Length of the header of a CDR message [bytes]; the first field, in most types header.stamp, begins after it."""
+
 MAX_CDR_BYTES = 8_000_000
 """Largest size of a message [bytes]; a program track of a whole day has 7 million."""
 
@@ -71,8 +74,8 @@ def nanoseconds(stamp) -> int:
 def stamp_of(data) -> int:
     """Return the stamp [ns] in the CDR bytes of a message that begins with a stamp. Raises ValueError for other
     bytes."""
-    if len(data) >= 12:
-        seconds, nanosec = _STAMP.unpack_from(data, 4)
+    if len(data) >= CDR_HEADER_BYTES + _STAMP.size:
+        seconds, nanosec = _STAMP.unpack_from(data, CDR_HEADER_BYTES)
         if seconds >= 0 and nanosec < 1_000_000_000:
             return seconds * 1_000_000_000 + nanosec
         raise ValueError(f'{seconds} s {nanosec} ns is no stamp')

@@ -57,7 +57,9 @@ def empty(record_type, count) -> np.ndarray:
 
 def numbers(records, topic) -> np.ndarray:
     """Return a view (n, columns) of the numbers of a stamped topic in records (n,)."""
-    start = records.dtype.fields[topic][1] // 8 + 1
+    # In words of 8 bytes; the first word of the topic is its stamp.
+    offset = records.dtype.fields[topic][1]
+    start = offset // 8 + 1
     return records.view('f8').reshape(len(records), -1)[:, start:start + len(layouts.columns(topic))]
 
 
@@ -79,10 +81,12 @@ class _Shape:
         places = cdr.Places(data, type_name)
         index = {column.name: i for i, column in enumerate(layouts.columns(topic))}
         self.size = places.stop
+        # Bytes that another message must have too, so that its numbers are at the same places.
         self.guard = [(start, stop, bytes(data[start:stop])) for start, stop in _joined(places.fixed)]
         self.fields = [(index[name], start, dtype) for path, start, dtype in places.numbers
                       if (name := layouts.column(type_name, path, places.texts)) in index]
         self.in_order = [column for column, _, _ in self.fields] == list(range(len(index)))
+        # One format for the struct module: skip the bytes up to each number, then read the number.
         form, at = places.order, 0
         for _, start, dtype in self.fields:
             form += f'{start - at}x{_FORMATS[dtype[1:]]}'
@@ -138,7 +142,7 @@ class Decoder:
         type, and for an invalid stamp."""
         if not self._shape.fits(data):
             self._shape = _Shape(self.topic, data)
-        seconds, nanoseconds = _STAMP.unpack_from(data, 4)
+        seconds, nanoseconds = _STAMP.unpack_from(data, messages.CDR_HEADER_BYTES)
         if seconds < 0 or nanoseconds >= 1_000_000_000:
             raise ValueError(f'{self.topic}: {seconds} s {nanoseconds} ns is no stamp')
         values = self._shape.reader.unpack_from(data)
@@ -187,7 +191,7 @@ class Encoder:
 
     def bytes_of(self, stamp, values) -> bytes:
         """Return the message with a stamp [ns] and numbers (columns,)."""
-        _STAMP.pack_into(self._buffer, 4, *divmod(stamp, 1_000_000_000))
+        _STAMP.pack_into(self._buffer, messages.CDR_HEADER_BYTES, *divmod(stamp, 1_000_000_000))
         for columns, view in self._views:
             view[:] = values[columns]
         return bytes(self._buffer)

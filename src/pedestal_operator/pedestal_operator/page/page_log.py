@@ -26,6 +26,7 @@ class Log:
 
     def replied(self, t, command, reply):
         """Log the commands.Reply to a commands.Command, a repeated jog once."""
+        # The time is stored first. A command that is no jog then deletes it, because the next jog is a new line.
         before, self._last_jogs[command.who] = self._last_jogs.get(command.who, -NEW_JOG_PAUSE_S), t
         if command.verb != JOG_VERB:
             del self._last_jogs[command.who]

@@ -33,14 +33,15 @@ class Refused(Exception):  # noqa: N818  no error of the server
 class Request(typing.NamedTuple):
     """Parts of a request that decide about access.
 
-    path: without the query; token: of the query; asks: True for a web socket, and for all methods except GET and HEAD.
+    path: without the query; token: of the query; changes_state: True for a web socket, and for all methods except GET
+    and HEAD.
     """
     host: str
     origin: str
     cookie: str
     token: str
     path: str
-    asks: bool
+    changes_state: bool
 
 
 class Access:
@@ -64,7 +65,7 @@ class Access:
         """Return the role of a Request. Raises Refused: 400 wrong host, 403 foreign page, 401 no valid token."""
         if request.host.lower() not in self._hosts:
             raise Refused(400, 'unknown name of this server: open the address that the server printed at its start')
-        if request.origin.lower() != f'http://{request.host.lower()}' and (request.origin or request.asks):
+        if request.origin.lower() != f'http://{request.host.lower()}' and (request.origin or request.changes_state):
             raise Refused(403, 'the request comes from another page than that of this server')
         given = request.token if request.path == '/' and request.token else self._of_cookie(request.cookie)
         for role, token in self.tokens.items():

@@ -1,9 +1,10 @@
 """Server of the page: its files, and a web socket for each page, in a separate thread. No ROS here.
 
-A message to a page has the sections of the state whose revisions have changed. Messages are numbered, and a page
-acknowledges the number of the last one. A page with MAX_UNSEEN_MESSAGES unacknowledged messages receives no further
-message; the next one has the newest sections. So no queue grows except the short queue of replies to the page. A page
-without an acknowledgement for PAGE_TIMEOUT_S is dropped.
+A section is a named part of the state that a page shows, as JSON. The revision of a section is the number of its last
+change. A message to a page has the sections whose revision the page does not have yet. Messages are numbered, and a
+page acknowledges the number of the last one. A page with MAX_UNSEEN_MESSAGES unacknowledged messages receives no
+further message; the next one has the newest sections. So no queue grows except the short queue of replies to the page.
+A page without an acknowledgement for PAGE_TIMEOUT_S is dropped.
 """
 import asyncio
 import collections
@@ -94,7 +95,7 @@ class Client:
 
     @property
     def gone(self):
-        """True after PAGE_TIMEOUT_S without an acknowledgement."""
+        """True if MAX_UNSEEN_MESSAGES are unacknowledged and the oldest of these is older than PAGE_TIMEOUT_S."""
         return self.busy and time.monotonic() - next(iter(self._sent.values())) > PAGE_TIMEOUT_S
 
     @property
@@ -125,6 +126,8 @@ class PageServer:
         self.access = page_security.Access(address, self._socket.getsockname()[1], names)
         self._most, self._history = most, history
         self._clients, self._sections, self._revision, self._named = set(), {}, 0, 0
+        # _clients, _sections: of the thread of the server; _published, the JSON of each section: of the thread of the
+        # node.
         self._published = {}
         app = Starlette(routes=[Route('/', self._index), Route('/history', self._history_answer),
                                 WebSocketRoute('/socket', self._serve_page),
@@ -147,7 +150,7 @@ class PageServer:
         texts = {name: encoded(content) for name, content in sections.items()}
         fresh = {name: text for name, text in texts.items() if self._published.get(name) != text}
         self._published |= fresh
-        self._call(self._take, fresh)
+        self._call(self._update_sections, fresh)
 
     def reply(self, client, message):
         """Send a message to one page; called from the thread of the node."""
@@ -157,7 +160,7 @@ class PageServer:
         with contextlib.suppress(RuntimeError):  # the loop is closed after the end of the server
             self._loop.call_soon_threadsafe(function, *arguments)
 
-    def _take(self, sections):
+    def _update_sections(self, sections):
         self._revision += 1
         self._sections |= {name: (self._revision, text) for name, text in sections.items()}
         for client in self._clients:
@@ -275,9 +278,9 @@ def _request(scope):
     for key, value in scope['headers']:
         given.setdefault(key.decode('latin-1'), value.decode('latin-1'))
     query = dict(part.split('=', 1) for part in scope['query_string'].decode('latin-1').split('&') if '=' in part)
-    asks = scope['type'] == 'websocket' or scope['method'] not in ('GET', 'HEAD')
+    changes_state = scope['type'] == 'websocket' or scope['method'] not in ('GET', 'HEAD')
     return page_security.Request(given.get('host', ''), given.get('origin', ''), given.get('cookie', ''),
-                                 query.get('token', ''), scope['path'], asks)
+                                 query.get('token', ''), scope['path'], changes_state)
 
 
 def _adding(send, host):

@@ -30,6 +30,8 @@ class ServerNode(Remote):
     line_server.LineServer.
     """
     awaits = 'clients'
+    """What the node waits for, in the line that it logs when it is ready (Shell.awaits)."""
+
     device = ''
     """Serial device of a further client, '' for none; overridden by servers with serial devices."""
 
@@ -53,7 +55,7 @@ class ServerNode(Remote):
         self.controller.look(now)
         for client in self._server.clients:
             self.serve(client, now)
-        for client in self._server.send():
+        for client in self._server.send():     # the clients that have left
             self.controller.leave(client.name)
             dropped = f'{client.dropped} answers dropped, because they were not read' if client.dropped else ''
             if client.gone or dropped:
@@ -69,13 +71,14 @@ class ServerNode(Remote):
             return
         self._checked_arrival, holder = arrival, self.diagnostics_of('acu').get('control', '')
         if self._server.is_own(holder) and holder != self.controller.holder:
-            self.who = holder
+            self.who = holder     # releases in the name of the client that holds control
             self.request('release')
 
     def refuse(self, client, command, line, reason):
         """Log the refusal of a line, None for a line that was too long.
 
-        A repeated reason is logged again after the next success of the command.
+        A repeated reason is logged again after the next success of the command: the subclass then deletes the reason
+        from client.refusals.
         """
         if client.refusals.get(command) != reason:
             client.refusals[command] = reason

@@ -3,7 +3,7 @@
 Publishes the command on acu/command, or with --node NODE on NODE/inject, and waits for the reply.
 Exit code 0: the node accepted the command. Exit code 1: the node refused it; the reason is printed.
 
-    pedestal ask take                    take control: of other clients only `stop` and `standby` are accepted
+    pedestal ask take                    take control; other clients can then send only `stop` and `standby`
     pedestal ask fallback mode=memory    select the mode after a loss of the track
     pedestal ask offset time=0.5         follow the program track 0.5 s later
     pedestal ask elements --tle iss.tle  predict by the elements of a file, without a change of the mode

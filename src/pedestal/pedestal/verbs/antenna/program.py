@@ -16,9 +16,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add scenario, duration, start and parameters."""
     arguments.add_scenario(parser)
     arguments.add_duration(parser, 'the program track')
-    parser.add_argument('--start', metavar='UTC', help='time of the first row: a UTC such as '
-                        '2026-11-22T12:00:00, now, or the word file (start time in the file or TLE of the target); '
-                        'default: start of the running graph')
+    parser.add_argument('--start', metavar='UTC', help="time of the first row, one of: a UTC such as "
+                        "2026-11-22T12:00:00; `now`; `file`: the start time given in the target's track file or TLE; "
+                        "default: start of the running graph")
     arguments.add_param(parser)
     arguments.add_namespace(parser)
 

@@ -3,8 +3,8 @@
 Starts a process for each node, records every topic in a new bag, and prints the results.
 
 Exit code 0: the run is complete. 1: the run failed, or the recording is not complete. 3: a realtime run ended early,
-or its drive lost more than 1 % of its steps, without the 5 s after each death of a node. 130: the run was stopped,
-for example by Ctrl-C.
+or its drive lost more than 1 % of its steps (steps in the 5 s after a node died are not counted). 130: the run was
+stopped, for example by Ctrl-C.
 """
 import argparse
 import sys
@@ -74,13 +74,13 @@ def main(options: argparse.Namespace) -> int:
     recording = read(bag)
     beams = [prefix[:-1] for prefix in chosen.prefixes]
     parts = [results.of_bag(recording.view(beam)) for beam in beams]
-    of_beams = [results.measured(of) for of in parts]
+    of_beams = [results.measured(part) for part in parts]
     realtime = chosen.header.pacing == 'realtime'
     whole = results.measured({'run': outcome, 'supervised': outcome if realtime else None})
     lost, steps = whole['lost_steps'][0], outcome.drive.get('steps')
     console.show_results(f'{chosen.name}: {chosen.header.title}', beams, of_beams,
                          {**whole, 'lost_steps': (lost, f'of {steps}' if lost and steps else 'steps')},
-                         [results.marks(of) for of in parts])
+                         [results.marks(part) for part in parts])
     if options.explain:
         console.explain(results.RESULTS, {*of_beams[0], *whole})
     print(f'{bag}  mcap sha256 {outcome.recorder["sha256"]}')
@@ -126,8 +126,8 @@ def _chosen(options: argparse.Namespace) -> 'Scenario | None':
     if options.station is not None:
         changes = satellite.station_changes(options.station) + changes
     if options.tle:
-        named = options.which is not None and not (options.which in ('list', 'next') or options.which.isdecimal())
-        when = (orbit.instant('--pass', options.which) if named else
+        by_utc = options.which is not None and not (options.which in ('list', 'next') or options.which.isdecimal())
+        when = (orbit.instant('--pass', options.which) if by_utc else
                 orbit.instant('start_time', started) if started else now)
         elements, remark = satellite.tle_changes(options.tle, options.satellite, when)
         changes = elements + changes

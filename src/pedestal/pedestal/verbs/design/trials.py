@@ -1,7 +1,8 @@
 """run a scenario many times with varied parameters, and print statistics and the worst trials
 
-Each trial has its own seed and the results of `pedestal run`. A trial runs all nodes in one process, without ROS. For
-each of the worst trials a `pedestal run` command is printed, which runs separate nodes and gives the same numbers.
+Each trial has its own seed. It yields the same kinds of results as `pedestal run`. A trial runs all nodes in one
+process, without ROS. For each of the worst trials a `pedestal run` command is printed, which runs separate nodes and
+gives the same numbers.
 
 --vary NODE.KEY=DISTRIBUTION draws a parameter from uniform(low, high), normal(mean, sigma) or choice(a, b, ...). With
 an x after the distribution, as in normal(1, 0.1)x, the drawn number is a factor of the value of the scenario. The
@@ -60,12 +61,12 @@ def main(options: argparse.Namespace) -> int:
     console.check_json(options.json)
     folder = options.output or pathlib.Path('trials', plans[0].name)
     with contextlib.ExitStack() as stack:
-        tables = [stack.enter_context(ensemble.table(plan, folder, name))
+        tables = [stack.enter_context(ensemble.open_table(plan, folder, name))
                   for plan, name in zip(plans, ('trials', 'against'))]
         pool = stack.enter_context(monte_carlo.Pool(options.workers, options.scheduler))
         progress = stack.enter_context(console.progress_of_trials())
         try:
-            ensemble.make(plans, tables, pool, progress)
+            ensemble.run_missing_trials(plans, tables, pool, progress)
         except KeyboardInterrupt:
             print(f'pedestal: {sum(len(table.rows) for table in tables)} of {sum(plan.runs for plan in plans)} trials '
                   f'are in {folder}; the same command continues', file=sys.stderr)

@@ -1,4 +1,8 @@
-"""tune a filter, the feed-forward, or the loops of your own plant"""
+"""tune a filter, the feed-forward, or the loops of your own plant
+
+Give exactly one of --filter, --feedforward and --loops. --filter needs a recording or a scenario; --feedforward and
+--loops need a scenario.
+"""
 import argparse
 import pathlib
 
@@ -8,14 +12,15 @@ from pedestal_analysis import console
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add recording or scenario, subject of the tuning, axes and seeds."""
-    parser.add_argument('source', metavar='BAG|SCENARIO', help='recording: maximises the likelihood of its '
-                        'innovations; or scenario: minimises its true pointing error')
+    parser.add_argument('source', metavar='BAG|SCENARIO', help='input of the tuning. With a recording, the filter is '
+                        'tuned for the largest likelihood of the innovations; with a scenario, for the smallest true '
+                        'pointing error')
     parser.add_argument('--filter', metavar='KIND', help='kind of the filter to tune, for example imm (all kinds: '
-                        '`pedestal parameters acu`, filter.kind)')
+                        '`pedestal parameters acu`, filter.kind); excludes --feedforward and --loops')
     parser.add_argument('--feedforward', action='store_true', help='compute the gains of the feed-forward from the '
-                        'rate loop of the drive')
+                        'rate loop of the drive; needs a scenario; excludes --filter and --loops')
     parser.add_argument('--loops', action='store_true', help='tune speed and position loop, shaper and bias for the '
-                        'plant of a scenario, and measure the margins on it')
+                        'plant of a scenario, and measure the margins on it; excludes --filter and --feedforward')
     parser.add_argument('--speed-bandwidth', type=float, metavar='HZ', help='crossover of the speed loop [Hz], for '
                         '--loops; default: 8 times --position-bandwidth if this option is given, else 28')
     parser.add_argument('--position-bandwidth', type=float, metavar='HZ', help='crossover of the position loop [Hz], '

@@ -16,8 +16,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--rate', type=float, metavar='HZ', help='largest rate of the records of a tdm [Hz]; default: '
                         '10')
     parser.add_argument('--participants', nargs=2, metavar=('STATION', 'TARGET'), help='names of station and target '
-                        'in a tdm; default: PEDESTAL and the international designator of the TLE; kind of the target '
-                        'without a TLE')
+                        'in a tdm; default: station PEDESTAL; target: international designator of the TLE, or, if '
+                        'there is no TLE, the kind of the target')
     parser.add_argument('--overwrite', action='store_true', help='replace existing files')
 
 
@@ -28,11 +28,12 @@ def main(options: argparse.Namespace) -> int:
     if options.rate is not None or options.participants:
         raise ValueError(f'--rate, --participants: need --format tdm, not {options.format}')
     from pedestal_recording.export import export
-    for file, rows, columns in export(options.bag, options.format, options.output, options.topics, options.overwrite):
-        if file is None:
-            print(f'pedestal: left out: {rows}', file=sys.stderr)
+    for file, rows_or_reason, columns in export(options.bag, options.format, options.output, options.topics,
+                                                options.overwrite):
+        if file is None:     # a topic that cannot be exported
+            print(f'pedestal: left out: {rows_or_reason}', file=sys.stderr)
         else:
-            print(f'{file}  {rows} rows, {columns} columns')
+            print(f'{file}  {rows_or_reason} rows, {columns} columns')
     return 0
 
 

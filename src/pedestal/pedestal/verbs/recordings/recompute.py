@@ -8,10 +8,9 @@ A lockstep recording is recomputed exactly: the same version on the same machine
 recording, a step of the recomputation gets all messages that were sent before the next step began. In the run, a
 message in transit at that moment was used one step later, so small differences are normal.
 
-A bag holds the replies to service requests, not the requests. Changes of acu/mode or adu/state that no recorded input
-explains are therefore repeated as requests in their steps; the report states their number. Changes of parameters
-during the run are not recorded.
-Diagnostics are not recomputed.
+Commands are taken from the recorded replies and repeated at their steps. In a bag without replies, a change of
+acu/mode or adu/state that no recorded input explains is repeated as a request. The report states the number of the
+repeated commands. Changes of parameters during the run are not recorded. Diagnostics are not recomputed.
 
 With --param the verb compares old with new results, and a difference is no failure. Because the recorded antenna does
 not follow the recomputed command, only two results are compared: the estimate against the recorded truth (error,

@@ -23,7 +23,7 @@ def main(options: argparse.Namespace) -> int:
     from pedestal_bringup.scenario.program import Plan
     from pedestal_recording import bag
     recording = bag.read(options.recording)
-    chosen = rerun.configured(recording)
+    chosen = rerun.scenario_of_recording(recording)
     path = graph.new_bag(options.bag, chosen.name)
     if graph.run(Plan(chosen), path, console.progress_of_run(chosen.header.duration)).stopped:
         raise KeyboardInterrupt
