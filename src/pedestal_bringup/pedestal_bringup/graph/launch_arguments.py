@@ -75,9 +75,9 @@ def _port(name, text):
 
 
 def prepare(given, chosen):
-    """Make the laws of a Scenario and the folder of its logs; return (ROS 2 parameter file of all nodes, the scenario
-    as a file). Raises ValueError, RunError."""
-    graph.read_files(Plan(chosen))
+    """Make the laws of a Scenario and the folder of its logs; return (lines on the run, ROS 2 parameter file of all
+    nodes, the scenario as a file). Raises ValueError, RunError."""
+    lines, _ = graph.read_files(Plan(chosen))
     bag = graph.new_bag(given['bag'], chosen.name)
     if chosen.header.pacing == 'realtime':
         supervisor.prepare(chosen)
@@ -85,4 +85,4 @@ def prepare(given, chosen):
     made.write(parameters_of_all(chosen, bag, begins(chosen)))
     whole = made.log / f'{chosen.name}.yaml'
     whole.write_text(chosen.as_yaml())
-    return made.file, whole
+    return lines, made.file, whole
