@@ -70,6 +70,19 @@ def test_a_wrong_value_is_named(texts, told):
     assert told in str(refused.value) and '\n' not in str(refused.value)
 
 
+@pytest.mark.parametrize('namespace', ['ship 1', '1ship', 'ship-1', '~', 'a//b', 'ä'])
+def test_a_namespace_that_ros_2_refuses_is_named(namespace):
+    with pytest.raises(ValueError, match=f'^namespace:={namespace}: must be letters, digits and _, for example '):
+        launch_arguments.load_scenario(given(namespace=namespace))
+
+
+@pytest.mark.parametrize('change', ['ship_motion.ship.sea_state=6', 'ins.latency=0.1'])
+def test_a_parameter_of_a_node_that_takes_no_part_is_refused(change):
+    with pytest.raises(ValueError, match=f'^scenario leo_pass: {change.partition("=")[0]}: has no effect, because '):
+        scenario.load('leo_pass', [change])
+    assert 'ship_motion' in scenario.load('leo_pass', [change, 'scenario.ship=true']).nodes
+
+
 @pytest.mark.parametrize('pacing, texts, told', [
     ('lockstep', {'page': 'true'}, 'page:= needs pacing:=realtime'),
     ('realtime', {'rotctld': '70000'}, 'rotctld:=70000: must be false, true or a port, 1 to 65535'),
@@ -108,8 +121,8 @@ def test_the_lines_of_a_launch_are_those_of_a_run(tmp_path, monkeypatch):
     asked = given(scenario='ship_pass', params_file='mine.yaml', duration='5')
     limit, ship, target, *_ = launch_arguments.prepare(asked, launch_arguments.load_scenario(asked))[0]
     assert limit.startswith('acu.azimuth.limits.high = 6.2832 rad is wider than the travel of the drive')
-    assert ship == ('ship.csv: columns time [s] in s, Roll_deg in deg, pitch [rad] in rad, heading_deg in deg: 21 rows, '
-                    'passed over 21 x row that repeats the row before')
+    assert ship == ('ship.csv: columns time [s] in s, Roll_deg in deg, pitch [rad] in rad, heading_deg in deg: '
+                    '21 rows, passed over 21 x row that repeats the row before')
     assert target.startswith('a.csv: table of azimuth and elevation, columns t in s, az in deg, el in deg: 21 rows')
 
 

@@ -51,7 +51,9 @@ def _number(given, name, kind, what):
 
 def load_scenario(given):
     """Return the Scenario of the texts {argument: value}. Raises ValueError."""
-    changes = scenario.file_overrides(given['params_file'], given['namespace']) if given['params_file'] else ()
+    from pedestal_common.node import middleware  # loads rclpy, which --show-args does not need
+    namespace = middleware.namespace('namespace:=', given['namespace'])
+    changes = scenario.file_overrides(given['params_file'], namespace) if given['params_file'] else ()
     return scenario.load(given['scenario'], changes,
                          _number(given, 'seed', int, 'a whole number'),
                          _number(given, 'duration', float, 'a number of seconds'), given['pacing'] or None)

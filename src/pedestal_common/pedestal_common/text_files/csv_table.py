@@ -198,8 +198,15 @@ class Table:
         return f'{_columns.listed(self.fieldnames)} (separator {self.separator!r})'
 
     def number(self, column, cell, low, high):
-        """Return the number in a cell of a columns.Column, in the unit of its quantity, between low and high. Raises
-        TableError."""
+        """Return the number in a cell of a columns.Column, in the unit of its quantity, between low and high.
+
+        cell: None if the row ends before the column. Raises TableError.
+        """
+        if cell is None:
+            raise TableError(f'{self.path}: line {self.line_num}: the row ends before the column {column.name!r:.60}')
+        if column.unit == _columns.UTC and ':' in cell:
+            raise TableError(f'{self.path}: line {self.line_num}: {column.name} = {cell!r:.60}: must be a number of '
+                             'seconds, as in a column time_s, because only tracks have dates')
         return column.size * number(self.path, self.line_num, column.name, self.point(column.name, cell),
                                     low / column.size, high / column.size)
 

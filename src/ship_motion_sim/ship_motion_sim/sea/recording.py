@@ -48,7 +48,8 @@ class Recording(typing.NamedTuple):
 
 def read(params) -> Recording:
     """Return the Recording of a RecordedParameters. Raises csv_table.TableError."""
-    rows, description = csv_table.read(params.path, COLUMN_RANGES, 4, params.max_gap, 'ship.recorded.max_gap', DISPLACEMENT_RANGES)
+    rows, description = csv_table.read(params.path, COLUMN_RANGES, 4, params.max_gap, 'ship.recorded.max_gap',
+                                       DISPLACEMENT_RANGES)
     if len(rows) > MAX_ROWS:
         raise csv_table.TableError(f'{params.path}: {len(rows)} rows, must be at most {MAX_ROWS}: shorten '
                                    'the file or reduce its rate')
