@@ -4,17 +4,31 @@ import pathlib
 import pytest
 
 from pedestal import cli, samples
+from pedestal.verbs import arguments
+from pedestal_bringup.scenario import scenario
 
 REPOSITORY = pathlib.Path(__file__).parents[1]
 
 
-@pytest.mark.parametrize('arguments, parsed', [
+@pytest.mark.parametrize('given, parsed', [
     (['mode', 'rate', '--az', '-1e-2'], {'az': -0.01}), (['mode', 'rate', '--az', '-.5', '--el=-2'], {'az': -0.5}),
     (['run', 'leo_pass', '--station', '-33.9,18.4,10'], {'station': '-33.9,18.4,10'}),
     (['run', 'leo_pass', '--seed', '-1', '--param', 'a.b=-1'], {'seed': -1, 'param': ['a.b=-1']})])
-def test_a_negative_value_needs_no_equals_sign(arguments, parsed):
-    options = vars(cli._parser().parse_args(arguments))
+def test_a_negative_value_needs_no_equals_sign(given, parsed):
+    options = vars(cli._parser().parse_args(given))
     assert {name: options[name] for name in parsed} == parsed
+
+
+def test_parameter_files_may_be_several(tmp_path):
+    """The last value holds, and --param replaces all files."""
+    for name, text in (('a', 'azimuth.stow: 0.1, azimuth.preset: 0.2'), ('b', 'azimuth.stow: 0.3')):
+        (tmp_path / f'{name}.yaml').write_text(f'acu: {{ros__parameters: {{{text}}}}}')
+    files = [part for name in 'ab' for part in ('--params-file', str(tmp_path / f'{name}.yaml'))]
+    options = cli._parser().parse_args(['run', 'leo_pass', *files, '--param', 'adu.period=0.01'])
+    assert arguments.changes(options) == ['acu.azimuth.stow=0.1', 'acu.azimuth.preset=0.2', 'acu.azimuth.stow=0.3',
+                                          'adu.period=0.01']
+    chosen = scenario.load('leo_pass', arguments.changes(options)).node_parameters('acu')
+    assert (chosen.azimuth.stow, chosen.azimuth.preset, chosen.period) == (0.3, 0.2, 0.01)
 
 
 def test_passes_of_a_station_in_the_south(capsys):

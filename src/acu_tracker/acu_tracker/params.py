@@ -61,13 +61,14 @@ class AxisParameters(Parameters):
 
 @dataclasses.dataclass(frozen=True)
 class ElevationParameters(AxisParameters):
-    """Parameters of the elevation axis: lighter, with its own limits."""
+    """Parameters of the elevation axis: lighter, with its own limits, which are those of the drive."""
 
     stow: float = parameter(0.5 * math.pi, -20.0, 20.0, 'rad', 'deck angle in mode stow')
     preset: float = parameter(0.5, -20.0, 20.0, 'rad', 'deck angle in mode preset before the first preset command')
     feedforward: FeedforwardParameters = group(FeedforwardParameters, inertia=288.0, friction=45.0)
     shaper: ShaperParameters = group(ShaperParameters, rate=1.4, acceleration=20.0)
-    limits: LimitsParameters = group(LimitsParameters, low=-0.09, high=1.66, rate=1.57)
+    limits: LimitsParameters = group(LimitsParameters, low=math.radians(-2.0), high=math.radians(92.0),
+                                     rate=1.57)
 
 
 @dataclasses.dataclass(frozen=True)

@@ -37,9 +37,9 @@ def start(context):
              for argument in launch_arguments.ARGUMENTS}
     chosen = launch_arguments.load_scenario(given)
     servers = launch_arguments.servers(given, chosen)
-    file, whole = launch_arguments.prepare(given, chosen)
+    lines, file, whole = launch_arguments.prepare(given, chosen)
     actions = [LogInfo(msg=line) for line in launch_arguments.misspelt_arguments(context.launch_configurations)]
-    actions += [LogInfo(msg=line) for line in chosen.notes]
+    actions += [LogInfo(msg=line) for line in lines]
     actions += [PushRosNamespace(given['namespace'])] if given['namespace'] else []
     for name in chosen.nodes:
         if name == 'operator':

@@ -7,6 +7,7 @@ import pytest
 from pedestal_bringup.scenario import scenario
 from pedestal_bringup.scenario.program import Plan
 from pedestal_common import parameters
+from pedestal_common.graph import nodes
 
 
 def lines(name, duration):
@@ -57,6 +58,13 @@ def test_the_narrower_limit_of_control_unit_and_drive_holds(given, held, line):
     assert held.items() <= parameters.as_dict(chosen.node_parameters('acu')).items()
     assert Plan(chosen).announced() == ([line] if line else [])
     assert Plan(scenario.parse('uav_flyby', chosen.as_yaml())).announced() == []
+
+
+def test_the_default_limits_of_the_control_unit_are_those_of_the_drive():
+    acu, drive = (parameters.defaults(nodes.row(node).parameters_type()) for node in ('acu', 'adu'))
+    for axis in ('azimuth', 'elevation'):
+        for own, of_drive in (('low', 'lower'), ('high', 'upper')):
+            assert acu[f'{axis}.limits.{own}'] == drive[f'{axis}.limits.{of_drive}']
 
 
 def test_every_scenario_keeps_its_limits():

@@ -3,7 +3,7 @@ import pytest
 
 from pedestal_bringup.graph import launch_arguments, operator_servers
 from pedestal_bringup.graph.start import parameters_of_all
-from pedestal_bringup.scenario import scenario
+from pedestal_bringup.scenario import program, scenario
 from pedestal_common.text_files import parameter_file, plain_yaml
 
 
@@ -70,6 +70,19 @@ def test_a_wrong_value_is_named(texts, told):
     assert told in str(refused.value) and '\n' not in str(refused.value)
 
 
+@pytest.mark.parametrize('namespace', ['ship 1', '1ship', 'ship-1', '~', 'a//b', 'ä'])
+def test_a_namespace_that_ros_2_refuses_is_named(namespace):
+    with pytest.raises(ValueError, match=f'^namespace:={namespace}: must be letters, digits and _, for example '):
+        launch_arguments.load_scenario(given(namespace=namespace))
+
+
+@pytest.mark.parametrize('change', ['ship_motion.ship.sea_state=6', 'ins.latency=0.1'])
+def test_a_parameter_of_a_node_that_takes_no_part_is_refused(change):
+    with pytest.raises(ValueError, match=f'^scenario leo_pass: {change.partition("=")[0]}: has no effect, because '):
+        scenario.load('leo_pass', [change])
+    assert 'ship_motion' in scenario.load('leo_pass', [change, 'scenario.ship=true']).nodes
+
+
 @pytest.mark.parametrize('pacing, texts, told', [
     ('lockstep', {'page': 'true'}, 'page:= needs pacing:=realtime'),
     ('realtime', {'rotctld': '70000'}, 'rotctld:=70000: must be false, true or a port, 1 to 65535'),
@@ -95,12 +108,31 @@ def test_a_misspelt_argument_is_told_apart_from_those_of_other_launch_files():
         "no argument scenaro:=; did you mean 'scenario'?"]
 
 
+def test_the_lines_of_a_launch_are_those_of_a_run(tmp_path, monkeypatch):
+    """A limit that is wider than that of the drive, and the columns of the files of ship and target."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / 'a.csv').write_text('t,az,el\n' + ''.join(f'{k},{k},40\n' for k in range(21)))
+    (tmp_path / 'ship.csv').write_text('time [s];Roll_deg;pitch [rad];heading_deg\n'
+                                       + ''.join(f'{k};1,5;0;{k}\n{k};1,5;0;{k}\n' for k in range(21)))
+    (tmp_path / 'mine.yaml').write_text(
+        'acu: {ros__parameters: {azimuth.limits.high: 6.2832}}\n'
+        'ship_motion: {ros__parameters: {ship: {motion: recorded, recorded.path: ship.csv, heading_deg: 0}}}\n'
+        'tracking_receiver: {ros__parameters: {target: {kind: track_file, track_file.path: a.csv}}}\n')
+    asked = given(scenario='ship_pass', params_file='mine.yaml', duration='5')
+    limit, ship, target, *_ = launch_arguments.prepare(asked, launch_arguments.load_scenario(asked))[0]
+    assert limit.startswith('acu.azimuth.limits.high = 6.2832 rad is wider than the travel of the drive')
+    assert ship == ('ship.csv: columns time [s] in s, Roll_deg in deg, pitch [rad] in rad, heading_deg in deg: '
+                    '21 rows, passed over 21 x row that repeats the row before')
+    assert target.startswith('a.csv: table of azimuth and elevation, columns t in s, az in deg, el in deg: 21 rows')
+
+
 def test_what_the_nodes_start_with_lies_beside_the_bag(tmp_path, monkeypatch):
     """The operator is given the scenario whole, with every change, under its name."""
     monkeypatch.chdir(tmp_path)
     asked = given(scenario='uav_flyby', seed='7', bag='mine')
     chosen = launch_arguments.load_scenario(asked)
-    file, whole = launch_arguments.prepare(asked, chosen)
+    lines, file, whole = launch_arguments.prepare(asked, chosen)
+    assert lines == [] == program.Plan(chosen).announced()
     assert plain_yaml.read(file)['/**/recorder']['ros__parameters']['bag'] == 'mine'
     assert launch_arguments.load_scenario(given(scenario=str(whole))) == chosen
     (tmp_path / 'mine').mkdir()

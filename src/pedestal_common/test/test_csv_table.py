@@ -18,7 +18,7 @@ EUROPEAN = PLAIN.replace('.', ';').replace(',', 'C').replace(';', ',').replace('
 def read(tmp_path, data, **options):
     path = tmp_path / 'table.csv'
     path.write_bytes(data if isinstance(data, bytes) else data.encode())
-    return csv_table.read(path, COLUMNS, **options).tolist()
+    return csv_table.read(path, COLUMNS, **options).numbers.tolist()
 
 
 def refused(tmp_path, data, **options):

@@ -89,6 +89,8 @@ class ShipParameters(Parameters):
         if (self.spectrum == 'file') != bool(self.spectrum_file):
             raise ParameterError(f"spectrum_file = '{self.spectrum_file}': must name a CSV file with spectrum = file, "
                                  'and be empty otherwise')
+        if self.spectrum == 'file' and self.motion != 'waves':
+            raise ParameterError(f"spectrum = 'file': has no effect with motion = {self.motion}; take motion = waves")
         if self.sea_state in (1, 2):
             raise ParameterError(f'sea_state = {self.sea_state}: must be 3 to 6, or 0 for significant_height and '
                                  'peak_period')

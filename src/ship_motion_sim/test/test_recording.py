@@ -121,19 +121,36 @@ def test_a_log_of_a_spreadsheet_is_read(path, tmp_path):
         np.testing.assert_allclose(now['freedoms'], was['freedoms'], atol=1e-9)
 
 
+def test_repeated_rows_are_passed_over_and_counted(path, tmp_path):
+    """A logger that writes a row twice: the motion of the log without the repeated rows."""
+    names, *rows = path.read_text().splitlines()
+    other = tmp_path / 'ship.csv'
+    other.write_text('\n'.join([names, *(row for i, row in enumerate(rows) for _ in range(1 + (i % 10 == 3)))]))
+    for t in (5.0, 31.0):
+        np.testing.assert_array_equal(truth(recorded(other), t)['freedoms'], truth(recorded(path), t)['freedoms'])
+    [line] = motion.summary(ShipParameters(motion='recorded', recorded=RecordedParameters(path=str(other))))
+    assert line == ('ship.csv: columns time_s in s, roll_deg in deg, pitch_deg in deg, heading_deg in deg, '
+                    'surge_m in m, sway_m in m, heave_m in m: 601 rows, passed over 60 x row that repeats the row '
+                    'before')
+
+
 HEAD = 'time_s,roll_deg,pitch_deg,heading_deg\n'
 
 
 @pytest.mark.parametrize('content, changes, message', [
     ('time_s,roll_deg,heading_deg\n', {}, "line 1: column 'pitch_deg' is missing"),
-    (HEAD + '0,1,1,1\n1,1,1,1\n1,1,1,1\n', {}, 'line 4: time_s = 1: 0 s after the row before, must be above 0 and at '
+    (HEAD + '0,1,1,1\n1,1,1,1\n1,2,1,1\n', {}, 'line 4: time_s = 1: 0 s after the row before, must be above 0 and at '
                                                'most ship.recorded.max_gap = 2 s'),
     (HEAD + '0,1,1,1\n5,1,1,1\n', {}, 'line 3: time_s = 5: 5 s after the row before'),
     (HEAD.replace('roll_deg', 'roll'), {}, "line 1: column 'roll': must end with a known unit to be taken as roll"),
     (HEAD.replace(',pitch', ',heave,pitch'), {}, "line 1: column 'heave': must end with a known unit"),
     (HEAD + '0,nan,1,1\n', {}, 'line 2: roll_deg = nan: must be -80 to 80'),
+    (HEAD + '0,1,1,1\n1,1\n', {}, "line 3: the row ends before the column 'pitch_deg'"),
+    (HEAD.replace('time_s', 'time_utc') + '2026-06-01T12:00:00Z,1,1,1\n', {},
+     "line 2: time_utc = '2026-06-01T12:00:00Z': must be a number of seconds, as in a column time_s"),
     (HEAD + '0,1,,1\n', {}, "line 2: pitch_deg = '': must be a number"),
     (HEAD + '0,1,1,1\n1,1,1,1\n', {}, '2 rows, must be at least 4'),
+    (HEAD + 5 * '0,1,1,1\n', {}, '1 rows, must be at least 4, passed over 4 x row that repeats the row before'),
     (HEAD + ''.join(f'{t},1,1,1\n' for t in range(6)), {'start': 5.0},
      'ship.recorded.start = 5 s: must be below the length of the record, 5 s'),
     (HEAD + ''.join(f'{t},1,1,1\n' for t in range(recording.MAX_ROWS + 1)), {},

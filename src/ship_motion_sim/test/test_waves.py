@@ -7,7 +7,7 @@ from scipy import integrate, signal
 from pedestal_common.parameters import ParameterError
 from pedestal_common.text_files import csv_table
 from ship_motion_sim.params import HullParameters, ShipParameters
-from ship_motion_sim.sea import waves
+from ship_motion_sim.sea import motion, waves
 
 G = 9.81
 HULL = HullParameters()
@@ -193,6 +193,19 @@ def test_a_broken_spectrum_is_named(tmp_path, content, message):
     path.write_text(content)
     with pytest.raises(csv_table.TableError, match=f'{path}: {message}'):
         waves.build(measured(path))
+
+
+def test_a_spectrum_names_its_columns(tmp_path):
+    path = tmp_path / 'buoy.csv'
+    path.write_text('frequency [rad/s];density [m2 s/rad]\n' + '0,5;1\n' + 2 * '0,7;1\n')
+    assert motion.summary(measured(path)) == ('buoy.csv: columns frequency [rad/s] in rad/s, density [m2 s/rad] in '
+                                              'm2 s/rad: 2 rows, passed over 1 x row that repeats the row before',)
+    assert motion.summary(ShipParameters()) == ()
+
+
+def test_a_spectrum_has_no_effect_without_waves():
+    with pytest.raises(ParameterError, match="^spectrum = 'file': has no effect with motion = plain"):
+        measured('buoy.csv', motion='plain')
 
 
 def test_a_spectrum_needs_its_file_and_a_file_its_spectrum():

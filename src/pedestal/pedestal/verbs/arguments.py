@@ -83,17 +83,10 @@ def elements(options: argparse.Namespace) -> dict[str, str]:
 
 def ros_arguments(options: argparse.Namespace) -> list[str]:
     """Return the ROS 2 arguments for a node in the namespace of --namespace. Raises ValueError."""
-    from rclpy.exceptions import InvalidNamespaceException
-    from rclpy.validate_namespace import validate_namespace
     if not options.namespace:
         return []
-    name = f'/{options.namespace.strip("/")}'
-    try:
-        validate_namespace(name)
-    except InvalidNamespaceException:
-        raise ValueError(f'--namespace {options.namespace}: must be letters, digits and _, for example '
-                         'ship_1') from None
-    return ['--ros-args', '-r', f'__ns:={name}']
+    from pedestal_common.node import middleware
+    return ['--ros-args', '-r', f'__ns:={middleware.namespace("--namespace ", options.namespace) or "/"}']
 
 
 def add_remote(parser: argparse.ArgumentParser, commands: bool = True) -> None:
@@ -129,7 +122,13 @@ def add_workers(parser: argparse.ArgumentParser) -> None:
 
 
 def add_params_file(parser: argparse.ArgumentParser) -> None:
-    """Add --params-file FILE."""
-    parser.add_argument('--params-file', type=pathlib.Path, metavar='FILE',
+    """Add --params-file FILE, which may be repeated."""
+    parser.add_argument('--params-file', action='append', type=pathlib.Path, default=[], metavar='FILE',
                         help='ROS 2 parameter file whose values replace the values of the scenario, for example an '
-                        'output of `pedestal tune`; --param replaces both')
+                        'output of `pedestal tune`; may be repeated, the last value holds; --param replaces both')
+
+
+def changes(options: argparse.Namespace) -> list[str]:
+    """Return the texts 'node.key=value' of --params-file, then of --param. Raises ValueError."""
+    from pedestal_bringup.scenario import scenario
+    return [change for file in options.params_file for change in scenario.file_overrides(file)] + options.param

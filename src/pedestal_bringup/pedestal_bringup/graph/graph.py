@@ -3,7 +3,6 @@ import pathlib
 
 from pedestal_bringup.graph.processes import Graph
 from pedestal_bringup.graph.start import START_LEAD_TIME_S
-from ship_motion_sim.sea import motion
 
 
 def _free_bag(scenario):
@@ -26,14 +25,11 @@ def new_bag(given, scenario):
 
 
 def read_files(plan):
-    """Read the files of ship and target of a program.Plan before any node is started, and return the program tracks.
+    """Read the files of ship and target of a program.Plan before any node is started.
 
-    The property plan.tracks reads the file of the target. Raises ValueError, OSError for an invalid file.
+    Return (lines on the run, program tracks). Raises ValueError, OSError for an invalid file.
     """
-    scenario = plan.scenario
-    if 'ship_motion' in scenario.nodes:
-        motion.constants(scenario.node_parameters('ship_motion').ship)
-    return plan.tracks
+    return plan.announced(), plan.tracks
 
 
 def run(plan, bag, progress, servers=None):
@@ -43,7 +39,7 @@ def run(plan, bag, progress, servers=None):
     progress: a context with a function of the time of the run [s], which is called during the run. Raises RunError
     when the run cannot continue. The recording up to then stays readable.
     """
-    tracks = read_files(plan)
+    _, tracks = read_files(plan)
     with Graph(plan.scenario, bag, servers) as graph:
         graph.start_servers()
         if servers:

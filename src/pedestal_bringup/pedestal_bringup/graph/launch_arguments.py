@@ -51,7 +51,9 @@ def _number(given, name, number_type, description):
 
 def load_scenario(given):
     """Return the Scenario of the texts {argument: value}. Raises ValueError."""
-    changes = scenario.file_overrides(given['params_file'], given['namespace']) if given['params_file'] else ()
+    from pedestal_common.node import middleware  # loads rclpy, which --show-args does not need
+    namespace = middleware.namespace('namespace:=', given['namespace'])
+    changes = scenario.file_overrides(given['params_file'], namespace) if given['params_file'] else ()
     return scenario.load(given['scenario'], changes,
                          _number(given, 'seed', int, 'a whole number'),
                          _number(given, 'duration', float, 'a number of seconds'), given['pacing'] or None)
@@ -77,9 +79,9 @@ def _port(name, text):
 def prepare(given, chosen):
     """Compile the laws of a Scenario for realtime, and make the folder of its logs.
 
-    Return (ROS 2 parameter file of all nodes, the scenario as a file). Raises ValueError, RunError.
+    Return (lines on the run, ROS 2 parameter file of all nodes, the scenario as a file). Raises ValueError, RunError.
     """
-    graph.read_files(Plan(chosen))
+    lines, _ = graph.read_files(Plan(chosen))
     bag = graph.new_bag(given['bag'], chosen.name)
     if chosen.header.pacing == 'realtime':
         supervisor.prepare(chosen)
@@ -87,4 +89,4 @@ def prepare(given, chosen):
     files.write(parameters_of_all(chosen, bag, begins(chosen)))
     scenario_file = files.log / f'{chosen.name}.yaml'
     scenario_file.write_text(chosen.as_yaml())
-    return files.file, scenario_file
+    return lines, files.file, scenario_file

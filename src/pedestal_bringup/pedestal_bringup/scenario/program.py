@@ -8,6 +8,7 @@ import numpy as np
 from pedestal_bringup.scenario.scenario import Scenario
 from pedestal_common.geometry import orbit
 from pedestal_common.wire import messages
+from ship_motion_sim.sea import motion
 from tracking_receiver_sim import target
 from tracking_receiver_sim.path import arrival
 
@@ -66,12 +67,20 @@ class Plan:
             return {}
         return {f'{prefix}acu/program_track': program_message(*table) for prefix, table in self.tables.items()}
 
-    def announced(self):
-        """Return lines on changed values and on the targets of the beams, each once.
+    @functools.cached_property
+    def ship_summary(self):
+        """Lines on the file of the ship's motion, see motion.summary."""
+        if 'ship_motion' not in self.scenario.nodes:
+            return ()
+        return motion.summary(self.scenario.node_parameters('ship_motion').ship)
 
-        The lines of a target state what a flight is, when the target is highest, and when it rises and sets.
+    def announced(self):
+        """Return lines on changed values, on the file of the ship and on the targets of the beams, each once.
+
+        The lines of a target state what a flight is, when the target is highest, and when it rises and sets. Raises
+        csv_table.TableError for a file that cannot be used.
         """
-        lines = list(self.scenario.notes)
+        lines = [*self.scenario.notes, *self.ship_summary]
         for prefix, built in self.targets.items():
             lines += [*built.summary, *_sky(built, self._parameters(prefix).kind, self.scenario.header.duration)]
         return list(dict.fromkeys(lines))

@@ -98,6 +98,9 @@ class ScenarioParameters(parameters.Parameters):
 SECTION_NODES = tuple(node.name for node in nodes.NODES if node.module)
 """Nodes that can have a section in a scenario."""
 
+OPTIONAL_NODES = tuple(node.name for node in nodes.NODES if node.optional)
+"""Nodes that take part only on a ship."""
+
 BEAM_NODES = tuple(node.name for node in nodes.NODES if node.of_beam)
 """Nodes that each beam of an array has of its own."""
 
@@ -331,11 +334,17 @@ class Draft:
     sections: Sections
 
     def changed(self, overrides: Iterable[str]) -> 'Draft':
-        """Return the Draft changed by texts 'node.key=value'. Raises ScenarioError."""
+        """Return the Draft changed by texts 'node.key=value'. Raises ScenarioError, also for a node that takes no
+        part."""
         sections = {node: dict(values) for node, values in self.sections.items()}
-        for override in overrides:
-            node, key, value = parse_override(override)
+        changes = [parse_override(override) for override in overrides]
+        for node, key, value in changes:
             sections.setdefault(node, {})[key] = value
+        for node, key, value in changes:
+            absent = node in OPTIONAL_NODES and not sections['scenario'].get('ship')
+            if absent and parameters.without_ros({key: value}):
+                raise ScenarioError(f'scenario {self.name}: {node}.{key}: has no effect, because {node} takes no '
+                                    'part; scenario.ship = true adds it')
         return Draft(self.name, sections)
 
     @property
@@ -420,19 +429,17 @@ LIMIT_ENDS = (('low', 'lower', 1.0), ('high', 'upper', -1.0))
 def _narrow(sections: Sections, header: ScenarioParameters) -> tuple[str, ...]:
     """Set each limit of a control unit to that of the drive where the drive's is narrower. Return a line for each.
 
-    Only ends that the scenario sets in the drive or in the control unit are changed; two defaults stay as they are.
+    The defaults of both agree, so a scenario that gives no limit is not changed.
     """
-    drive, notes = nodes.row('adu', header.beam).parameters_type(), []
     if header.beam:
         return ()
+    drive, notes = nodes.row('adu').parameters_type(), []
     acu_defaults, drive_defaults = parameters.defaults(nodes.row('acu').parameters_type()), parameters.defaults(drive)
     for section in [section for section in sections if nodes.plain(section) == 'acu']:
         for axis, (end, drive_end, inward) in itertools.product(topics.AXES, LIMIT_ENDS):
             own, of_drive = f'{axis}.limits.{end}', f'{axis}.limits.{drive_end}'
-            values = _values_of(sections, section)
-            if own not in values and of_drive not in sections['adu']:
-                continue
-            wide, narrow = values.get(own, acu_defaults[own]), sections['adu'].get(of_drive, drive_defaults[of_drive])
+            wide = _values_of(sections, section).get(own, acu_defaults[own])
+            narrow = sections['adu'].get(of_drive, drive_defaults[of_drive])
             if inward * (narrow - wide) > 0.0:
                 sections[section][own] = narrow
                 notes.append(f'{section}.{own} = {wide:g} rad is wider than the travel of the drive: '

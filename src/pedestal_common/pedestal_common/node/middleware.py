@@ -7,8 +7,10 @@ import sys
 
 import rclpy
 from rclpy._rclpy_pybind11 import RCLError, RCLInvalidROSArgsError, UnknownROSArgsError
+from rclpy.exceptions import InvalidNamespaceException
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
+from rclpy.validate_namespace import validate_namespace
 
 from pedestal_common.graph import topics
 from pedestal_common.text_files import parameter_file
@@ -31,6 +33,19 @@ def message_class(type_name):
     """Return the rclpy class of 'package/msg/Name'."""
     package, _, name = type_name.split('/')
     return getattr(importlib.import_module(f'{package}.msg'), name)
+
+
+def namespace(option, name):
+    """Return the namespace of a name such as ship_1, with a slash before it; '' for none.
+
+    option: beginning of the error, such as '--namespace '. Raises ValueError.
+    """
+    place = f'/{name.strip("/")}'.rstrip('/')
+    try:
+        validate_namespace(place or '/')
+    except InvalidNamespaceException:
+        raise ValueError(f'{option}{name}: must be letters, digits and _, for example ship_1') from None
+    return place
 
 
 def set_defaults():

@@ -9,7 +9,9 @@ import contextlib
 import csv
 import io
 import itertools
+import pathlib
 import re
+import typing
 
 import numpy as np
 
@@ -34,6 +36,9 @@ MAX_HEAD_LINES = 2000
 SNIFFED_LINES = 10
 """Number of lines by which the separator is found."""
 
+REPEATED_ROW = 'row that repeats the row before'
+"""Name of the rows that are passed over because they repeat the row before them."""
+
 _DIGIT_FIRST_PATTERN = re.compile(r'[-+]?\.?\d', re.ASCII)
 _DECIMAL_COMMA_PATTERN = re.compile(r'[-+]?\d+,\d+(?:[eE][-+]?\d+)?', re.ASCII)
 
@@ -42,33 +47,46 @@ class TableError(ValueError):
     """Error of a file that is no such table; one line with file, line, column, value and allowed range."""
 
 
-def read(path, columns, least_rows=2, max_step=np.inf, step_name='its greatest step', optional=None) -> np.ndarray:
-    """Return the rows of a CSV file with a header, (n, k) in the order of columns {name: (low, high)}, then of the
-    optional columns, which are 0 where the file has none.
+class Rows(typing.NamedTuple):
+    """Rows of a table: numbers (n, k), and a line that names the columns that were taken and counts the rows."""
+    numbers: np.ndarray
+    description: str
+
+
+def read(path, columns, least_rows=2, max_step=np.inf, step_name='its greatest step', optional=None) -> Rows:
+    """Return the Rows of a CSV file with a header: numbers (n, k) in the order of columns {name: (low, high)}, then of
+    the optional columns, which are 0 where the file has none.
 
     A name ends with the unit of the values, as in time_s; the file may have another known unit, as in `time [min]`.
-    The first column grows from row to row, by at most max_step (called step_name in the error). Columns of other
-    names are ignored. Raises TableError.
+    The first column grows from row to row, by at most max_step (called step_name in the error). A row that repeats
+    the row before is passed over. Columns of other names are ignored. Raises TableError.
     """
     first, *_ = columns
     unit = first.partition('_')[2]
     limits = {**columns, **(optional or {})}
     rows = array.array('d')
-    width = len(limits)
+    width, repeated = len(limits), 0
     with opened(path) as table:
         there = {name: table.column(_columns.quantity(name), name in columns) for name in limits}
         for row in table:
-            rows.extend(table.number(column, row[column.name], *limits[name]) if column else 0.0
-                        for name, column in there.items())
-            step = rows[-width] - rows[-2 * width] if len(rows) > width else max_step
+            numbers = array.array('d', (table.number(column, row[column.name], *limits[name]) if column else 0.0
+                                        for name, column in there.items()))
+            if numbers == rows[-width:]:
+                repeated += 1
+                continue
+            step = numbers[0] - rows[-width] if rows else max_step
+            rows.extend(numbers)
             if len(rows) > MAX_CSV_ROWS * width:
                 raise too_long(path, table.line_num)
             if not 0.0 < step <= max_step:
-                raise bad_step(path, table.line_num, f'{first} = {rows[-width]:.10g}', step, unit, max_step,
-                               step_name)
-    if len(rows) < least_rows * width:
-        raise TableError(f'{path}: {len(rows) // width} rows, must be at least {least_rows}')
-    return np.array(rows).reshape(-1, width)
+                raise bad_step(path, table.line_num, f'{first} = {numbers[0]:.10g}', step, unit, max_step, step_name)
+    count = len(rows) // width
+    passed_over = f', passed over {repeated} x {REPEATED_ROW}' if repeated else ''
+    if count < least_rows:
+        raise TableError(f'{path}: {count} rows, must be at least {least_rows}{passed_over}')
+    described = ', '.join(column.described() for column in there.values() if column)
+    return Rows(np.array(rows).reshape(-1, width),
+                f'{pathlib.Path(path).name}: columns {described}: {count} rows{passed_over}')
 
 
 @contextlib.contextmanager
@@ -183,8 +201,15 @@ class Table:
         return f'{_columns.listed(self.fieldnames)} (separator {self.separator!r})'
 
     def number(self, column, cell, low, high):
-        """Return the number in a cell of a columns.Column, in the unit of its quantity, between low and high. Raises
-        TableError."""
+        """Return the number in a cell of a columns.Column, in the unit of its quantity, between low and high.
+
+        cell: None if the row ends before the column. Raises TableError.
+        """
+        if cell is None:
+            raise TableError(f'{self.path}: line {self.line_num}: the row ends before the column {column.name!r:.60}')
+        if column.unit == _columns.UTC and ':' in cell:
+            raise TableError(f'{self.path}: line {self.line_num}: {column.name} = {cell!r:.60}: must be a number of '
+                             'seconds, as in a column time_s, because only tracks have dates')
         return column.size * number(self.path, self.line_num, column.name, self.point(column.name, cell),
                                     low / column.size, high / column.size)
 

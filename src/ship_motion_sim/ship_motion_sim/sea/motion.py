@@ -61,6 +61,16 @@ def constants(params: ShipParameters) -> np.ndarray:
     return record
 
 
+def summary(params: ShipParameters) -> tuple[str, ...]:
+    """Return a line on the file of the motion, with the columns that were taken; () without a file.
+
+    Raises csv_table.TableError for a file that cannot be used.
+    """
+    if params.motion == 'recorded':
+        return (recording.read(params.recorded).description,)
+    return (waves.measured(params).description,) if params.spectrum == 'file' else ()
+
+
 def _put_components(record, sines):
     count = len(sines.frequency)
     record['frequency'][0, :count] = sines.frequency
@@ -71,7 +81,7 @@ def _put_components(record, sines):
 
 def _put_recorded(record, params):
     """Put a recording into record; return its mean yaw [rad]."""
-    times, freedoms = recording.read(params)
+    times, freedoms, _ = recording.read(params)
     mean = float(np.mean(freedoms[:, YAW]))
     freedoms[:, YAW] -= mean
     breaks, coefficients = recording.spline_with_ends(times, freedoms)

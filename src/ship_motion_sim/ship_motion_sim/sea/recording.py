@@ -13,6 +13,8 @@ Because the recorded values are taken as the truth, a noisy recording must be sm
 ship comes to rest within COME_TO_REST_TIME_S in the attitude of the nearest end: a quintic leads from value, rate and
 acceleration of this end to the same value at rest.
 """
+import typing
+
 import numpy as np
 
 from pedestal_common.compiled import compiled
@@ -34,13 +36,20 @@ DISPLACEMENT_RANGES = {'surge_m': (-1e3, 1e3), 'sway_m': (-1e3, 1e3), 'heave_m':
 """{column: (lowest, highest)}; the columns of DISPLACEMENT_RANGES may be missing."""
 
 
-def read(params):
-    """Return (times (n,) [s] from stamp 0 on, freedoms (n, 6)) of a RecordedParameters. Raises csv_table.TableError.
+class Recording(typing.NamedTuple):
+    """A recorded motion: times (n,) [s] from stamp 0 on, freedoms (n, 6), and csv_table.Rows.description.
 
     freedoms: surge, sway, heave [m], roll, pitch, yaw [rad], REP 103, yaw unwrapped.
     """
-    rows = csv_table.read(params.path, COLUMN_RANGES, MIN_ROWS, params.max_gap, 'ship.recorded.max_gap',
-                          DISPLACEMENT_RANGES)
+    times: np.ndarray
+    freedoms: np.ndarray
+    description: str
+
+
+def read(params) -> Recording:
+    """Return the Recording of a RecordedParameters. Raises csv_table.TableError."""
+    rows, description = csv_table.read(params.path, COLUMN_RANGES, MIN_ROWS, params.max_gap,
+                                       'ship.recorded.max_gap', DISPLACEMENT_RANGES)
     if len(rows) > MAX_ROWS:
         raise csv_table.TableError(f'{params.path}: {len(rows)} rows, must be at most {MAX_ROWS}: shorten '
                                    'the file or reduce its rate')
@@ -50,10 +59,10 @@ def read(params):
     if params.start >= length:
         raise csv_table.TableError(f'{params.path}: ship.recorded.start = {params.start:g} s: must be below the '
                                    f'length of the record, {length:.10g} s')
-    return time - time[0] - params.start, np.column_stack((
+    return Recording(time - time[0] - params.start, np.column_stack((
         *(column[name] for name in DISPLACEMENT_RANGES), np.radians(column['roll_deg']),
         -np.radians(column['pitch_deg']),
-        np.unwrap(np.radians(90.0 - column['heading_deg']))))
+        np.unwrap(np.radians(90.0 - column['heading_deg'])))), description)
 
 
 def spline_with_ends(times, freedoms):

@@ -114,6 +114,11 @@ def transfer(hull: HullParameters, w, mu, speed, gravity):
     return w_e, rao
 
 
+def measured(params: ShipParameters) -> csv_table.Rows:
+    """Return the Rows of the measured spectrum. Raises csv_table.TableError."""
+    return csv_table.read(params.spectrum_file, SPECTRUM_COLUMN_RANGES)
+
+
 def density(params: ShipParameters):
     """Return (w [rad/s], S [m2 s/rad]) of the sea state or the measured spectrum. Raises csv_table.TableError.
 
@@ -121,10 +126,10 @@ def density(params: ShipParameters):
     linearly between its rows.
     """
     if params.spectrum == 'file':
-        frequency, measured = csv_table.read(params.spectrum_file, SPECTRUM_COLUMN_RANGES).T
+        frequency, level = measured(params).numbers.T
         w = 2.0 * math.pi * frequency
         grid = np.linspace(w[0], w[-1], WAVE_COMPONENT_COUNT * _GRID_STEPS_PER_COMPONENT + 1)
-        return grid, np.interp(grid, w, measured / (2.0 * math.pi))
+        return grid, np.interp(grid, w, level / (2.0 * math.pi))
     hs, tp = SEA_STATES.get(params.sea_state, (params.significant_height, params.peak_period))
     grid = _grid(tp)
     return grid, spectrum(grid, hs, tp, params.gamma)

@@ -142,5 +142,5 @@ def _directions(path, rows, dated, form):
         raise csv_table.TableError(f'{path}: line {line[i]}: {apart[i - 1]:.3g} deg from the row above: must be at '
                                    f'most {MAX_STEP_DEG:g} deg')
     return Directions(path, line, t, azimuth, elevation, float(midnight) if dated else None,
-                      f'{form}: {len(t)} rows' + (f', passed over {(~fresh).sum()} x row that repeats the row before'
+                      f'{form}: {len(t)} rows' + (f', passed over {(~fresh).sum()} x {csv_table.REPEATED_ROW}'
                                                    if not fresh.all() else ''))

@@ -109,7 +109,7 @@ def main(options: argparse.Namespace) -> int:
 def _chosen(options: argparse.Namespace) -> 'Scenario | None':
     """Return the Scenario with the satellite, station and pass of the options; None after listing the passes."""
     from pedestal_bringup.scenario import scenario
-    changes = (scenario.file_overrides(options.params_file) if options.params_file else []) + options.param
+    changes = arguments.changes(options)
     duration = options.duration
     arguments.check_elements(options)
     if options.tle is options.station is options.which is None:

@@ -96,8 +96,7 @@ def main(options: argparse.Namespace) -> int:
 def _plans(options: argparse.Namespace) -> 'list[Plan]':
     """Return the Plan of the trials and, for a comparison, the Plan of the other side."""
     from pedestal_analysis.trials.plan import plan
-    from pedestal_bringup.scenario import scenario
-    changes = (*(scenario.file_overrides(options.params_file) if options.params_file else ()), *options.param)
+    changes = arguments.changes(options)
     first = plan(options.scenario, options.runs, options.vary, changes, options.seed, options.duration, options.sobol)
     if not (options.against or options.against_param):
         return [first]
