@@ -28,7 +28,12 @@ from pedestal_common.graph.graph_parameters import GraphParameters
 from pedestal_common.graph.steps import NS_PER_SECOND, SECONDS_PER_DAY, GraphError
 from pedestal_common.node import middleware
 from pedestal_common.node.diagnostics import Diagnostics
-from pedestal_common.node.subscriptions import LockstepSubscriber, TopicSubscriber, pair, subscribe
+from pedestal_common.node.subscriptions import (
+    LockstepSubscriber,
+    TopicSubscriber,
+    subscribe,
+    two_argument_callback,
+)
 from pedestal_common.realtime import utc
 from pedestal_common.wire import messages
 
@@ -233,7 +238,8 @@ class Shell(Node):
         if self.graph.lockstep:
             listener = LockstepSubscriber(self, link, ros_name, decode, take)
             self.create_subscription(middleware.message_class(link.type), ros_name,
-                                     pair(self._guarded(listener.callback)), middleware.qos(link.rate), raw=True)
+                                     two_argument_callback(self._guarded(listener.callback)),
+                                     middleware.qos(link.rate), raw=True)
         else:
             listener = TopicSubscriber(self, link, ros_name, decode, take)
             self.listeners.append(listener)
