@@ -49,7 +49,7 @@ def test_passes_of_a_station_in_the_south(capsys):
     (['run', 'leo_pass', '--param', 'tracking_receiver.target.track_file.path=flight.csv'],
      "target.track_file.path = 'flight.csv': has no effect with target.kind = leo_pass"),
     (['live', '--layouts', 'folder', '--port', '8765'], '--port: has no effect with --layouts'),
-    (['mode', 'preset', 'azimuth=0.1', '--az', '5'], '--az 5: azimuth is given twice'),
+    (['mode', 'preset', 'azimuth=0.1', '--az', '5'], 'azimuth 5 deg and azimuth=0.1: azimuth is given twice'),
     (['ask', 'offset', 'time=1', 'time=2'], "'time=2': time is given twice"),
     (['study', '--runs', '3'], '--runs: needs the NAME of a study'),
     (['tune', 'leo_pass', '--filter', 'imm', '--gain-margin', '7'], '--gain-margin 7: needs --loops'),
