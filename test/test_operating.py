@@ -1,5 +1,6 @@
 """By hand from a terminal: `pedestal status`, `mode`, `ask` and `operate` on a running realtime graph."""
 import json
+import math
 import os
 import pty
 import select
@@ -55,7 +56,12 @@ def test_one_shot_verbs_ask_wait_and_say(running, terminal, tmp_path):
     assert (said.returncode, said.stdout) == (0, 'acu: mode is preset\n'), said.stderr
     mode(client, 'preset')
     refused = terminal('mode', 'preset', '--el', '1000')
-    assert (refused.returncode, refused.stdout) == (1, 'acu: refused: outside limits; mode is preset\n')
+    assert refused.returncode == 1
+    assert refused.stdout.startswith('acu: refused: outside limits, elevation 1000.00 deg: must be -')
+    assert terminal('mode', 'preset', '20', '35').returncode == 0
+    assert client.heard['acu/mode'][-1].data == 'preset'
+    assert '30: must be azimuth and elevation [deg]' in terminal('mode', 'preset', '30').stderr
+    assert '--hold 5: must be' in terminal('mode', 'preset', '20', '35', '--hold', '5').stderr
     assert terminal('ask', 'take', '--who', 'anna').returncode == 0
     assert 'control is held by anna' in terminal('mode', 'program', '--who', 'bert').stdout
     assert terminal('mode', 'stop', '--who', 'bert').returncode == 0
@@ -67,6 +73,18 @@ def test_one_shot_verbs_ask_wait_and_say(running, terminal, tmp_path):
     assert rows['acu', 'mode'] == 'stop' and rows['acu', 'control'] == 'anna' and rows['acu', 'fallback'] == 'memory'
     assert rows['angle', 'elevation'] == pytest.approx(rows['commanded', 'elevation'], abs=0.2)
     assert terminal('ask', 'release', '--who', 'anna').returncode == 0
+    printed = json.loads(terminal('status', '--json').stdout)
+    assert ('acu', 'mode', 'stop') in [(row['case'], row['metric'], row['value']) for row in printed['rows']]
+
+
+def test_a_held_rate_lasts_as_long_as_the_program_and_no_longer(running, terminal):
+    _, client = running
+    client.until(lambda: client.heard['joint_states'])
+    began = client.heard['joint_states'][-1].position[0]
+    done = terminal('mode', 'rate', '--az', '0.5', '--hold', '2')
+    assert (done.returncode, done.stdout) == (0, 'acu: mode is rate\n'), done.stderr
+    client.until(lambda: abs(client.heard['joint_states'][-1].velocity[0]) < 1e-3)
+    assert client.heard['joint_states'][-1].position[0] - began > math.radians(0.5)  # at least half of the time
 
 
 @pytest.fixture

@@ -1,6 +1,7 @@
 """Hamlib's rotctl, gpredict's exact bytes and clients that misbehave, on a running realtime graph."""
 import contextlib
 import importlib.util
+import itertools
 import math
 import os
 import pathlib
@@ -14,6 +15,8 @@ import time
 
 import pytest
 from shared import begins_with, free_port
+
+from pedestal_common.wire import commands
 
 ROTCTL = shutil.which('rotctl')
 _SPEC = importlib.util.spec_from_file_location('rotator_gpredict',
@@ -166,6 +169,70 @@ def test_one_client_is_in_control_and_the_others_are_told_so(antenna):
         first.recv(10)
         time.sleep(0.5)
         assert granted(second, 'P 12 40')
+
+
+@pytest.fixture(params=('rotctld', 'easycomm'))
+def server(request, antenna, start_process):
+    """(name of a server, its port, its number as a model of rotctl)."""
+    run, client, port = antenna
+    if request.param == 'rotctld':
+        yield request.param, port, '2'
+        return
+    port = free_port()
+    command = [sys.executable, '-m', 'pedestal_operator.easycomm_node', '--ros-args', '-p', f'port:={port}']
+    node = start_process(command, ROS_DOMAIN_ID=str(run.domain_id))
+    with connected(port) as probe:
+        client.until(lambda: ask(probe, 'AZ GS').startswith(b'AZ'), 60.0)
+    yield request.param, port, '202'
+    node.send_signal(signal.SIGINT)
+    assert node.wait(30.0) == 0
+
+
+@pytest.mark.skipif(ROTCTL is None, reason='rotctl is not installed (libhamlib-utils)')
+def test_a_program_that_connects_for_each_set_point_is_one_program(antenna, server):
+    """rotctl, a process for each set-point. A busy machine may spoil the pace of some of them."""
+    _, client, _ = antenna
+    kind, port, model = server
+    if 'acu/command_result' not in client.heard:
+        client.read('acu/command_result')
+    heard = client.heard['acu/command_result']
+    heard.clear()
+
+    def presets():
+        """(name of the client, {argument: number}) of the set-points that were granted."""
+        return [(command.who, {name: float(text) for name, text in command.arguments.items()})
+                for command, reply in map(commands.of_reply, heard)
+                if command.verb == 'preset' and command.who.startswith(kind) and reply.granted]
+
+    def shot(azimuth):
+        """Send a set-point, and hear of it until the next is due, a second later."""
+        due = time.monotonic() + 1.0
+        subprocess.run([ROTCTL, '-m', model, '-r', f'127.0.0.1:{port}', 'P', str(azimuth), '40'], timeout=60.0,
+                       capture_output=True)
+        client.spin(max(due - time.monotonic(), 0.2))
+    azimuths = itertools.count()
+    client.until(lambda: shot(next(azimuths)) or any(arguments['azimuth_rate'] > 0.0 for _, arguments in presets()),
+                 60.0)
+    assert len({who for who, _ in presets()}) > 2
+    if kind == 'easycomm':                                                  # an angle that a line leaves out
+        far = next(azimuths) + 60
+        shot(far)
+        with connected(port) as half:
+            half.sendall(b'EL41.0\n')
+            client.until(lambda: presets()[-1][1]['elevation'] == pytest.approx(math.radians(41.0)), 60.0)
+        assert presets()[-1][1]['azimuth'] == pytest.approx(math.radians(far), abs=0.02)
+    with socket.create_connection(('127.0.0.1', port), 5.0, ('127.0.0.2', 0)) as other:
+        other.settimeout(10.0)
+
+        def is_refused():
+            shot(next(azimuths))
+            if kind == 'rotctld':
+                return ask(other, 'P 50 40') == b'RPRT -14\n'
+            other.sendall(b'AZ50 EL40\n')
+            return ask(other, 'GS') == b'GS8\n'
+        client.until(is_refused, 60.0)
+        if kind == 'rotctld':
+            assert ask(other, 'S') == b'RPRT 0\n' and granted(other, 'P 50 40')  # a stop ends the motion
 
 
 def test_clients_that_misbehave_disturb_nobody(antenna):

@@ -139,7 +139,8 @@ def test_one_row_is_a_preset(plant):
     assert plant.client.trigger('acu/standby')[0]
     plant.client.publish('acu/program_track', plant.program([(0.0, 0.3, 3.0)]))
     plant.step()
-    assert plant.client.trigger('acu/preset') == (False, 'refused: outside limits; mode is standby')
+    assert plant.client.trigger('acu/preset') == (
+        False, 'refused: outside limits, elevation 171.89 deg: must be -5.16 to 95.11 deg; mode is standby')
 
 
 def test_a_writer_that_does_not_latch_is_heard(plant):

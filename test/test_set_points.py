@@ -50,18 +50,26 @@ def test_refusals_of_the_control_unit_are_distinguished():
                            'refused': outcomes.OUTCOME_REFUSED}
 
 
-def test_set_points_at_a_pace_are_met_without_jerk():
-    """One each 0.8 s, 1 deg/s through north: from the eighth second on the axis goes at this rate."""
+@pytest.mark.parametrize('connects_anew', (False, True))
+def test_set_points_at_a_pace_are_met_without_jerk(connects_anew):
+    """One each 0.8 s, 1 deg/s through north: from the eighth second on the axis goes at this rate, also where each
+    set-point comes on a connection of its own."""
     loop = closed_loop.Loop(scenario.load('leo_pass', (
         *passes.IDLE, f'adu.initial_azimuth={math.radians(-7.0)}', f'adu.initial_elevation={math.radians(45.0)}'),
         None, 16.0, 'lockstep'))
-    ask = passes.server(loop.units['acu'])
+    remote = passes.Remote(loop.units['acu'])
+    control = Controller(remote)
 
     def watch(step):
         number, since = divmod(step, 160)
+        control.look(step / 200)
         if step and since == 0:
-            assert ask(f'P {(353.0 + 0.8 * number) % 360.0:.2f} 45.00', 0.8 * number) == b'RPRT 0\n'
-        return 160 - since
+            client = f'rotctld 4533 from 127.0.0.1:{5000 + number * connects_anew}'
+            pending = control.go(client, (353.0 + 0.8 * number) % 360.0, 45.0, step / 200)
+            assert pending.look(remote, step / 200) == outcomes.OUTCOME_DONE
+            if connects_anew:
+                control.leave(client)
+        return 10
     run = loop.run(watch=watch)
     joints, reference = run.table('joint_states'), run.table('acu/reference')
     late = joints['t'] > 8.0

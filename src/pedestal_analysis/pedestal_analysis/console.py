@@ -14,7 +14,7 @@ EXIT_DISTURBED = 3
 """Exit code of a run that was disturbed, for example by lost steps."""
 
 STDOUT_PATH = pathlib.Path('/dev/stdout')
-"""Path that --json - selects."""
+"""Path that --json without a file, or with -, selects."""
 
 MAX_NAME_COLUMNS, MAX_CELL_COLUMNS, MIN_SENTENCE_COLUMNS = 44, 24, 40
 """Widths of a list: largest width of the names, of the other cells, and smallest width of the sentences [columns].
@@ -76,10 +76,10 @@ def progress_of_trials():
 
 
 def add_json(parser):
-    """Add the option --json FILE to the parser of a verb that measures."""
+    """Add the option --json [FILE] to the parser of a verb that measures."""
     parser.add_argument('--json', type=lambda text: STDOUT_PATH if text == '-' else pathlib.Path(text), metavar='FILE',
-                        help='file for the results as JSON; -: JSON to standard output, all other output to standard '
-                        'error')
+                        nargs='?', const=STDOUT_PATH, help='file for the results as JSON; without FILE, or with -: '
+                        'JSON to standard output, all other output to standard error')
 
 
 def check_json(path):

@@ -5,19 +5,17 @@ import os
 import select
 import sys
 import termios
+import textwrap
 import time
 import tty
 
-from rich.columns import Columns
 from rich.console import Group
 from rich.live import Live
-from rich.panel import Panel
-from rich.table import Table
 from rich.text import Text
 
 from pedestal_common.graph import topics
 from pedestal_operator import state
-from pedestal_operator.rotator.controller import JOG_REPEAT_PERIOD_S
+from pedestal_operator.requests import JOG_REPEAT_PERIOD_S
 
 KEY_HOLD_S = 0.35
 """Time after the last press of a key during which the key counts as held [s].
@@ -30,7 +28,7 @@ JOG_RATES_DEG_S = (0.1, 0.5, 1.0, 2.0, 5.0)
 
 KEY_COMMANDS = {'s': ('stop', 'stop'), 'b': ('standby', 'standby'), 'w': ('stow', 'stow'), 'p': ('preset', 'preset'),
              'g': ('program', 'program'), 'a': ('autotrack', 'autotrack'), 't': ('take', 'take control'),
-             'r': ('release', 'release control'), 'c': ('acu/reset_faults', 'reset faults')}
+             'r': ('release', 'release control'), 'c': ('reset', 'reset faults')}
 """{key: (command, text on the screen)}."""
 
 ARROW_DIRECTIONS = {'\x1b[A': (0, 1), '\x1b[B': (0, -1), '\x1b[C': (1, 0), '\x1b[D': (-1, 0)}
@@ -41,6 +39,15 @@ QUIT_KEYS = ('q', '\x03', '\x04')
 
 ESCAPE_SEQUENCE_CHARS = 3
 """Length of the escape sequence of an arrow [characters]."""
+
+LEVEL_STYLES = {'': '', 'warn': 'yellow', 'bad': 'bold red'}
+"""{level of a state.Shown: style on the terminal}."""
+
+MAX_WRAPPED_LINES = 2
+"""Largest number of lines of a reply, and of the recommended action of an alarm."""
+
+VALUE_COLUMN_CHARS = 14
+"""Width of a column of values [characters]."""
 
 
 @contextlib.contextmanager
@@ -83,6 +90,8 @@ class Console:
             self.finished = True
         elif key in KEY_COMMANDS:
             self._request(KEY_COMMANDS[key][0])
+        elif key in ARROW_DIRECTIONS and self._refusal('rate'):
+            self.last_reply = f'jog: {self._refusal("rate")}'
         elif key in ARROW_DIRECTIONS:
             is_held = ARROW_DIRECTIONS[key] == self._jog and now - self._press_time < KEY_HOLD_S
             self._jog, self._press_time = ARROW_DIRECTIONS[key], now
@@ -103,31 +112,112 @@ class Console:
                 del self._pending[number]
                 self.last_reply = f'{verb}: {reply.text}'
 
-    def _request(self, verb, arguments=None):
-        self._pending[self._remote.request(verb, arguments)] = verb
+    def _refusal(self, verb):
+        """Return the reason of the present refusal of a command, '' without a known reason."""
+        holds_control = self._remote.diagnostics_of('acu').get('control', '') in ('', self._remote.who)
+        return state.refusals(self._remote, holds_control).get(verb, '')
 
-    def content(self):
-        """Return the content of the screen."""
-        rows = state.rows(self._remote)
-        groups = {}
-        for row in rows:
-            groups.setdefault(row.group, []).append(row)
-        panels = []
-        for group, members in groups.items():
-            table = Table.grid(padding=(0, 2))
-            for row in members:
-                table.add_row(row.name, Text(row.text, justify='right'), row.unit)
-            panels.append(Panel(table, title=group, padding=(0, 1)))
-        alarms = [Text(f'{node}: {text}', style='bold red') for node, text in state.alarms(self._remote)]
-        keys = '  '.join(f'[{key}] {doc}' for key, (_, doc) in KEY_COMMANDS.items())
-        return Group(Columns(panels), *alarms, Text(self.last_reply, style='bold'),
-                     Text(f'{keys}  [arrows] jog at {self.rate:g} deg/s  [+-] rate  [q] quit', style='dim'))
+    def _request(self, verb, arguments=None):
+        if reason := self._refusal(verb):
+            self.last_reply = f'{verb}: {reason}'
+        else:
+            self._pending[self._remote.request(verb, arguments)] = verb
+
+    def screen(self, width, height):
+        """Return the lines of the screen [Text], at most `height`.
+
+        Mode, first alarm, axes, reply and keys have their lines on every terminal of at least 60 x 20 characters.
+        Further alarms and reports of nodes fill the rest.
+        """
+        above = [*_header_lines(self._remote), *_alarm_lines(self._remote, width), *_axis_lines(self._remote),
+                 _receiver_line(self._remote)]
+        below = [*_wrapped(self.last_reply, width, 'bold'), *self._key_lines(width)]
+        between = _report_lines(self._remote)[:max(height - len(above) - len(below), 0)]
+        lines = [*above, *between, *below][:height]
+        for line in lines:
+            line.no_wrap, line.overflow = True, 'ellipsis'
+        return lines
+
+    def _key_lines(self, width):
+        """Return the keys and their commands; a command that would be refused is dim."""
+        cells = [Text(f'[{key}] {doc}', style='dim' if self._refusal(verb) else '')
+                 for key, (verb, doc) in KEY_COMMANDS.items()]
+        cells += [Text(f'[arrows] jog at {self.rate:g} deg/s', style='dim' if self._refusal('rate') else ''),
+                  Text('[+-] rate'), Text('[q] quit')]
+        lines = [cells[0]]
+        for cell in cells[1:]:
+            if lines[-1].cell_len + 2 + cell.cell_len <= width:
+                lines[-1] = Text.assemble(lines[-1], '  ', cell)
+            else:
+                lines.append(cell)
+        return lines
+
+
+def _header_lines(remote):
+    header = {name: (shown.text, LEVEL_STYLES[shown.level]) for name, shown in state.header(remote).items()}
+    mode = state.header(remote)['mode']
+    return [Text.assemble((mode.text.upper(), LEVEL_STYLES[mode.level] or 'bold'), '  ', header['reason']),
+            Text.assemble('drive ', header['drive']),
+            Text.assemble('link ', header['link'], '   loss of track ', header['fallback'], '   control ',
+                          header['control'])]
+
+
+def _alarm_lines(remote, width):
+    """Return the alarm to look at first, and the recommended action."""
+    first = state.first_alarm(remote)
+    if not remote.diagnostics_of('acu'):
+        return [Text('alarms unknown: the control unit is silent', style='bold red')]
+    if first is None:
+        return [Text('no alarm', style='dim')]
+    more = len(remote.alarms) - 1
+    name = f'{first["priority"].upper()} {first["name"]}: {first["detail"] or first["meaning"]}'
+    return [Text.assemble(f'{more} more alarms, first ' if more else '', (name, 'bold red')),
+            *_wrapped(f'-> {first["action"]}', width)]
+
+
+def _axis_lines(remote):
+    """Return the table of the axes."""
+    actual, commanded, rates = remote.angles('joint_states'), remote.angles('acu/reference'), remote.rates()
+    rows = {'actual [deg]': actual, 'commanded [deg]': commanded,
+            'error [deg]': [a - b for a, b in zip(commanded, actual)], 'rate [deg/s]': rates}
+    lines = [Text(f'{"":16}' + ''.join(f'{axis:>{VALUE_COLUMN_CHARS}}' for axis in topics.AXES), style='dim')]
+    lines += [Text(f'{name:16}' + ''.join(f'{_number(value):>{VALUE_COLUMN_CHARS}}' for value in values))
+              for name, values in rows.items()]
+    states = [(f'  {shown.text:>{VALUE_COLUMN_CHARS - 2}}', LEVEL_STYLES[shown.level])
+              for shown in state.axis_states(remote)]
+    return [*lines, Text.assemble(f'{"state":16}', *states)]
+
+
+def _receiver_line(remote):
+    x, y, level = (row.value for row in state.rows(remote) if row.group == 'receiver')
+    locked = remote.diagnostics_of('acu').get('locked') == '1'
+    return Text.assemble('receiver  ', ('locked', '') if locked else ('no lock', 'yellow'),
+                         f'  level {_number(level, 1)} dB-Hz  error {_number(x)} / {_number(y)} deg')
+
+
+def _report_lines(remote):
+    """Return the further alarms and the reports of the nodes."""
+    first = state.first_alarm(remote)
+    further = [each for each in map(state.alarm, remote.alarms) if first and each['name'] != first['name']]
+    return [*(Text(f'{each["priority"]} {each["name"]} ({each["state"]})', style='red') for each in further),
+            *(Text(f'{node}: {text}', style='yellow') for node, text in state.node_reports(remote))]
+
+
+def _wrapped(text, width, style=''):
+    """Return a text in one line, or in MAX_WRAPPED_LINES lines; the last one is cut at the width."""
+    lines = textwrap.wrap(text, width)
+    rest = ' '.join(lines[MAX_WRAPPED_LINES - 1:])
+    return [Text(line, style=style) for line in (*lines[:MAX_WRAPPED_LINES - 1], rest)][:max(len(lines), 1)]
+
+
+def _number(value, digits=4):
+    return '-' if math.isnan(value) else f'{value:.{digits}f}'
 
 
 def operate(session):
     """Run the console until the operator quits it."""
     console = Console(session)
-    with keyboard() as pressed, Live(console.content(), refresh_per_second=8, screen=False, transient=True) as live:
+    with keyboard() as pressed, Live(auto_refresh=False, screen=True) as live:
         last_draw_time = 0.0
         while not console.finished:
             session.spin(0.02)
@@ -137,4 +227,4 @@ def operate(session):
             console.update(now)
             if now - last_draw_time > 0.12:
                 last_draw_time = now
-                live.update(console.content())
+                live.update(Group(*console.screen(*live.console.size)), refresh=True)

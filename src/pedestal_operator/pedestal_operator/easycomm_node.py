@@ -96,7 +96,8 @@ class EasycommNode(ServerNode):
     def _point(self, client, angles, now):
         """Return the pending request of a set-point, (azimuth, elevation) [deg], None for an angle that is kept."""
         try:
-            before = client.set_point or self.controller.pointing.earth_angles()
+            last = None if client.refused else self.controller.pointing.set_point(now)
+            before = client.set_point or last or self.controller.pointing.earth_angles()
         except Refused as refused:
             return PendingRequest([], now, refused.outcome, refused.reason)
         set_point = tuple(angle if given is None else given for given, angle in zip(angles, before))

@@ -15,7 +15,7 @@ from pedestal_common.node.shell import Shell
 from pedestal_common.wire import commands, messages, records
 from pedestal_common.wire.commands import Reply
 from pedestal_operator.antenna import Antenna
-from pedestal_operator.requests import Requests
+from pedestal_operator.requests import JOG_REPEAT_PERIOD_S, Requests
 
 NUMBER_TOPICS = ('joint_states', 'acu/reference', 'tracking_receiver/angle_error')
 """Topics of numbers that every client receives."""
@@ -23,11 +23,11 @@ NUMBER_TOPICS = ('joint_states', 'acu/reference', 'tracking_receiver/angle_error
 TEXT_TOPICS = ('acu/mode', 'adu/state', 'acu/keyhole')
 """Topics of text that every client receives."""
 
-MAX_MESSAGE_AGE_S = 2.5
-"""Age after which the last message is stale [s]."""
-
 REPLY_TIMEOUT_S = 5.0
 """Longest wait for the reply to a command [s]."""
+
+DISCOVERY_MARGIN_S = 0.05
+"""Time for the discovery of this node by the commanded node [s], after its own discovery of that node."""
 
 RETRY_PERIOD_S = 1.0
 """Time without a reply after which a command is repeated [s], because discovery may have been incomplete."""
@@ -50,6 +50,7 @@ class Remote(Shell, Antenna):
     numbers   {topic: numbers of its last message in the order of `records`}
     texts     {topic: its last text}
     status    {node: its last DiagnosticStatus}
+    alarms    list of the DiagnosticStatus on acu/alarms
     arrivals  {topic or node: time of its last message [s, monotonic clock]}
     """
 
@@ -58,12 +59,13 @@ class Remote(Shell, Antenna):
         self.links = nodes.links(nodes.MAX_BEAMS if beam else 0)
         self.beam = f'{beam}/' if beam else ''
         self.who, self.node = who, nodes.row(node)
-        self.numbers, self.texts, self.status, self.arrivals = {}, {}, {}, {}
+        self.numbers, self.texts, self.status, self.arrivals, self.alarms = {}, {}, {}, {}, []
         self._requests = Requests(f'{os.getpid()}.{time.time_ns()}')
         for topic in NUMBER_TOPICS:
             self.subscribe_numbers(topic)
         for topic in TEXT_TOPICS:
             self.message_reader(topic, self._text_taker(topic))
+        self.message_reader('acu/alarms', self._take_alarms)
         self.message_reader('diagnostics', self._take_status)
         self.message_reader(self.node.replies, self._take_reply)
         self._send_command = self.writer(self.node.obeys)
@@ -80,6 +82,9 @@ class Remote(Shell, Antenna):
         def take(message):
             self.texts[topic], self.arrivals[topic] = message.data, time.monotonic()
         return take
+
+    def _take_alarms(self, array):
+        self.alarms = array.status
 
     def _take_status(self, array):
         for status in array.status:
@@ -106,9 +111,9 @@ class Remote(Shell, Antenna):
         """Return the Reply to a request once, None before it arrives."""
         return self._requests.replied(number)
 
-    def present(self, name, age=MAX_MESSAGE_AGE_S):
-        """Return True if the last message of a topic or node is younger than an age [s]."""
-        return name in self.arrivals and time.monotonic() - self.arrivals[name] < age
+    def age(self, name):
+        """Return the age of the last message of a topic or node [s], infinite before the first."""
+        return time.monotonic() - self.arrivals.get(name, -math.inf)
 
     def exists(self, name):
         """Return True if a topic has a publisher, or had one."""
@@ -177,7 +182,7 @@ class RemoteSession:
                           and remote.count_publishers(reply_topic) > 0, seconds):
             raise GraphError(f'no {remote.beam}{row.name} on ROS_DOMAIN_ID {remote.context.get_domain_id()} within '
                              f'{seconds:g} s: is a graph running?')
-        self.until(lambda: False, 0.2)  # time for the discovery of this node by the other one
+        self.until(lambda: False, DISCOVERY_MARGIN_S)
 
     def request(self, verb, arguments=None, seconds=REPLY_TIMEOUT_S) -> Reply:
         """Send a command and wait for the Reply. Raises GraphError after `seconds`."""
@@ -187,4 +192,18 @@ class RemoteSession:
             if time.monotonic() > deadline:
                 raise GraphError(f'{self.remote.node.name} did not reply to {verb} within {seconds:g} s')
             self.remote.repeat_request(number)
+        return reply
+
+    def hold_jog(self, verb, arguments, seconds) -> Reply:
+        """Repeat a jog for some seconds, then stop the axes; also after a stop of this program. Return the last Reply.
+
+        If the antenna has left the mode, its new mode stays.
+        """
+        end = time.monotonic() + seconds
+        try:
+            while (reply := self.request(verb, arguments)).granted and (left := end - time.monotonic()) > 0.0:
+                self.until(lambda: False, min(JOG_REPEAT_PERIOD_S, left))
+        finally:
+            if self.remote.texts.get('acu/mode') == verb:
+                self.request(verb)
         return reply

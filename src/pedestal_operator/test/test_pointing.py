@@ -12,13 +12,15 @@ class Remote:
     """Antenna at rest.
 
     fresh: topics whose last message is not stale; seen: topics that have, or had, a publisher;
-    limits: of the axes [rad], None before the reply; requests: verbs that were sent.
+    limits: of the axes [rad], None before the reply; requests: verbs that were sent; senders: their clients;
+    arguments: of the last one.
     """
 
     def __init__(self):
         self.fresh, self.seen, self.limits = {'joint_states'}, {'joint_states'}, [-4.0, 4.0, 0.0, 1.5]
         self.numbers = {pointing.ATTITUDE_TOPIC: (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)}
         self.joints, self.requests, self.who, self.texts = (10.0, 20.0), [], '', {}
+        self.senders, self.arguments = [], None
 
     def subscribe_numbers(self, topic):
         pass
@@ -44,6 +46,8 @@ class Remote:
 
     def request(self, verb, arguments=None):
         self.requests.append(verb)
+        self.senders.append(self.who)
+        self.arguments = arguments
         return len(self.requests)
 
     def replied(self, number):
@@ -120,3 +124,81 @@ def test_no_reply_has_a_reason(remote, control):
     assert pending.reason == 'the control unit did not reply within 1.5 s'
     assert refusal(control, 31.0, 40.0)[0] is None
     assert control.go('b', 30.0, 40.0, 0.0).reason == 'control is held by a'
+
+
+HOST, OTHER_HOST = 'rotctld 4533 from 127.0.0.1', 'rotctld 4533 from 127.0.0.2'
+
+
+def send(remote, control, clients):
+    """Send a set-point a second, 1 deg apart, each from the next client, which leaves when the next is another one."""
+    remote.texts['acu/mode'] = 'preset'
+    for second, (client, following) in enumerate(zip(clients, (*clients[1:], ''))):
+        control.look(second)
+        assert control.go(client, 10.0 + second, 40.0, second).outcome is None
+        if client != following:
+            control.leave(client)
+
+
+@pytest.fixture
+def one_shots(remote, control):
+    """Send set-points, each from a connection of HOST that ends at once; the time of the last."""
+    send(remote, control, [f'{HOST}:{port}' for port in range(5)])
+    return 4.0
+
+
+def test_connections_of_one_host_in_sequence_are_one_motion(remote, control, one_shots):
+    connected = Remote()
+    send(connected, Controller(connected), [f'{HOST}:1'] * 5)
+    assert remote.arguments == connected.arguments and remote.arguments['moves'] == 1.5
+    assert remote.requests == ['take', 'preset', *['release', 'take', 'preset'] * 4]
+    assert remote.senders[-3:] == [f'{HOST}:3', f'{HOST}:4', f'{HOST}:4']
+    assert control.pointing.set_point(one_shots) == (14.0, 40.0)
+
+
+@pytest.mark.parametrize('client', (f'{OTHER_HOST}:5', 'rotctld 4533 from ::1:5', 'easycomm /dev/ttyUSB0'))
+def test_another_host_is_refused_until_the_motion_has_ended(remote, control, one_shots, client):
+    sent = len(remote.requests)
+    refused = control.go(client, 30.0, 40.0, one_shots + 1.0)
+    assert (refused.outcome, refused.reason) == (outcomes.OUTCOME_BUSY, f'control is held by {HOST}:4')
+    control.look(one_shots + 2.9)
+    assert len(remote.requests) == sent and control.holder == f'{HOST}:4'
+    control.look(one_shots + 3.1)
+    assert remote.requests[sent:] == ['preset', 'release'] and remote.senders[sent:] == [f'{HOST}:4'] * 2
+    assert control.holder == '' and control.go(client, 30.0, 40.0, one_shots + 3.2).outcome is None
+
+
+def test_a_connected_client_in_control_is_not_replaced_by_its_own_host(control, one_shots):
+    assert control.go(f'{HOST}:6', 15.0, 40.0, one_shots + 1.0).outcome is None
+    assert control.go(f'{HOST}:7', 16.0, 40.0, one_shots + 2.0).outcome == outcomes.OUTCOME_BUSY
+    control.leave(f'{HOST}:7')
+    assert control.holder == f'{HOST}:6'
+
+
+def test_a_late_set_point_begins_a_new_motion(remote, control, one_shots):
+    control.look(one_shots + 4.0)
+    assert control.pointing.set_point(one_shots + 4.0) is None
+    assert control.go(f'{HOST}:6', 15.0, 40.0, one_shots + 4.0).outcome is None
+    assert remote.requests[-2:] == ['take', 'preset'] and remote.arguments['moves'] == 0.0
+
+
+def test_a_stop_ends_the_motion_and_the_control_of_a_client_that_has_left(remote, control, one_shots):
+    sent = len(remote.requests)
+    control.stop(f'{OTHER_HOST}:5', one_shots + 0.5)
+    control.look(one_shots + 0.6)
+    assert remote.requests[sent:] == ['stop', 'release'] and control.holder == ''
+    assert remote.senders[sent:] == [f'{OTHER_HOST}:5', f'{HOST}:4']
+
+
+def test_a_jog_ends_with_its_connection(remote, control):
+    control.jog(f'{HOST}:1', (1.0, 0.0), 0.0)
+    control.leave(f'{HOST}:1')
+    control.look(0.005)
+    assert remote.requests == ['take', 'rate', 'stop', 'release'] and control.holder == ''
+
+
+def test_a_server_that_ends_releases_the_control_of_a_client_that_has_left(remote, control, one_shots):
+    control.release(one_shots + 0.5)
+    assert remote.requests[-2:] == ['preset', 'release'] and remote.arguments is None and control.holder == ''
+    sent = len(remote.requests)
+    control.release(one_shots + 0.6)
+    assert len(remote.requests) == sent

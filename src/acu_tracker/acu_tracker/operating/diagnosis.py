@@ -47,6 +47,17 @@ def missing(unit, name):
     return f'{topic}: {", ".join(absent)} missing' if absent else ''
 
 
+def beyond_limits(parameters, angles):
+    """Return the text of the axes whose deck angles [rad] are outside the limits of AcuParameters; else of the floor.
+    """
+    outside = [f'{axis} {math.degrees(angle):.2f} deg: must be {math.degrees(limits.low):.2f} to '
+               f'{math.degrees(limits.high):.2f} deg'
+               for axis, angle in zip(topics.AXES, angles)
+               if not (limits := getattr(parameters, axis).limits).low <= angle <= limits.high]
+    azimuth, elevation = (f'{math.degrees(angle):.2f} deg' for angle in angles)
+    return ', '.join(outside) or f'elevation {elevation} is below the parameter floor at azimuth {azimuth}'
+
+
 def of(unit):
     """Return the Diagnosis of an Acu."""
     state, outputs = unit.parts['state'], unit.parts['outputs']

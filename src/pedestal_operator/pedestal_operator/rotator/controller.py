@@ -1,10 +1,13 @@
 """Control of the antenna by programs, independent of their protocol.
 
-One program at a time is in control. Set-points become a motion. A jog lasts until its program leaves.
+One program at a time is in control. Set-points become a motion. A jog lasts until its program leaves. A program with
+a connection for each set-point stays in control until its motion ends.
 """
 import math
 
 from pedestal_common.wire.commands import HELD_REFUSAL, LIMITS_REFUSAL, RANGE_REFUSAL
+from pedestal_operator.requests import JOG_REPEAT_PERIOD_S
+from pedestal_operator.rotator.line_server import address_of
 from pedestal_operator.rotator.outcomes import (
     OUTCOME_BUSY,
     OUTCOME_DONE,
@@ -20,9 +23,6 @@ CLIENT_REPLY_TIMEOUT_S = 1.5
 
 CONTROL_TIMEOUT_S = 10.0
 """Time without a command of a client after which its control is released [s]."""
-
-JOG_REPEAT_PERIOD_S = 0.2
-"""Period of the repetition of a jog [s], less than half of the jog timeout of the control unit."""
 
 
 class PendingRequest:
@@ -64,12 +64,12 @@ class Controller:
     def __init__(self, remote):
         self._remote = remote
         self.pointing = Pointing(remote)
-        self._holder, self._last_command_time = '', 0.0
+        self._holder, self._has_left, self._last_command_time = '', False, 0.0
         self._jog, self._last_jog_time, self._was_jogging = None, 0.0, False
 
     @property
     def holder(self):
-        """Name of the client in control, '' without one."""
+        """Name of the client in control, '' without one. A client that has left stays in control of its motion."""
         return self._holder
 
     def go(self, client, azimuth, elevation, now) -> PendingRequest:
@@ -105,24 +105,38 @@ class Controller:
         if self._was_jogging and not is_jogging:
             self._jog = None  # another mode was commanded
         self._was_jogging = is_jogging
+        if (self._has_left and not self.pointing.continues(now)
+                or now - self._last_command_time > CONTROL_TIMEOUT_S):
+            self.release(now)
         if self._jog and now - self._last_jog_time >= JOG_REPEAT_PERIOD_S:
             self._last_jog_time = self._last_command_time = now
             self._remote.request('rate', _rates(self._jog))
-        if self._holder and now - self._last_command_time > CONTROL_TIMEOUT_S:
-            self.leave(self._holder, now)
 
-    def leave(self, client, now):
-        """Stop the jog of a client that has left, and release its control."""
-        if client != self._holder:
+    def leave(self, client):
+        """Note that a client has left. Its control is released as soon as its motion has ended."""
+        if client == self._holder:
+            self._has_left = True
+
+    def release(self, now):
+        """Stop the jog or the motion of the client in control, and release its control."""
+        if not self._holder:
             return
-        self._remote.who = client
+        self._remote.who = self._holder
         if self._jog:
             self._remote.request('stop')
         self.pointing.settle(now)
-        self._jog, self._holder = None, ''
+        self._jog = None
+        self._release()
+
+    def _release(self):
+        """Release control, and leave the motion as it is."""
+        self._remote.who = self._holder
+        self._holder, self._has_left = '', False
         self._remote.request('release')
 
     def _request(self, client, now, send, continues=True):
+        if self._has_left and address_of(client) == address_of(self._holder):
+            self._release()  # the same program on a new connection: its motion continues
         if self._holder not in ('', client):
             return PendingRequest([], now, OUTCOME_BUSY, f'{HELD_REFUSAL} {self._holder}')
         if not continues:

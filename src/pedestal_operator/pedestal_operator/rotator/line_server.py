@@ -21,6 +21,11 @@ READ_CHUNK_BYTES = 65_536
 """Largest size of one read [bytes]."""
 
 
+def address_of(name):
+    """Return the name of a client without its TCP port. All connections from one address have this name in common."""
+    return name.rsplit(':', 1)[0]
+
+
 class Lines:
     """Splitter of bytes into lines of at most `longest` bytes; a longer line is dropped."""
 

@@ -59,8 +59,19 @@ class Pointing:
     def look(self, now):
         """Take the limits of the control unit, and settle if no set-point has followed the last one."""
         self._query.look()
-        if not self._filter.continues(now):
+        if not self.continues(now):
             self.settle(now)
+
+    def continues(self, now):
+        """Return True if a set-point at the time now [s] continues the motion."""
+        return self._filter.continues(now)
+
+    def set_point(self, now):
+        """Return the last set-point (azimuth, elevation) [deg] of the motion, None if no motion continues."""
+        if not self.continues(now):
+            return None
+        azimuth, elevation = self._filter.set_point
+        return azimuth % 360.0, elevation
 
     def earth_angles(self):
         """Return earth angles (azimuth, elevation) [deg] of the antenna. Raises Refused if they are stale."""
@@ -87,7 +98,7 @@ class Pointing:
         self._check('azimuth', azimuth, -MAX_AZIMUTH_DEG, MAX_AZIMUTH_DEG)
         self._check('elevation', elevation, low, high)
         self.earth_angles()
-        near = (self._filter.set_point if self._filter.continues(now) else self._remote.angles('joint_states'))[0]
+        near = (self._filter.set_point if self.continues(now) else self._remote.angles('joint_states'))[0]
         if self.on_ship:
             return near + (azimuth - near + 180.0) % 360.0 - 180.0, elevation
         turned = turn(azimuth, near, limits.azimuth)

@@ -54,7 +54,7 @@ class ServerNode(Remote):
         for client in self._server.clients:
             self.serve(client, now)
         for client in self._server.send():
-            self.controller.leave(client.name, now)
+            self.controller.leave(client.name)
             dropped = f'{client.dropped} answers dropped, because they were not read' if client.dropped else ''
             if client.gone or dropped:
                 self.get_logger().warning(f'{client.name}: {", ".join(filter(None, (client.gone, dropped)))}')
@@ -84,7 +84,6 @@ class ServerNode(Remote):
 
     def close(self):
         """Release the control of the clients, and close the port, then the node."""
-        if self.controller.holder:
-            self.controller.leave(self.controller.holder, time.monotonic())
+        self.controller.release(time.monotonic())
         self._server.close()
         super().close()

@@ -42,8 +42,9 @@ def pairs(texts: Iterable[str]) -> dict[str, str | float]:
     return given
 
 
-def send_command(options: argparse.Namespace, verb: str, given: Mapping[str, str | float], node: str = 'acu') -> int:
-    """Send a command to a node and print its reply. Return the exit code."""
+def send_command(options: argparse.Namespace, verb: str, given: Mapping[str, str | float], node: str = 'acu',
+                 hold: float | None = None) -> int:
+    """Send a command to a node and print its reply. Return the exit code. hold: time of its repetition [s]."""
     from pedestal_common.graph import nodes
     commanded = [row.name for row in nodes.NODES if row.obeys]
     if node not in commanded:
@@ -51,5 +52,7 @@ def send_command(options: argparse.Namespace, verb: str, given: Mapping[str, str
     with arguments.remote(options, node) as spun:
         spun.wait_for_node(options.timeout)
         reply = spun.request(verb, given, options.timeout)
+        if hold and reply.granted:
+            reply = spun.hold_jog(verb, given, hold)
     print(f'{node}: {reply.text}')
     return 0 if reply.granted else 1

@@ -17,18 +17,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(options: argparse.Namespace) -> int:
     """Wait for the state of the control unit and print it. Return the exit code."""
-    import json
-
+    from pedestal_analysis import console
     from pedestal_operator import state
+    console.check_json(options.json)
     with arguments.remote(options) as spun:
         spun.wait_for_node(options.timeout)
         name = spun.remote.beam + 'acu'
         spun.until(lambda: spun.remote.present(name) and spun.remote.present('joint_states'), options.timeout)
-        rows, alarms = state.rows(spun.remote), state.alarms(spun.remote)
-    if options.json:
-        table = [{'case': row.group, 'metric': row.name, 'value': row.value, 'unit': row.unit} for row in rows]
-        table += [{'case': 'alarm', 'metric': node, 'value': text, 'unit': ''} for node, text in alarms]
-        options.json.write_text(json.dumps({'name': 'status', 'rows': table}, indent=1) + '\n')
+        rows, alarms = state.rows(spun.remote), state.node_reports(spun.remote)
+    table = [{'case': row.group, 'metric': row.name, 'value': row.json, 'unit': row.unit} for row in rows]
+    table += [{'case': 'alarm', 'metric': node, 'value': text, 'unit': ''} for node, text in alarms]
+    console.write_json(options.json, {'name': 'status', 'rows': table})
     for row in rows:
         print(f'{row.group:10} {row.name:22} {row.text:>14} {row.unit}'.rstrip())
     for node, text in alarms:

@@ -1,0 +1,168 @@
+"""State of the antenna as the page, the console and `pedestal status` show it, and the screen of the console."""
+import math
+import types
+
+import pytest
+
+from pedestal_common.wire import messages
+from pedestal_operator import console, state
+from pedestal_operator.antenna import Antenna
+from pedestal_operator.page import page_security
+from pedestal_operator.requests import Requests
+
+HEALTHY = {'mode': 'rate', 'reason': 'command', 'fallback': 'coast', 'control': '', 'drive': 'enabled',
+           'coasting': '0', 'azimuth limit_s': '12.4', 'elevation limit_s': 'inf'}
+
+FAULT = {'drive': 'fault: azimuth encoder jump, azimuth following error, elevation encoder disagreement',
+         'control': 'berta@page 127.0.0.1', 'refused tle': 'no elements'}
+REPLY = 'reset: refused: the cause of uncommanded motion is still there, and the antenna has not come to rest yet'
+
+
+def alarm(name, condition, cause=''):
+    values = {'state': condition, 'priority': 'high', 'cause': cause, 'action': f'mend {name}', 'raised_s': '3.000'}
+    return types.SimpleNamespace(name=name, message=f'meaning of {name}', values=[
+        messages.KeyValue(key=key, value=value) for key, value in values.items()])
+
+
+class Station(Antenna):
+    """An antenna whose messages and their ages [s] a test chooses."""
+
+    def __init__(self, diagnostics=None, alarms=(), rates=(0.0, 0.0), ages=None):
+        self.beam, self.texts, self.alarms = '', {}, list(alarms)
+        self._ages = {'acu': 0.1, 'adu': 0.1, 'joint_states': 0.0} | (ages or {})
+        self.numbers = {'joint_states': (0.5, 0.6, *map(math.radians, rates))}
+        values = [messages.KeyValue(key=key, value=value)
+                  for key, value in {**HEALTHY, **(diagnostics or {})}.items()]
+        self.status = {'acu': types.SimpleNamespace(values=values, level=0, message='rate (command)'),
+                       'adu': types.SimpleNamespace(values=[], level=0, message='enabled')}
+        self.status = {name: status for name, status in self.status.items() if self._ages[name] < math.inf}
+
+    def age(self, name):
+        return self._ages.get(name, math.inf)
+
+
+def test_a_healthy_antenna():
+    header = state.header(Station())
+    assert {name: shown.text for name, shown in header.items()} == {
+        'mode': 'rate', 'reason': 'command', 'drive': 'enabled', 'control': 'none', 'fallback': 'coast',
+        'link': 'live'}
+    assert all(shown.level == '' for shown in header.values())
+    assert state.axis_states(Station(rates=(0.0, 0.3))) == [('limit in 12 s', 'warn'), ('moving', '')]
+    assert state.axis_states(Station({'elevation limited': 'rate'}))[1] == ('rate limited', 'warn')
+    assert state.first_alarm(Station()) is None and state.node_reports(Station()) == []
+    assert state.header(Station({'coasting': '1'}))['reason'].text == 'command, coasting'
+
+
+@pytest.mark.parametrize('drive, ages', [('silent', {'joint_states': 0.9}), ('enabled', {'joint_states': 5.2}),
+                                         ('unknown', {'joint_states': math.inf})])
+def test_a_silent_drive_is_silent_in_every_place(drive, ages):
+    """Also before the control unit reports the silence, and before the first angle arrived."""
+    station = Station({'drive': drive, 'azimuth limit_s': '0.0'}, ages=ages)
+    header = state.header(station)
+    assert header['link'] == ('no adu', 'bad')
+    assert state.axis_states(station) == [('silent', 'bad')] * 2
+    assert header['drive'] == {'silent': ('silent for 1 s', 'bad'), 'enabled': ('silent for 5 s', 'bad'),
+                               'unknown': ('unknown', 'bad')}[drive]
+
+
+def test_a_silent_control_unit_has_no_mode_and_no_commands():
+    station = Station({'control': 'anna@page 127.0.0.1'}, ages={'acu': 12.2})
+    header = state.header(station)
+    assert header['mode'] == ('unknown', 'bad') and header['reason'] == ('last: rate, 12 s ago', 'bad')
+    assert header['link'] == ('no ACU', 'bad') and header['control'] == ('unknown', 'bad')
+    for holds in (True, False):
+        assert state.refusals(station, holds) == dict.fromkeys(state.OPERATOR_COMMANDS, 'the control unit is silent')
+    assert ('acu', 'silent') in state.node_reports(station)
+    assert state.header(Station(ages={'acu': math.inf, 'adu': math.inf}))['drive'] == ('unknown', 'bad')
+
+
+@pytest.mark.parametrize('control, holds, may_take, expected', [
+    ('', True, False, {'release': 'control is free', 'tle': 'no elements'}),
+    ('anna', True, False, {'take': 'you are in control', 'tle': 'no elements'}),
+])
+def test_the_holder_is_refused_by_the_mode_only(control, holds, may_take, expected):
+    assert state.refusals(Station({'control': control, 'refused tle': 'no elements'}), holds, may_take) == expected
+
+
+def test_another_client_may_command_standby_and_a_supervisor_may_take_control():
+    station = Station({'control': 'anna', 'refused tle': 'no elements'})
+    refused, supervisor = state.refusals(station, False), state.refusals(station, False, may_take=True)
+    assert set(state.OPERATOR_COMMANDS) - set(refused) == {'standby'}
+    assert set(state.OPERATOR_COMMANDS) - set(supervisor) == {'standby', 'take'}
+    assert set(refused.values()) == {'held by anna'}
+
+
+def test_a_monitor_may_send_no_command_of_the_list():
+    assert set(page_security.refusals('monitor')) == set(state.OPERATOR_COMMANDS)
+    assert page_security.refusals('operator') == page_security.refusals('supervisor') == {}
+
+
+def test_the_first_alarm_is_the_first_unacknowledged_one():
+    listed = [alarm('drive fault', 'acknowledged'), alarm('signal lost', 'unacknowledged', 'drive fault'),
+              alarm('INS lost', 'shelved')]
+    first = state.first_alarm(Station(alarms=listed))
+    assert (first['name'], first['action'], first['raised_s']) == ('signal lost', 'mend signal lost', 3.0)
+    assert state.first_alarm(Station(alarms=listed[:1]))['name'] == 'drive fault'
+    assert state.first_alarm(Station(alarms=listed[2:])) is None
+
+
+class Remote(Station):
+    """A Station that keeps the requests of a console."""
+
+    def __init__(self, *arguments, **named):
+        super().__init__(*arguments, **named)
+        self.who, self._requests, self.sent = 'anna', Requests('test'), []
+
+    def request(self, verb, arguments=None):
+        self.sent.append(verb)
+        return self._requests.add(verb, self.who, arguments).number
+
+    def replied(self, number):
+        return self._requests.replied(number)
+
+
+def made(*arguments, **named):
+    """(Remote, its Console)"""
+    remote = Remote(*arguments, **named)
+    return remote, console.Console(types.SimpleNamespace(remote=remote))
+
+
+def texts(shown, size):
+    lines = [line.plain for line in shown.screen(*size)]
+    assert len(lines) <= size[1]
+    return '\n'.join(line[:size[0]] for line in lines)
+
+
+@pytest.mark.parametrize('size', [(80, 24), (60, 20)])
+@pytest.mark.parametrize('first', ['drive fault', 'an alarm with a long name and a long meaning'])
+def test_mode_alarm_reply_and_keys_are_on_every_screen(size, first):
+    listed = [alarm(first, 'unacknowledged'), *(alarm(f'signal lost {i}', 'acknowledged', first) for i in range(9))]
+    _, shown = made(FAULT, alarms=listed)
+    shown.last_reply = REPLY
+    text = texts(shown, size)
+    assert text.startswith('RATE  command\n') and f'9 more alarms, first HIGH {first[:20]}' in text
+    assert f'-> mend {first}' in text.replace('\n', ' ') and 'has not come to rest yet' in text.replace('\n', ' ')
+    for key, (_, doc) in console.KEY_COMMANDS.items():
+        assert f'[{key}] {doc}' in text
+    assert '[q] quit' in text and 'drive fault: azimuth encoder jump' in text and 'control berta' in text
+
+
+def test_a_silent_control_unit_is_not_shown_as_healthy():
+    text = texts(made(ages={'acu': 12.3})[1], (60, 20))
+    assert text.startswith('UNKNOWN  last: rate, 12 s ago\n') and 'alarms unknown' in text and 'no alarm' not in text
+
+
+def test_a_silent_drive_has_no_angles_of_now():
+    text = texts(made({'drive': 'silent'}, ages={'joint_states': 4.0})[1], (60, 20))
+    assert 'drive silent for 4 s' in text and 'link no adu' in text and text.count('silent') == 3
+
+
+@pytest.mark.parametrize('key, command, control, sent', [
+    ('s', 'stop', 'berta', True), ('b', 'standby', 'berta', True), ('g', 'program', 'berta', False),
+    ('g', 'program', '', True), ('g', 'program', 'anna', True), ('\x1b[A', 'rate', 'x', False)])
+def test_a_key_whose_command_would_be_refused_shows_the_reason_instead(key, command, control, sent):
+    remote, shown = made({'control': control})
+    shown.press(key, 1.0)
+    shown.update(1.0)
+    assert remote.sent == [command] * sent
+    assert shown.last_reply == ('' if sent else f'{"jog" if command == "rate" else command}: held by {control}')
