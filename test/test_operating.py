@@ -15,6 +15,11 @@ from pedestal_common.wire import commands, messages
 from pedestal_recording import bag as bags
 
 ARROW_RIGHT = b'\x1b[C'
+ISS = {'OBJECT_NAME': 'ISS (ZARYA)', 'OBJECT_ID': '1998-067A', 'CENTER_NAME': 'EARTH', 'REF_FRAME': 'TEME',
+       'TIME_SYSTEM': 'UTC', 'MEAN_ELEMENT_THEORY': 'SGP4', 'EPOCH': '2019-12-09T16:38:29.363424',
+       'MEAN_MOTION': '15.50103472', 'ECCENTRICITY': '0.0007417', 'INCLINATION': '51.6439',
+       'RA_OF_ASC_NODE': '211.2001', 'ARG_OF_PERICENTER': '17.6667', 'MEAN_ANOMALY': '85.6398', 'EPHEMERIS_TYPE': '0',
+       'NORAD_CAT_ID': '25544', 'BSTAR': '0.000038792', 'MEAN_MOTION_DOT': '0.00001764', 'MEAN_MOTION_DDOT': '0'}
 BURST = tuple(str(number) for number in range(40))
 
 
@@ -67,6 +72,12 @@ def test_one_shot_verbs_ask_wait_and_say(running, terminal, tmp_path):
     assert terminal('mode', 'stop', '--who', 'bert').returncode == 0
     mode(client, 'stop')
     assert terminal('ask', 'fallback', 'mode=memory', '--who', 'anna').returncode == 0
+    elements = tmp_path / 'iss.omm'
+    elements.write_text('CCSDS_OMM_VERS = 2.0\n' + ''.join(f'{key} = {value}\n' for key, value in ISS.items()))
+    assert terminal('ask', 'elements', '--tle', str(elements), '--who', 'anna').stdout == (
+        'acu: elements of satellite 25544\n')
+    refused = terminal('mode', 'tle', '--tle', str(elements), '--who', 'anna')
+    assert refused.returncode == 1 and refused.stdout.startswith('acu: refused: ')
     file = tmp_path / 'status.json'
     terminal('status', '--json', str(file))
     rows = {(row['case'], row['metric']): row['value'] for row in json.loads(file.read_text())['rows']}

@@ -3,7 +3,7 @@ import pathlib
 
 import pytest
 
-from pedestal import cli
+from pedestal import cli, samples
 
 REPOSITORY = pathlib.Path(__file__).parents[1]
 
@@ -24,13 +24,18 @@ def test_passes_of_a_station_in_the_south(capsys):
 
 @pytest.mark.parametrize('arguments, message', [
     (['run', 'leo_pass', '--satellite', 'FOO'], '--satellite FOO: needs --tle FILE'),
+    (['run', 'leo_pass', '--station', ''], "--station '': must be LATITUDE,LONGITUDE,HEIGHT"),
+    (['run', 'leo_pass', '--pass', ''], "--pass = '': must be UTC as ISO 8601"),
+    (['run', 'leo_pass', '--pass', 'list', '--duration', '5'], '--duration: has no effect with --pass list'),
+    (['run', 'leo_pass', '--pass', 'list', '--seed', '0'], '--seed: has no effect with --pass list'),
+    (['mode', 'tle', '--satellite', 'FOO'], '--satellite FOO: needs --tle FILE'),
     (['run', 'leo_pass', '--pass', 'list', '--json', 'rows.json'], '--json: has no effect with --pass list'),
     (['run', 'leo_pass', '--pass', '1', '--param', 'tracking_receiver.target.leo_pass.start_time=2019-12-10T00:00'],
      '--pass 1: sets tracking_receiver.target.leo_pass.start_time, which is also given'),
     (['run', 'leo_pass', '--param', 'tracking_receiver.target.track_file.path=flight.csv'],
      "target.track_file.path = 'flight.csv': has no effect with target.kind = leo_pass"),
     (['live', '--layouts', 'folder', '--port', '8765'], '--port: has no effect with --layouts'),
-    (['mode', 'preset', 'azimuth=0.1', '--az', '5'], '--az 5: azimuth is given twice'),
+    (['mode', 'preset', 'azimuth=0.1', '--az', '5'], 'azimuth 5 deg and azimuth=0.1: azimuth is given twice'),
     (['ask', 'offset', 'time=1', 'time=2'], "'time=2': time is given twice"),
     (['study', '--runs', '3'], '--runs: needs the NAME of a study'),
     (['tune', 'leo_pass', '--filter', 'imm', '--gain-margin', '7'], '--gain-margin 7: needs --loops'),
@@ -44,6 +49,13 @@ def test_an_option_without_effect_is_refused(arguments, message, capsys, one_lin
     arguments = [str(REPOSITORY / each) if each.startswith('bags/') else each for each in arguments]
     assert cli.main(arguments) == 1
     assert message in one_line(capsys.readouterr().err)
+
+
+def test_elements_are_given_once(tmp_path, capsys, one_line):
+    file = tmp_path / 'iss.tle'
+    file.write_text(samples.tle())
+    assert cli.main(['mode', 'tle', 'line_1=x', '--tle', str(file)]) == 1
+    assert f'--tle {file}: line_1 is given twice' in one_line(capsys.readouterr().err)
 
 
 def test_a_status_asks_nothing_in_a_name(capsys):

@@ -315,9 +315,9 @@ class Acu(Unit):
                 self.update_tables()
         return reply
 
-    def take_elements(self, line_1, line_2):
-        """Predict from other elements, in whose lines _ stands for a blank. Raise ValueError."""
-        self._predict_by(self.predictor.with_elements(line_1.replace('_', ' '), line_2.replace('_', ' ')))
+    def take_elements(self, line_1, line_2, omm):
+        """Predict from other elements: lines in which _ stands for a blank, or an OMM in JSON. Raise ValueError."""
+        self._predict_by(self.predictor.with_elements(line_1.replace('_', ' '), line_2.replace('_', ' '), omm))
         self.update_tables()
 
     def admit(self, command):

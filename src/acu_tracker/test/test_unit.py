@@ -1,4 +1,6 @@
 """The control unit as a node sees it: its diagnosis, its program track, its requests."""
+import json
+
 import numpy as np
 import pytest
 
@@ -14,6 +16,9 @@ from pedestal_common.wire.commands import Command
 
 LINES = ('1 25544U 98067A   19343.69339541  .00001764  00000-0  38792-4 0  9991',
          '2 25544  51.6439 211.2001 0007417  17.6667  85.6398 15.50103472202482')
+OMM = json.dumps({'NORAD_CAT_ID': '25544', 'EPOCH': '2019-12-09T16:38:29.363424', 'MEAN_MOTION': '15.50103472',
+                  'ECCENTRICITY': '0.0007417', 'INCLINATION': '51.6439', 'RA_OF_ASC_NODE': '211.2001',
+                  'ARG_OF_PERICENTER': '17.6667', 'MEAN_ANOMALY': '85.6398', 'BSTAR': '0.000038792'})
 
 
 def test_diagnostics_show_whether_the_filter_is_honest():
@@ -67,6 +72,21 @@ def test_the_diagnosis_says_by_which_elements_it_predicts():
     assert unit.command(Command('elements', arguments={'line_1': LINES[0].replace(' ', '_'), 'line_2': LINES[1]}))[0]
     values = dict(unit.diagnose().values)
     assert (values['line_1'], values['line_2']) == LINES
+    assert unit.command(Command('elements', arguments={'omm': OMM})) == (True, 'elements of satellite 25544')
+    values = dict(unit.diagnose().values)
+    assert values['omm'] == OMM and 'line_1' not in values
+
+
+@pytest.mark.parametrize('arguments, text', [
+    ({}, 'elements: must be line_1 and line_2, or omm'),
+    ({'line_1': LINES[0], 'line_2': LINES[1], 'omm': OMM}, 'elements: must be line_1 and line_2, or omm'),
+    ({'line_1': LINES[0]}, 'TLE line 2: 0 characters, must be 69 of ASCII'),
+    ({'omm': '{}'}, 'omm: MEAN_MOTION = None: must be a number')])
+def test_elements_that_are_refused(arguments, text):
+    unit = Acu(AcuParameters(), ())
+    granted, reason = unit.command(Command('elements', arguments=arguments))
+    assert not granted and reason.startswith(f'refused: {text}')
+    assert not {'line_1', 'omm'} & dict(unit.diagnose().values).keys()
 
 
 def test_what_an_operator_waits_for_is_urgent():

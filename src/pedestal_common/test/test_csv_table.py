@@ -59,6 +59,7 @@ def test_each_dialect_holds_the_same_rows(tmp_path, name):
     (PLAIN.replace('note', 'roll_deg'), "columns 'roll_deg' and 'roll_deg'"),
     ('# one\n\n' + PLAIN.replace('-2.5', 'x'), "line 5: roll_deg = 'x': must be a number"),
     (EUROPEAN.replace(';', ','), "line 2: 4 cells, must be 3 as in line 1 (separator ',')"),
+    (PLAIN.replace('1.25', '1_25'), "line 2: roll_deg = '1_25': must be a number"),
     (PLAIN.replace('1.25', '"1,25"'), "line 2: roll_deg = '1,25': must be a number"),
     (EUROPEAN.replace('-2,5', '-2.5'), "line 3: roll_deg = '-2.5': must have the decimal sign of line 2, roll_deg = "
                                        "'1,25'"),
@@ -82,7 +83,9 @@ def zipped():
     (gzip.compress(PLAIN.encode(), mtime=0), 'compressed by gzip: unpack it with gunzip'),
     (zipped(), 'a zip archive, as are .kmz'),
     (bz2.compress(PLAIN.encode()), 'compressed by bzip2'), (lzma.compress(PLAIN.encode()), 'compressed by xz'),
-    (b'\x28\xb5\x2f\xfd' + b'1' * 50, 'compressed by zstd')])
+    (b'\x28\xb5\x2f\xfd' + b'1' * 50, 'compressed by zstd'), (b'\x04\x22\x4d\x18dp', 'compressed by lz4'),
+    (b'\x1f\x9d\x90ab', 'compressed by compress'), (b'Rar!\x1a\x07', 'a rar archive'), (b'PAR1\x15', 'a Parquet file'),
+    (b'%PDF-1.4\n', 'a PDF document')])
 def test_a_packed_file_is_named(tmp_path, data, message):
     assert message in refused(tmp_path, data)
 

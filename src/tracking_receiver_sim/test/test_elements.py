@@ -121,6 +121,21 @@ def test_a_history_of_omm_and_a_satellite_without_a_number(tmp_path):
     assert orbit.satellite(LeoPassParameters(**elements.read(path).values)).number == '1998-067A'
 
 
+def test_a_satellite_without_number_and_names(tmp_path):
+    path = tmp_path / 'a.json'
+    path.write_text(json.dumps({key: value for key, value in ISS.items()
+                                if key not in ('NORAD_CAT_ID', 'OBJECT_ID', 'OBJECT_NAME')}))
+    assert orbit.satellite(LeoPassParameters(**elements.read(path).values)).number == 'without a name'
+
+
+@pytest.mark.parametrize('when, julian', [
+    ((2000, 1, 1, 12), (2451544.5, 0.5)), ((2026, 11, 26, 6), (2461370.5, 0.25)), ((2100, 2, 28), (2488127.5, 0.0)),
+    ((2100, 3, 1, 18), (2488128.5, 0.75))])
+def test_a_julian_date_is_right_beyond_the_year_2100(when, julian):
+    """2100 has no 29 February; sgp4.api.jday counts one."""
+    assert orbit.julian_date(datetime.datetime(*when)) == julian
+
+
 @pytest.mark.parametrize('text, message', [
     ('{"EPOCH": ', 'omm: not valid JSON'), ('[]', 'omm: must be an object'),
     ('{}', 'omm: MEAN_MOTION = None: must be a number'),
@@ -157,6 +172,10 @@ REFUSED = {
     'number': (lambda: json.dumps({**ISS, 'NORAD_CAT_ID': 10**9}), '',
                "NORAD_CAT_ID = '1000000000': must be 0 to 999999999"),
     'json': (lambda: json.dumps([ISS])[:-20], '', 'line 1, column [0-9]+: not valid JSON: '),
+    'json of a server': (lambda: '{"error": "log in"}', '',
+                         'line 1, column 1: EPOCH is missing; keywords found: error$'),
+    'underscore': (lambda: json.dumps({**ISS, 'MEAN_MOTION': '15.50_1'}), '',
+                   "MEAN_MOTION = '15.50_1': must be a number"),
     'json of numbers': (lambda: '[1, 2]', '', 'line 1, column 2: must be an object of an OMM'),
     'json in depth': (lambda: '{"a": ' * 200_000, '', 'JSON nested too deeply|not valid JSON'),
     'xml': (lambda: xml(ALL)[:-200], '25544', 'line [0-9]+, column [0-9]+: not well-formed XML'),

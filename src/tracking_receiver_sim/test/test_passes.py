@@ -113,10 +113,11 @@ def test_a_pass_of_days_is_found_by_every_utc_inside(at, rise, down, start):
 @pytest.mark.parametrize('text, name, title', [
     (f'{LINE_1}\n{LINE_2}\n', '', '25544'), (f'ISS (ZARYA)   \r\n{LINE_1}\r\n{LINE_2}\r\n', '', 'ISS (ZARYA)'),
     (f'0 ISS\n{LINE_1}\n{LINE_2}\nGEO\n{summed(GEO_1)}\n{summed(GEO_2)}\n', 'iss', 'ISS'),
+    (f'  ISS\n  {LINE_1}\n  {LINE_2}\n', '', 'ISS'), (f'ISS\r{LINE_1}\r{LINE_2}\r', '', 'ISS'),
     (f'{LINE_1}\n{LINE_2}\n{summed(GEO_1)}\n{summed(GEO_2)}\n', '25544', '25544')])
 def test_a_tle_file(tmp_path, text, name, title):
     path = tmp_path / 'a.tle'
-    path.write_text(text)
+    path.write_bytes(text.encode())
     assert elements.read(path, name) == (title, {'line_1': LINE_1, 'line_2': LINE_2, 'omm': ''}, '')
 
 

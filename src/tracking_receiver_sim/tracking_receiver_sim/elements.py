@@ -152,6 +152,7 @@ def _tles(path):
     """Yield the satellites of a file of TLEs, with or without a line of the name before each."""
     before, first = (0, ''), (0, '')
     for number, text in lines.read(path):
+        text = text.strip()
         if first[1].startswith('1 ') and text.startswith('2 '):
             title = '' if before[1].startswith('2 ') else before[1].removeprefix('0 ').strip()
             yield Satellite(first[0], title or first[1][2:7].strip(), _number(first[1][2:7]), _designator(first[1]),
@@ -220,6 +221,9 @@ def _json(path):
             raise lines.wrong(path, line, begun - text.rfind('\n', 0, begun), 'JSON nested too deeply') from None
         if not isinstance(value, dict):
             raise lines.wrong(path, line, begun - text.rfind('\n', 0, begun), 'must be an object of an OMM')
+        if 'EPOCH' not in value:
+            raise lines.wrong(path, line, begun - text.rfind('\n', 0, begun),
+                              f'EPOCH is missing; keywords found: {", ".join(value):.60}')
         yield _omm(line, {keyword: str(value[keyword]).strip()[:MAX_VALUE_CHARS] for keyword in omm.KEYWORDS
                           if value.get(keyword) is not None})
         at = between.match(text, at).end()

@@ -22,14 +22,16 @@ def _of_axes(doc, low, high, unit, default=None, suffix=''):
 _MOTION_ARGUMENTS = (*_of_axes('rate of the angle', -10.0, 10.0, 'rad/s', 0.0, '_rate'),
                      Argument('moves', 'time for which the rates apply', 0.0, 3600.0, 's', default=1.0))
 
+_ELEMENT_ARGUMENTS = (*(Argument(f'line_{i}', f'line {i} of the TLE, _ for blanks', default='') for i in (1, 2)),
+                      Argument('omm', 'OMM in JSON, instead of the lines', default=''))
+
 MODE_ARGUMENTS = {
     'preset': (*_of_axes('deck angle; default: unchanged', -20.0, 20.0, 'rad', math.nan), *_MOTION_ARGUMENTS,
                Argument('point', 'name of a point of the parameter `points`, instead of angles', default='')),
     'rate': _of_axes(f'rate of the axis, valid for {manual.RATE_REQUEST_TIMEOUT_S:g} s', -10.0, 10.0, 'rad/s', 0.0),
     'slave': (*_of_axes('earth angle', -20.0, 20.0, 'rad'), *_MOTION_ARGUMENTS,
               Argument('holds', 'time for which the direction is valid', 0.01, 86400.0, 's', default=1.0)),
-    'tle': tuple(Argument(f'line_{i}', f'line {i} of the elements, _ for blanks; default: unchanged', default='')
-                 for i in (1, 2)),
+    'tle': tuple(argument._replace(doc=f'{argument.doc}; default: unchanged') for argument in _ELEMENT_ARGUMENTS),
 }
 """{mode: its Arguments}."""
 
@@ -49,8 +51,7 @@ ALARM_COMMAND_NAMES = tuple(command.name for command in ALARM_COMMANDS)
 
 ACU_COMMANDS = (
     *(CommandDefinition(mode, row.doc, MODE_ARGUMENTS.get(mode, ())) for mode, row in zip(MODES, MODE_ROWS)),
-    CommandDefinition('elements', 'predict by these elements in mode `tle`', tuple(
-        Argument(f'line_{i}', f'line {i} of the elements, _ for blanks') for i in (1, 2))),
+    CommandDefinition('elements', 'predict by these elements in mode `tle`', _ELEMENT_ARGUMENTS),
     CommandDefinition('fallback', 'choose the mode after the loss of the track', (
         Argument('mode', 'mode after the loss of the track', options=tuple(FALLBACK_MODES)),)),
     CommandDefinition('offset', 'shift the table of `program`, `tle` and `sun`, also while the antenna follows it', (

@@ -81,9 +81,11 @@ class Predictor:
         self.parameters, self.epoch = parameters, epoch
         self._satellite = (orbit.satellite(parameters) if parameters.line_1 or parameters.omm else None)
 
-    def with_elements(self, line_1, line_2):
-        """Return a Predictor by other elements. Raises ValueError if they are invalid."""
-        return Predictor(dataclasses.replace(self.parameters, line_1=line_1, line_2=line_2, omm=''), self.epoch)
+    def with_elements(self, line_1, line_2, omm):
+        """Return a Predictor by other elements: a TLE, or an OMM in JSON. Raises ValueError if they are invalid."""
+        if bool(line_1 or line_2) == bool(omm):
+            raise ValueError('elements: must be line_1 and line_2, or omm')
+        return Predictor(dataclasses.replace(self.parameters, line_1=line_1, line_2=line_2, omm=omm), self.epoch)
 
     @property
     def number(self):

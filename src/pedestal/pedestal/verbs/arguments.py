@@ -49,6 +49,38 @@ def add_namespace(parser: argparse.ArgumentParser) -> None:
                         'ship_1; default: none')
 
 
+def add_elements(parser: argparse.ArgumentParser) -> None:
+    """Add --tle FILE and --satellite NAME for the orbital elements of a satellite."""
+    parser.add_argument('--tle',
+                        type=pathlib.Path, metavar='FILE', help='file with the orbit of the satellite to track: '
+                        'TLE, or OMM in KVN, XML, JSON or CSV form')
+    parser.add_argument('--satellite',
+                        default='', metavar='NAME', help='name or catalogue number of the satellite, if '
+                        'the file of --tle contains several')
+
+
+def check_elements(options: argparse.Namespace) -> None:
+    """Raise ValueError for --satellite without --tle."""
+    if options.satellite and not options.tle:
+        raise ValueError(f'--satellite {options.satellite}: needs --tle FILE, the file that holds it')
+
+
+def elements(options: argparse.Namespace) -> dict[str, str]:
+    """Return the arguments of the commands `tle` and `elements` from the file of --tle, {} without one. Raises
+    ValueError."""
+    check_elements(options)
+    if not options.tle:
+        return {}
+    import datetime
+
+    from tracking_receiver_sim import elements as files
+    chosen = files.read(options.tle, options.satellite,
+                        datetime.datetime.now(datetime.timezone.utc).replace(tzinfo=None))
+    if chosen.remark:
+        print(chosen.remark)
+    return {name: text for name, text in chosen.values.items() if text}
+
+
 def ros_arguments(options: argparse.Namespace) -> list[str]:
     """Return the ROS 2 arguments for a node in the namespace of --namespace. Raises ValueError."""
     from rclpy.exceptions import InvalidNamespaceException

@@ -68,7 +68,7 @@ def checked(fields):
             raise ValueError(f'{keyword} = {fields[keyword]!r:.60}: must be absent, because it needs SGP4-XP')
     for keyword, (low, high) in NUMBER_LIMITS.items():
         try:
-            value = float(fields.get(keyword, ''))
+            value = float(fields.get(keyword, '').replace('_', ' '))  # float() passes over _ between digits
         except ValueError:
             raise ValueError(f'{keyword} = {fields.get(keyword)!r:.60}: must be a number') from None
         if not low <= value <= high:
@@ -97,4 +97,4 @@ def initialize(satrec, text):
     omm.initialize(satrec, {**fields, **angles, 'EPOCH': epoch.isoformat(timespec='microseconds'), 'NORAD_CAT_ID': '0',
                             'CLASSIFICATION_TYPE': 'U', 'OBJECT_ID': '    ', 'EPHEMERIS_TYPE': '0',
                             'ELEMENT_SET_NO': '0', 'REV_AT_EPOCH': '0'})
-    return fields['NORAD_CAT_ID'] or fields.get('OBJECT_ID') or fields.get('OBJECT_NAME', '')
+    return fields['NORAD_CAT_ID'] or fields.get('OBJECT_ID') or fields.get('OBJECT_NAME') or 'without a name'

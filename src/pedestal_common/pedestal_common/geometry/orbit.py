@@ -6,7 +6,7 @@ import datetime
 import re
 
 import numpy as np
-from sgp4.api import SGP4_ERRORS, WGS72, Satrec, jday
+from sgp4.api import SGP4_ERRORS, WGS72, Satrec
 from sgp4.io import compute_checksum
 from sgp4.propagation import gstime
 
@@ -23,6 +23,9 @@ TLE_NUMBER_COLUMNS = (
 
 TLE_TYPE_COLUMN = 62
 """Column of the ephemeris type in line 1, counted from 0."""
+
+ORDINAL_ZERO_JULIAN_DATE = 1721424.5
+"""Julian date of midnight of the day before 0001-01-01, day 0 of datetime."""
 
 LEAP_SECOND_PATTERN = re.compile(r'(T\d\d:59:)60\b')
 
@@ -123,7 +126,9 @@ def calendar(julian, fraction):
 
 def julian_date(when):
     """Return (Julian day, fraction) of a datetime in UTC."""
-    return jday(when.year, when.month, when.day, when.hour, when.minute, when.second + when.microsecond * 1e-6)
+    # sgp4.api.jday is one day off from March 2100 on.
+    second = when.second + when.microsecond * 1e-6 + when.minute * 60.0 + when.hour * 3600.0
+    return when.toordinal() + ORDINAL_ZERO_JULIAN_DATE, second / SECONDS_PER_DAY
 
 
 def instant(name, text):

@@ -89,7 +89,7 @@ def find(names, wanted, required=True):
     """
     found, others = [], []
     for name in names:
-        unit = _unit(name, wanted)
+        unit = unit_of(name, wanted)
         if unit:
             found.append(Column(name, unit, _SIZES[unit]))
         elif unit == '' and (required or not _known(name, wanted)[1].startswith(_DERIVED_WORDS)):
@@ -106,7 +106,7 @@ def find(names, wanted, required=True):
 
 def named(names, wanted):
     """Return True if one of the names of a table begins with the quantity, whatever follows."""
-    return any(_unit(name, wanted) is not None for name in names)
+    return any(unit_of(name, wanted) is not None for name in names)
 
 
 def names_unit(name, wanted):
@@ -130,7 +130,7 @@ def _known(name, wanted):
     return None
 
 
-def _unit(name, wanted):
+def unit_of(name, wanted):
     """Return the unit of a column, '' if the name has none that is known, None if it is another quantity."""
     match = _known(name, wanted)
     if not match:

@@ -14,6 +14,11 @@ PACKED_FORMATS = (
     (b'BZh', 'compressed by bzip2: unpack it with bunzip2'),
     (b'\xfd7zXZ\x00', 'compressed by xz: unpack it with unxz'),
     (b'\x28\xb5\x2f\xfd', 'compressed by zstd: unpack it with zstd -d'),
+    (b'\x04\x22\x4d\x18', 'compressed by lz4: unpack it with unlz4'),
+    (b'\x1f\x9d', 'compressed by compress: unpack it with uncompress'),
+    (b'Rar!', 'a rar archive: unpack it with unrar'),
+    (b'PAR1', 'a Parquet file: export it as CSV'),
+    (b'%PDF', 'a PDF document: save its table as CSV'),
     (b'7z\xbc\xaf\x27\x1c', 'a 7z archive: unpack it with 7z x'),
     (b'\xd0\xcf\x11\xe0', 'an Excel workbook (.xls): export it as CSV'))
 """(first bytes, name and remedy) of files that hold a text in another form."""

@@ -160,11 +160,11 @@ class Table:
                 return [cell.strip() for cell in cells]
         return None
 
-    def column(self, quantity, required=True):
-        """Return the columns.Column of a columns.Quantity; None if there is none and it is not required. Raises
-        TableError."""
+    def column(self, quantity, required=True, without=''):
+        """Return the columns.Column of a columns.Quantity, other than the column `without`; None if there is none and
+        it is not required. Raises TableError."""
         try:
-            column = _columns.find(self.fieldnames, quantity, required)
+            column = _columns.find([name for name in self.fieldnames if name != without], quantity, required)
         except _columns.ColumnError as error:
             raise TableError(f'{self.path}: line {self.head_line}: {error}; {self._listed()}') from None
         if column is None and required:
@@ -274,8 +274,8 @@ def require(table, names):
 def number(path, line, name, cell, low, high):
     """Return the number in a cell of text, between low and high. Raises TableError."""
     try:
-        value = float(cell)
-    except (TypeError, ValueError):
+        value = float(str(cell).replace('_', ' '))  # float() passes over _ between digits
+    except ValueError:
         raise TableError(f'{path}: line {line}: {name} = {cell!r:.60}: must be a number') from None
     if not low <= value <= high:
         raise TableError(f'{path}: line {line}: {name} = {value:g}: must be {low:g} to {high:g}')

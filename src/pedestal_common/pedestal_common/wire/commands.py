@@ -22,8 +22,8 @@ HELD_REFUSAL, LIMITS_REFUSAL, RANGE_REFUSAL = 'control is held by', 'outside lim
 """Parts of the texts of refusals by which a program distinguishes them: another client has control; the angles are
 outside the limits; an argument is outside its range."""
 
-MAX_TEXT_CHARACTERS = 200
-"""Largest length of a name or value [characters]."""
+MAX_TEXT_CHARACTERS = 1000
+"""Largest length of a name or value [characters]. The largest known value, an OMM in JSON, has half of it."""
 
 MAX_ARGUMENTS = 20
 """Largest number of arguments of a command."""

@@ -62,13 +62,15 @@ def is_table(beginning):
         names = csv_table.Table('', beginning, BARE_NAMES).fieldnames
     except csv_table.READ_ERRORS:
         return False
-    return columns.named(names, AZIMUTH) and columns.named(names, ELEVATION) and not _is_flight(names)
+    return columns.named(names, AZIMUTH) and not _is_flight(names)
 
 
 def _is_flight(names):
-    """Return True if an elevation beside latitude and longitude is a height in a length unit."""
+    """Return True for latitude and longitude without an elevation, or with one that is a height in a length unit."""
     if not (columns.named(names, tables.LATITUDE) and columns.named(names, tables.LONGITUDE)):
         return False
+    if not columns.named(names, ELEVATION):
+        return True
     try:
         return bool(columns.find(names, ELEVATION_LENGTH))
     except columns.ColumnError:
@@ -90,13 +92,13 @@ def read_table(path, _wanted='') -> Directions:
     """Return the Directions of a CSV file. Raises TableError."""
     rows = array.array('d')
     with csv_table.opened(path, BARE_NAMES) as table:
-        time, azimuth, elevation = map(table.column, (times.TIME, AZIMUTH, ELEVATION))
+        clock = times.Times(table, times.TIME)
+        azimuth, elevation = map(table.column, (AZIMUTH, ELEVATION))
         if all(columns.named(table.fieldnames, place) for place in (tables.LATITUDE, tables.LONGITUDE)) and not (
                 columns.names_unit(elevation.name, ELEVATION)):
             raise csv_table.TableError(
                 f'{path}: line {table.head_line}: column {elevation.name!r:.60} beside latitude and longitude: must '
                 f'name its unit, as in elevation_deg for a direction or elevation_m for a height')
-        clock = times.Times(table, time)
         for row in table:
             rows.extend((table.line_num, clock.seconds(row),
                          table.number(azimuth, row[azimuth.name], *ANGLE_LIMITS_DEG['azimuth']),

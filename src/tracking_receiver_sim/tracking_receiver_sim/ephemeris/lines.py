@@ -27,7 +27,7 @@ def wrong(path, line, column, problem):
 def read(path):
     """Yield (number, text) of each line of a text file that is not empty, see csv_table.text. Raises TableError, also
     for a line that is too long."""
-    stream = io.StringIO(csv_table.text(path))
+    stream = io.StringIO(csv_table.text(path), newline=None)
     number = 0
     while line := stream.readline(MAX_LINE_CHARS + 1):
         number += 1

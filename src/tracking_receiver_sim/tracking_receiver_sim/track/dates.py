@@ -2,15 +2,21 @@
 import re
 
 MONTH_NAMES = 'jan feb mar apr may jun jul aug sep oct nov dec'.split()
-_CLOCK = r'(?P<hour>\d{1,2}):(?P<minute>\d\d)(?::(?P<second>\d\d))?(?:[.,](?P<fraction>\d{0,9}))?'
+_FRACTION = r'(?:[.,](?P<fraction>\d{0,9}))?'
+_CLOCK = rf'(?P<hour>\d{{1,2}}):(?P<minute>\d\d)(?::(?P<second>\d\d))?{_FRACTION}'
+_BASIC_CLOCK = rf'(?P<hour>\d\d)(?P<minute>\d\d)(?P<second>\d\d){_FRACTION}'
 _MONTH = rf'(?P<name>{"|".join(MONTH_NAMES)})[a-z]*'
-DATE_PATTERNS = tuple(re.compile(f'{date}{_CLOCK}(?P<zone> ?(?:Z|UTC|[+-]\\d\\d:?\\d\\d))?', re.ASCII | re.IGNORECASE)
-                      for date in (r'(?P<year>\d{4})-(?P<month>\d\d)-(?P<day>\d\d)(?:T| )',
-                                   r'(?P<year>\d{4})/(?P<month>\d\d)/(?P<day>\d\d) ',
-                                   r'(?P<day>\d{1,2})\.(?P<month>\d{1,2})\.(?P<year>\d{4}) ',
-                                   rf'(?:A\.D\. )?(?P<year>\d{{4}})-{_MONTH}-(?P<day>\d\d) ',
-                                   rf'(?P<day>\d{{1,2}}) {_MONTH} (?P<year>\d{{4}}) '))
-"""ISO 8601, with strokes, day.month.year, of JPL Horizons (2018-Jul-23), of STK (23 Jul 2018)."""
+DATE_PATTERNS = tuple(re.compile(f'{date}(?P<zone> ?(?:Z|UTC|[+-]\\d\\d:?\\d\\d))?', re.ASCII | re.IGNORECASE)
+                      for date in (rf'(?P<year>\d{{4}})-(?P<month>\d\d)-(?P<day>\d\d)(?:T| ){_CLOCK}',
+                                   rf'(?P<year>\d{{4}})(?P<month>\d\d)(?P<day>\d\d)(?:T| ){_BASIC_CLOCK}',
+                                   rf'(?P<year>\d{{4}})/(?P<month>\d\d)/(?P<day>\d\d) {_CLOCK}',
+                                   rf'(?P<day>\d{{1,2}})\.(?P<month>\d{{1,2}})\.(?P<year>\d{{4}}) {_CLOCK}',
+                                   rf'(?:A\.D\. )?(?P<year>\d{{4}})-{_MONTH}-(?P<day>\d\d) {_CLOCK}',
+                                   rf'(?P<day>\d{{1,2}}) {_MONTH} (?P<year>\d{{4}}) {_CLOCK}'))
+"""ISO 8601, its basic format (20180723T100000), with strokes, day.month.year, of JPL Horizons (2018-Jul-23), of STK
+(23 Jul 2018)."""
+AMBIGUOUS_PATTERN = re.compile(r'\d{1,2}[/-]\d{1,2}[/-](?:\d{4}|\d\d)\b.*', re.ASCII)
+"""A date whose order of day and month differs between countries."""
 DATE_EXAMPLES = ('2018-07-23T10:00:00Z, 2018/07/23 10:00:00, 23.07.2018 10:00:00, 2018-Jul-23 10:00:00 or '
                  '23 Jul 2018 10:00:00')
 

@@ -67,13 +67,15 @@ def seconds(path, line, name, text):
     match = ISO_TIME_PATTERN.fullmatch(text)
     try:
         if not match:
-            return of_unix_time(csv_table.number(path, line, name, float(text), *UNIX_TIME_LIMITS_S))
+            return of_unix_time(csv_table.number(path, line, name, float(text.replace('_', ' ')),
+                                                 *UNIX_TIME_LIMITS_S))
         return _of_iso(*match.groups())
     except csv_table.TableError:
         raise
     except ValueError:
-        raise csv_table.TableError(f'{path}: line {line}: {name} = {text!r:.60}: must be UTC as ISO 8601, for example '
-                                   f'{dates.DATE_EXAMPLES}, or as seconds since 1970') from None
+        order = 'the order of day and month is unknown: ' if dates.AMBIGUOUS_PATTERN.fullmatch(text) else ''
+        raise csv_table.TableError(f'{path}: line {line}: {name} = {text!r:.60}: {order}must be UTC as ISO 8601, for '
+                                   f'example {dates.DATE_EXAMPLES}, or as seconds since 1970') from None
 
 
 def _of_iso(date, hours, minutes, second, fraction, sign, zone_hours, zone_minutes):

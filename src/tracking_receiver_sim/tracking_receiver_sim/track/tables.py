@@ -79,16 +79,15 @@ def rows(path, log):
     """
     with csv_table.opened(path) as table:
         layout = _layout(table)
-        time, latitude, longitude = map(table.column, (layout.time, layout.latitude, layout.longitude))
+        clock = times.Times(table, layout.time, columns.UTC if layout.adsb else '')
+        latitude, longitude = map(table.column, (layout.latitude, layout.longitude))
         altitudes = [table.column(altitude, required=False) for altitude in layout.altitudes]
         altitude = next(filter(None, altitudes), None) or table.column(layout.altitudes[0])
-        time = time._replace(unit=columns.UTC) if layout.adsb else time
         identities = [name for known in IDENTITY_NAMES for name in table.fieldnames if name.lower() == known]
-        log.form, log.time_name = layout.name, time.name
+        log.form, log.time_name = layout.name, clock.name
         if altitude in altitudes[layout.barometric:]:
             log.remarks.append('barometric altitude taken as height above the ellipsoid')
-        needed = [column.name for column in (time, latitude, longitude, altitude)] + identities[:1]
-        clock = times.Times(table, time)
+        needed = [column.name for column in (clock.column, latitude, longitude, altitude)] + identities[:1]
         for row in table:
             if layout.adsb and any((row[name] or '').lower() in EMPTY_CELL_TEXTS for name in needed):
                 log.passed_over['row without time, position or aircraft'] += 1

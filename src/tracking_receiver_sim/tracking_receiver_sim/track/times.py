@@ -1,4 +1,7 @@
-"""Times in a column of a table: UTC as a date, Julian dates, or numbers in the unit of the column, from any origin."""
+"""Times in a column of a table: UTC as a date, Julian dates, or numbers in the unit of the column, from any origin.
+
+A table may also have a column of the date and one of the time of day, UTC.
+"""
 from pedestal_common.graph.steps import SECONDS_PER_DAY
 from pedestal_common.text_files import columns, csv_table
 from tracking_receiver_sim.track import dates, instant
@@ -10,6 +13,9 @@ TIME = columns.Quantity('time', {
     **dict.fromkeys(('jd', 'jdut', 'jdutc', 'jd ut', 'jd utc', 'julian date', 'julian day'), columns.JULIAN_DATE),
     **dict.fromkeys(('mjd', 'mjd ut', 'mjd utc'), columns.MODIFIED_JULIAN_DATE)}, 's')
 """Names of the time in a table."""
+DATE = columns.Quantity('date', dict.fromkeys(('date', 'utc date'), columns.UTC), 's')
+TIME_OF_DAY = columns.Quantity('time of day', dict.fromkeys(('time', 'utc', 'utc time'), columns.UTC), 's')
+"""Names of the date and of the time of day in a table with a column for each."""
 MODIFIED_JULIAN_DATE_ZERO = 2_400_000.5
 """Julian date of the modified Julian date 0."""
 JULIAN_DATE_LIMITS = 2_400_000.5, 2_536_000.0
@@ -23,24 +29,36 @@ MIN_SPAN_S = 3.0
 
 
 class Times:
-    """The times of a column of a csv_table.Table, all with a date or all without.
+    """The times of a csv_table.Table, all with a date or all without.
 
+        column      columns.Column of the time, or of the time of day
+        date        name of the column of the date beside it, '' if there is none
         dated       True: instants, see track.instant; False: seconds from any origin; None before the first row
     """
 
-    def __init__(self, table, column):
-        self.table, self.column, self.dated = table, column, None
+    def __init__(self, table, wanted, unit=''):
+        """wanted: columns.Quantity of the time; unit: of its values, whatever its name states. Raises TableError."""
+        self.table, self.date, self.dated = table, _date(table.fieldnames, wanted), None
+        unit = columns.UTC if self.date else unit
+        column = table.column(wanted, without=self.date)
+        self.column = column._replace(unit=unit) if unit else column
         self.first = self.last = None
+
+    @property
+    def name(self):
+        """Name of the column, or names of the two columns."""
+        return f'{self.date} and {self.column.name}' if self.date else self.column.name
 
     def seconds(self, row):
         """Return the time of a row [s]. Raises TableError."""
-        value = self._seconds(row[self.column.name] or '')
+        cell = row[self.column.name] or ''
+        value = self._seconds(f'{row[self.date] or ""} {cell}' if self.date else cell)
         self.first, self.last = value if self.first is None else self.first, value
         return value
 
     def _seconds(self, cell):
         table, column = self.table, self.column
-        place = table.path, table.line_num, column.name
+        place = table.path, table.line_num, self.name
         if column.unit in (columns.JULIAN_DATE, columns.MODIFIED_JULIAN_DATE):
             self.dated = True
             return julian(*place, table.point(column.name, cell), column.unit == columns.MODIFIED_JULIAN_DATE)
@@ -63,7 +81,7 @@ class Times:
 
     def described(self):
         """Return the name of the column with the unit that was taken."""
-        return self.column._replace(unit=columns.UTC if self.dated else self.column.unit).described()
+        return self.column._replace(name=self.name, unit=columns.UTC if self.dated else self.column.unit).described()
 
     def check(self):
         """Raise TableError after the last row if times taken as seconds look like days of a Julian date."""
@@ -74,7 +92,19 @@ class Times:
                 raise csv_table.TableError(
                     f'{self.table.path}: line {self.table.head_line}: {self.column.name} = {self.first:.10g} to '
                     f'{self.last:.10g} s: must last at least {MIN_SPAN_S:g} s at such numbers, which look like a '
-                    f'Julian date in days: name the column {unit}')
+                    f'Julian date in days: name the column {unit}; write the dates of a spreadsheet as text')
+
+
+def _date(names, wanted):
+    """Return the name of the only column of dates beside the only column of the time of day, '' if there is none.
+
+    wanted: Quantity of the time; its names include those of DATE if a table may have both.
+    """
+    if not DATE.names.keys() <= wanted.names.keys():
+        return ''
+    found, clocks = ([name for name in names if columns.unit_of(name, part) == columns.UTC]
+                     for part in (DATE, TIME_OF_DAY))
+    return found[0] if len(found) == len(clocks) == 1 else ''
 
 
 def julian(path, line, name, text, modified=False):

@@ -6,6 +6,7 @@ Exit code 0: the node accepted the command. Exit code 1: the node refused it; th
     pedestal ask take                    take control: of other clients only `stop` and `standby` are accepted
     pedestal ask fallback mode=memory    select the mode after a loss of the track
     pedestal ask offset time=0.5         follow the program track 0.5 s later
+    pedestal ask elements --tle iss.tle  predict by the elements of a file, without a change of the mode
 """
 import argparse
 from collections.abc import Iterable, Mapping
@@ -21,12 +22,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         nargs='*', metavar='NAME=VALUE', help='arguments of the command (radians, SI units); see '
                         'docs/operating.md, Commands')
     parser.add_argument('--node', default='acu', metavar='NODE', help='node that receives the command; default: acu')
+    arguments.add_elements(parser)
     arguments.add_remote(parser)
 
 
 def main(options: argparse.Namespace) -> int:
     """Send the command. Return the exit code."""
-    return send_command(options, options.verb, pairs(options.given), options.node)
+    return send_command(options, options.verb, with_elements(options, options.given), options.node)
 
 
 def pairs(texts: Iterable[str]) -> dict[str, str | float]:
@@ -39,6 +41,16 @@ def pairs(texts: Iterable[str]) -> dict[str, str | float]:
         if name in given:
             raise ValueError(f'{text!r}: {name} is given twice')
         given[name] = value
+    return given
+
+
+def with_elements(options: argparse.Namespace, texts: Iterable[str]) -> dict[str, str | float]:
+    """Return {name: text} of texts NAME=VALUE and of --tle. Raises ValueError."""
+    given = pairs(texts)
+    for name, text in arguments.elements(options).items():
+        if name in given:
+            raise ValueError(f'--tle {options.tle}: {name} is given twice')
+        given[name] = text
     return given
 
 

@@ -8,6 +8,7 @@ the ACU refused it; the reason is printed.
     pedestal mode preset point=zenith    go to the stored preset zenith (parameter acu.points)
     pedestal mode rate --az 0.5          turn at 0.5 deg/s for half a second
     pedestal mode rate --az 0.5 --hold 8 turn at 0.5 deg/s for 8 s; Ctrl-C ends the motion at once
+    pedestal mode tle --tle iss.tle      follow the satellite of a file
     pedestal mode stow
 """
 import argparse
@@ -31,6 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         'units; see docs/operating.md, Commands); or two numbers, as --az and --el')
     parser.add_argument('--hold', type=float, metavar='S', help='time for which mode rate is repeated before the axes '
                         'stop [s]; default: the command is sent once and lasts 0.5 s')
+    arguments.add_elements(parser)
     arguments.add_remote(parser)
 
 
@@ -38,7 +40,7 @@ def main(options: argparse.Namespace) -> int:
     """Send the command. Return the exit code."""
     angles = {'azimuth': options.az, 'elevation': options.el}
     numbers = [text for text in options.given if is_number(text)]
-    given = ask.pairs(text for text in options.given if text not in numbers)
+    given = ask.with_elements(options, (text for text in options.given if text not in numbers))
     if len(numbers) not in (0, 2):
         raise ValueError(f'{" ".join(numbers)}: must be azimuth and elevation [deg], for example '
                          f'`pedestal mode {options.mode} 30 45`; one axis: --az 30 or --el 45')

@@ -7,7 +7,6 @@ or its drive lost more than 1 % of its steps, without the 5 s after each death o
 for example by Ctrl-C.
 """
 import argparse
-import pathlib
 import sys
 import typing
 
@@ -33,12 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     console.add_json(parser)
     console.add_explain(parser)
     arguments.add_param(parser)
-    parser.add_argument('--tle',
-                        type=pathlib.Path, metavar='FILE', help='file with the orbit of the satellite to track: '
-                        'TLE, or OMM in KVN, XML, JSON or CSV form')
-    parser.add_argument('--satellite',
-                        default='', metavar='NAME', help='name or catalogue number of the satellite, if '
-                        'the file of --tle contains several')
+    arguments.add_elements(parser)
     parser.add_argument('--station', metavar='LAT,LON,H', help='place of the antenna: latitude [deg], longitude '
                         '[deg], height [m]')
     parser.add_argument('--pass', dest='which', metavar='WHICH', help='pass to track from rise to set. next: the next '
@@ -117,9 +111,8 @@ def _chosen(options: argparse.Namespace) -> 'Scenario | None':
     from pedestal_bringup.scenario import scenario
     changes = (scenario.file_overrides(options.params_file) if options.params_file else []) + options.param
     duration = options.duration
-    if options.satellite and not options.tle:
-        raise ValueError(f'--satellite {options.satellite}: needs --tle FILE, the file that holds it')
-    if not (options.tle or options.station or options.which):
+    arguments.check_elements(options)
+    if options.tle is options.station is options.which is None:
         return scenario.load(options.scenario, changes, options.seed, duration, options.pacing)
     import datetime
 
@@ -128,12 +121,12 @@ def _chosen(options: argparse.Namespace) -> 'Scenario | None':
     now = datetime.datetime.now(datetime.timezone.utc).replace(tzinfo=None)
     started = next((change.partition('=')[2].strip('"\'') for change in reversed(changes)
                     if change.startswith(START_TIME_PARAMETER + '=')), '')
-    if options.which and started:
+    if options.which is not None and started:
         raise ValueError(f'--pass {options.which}: sets {START_TIME_PARAMETER}, which is also given; leave out one')
-    if options.station:
+    if options.station is not None:
         changes = satellite.station_changes(options.station) + changes
     if options.tle:
-        named = options.which and not (options.which in ('list', 'next') or options.which.isdecimal())
+        named = options.which is not None and not (options.which in ('list', 'next') or options.which.isdecimal())
         when = (orbit.instant('--pass', options.which) if named else
                 orbit.instant('start_time', started) if started else now)
         elements, remark = satellite.tle_changes(options.tle, options.satellite, when)
@@ -141,13 +134,13 @@ def _chosen(options: argparse.Namespace) -> 'Scenario | None':
         if remark:
             print(remark)
     draft = scenario.draft(options.scenario)
-    if options.which or options.tle and not started:
+    if options.which is not None or options.tle and not started:
         selection = satellite.PassSelection(draft.changed(changes), now)
         if options.which == 'list':
             _refuse_with_list(options)
             selection.print_passes()
             return None
-        start, duration, line = selection.choose(options.which or 'next', duration)
+        start, duration, line = selection.choose('next' if options.which is None else options.which, duration)
         print(line)
         changes = start + changes
     return scenario.checked(draft.changed(changes), options.seed, duration, options.pacing)
@@ -156,6 +149,6 @@ def _chosen(options: argparse.Namespace) -> 'Scenario | None':
 def _refuse_with_list(options: argparse.Namespace) -> None:
     """Raise ValueError for an option of a run beside --pass list, which runs nothing."""
     from pedestal_bringup.graph import operator_servers
-    for name in ('bag', 'json', 'explain', *operator_servers.SERVERS):
+    for name in ('bag', 'json', 'explain', 'duration', 'seed', 'pacing', *operator_servers.SERVERS):
         if not (getattr(options, name) is None or getattr(options, name) is False):
             raise ValueError(f'--{name}: has no effect with --pass list, which runs nothing')
