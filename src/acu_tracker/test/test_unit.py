@@ -85,7 +85,7 @@ def test_the_diagnosis_says_by_which_elements_it_predicts():
 def test_elements_that_are_refused(arguments, text):
     unit = Acu(AcuParameters(), ())
     granted, reason = unit.command(Command('elements', arguments=arguments))
-    assert not granted and reason.startswith(text)
+    assert not granted and reason.startswith(f'refused: {text}')
     assert not {'line_1', 'omm'} & dict(unit.diagnose().values).keys()
 
 
