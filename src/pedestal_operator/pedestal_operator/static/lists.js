@@ -3,6 +3,7 @@ import {me, onDraw, request} from './link.js';
 import {find, make, setText, time} from './text.js';
 
 const SHELVE_DURATIONS_S = [600, 3600, 28800];
+const URGENT_PRIORITIES = ['critical', 'high'];
 const UNACKNOWLEDGED_STATES = ['unacknowledged', 'returned unacknowledged', 'latched unacknowledged'];
 
 function button(text, act) {
@@ -52,9 +53,23 @@ function alarmRow(alarm) {
   return row;
 }
 
+let announced = [];  // unacknowledged alarms that were announced
+
+// Announce the fresh alarms to screen readers: the grave ones at once, the others after the present speech.
+function announce(waiting) {
+  const fresh = waiting.filter((alarm) => !announced.includes(alarm.name));
+  announced = waiting.map((alarm) => alarm.name);
+  for (const [id, grave] of [['urgent', true], ['news', false]]) {
+    const texts = fresh.filter((alarm) => URGENT_PRIORITIES.includes(alarm.priority) === grave)
+        .map((alarm) => `${alarm.priority} alarm at ${time(alarm.raised)}: ${alarm.name}. ${alarm.detail || alarm.meaning}. ${alarm.action}.`);
+    if (texts.length) setText(find(id), texts.join(' '), 'hidden');
+  }
+}
+
 function showAlarms(alarms) {
   const waiting = alarms.filter((alarm) => UNACKNOWLEDGED_STATES.includes(alarm.state));
   const rest = alarms.filter((alarm) => !waiting.includes(alarm));
+  announce(waiting);
   find('alarm-list').replaceChildren(...[...waiting, ...rest].map(alarmRow));
   if (!alarms.length) find('alarm-list').appendChild(make('div', 'none', 'none'));
   setText(find('alarm-count'), alarms.length ? `${waiting.length} of ${alarms.length} unacknowledged` : '',
