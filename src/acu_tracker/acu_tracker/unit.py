@@ -43,6 +43,12 @@ RECORD_DTYPE = np.dtype([('state', control_unit.STATE_DTYPE), ('constants', cont
 """Memory of the control unit; invalid: bits of signals.INVALID_INPUTS that were set since the last diagnosis."""
 
 
+SILENCE_REFUSAL = f'no {JOINT_STATES_TOPIC}, the drive is silent'
+"""Reason of the refusal of every mode except standby while the drive is silent."""
+
+RESET_REQUEST_DURATION_S = 0.2
+"""Time after a reset by an operator during which the reset of the drive is requested [s]."""
+
 DRIVE_SILENT_ALARM, DRIVE_FAULT_ALARM = table.ALARM_INDEX['drive silent'], table.ALARM_INDEX['drive fault']
 MOTOR_LOST_ALARMS = tuple(table.ALARM_INDEX[f'{axis} motor lost'] for axis in topics.AXES)
 """Alarms to which adu/state, or its silence, adds detail."""
@@ -133,7 +139,7 @@ class Acu(Unit):
     LIVE = ('tracker', 'azimuth', 'elevation')
     REQUESTS = (*(f'acu/{mode}' for mode in modes.MODES), 'acu/acknowledge', 'acu/reset_faults')
     VERBS = ACU_COMMANDS
-    CALLS = ('adu/emergency_stop',)
+    CALLS = ('adu/emergency_stop', 'adu/reset_faults')
     MOMENTARY = (KEYHOLE_TOPIC, BLOCKAGE_TOPIC, ALARMS_TOPIC)
 
     def __init__(self, parameters, reads):
@@ -149,7 +155,7 @@ class Acu(Unit):
         self.predictor, self.predicted = Predictor(parameters.prediction), {}
         self.offset, self._tables_valid = (0.0, 0.0, 0.0), (NEVER_DUE_NS, NO_STAMP)
         self.desk = AlarmDesk(self.parts['state'], control_unit.reset)
-        self._silent = False
+        self._silent, self._reset_stamp = False, -math.inf
 
     @property
     def silent(self):
@@ -278,6 +284,8 @@ class Acu(Unit):
     def execute(self, command, arguments):
         """Return the Reply to a command of VERBS; a refusal states the reason and changes nothing."""
         verb, state = command.verb, self.parts['state']
+        if verb == 'reset':
+            return self._reset()
         if verb in ALARM_COMMAND_NAMES:
             return getattr(self.desk, verb)(*arguments.values())
         if verb == 'take':
@@ -321,17 +329,28 @@ class Acu(Unit):
         mode = name.removeprefix('acu/')
         m, outputs = self.parts, self.parts['outputs']
         if mode == 'reset_faults':
-            return self.desk.reset()
+            return self._reset()
         if mode == 'acknowledge':
             return self.desk.acknowledge()
         if self.silent and mode != 'standby':
-            return Reply(False, f'refused: no {JOINT_STATES_TOPIC}, the drive is silent; '
-                                f'mode is {modes.MODES[outputs["mode"]]}')
+            return Reply(False, f'refused: {SILENCE_REFUSAL}; mode is {modes.MODES[outputs["mode"]]}')
         m['inputs']['drive_ready'] = self.inputs[0][DRIVE_STATE_TOPIC] <= signals.DRIVE_READY
         code = modes.MODES.index(mode)
         granted = control_unit.request(m['state'], m['constants'], m['inputs'], outputs, self.memory.tables, code)
         refusal = '' if granted else f'refused: {self._refusal(code, outputs["reason"])}; '
         return Reply(bool(granted), f'{refusal}mode is {modes.MODES[outputs["mode"]]}')
+
+    def _reset(self):
+        """Return the Reply to a reset of the latched alarms and faults. It also requests the reset of a drive in fault.
+
+        A drive in an emergency stop is reset by a person at adu/reset_faults only.
+        """
+        reply = self.desk.reset()
+        if self.drive_state.startswith('fault'):
+            self._reset_stamp = float(self.parts['state']['stamp'])
+        if reply.granted and self.drive_state.startswith(('fault', 'emergency stop')):
+            return Reply(True, f'{reply.text}; the drive reports {self.drive_state}')
+        return reply
 
     def _refusal(self, mode, reason):
         """Return the text of the reason why a mode is refused."""
@@ -346,6 +365,8 @@ class Acu(Unit):
 
     def refusals(self):
         """Return {mode: reason} of the modes that would be refused now."""
+        if self.silent:
+            return dict.fromkeys((mode for mode in modes.MODES if mode != 'standby'), SILENCE_REFUSAL)
         m, why = self.parts, np.zeros(len(modes.MODES), int)
         control_unit.refusals(m['state'], m['constants'], m['inputs'], self.memory.tables, why)
         words = {code: modes.REASONS[code] for code in set(why) - {Reason.NONE}}
@@ -371,8 +392,11 @@ class Acu(Unit):
 
     @property
     def calls(self):
-        """Services of CALLS to call now: all during uncommanded motion, else none."""
-        return self.CALLS if self.parts['state']['unasked']['moves'] else ()
+        """Services of CALLS to call now: the stop during uncommanded motion, the reset after a reset by an operator."""
+        stop, reset = self.CALLS
+        if self.parts['state']['unasked']['moves']:
+            return (stop,)
+        return (reset,) if 0.0 < self.parts['state']['stamp'] - self._reset_stamp < RESET_REQUEST_DURATION_S else ()
 
     @property
     def alarms(self):

@@ -2,7 +2,11 @@
 import numpy as np
 import pytest
 
+from acu_tracker import modes
 from acu_tracker.modes import Mode
+from acu_tracker.params import AcuParameters
+from acu_tracker.unit import DRIVE_STATE_TOPIC, JOINT_STATES_TOPIC, SILENCE_REFUSAL, Acu
+from pedestal_common.parameters import build
 
 MODES = ('preset', 'program')
 
@@ -147,3 +151,35 @@ def test_normal_work_is_no_alarm(Rig):
         rig.ask(mode)
         rig.run(0.7)
         assert not rig.state['unasked']['moves'][0]
+
+
+def test_every_mode_except_standby_is_refused_in_advance_while_the_drive_is_silent():
+    acu = Acu(build(AcuParameters, {}), (JOINT_STATES_TOPIC, DRIVE_STATE_TOPIC))
+    acu.silent = True
+    refused = acu.refusals()
+    assert set(modes.MODES) - set(refused) == {'standby'}
+    for mode, reason in refused.items():
+        assert acu.request(f'acu/{mode}').text.startswith(f'refused: {reason}')
+    acu.silent = False
+    assert SILENCE_REFUSAL not in acu.refusals().values()
+
+
+def test_a_reset_reports_a_drive_in_fault_and_requests_its_reset_for_a_short_time():
+    acu = Acu(build(AcuParameters, {}), (JOINT_STATES_TOPIC, DRIVE_STATE_TOPIC))
+    acu.take_text(DRIVE_STATE_TOPIC, 'fault: azimuth encoder jump')
+    acu.parts['state']['stamp'] = 10.0
+    assert acu.calls == ()
+    assert acu.request('acu/reset_faults').text.endswith('the drive reports fault: azimuth encoder jump')
+    acu.parts['state']['stamp'] = 10.005
+    assert acu.calls == ('adu/reset_faults',)
+    acu.parts['state']['stamp'] = 10.3
+    assert acu.calls == ()
+
+
+def test_a_drive_in_an_emergency_stop_is_not_reset_from_the_desk():
+    acu = Acu(build(AcuParameters, {}), (JOINT_STATES_TOPIC, DRIVE_STATE_TOPIC))
+    acu.take_text(DRIVE_STATE_TOPIC, 'emergency stop')
+    acu.parts['state']['stamp'] = 10.0
+    assert acu.request('acu/reset_faults') == (True, 'cleared; the drive reports emergency stop')
+    acu.parts['state']['stamp'] = 10.005
+    assert acu.calls == ()

@@ -4,26 +4,45 @@ import math
 
 from pedestal_common.graph import nodes
 
+MAX_MESSAGE_AGE_S = 2.5
+"""Age after which the last message is stale [s]."""
+
 
 class Antenna(abc.ABC):
     """Reader of the last messages of an antenna.
 
     beam      prefix of the nodes of the beam
     numbers   {topic: numbers of its last message}
+    texts     {topic: its last text}
     status    {node: its last DiagnosticStatus}
+    alarms    list of the DiagnosticStatus on acu/alarms
     """
     beam: str
     numbers: dict
+    texts: dict
     status: dict
+    alarms: list
 
     @abc.abstractmethod
-    def present(self, name):
-        """Return True if a topic or node published lately."""
+    def age(self, name) -> float:
+        """Return the age of the last message of a topic or node [s], infinite before the first."""
+
+    def present(self, name, age=MAX_MESSAGE_AGE_S):
+        """Return True if the last message of a topic or node is younger than an age [s]."""
+        return self.age(name) < age
 
     def diagnostics_of(self, node) -> dict:
         """Return {key: text} of the last diagnostics of a node, {} if stale."""
-        name = self.beam + node if nodes.row(node).of_beam else node
-        return {pair.key: pair.value for pair in self.status[name].values} if self.present(name) else {}
+        return self.last_diagnostics_of(node) if self.present(self.name_of(node)) else {}
+
+    def last_diagnostics_of(self, node) -> dict:
+        """Return {key: text} of the last diagnostics of a node, however old, {} before the first."""
+        status = self.status.get(self.name_of(node))
+        return {pair.key: pair.value for pair in status.values} if status else {}
+
+    def name_of(self, node) -> str:
+        """Return the name under which a node publishes its diagnostics."""
+        return self.beam + node if nodes.row(node).of_beam else node
 
     def angles(self, topic):
         """Return (azimuth, elevation) [deg] of joint_states or acu/reference, NaN if stale."""

@@ -118,7 +118,7 @@ class Console:
             for row in members:
                 table.add_row(row.name, Text(row.text, justify='right'), row.unit)
             panels.append(Panel(table, title=group, padding=(0, 1)))
-        alarms = [Text(f'{node}: {text}', style='bold red') for node, text in state.alarms(self._remote)]
+        alarms = [Text(f'{node}: {text}', style='bold red') for node, text in state.node_reports(self._remote)]
         keys = '  '.join(f'[{key}] {doc}' for key, (_, doc) in KEY_COMMANDS.items())
         return Group(Columns(panels), *alarms, Text(self.last_reply, style='bold'),
                      Text(f'{keys}  [arrows] jog at {self.rate:g} deg/s  [+-] rate  [q] quit', style='dim'))

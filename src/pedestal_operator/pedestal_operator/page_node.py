@@ -40,7 +40,7 @@ class PageNode(Remote):
 
     def __init__(self):
         super().__init__('operator_page', 'page', parameters_type=PageParameters)
-        self.alarms, self.path, self.configuration, self.log = [], None, {}, Log()
+        self.path, self.configuration, self.log = None, {}, Log()
         self._history = collections.deque(maxlen=round(page_state.CHART_SPAN_S / page_state.CHART_PERIOD_S))
         self._beam_history, self._upcoming_passes = page_sky.BeamHistory(page_state.CHART_SPAN_S), UpcomingPasses()
         self._pages = PageRequests(self._request_for, self.replied,
@@ -58,7 +58,6 @@ class PageNode(Remote):
             self.subscribe_numbers(topic)
         self.message_reader('ins/state', self._text_taker('ins/state'))
         self.message_reader('acu/blockage', self._text_taker('acu/blockage'))
-        self.message_reader('acu/alarms', self._take_alarms)
         self.message_reader('acu/program_track', self._take_program)
         for role in page_security.PAGE_ROLES:
             print(f'page, {role}: {self._server.access.url(role)}', flush=True)
@@ -91,7 +90,7 @@ class PageNode(Remote):
         return logged
 
     def _take_alarms(self, array):
-        self.alarms = array.status
+        super()._take_alarms(array)
         self.log.alarms(self.now, page_state.alarms(self))
 
     def _take_program(self, message):

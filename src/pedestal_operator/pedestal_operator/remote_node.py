@@ -23,9 +23,6 @@ NUMBER_TOPICS = ('joint_states', 'acu/reference', 'tracking_receiver/angle_error
 TEXT_TOPICS = ('acu/mode', 'adu/state', 'acu/keyhole')
 """Topics of text that every client receives."""
 
-MAX_MESSAGE_AGE_S = 2.5
-"""Age after which the last message is stale [s]."""
-
 REPLY_TIMEOUT_S = 5.0
 """Longest wait for the reply to a command [s]."""
 
@@ -50,6 +47,7 @@ class Remote(Shell, Antenna):
     numbers   {topic: numbers of its last message in the order of `records`}
     texts     {topic: its last text}
     status    {node: its last DiagnosticStatus}
+    alarms    list of the DiagnosticStatus on acu/alarms
     arrivals  {topic or node: time of its last message [s, monotonic clock]}
     """
 
@@ -58,12 +56,13 @@ class Remote(Shell, Antenna):
         self.links = nodes.links(nodes.MAX_BEAMS if beam else 0)
         self.beam = f'{beam}/' if beam else ''
         self.who, self.node = who, nodes.row(node)
-        self.numbers, self.texts, self.status, self.arrivals = {}, {}, {}, {}
+        self.numbers, self.texts, self.status, self.arrivals, self.alarms = {}, {}, {}, {}, []
         self._requests = Requests(f'{os.getpid()}.{time.time_ns()}')
         for topic in NUMBER_TOPICS:
             self.subscribe_numbers(topic)
         for topic in TEXT_TOPICS:
             self.message_reader(topic, self._text_taker(topic))
+        self.message_reader('acu/alarms', self._take_alarms)
         self.message_reader('diagnostics', self._take_status)
         self.message_reader(self.node.replies, self._take_reply)
         self._send_command = self.writer(self.node.obeys)
@@ -80,6 +79,9 @@ class Remote(Shell, Antenna):
         def take(message):
             self.texts[topic], self.arrivals[topic] = message.data, time.monotonic()
         return take
+
+    def _take_alarms(self, array):
+        self.alarms = array.status
 
     def _take_status(self, array):
         for status in array.status:
@@ -106,9 +108,9 @@ class Remote(Shell, Antenna):
         """Return the Reply to a request once, None before it arrives."""
         return self._requests.replied(number)
 
-    def present(self, name, age=MAX_MESSAGE_AGE_S):
-        """Return True if the last message of a topic or node is younger than an age [s]."""
-        return name in self.arrivals and time.monotonic() - self.arrivals[name] < age
+    def age(self, name):
+        """Return the age of the last message of a topic or node [s], infinite before the first."""
+        return time.monotonic() - self.arrivals.get(name, -math.inf)
 
     def exists(self, name):
         """Return True if a topic has a publisher, or had one."""

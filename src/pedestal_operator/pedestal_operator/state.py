@@ -1,9 +1,44 @@
-"""State of the antenna for operators: one table for the terminal, for JSON and for other programs."""
+"""Derived state of the antenna for the operator: values, their age, alarms, and the commands that would be refused.
+
+The page, the console, `pedestal status` and its JSON show these results and derive nothing themselves. All functions
+take an antenna.Antenna. A level is '' (normal), 'warn' or 'bad'.
+"""
 import math
 import typing
 
 from pedestal_common.graph import topics
+from pedestal_common.graph.modes import MODE_ROWS
 from pedestal_common.node.unit import LEVEL_OK
+
+BUTTON_MODES = tuple(row.name for row in MODE_ROWS if row.button)
+"""Modes with a button or a key; `stop` has a separate button, `rate` is the jog, `slave` is for programs."""
+
+OPERATOR_COMMANDS = (*BUTTON_MODES, 'rate', 'take', 'release', 'reset', 'fallback', 'acknowledge', 'shelve', 'unshelve')
+"""Commands of an operator, except `stop`, which is never refused in advance."""
+
+FREE_COMMANDS = ('standby', 'take')
+"""Commands among OPERATOR_COMMANDS that the control unit accepts from a client without control."""
+
+REFUSAL_PREFIX = 'refused '
+"""Start of a key in the diagnostics of the control unit, before the name of a mode."""
+
+ACU_STATUS_KEYS = ('mode', 'reason', 'fallback', 'control', 'drive', 'faults', 'locked', 'coasting', 'keyhole')
+"""Keys in the diagnostics of the control unit."""
+
+GRAPH_NODES = ('acu', 'adu', 'tracking_receiver', 'ins', 'ship_motion')
+"""Nodes of an antenna whose silence the operator must see."""
+
+LIMIT_WARNING_S = 20.0
+"""Time to a limit below which the axis has a warning [s]."""
+
+REST_RATE_DEG_S = 0.002
+"""Rate below which an axis counts as stopped [deg/s]."""
+
+UNACKNOWLEDGED_STATES = ('unacknowledged', 'returned unacknowledged', 'latched unacknowledged')
+"""States of an alarm that waits for an acknowledgement."""
+
+ALARM_KEYS = ('state', 'priority', 'annunciated', 'first_out', 'cause', 'action', 'detail', 'shelved_reason', 'raised_s')
+"""Keys of an alarm on acu/alarms."""
 
 
 class Row(typing.NamedTuple):
@@ -21,35 +56,138 @@ class Row(typing.NamedTuple):
         return f'{self.value:.4f}' if isinstance(self.value, float) else str(self.value)
 
 
-ACU_STATUS_KEYS = ('mode', 'reason', 'fallback', 'control', 'drive', 'faults', 'locked', 'coasting', 'keyhole')
-"""Keys in the diagnostics of the control unit."""
+class Shown(typing.NamedTuple):
+    """A text for the operator and its level."""
+    text: str
+    level: str = ''
 
 
-def rows(remote) -> list:
-    """Return the Rows of the present state of a remote_node.Remote."""
-    actual, commanded = remote.angles('joint_states'), remote.angles('acu/reference')
-    acu = remote.diagnostics_of('acu')
+def rows(antenna) -> list:
+    """Return the Rows of the present state."""
+    actual, commanded = antenna.angles('joint_states'), antenna.angles('acu/reference')
+    acu = antenna.diagnostics_of('acu')
     found = [Row('angle', axis, angle, 'deg') for axis, angle in zip(topics.AXES, actual)]
     found += [Row('commanded', axis, angle, 'deg') for axis, angle in zip(topics.AXES, commanded)]
     found += [Row('deviation', axis, a - b, 'deg') for axis, a, b in zip(topics.AXES, commanded, actual)]
-    found += [Row('rate', axis, rate, 'deg/s') for axis, rate in zip(topics.AXES, remote.rates())]
-    found += [Row('receiver', name, value, unit) for name, value, unit in _receiver(remote)]
+    found += [Row('rate', axis, rate, 'deg/s') for axis, rate in zip(topics.AXES, antenna.rates())]
+    found += [Row('receiver', name, value, unit) for name, value, unit in _receiver(antenna)]
     found += [Row('acu', key, acu.get(key)) for key in ACU_STATUS_KEYS]
-    found.append(Row('adu', 'state', remote.texts.get('adu/state')))
+    found.append(Row('adu', 'state', header(antenna)['drive'].text))
     return found
 
 
-def alarms(remote) -> list:
-    """Return [(node, text)] of the nodes whose diagnostics are not OK, and of silent nodes."""
-    found = [(name, status.message) for name, status in remote.status.items()
-             if status.level != LEVEL_OK and remote.present(name)]
-    return found + [(name, 'silent') for name in remote.status if not remote.present(name)]
-
-
-def _receiver(remote):
+def _receiver(antenna):
     values = (math.nan,) * 3
-    if remote.present('tracking_receiver/angle_error'):
-        values = remote.numbers['tracking_receiver/angle_error']
+    if antenna.present('tracking_receiver/angle_error'):
+        values = antenna.numbers['tracking_receiver/angle_error']
     cross_elevation, elevation, level = values
     return (('cross_elevation_error', math.degrees(cross_elevation), 'deg'),
             ('elevation_error', math.degrees(elevation), 'deg'), ('level', float(level), 'dB-Hz'))
+
+
+def node_reports(antenna) -> list:
+    """Return [(node, text)] of the nodes whose diagnostics are not OK, and of silent nodes."""
+    return [(name, 'silent' if not antenna.present(name) else status.message)
+            for name, status in antenna.status.items() if not antenna.present(name) or status.level != LEVEL_OK]
+
+
+def header(antenna) -> dict:
+    """Return {item: Shown} of mode, reason, drive, control, fallback and link.
+
+    A silent control unit has no mode: the last one is part of the reason, with its age.
+    """
+    acu, link = antenna.diagnostics_of('acu'), _link(antenna)
+    if acu:
+        reason = acu.get('reason', '') + (', coasting' if acu.get('coasting') == '1' else '')
+        mode = antenna.texts.get('acu/mode') or acu.get('mode', '')
+        return {'mode': Shown(mode), 'reason': Shown(reason), 'drive': _drive(antenna, acu),
+                'control': Shown(acu.get('control') or 'none'), 'fallback': Shown(acu.get('fallback', '')),
+                'link': link}
+    last = antenna.last_diagnostics_of('acu')
+    reason = f'last: {last.get("mode", "")}, {antenna.age(antenna.name_of("acu")):.0f} s ago' if last else ''
+    return {'mode': Shown('unknown', 'bad'), 'reason': Shown(reason, 'bad'), 'drive': _drive(antenna, acu),
+            'control': Shown('unknown', 'bad'), 'fallback': Shown('unknown', 'bad'), 'link': link}
+
+
+def _drive(antenna, acu):
+    """Return the Shown state of the drive, by the control unit, which notices a silence first."""
+    text = acu.get('drive') or (antenna.texts.get('adu/state') if antenna.present(antenna.name_of('adu')) else None)
+    if not text:
+        return Shown('unknown', 'bad')
+    if text == 'silent' or text != 'unknown' and is_drive_silent(antenna):
+        age = antenna.age('joint_states')
+        return Shown(f'silent for {age:.0f} s' if math.isfinite(age) else text, 'bad')
+    if not text.startswith('enabled'):
+        return Shown(text, 'bad')
+    return Shown(text, '' if text == 'enabled' else 'warn')
+
+
+def _link(antenna):
+    """Return the Shown link to the graph: live, or the first silent node."""
+    if not antenna.present(antenna.name_of('acu')):
+        return Shown('no ACU', 'bad')
+    if is_drive_silent(antenna):
+        return Shown('no adu', 'bad')
+    for node in GRAPH_NODES:
+        name = antenna.name_of(node)
+        if name in antenna.status and not antenna.present(name):
+            return Shown(f'no {node}', 'bad')
+    return Shown('live')
+
+
+def is_drive_silent(antenna):
+    """Return True if no angles arrive from the drive, or if the control unit reports its silence."""
+    return antenna.diagnostics_of('acu').get('drive') == 'silent' or not antenna.present('joint_states')
+
+
+def axis_states(antenna) -> list:
+    """Return the Shown state of each axis: silent, limited, near a limit, stopped or moving."""
+    acu = antenna.diagnostics_of('acu')
+    return [_axis_state(is_drive_silent(antenna), acu.get(f'{axis} limited', ''), acu.get(f'{axis} limit_s', 'inf'),
+                        rate) for axis, rate in zip(topics.AXES, antenna.rates())]
+
+
+def _axis_state(silent, limited, limit_s, rate):
+    if silent:
+        return Shown('silent', 'bad')
+    if limited:
+        return Shown(f'{limited} limited', 'warn')
+    if float(limit_s) < LIMIT_WARNING_S:
+        return Shown(f'limit in {float(limit_s):.0f} s', 'warn')
+    return Shown('stopped' if abs(rate) < REST_RATE_DEG_S else 'moving')
+
+
+def refusals(antenna, holds_control, may_take=False) -> dict:
+    """Return {command: reason} of the OPERATOR_COMMANDS that the control unit would refuse now.
+
+    holds_control: the client has control, or control is free; may_take: a supervisor takes control from others.
+    """
+    acu = antenna.diagnostics_of('acu')
+    if not acu:
+        return dict.fromkeys(OPERATOR_COMMANDS, 'the control unit is silent')
+    holder = acu.get('control', '')
+    if not holds_control:
+        refused = {command: f'held by {holder}' for command in OPERATOR_COMMANDS
+                   if command not in FREE_COMMANDS or command == 'take' and not may_take}
+    elif holder:
+        refused = {'take': 'you are in control'}
+    else:
+        refused = {'release': 'control is free'}
+    return {key.removeprefix(REFUSAL_PREFIX): text for key, text in acu.items()
+            if key.startswith(REFUSAL_PREFIX)} | refused
+
+
+def alarm(status) -> dict:
+    """Return an alarm of acu/alarms as {name, meaning, raised_s [s of the graph], further ALARM_KEYS}."""
+    values = {pair.key: pair.value for pair in status.values}
+    return {'name': status.name, 'meaning': status.message, **{key: values.get(key, '') for key in ALARM_KEYS},
+            'raised_s': float(values.get('raised_s', 'nan'))}
+
+
+def first_alarm(antenna) -> dict | None:
+    """Return the alarm that the operator must look at first, None without alarms: the first unacknowledged one.
+
+    The list on acu/alarms is in the order of priority and has the consequences of alarms after their causes.
+    """
+    listed = [each for each in map(alarm, antenna.alarms) if each['state'] != 'shelved']
+    return min(listed, key=lambda each: each['state'] not in UNACKNOWLEDGED_STATES, default=None)

@@ -213,11 +213,6 @@ def test_the_past_of_the_beam_is_where_it_moved():
     assert past.places == [[0.2 * 98, 20.0], [20.0, 30.0]]
 
 
-def test_a_refusal_is_told_as_the_control_unit_says_it():
-    assert page_state.refusals({'mode': 'stop', 'refused tle': 'no elements', 'refused sun': 'UTC unknown'}) == {
-        'tle': 'no elements', 'sun': 'UTC unknown'}
-
-
 class Station:
     """An antenna ashore with the elements of the ISS, at a time [s UTC]."""
     LINES = {'line_1': '1 25544U 98067A   19343.69339541  .00001764  00000-0  38792-4 0  9991',

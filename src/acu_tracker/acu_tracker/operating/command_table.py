@@ -43,7 +43,8 @@ ALARM_COMMANDS = (
         Argument('reason', 'reason for shelving'))),
     CommandDefinition('unshelve', 'end the shelving of an alarm', (_ALARM_ARGUMENT,)),
     CommandDefinition('reset', 'reset latched alarms and cancel a mode that waits for entry (initial mode, mode to '
-                      'resume); refused while a cause remains'))
+                      'resume); refused while a cause remains; in realtime the control unit also requests the reset of '
+                      'a drive in fault'))
 ALARM_COMMAND_NAMES = tuple(command.name for command in ALARM_COMMANDS)
 
 ACU_COMMANDS = (

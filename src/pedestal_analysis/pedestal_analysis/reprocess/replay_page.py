@@ -68,9 +68,9 @@ class Recording(Antenna):
         """Time in the recording [s]; UTC in realtime."""
         return (self._begin + round(self.position * NS_PER_SECOND)) / NS_PER_SECOND
 
-    def present(self, name):
-        """Return True if the newest message of a topic or node is not stale."""
-        return name in self._received and self.now - self._received[name] < remote_node.MAX_MESSAGE_AGE_S
+    def age(self, name):
+        """Return the age of the last message of a topic or node [s], infinite before the first."""
+        return self.now - self._received.get(name, -math.inf)
 
     def lines(self):
         """Return the events up to now, for the event log."""

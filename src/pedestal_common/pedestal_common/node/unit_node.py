@@ -308,8 +308,14 @@ class UnitNode(shell.Shell):
         if self._callees:
             calls = {name for port in self.ports for name in port.unit.calls}
             for name in calls - self._called:
-                self._callees[name].call_async(Trigger.Request())
+                answer = self._callees[name].call_async(Trigger.Request())
+                answer.add_done_callback(lambda done, name=name: self._log_refusal(name, done.result()))
             self._called = calls
+
+    def _log_refusal(self, name, response):
+        """Log the refusal of a called service."""
+        if not response.success:
+            self.get_logger().warning(f'{name}: {response.message}')
 
     def _watch_trigger(self):
         """Set `silent` of the units in realtime while the trigger is absent, except after a stall of this node and

@@ -14,6 +14,8 @@ import secrets
 import typing
 from http import cookies
 
+from pedestal_operator import state
+
 PAGE_ROLES = ('operator', 'monitor', 'supervisor')
 """Roles: an operator sends commands; a monitor may send `stop` only; a supervisor may take control from others."""
 
@@ -114,6 +116,11 @@ def refusal_reason(role, verb, arguments) -> str:
                                     for name, argument, value in SUPERVISOR_REQUESTS):
         return 'only the role supervisor may take control from others'
     return ''
+
+
+def refusals(role) -> dict:
+    """Return {command: reason} of the commands of an operator that a role may not send."""
+    return {command: reason for command in state.OPERATOR_COMMANDS if (reason := refusal_reason(role, command, {}))}
 
 
 def is_loopback(address):

@@ -208,7 +208,7 @@ class PageServer:
         role = websocket.scope['role']
         client = Client(_name(websocket.query_params.get('name', '')) or f'{role}-{self._named}', role,
                         websocket.client.host)
-        client.replies.append(json.dumps({'you': client.name, 'role': role}))
+        client.replies.append(json.dumps({'you': client.name, 'role': role, 'refused': page_security.refusals(role)}))
         await websocket.accept()
         self._clients.add(client)
         self.pages = len(self._clients)

@@ -1,16 +1,15 @@
 """Sections of the state that the page shows, of a running antenna or of a recording. No ROS here.
 
-The functions take an antenna.Antenna with four further attributes:
+The functions take an antenna.Antenna with three further attributes:
 
 now             UTC [s]
-alarms          list of DiagnosticStatus
 configuration   {name of a parameter: value}
 path            page_sky.Path or None
 """
 import math
 
 from pedestal_common.graph import topics
-from pedestal_common.graph.modes import MODE_ROWS
+from pedestal_operator import state
 from pedestal_operator.page import page_sky
 
 ANGLE_ERROR_TOPIC = 'tracking_receiver/angle_error'
@@ -19,7 +18,7 @@ ATTITUDE_TOPIC = 'ship/imu/data'
 EXTRA_NUMBER_TOPICS = (MOTOR_STATES_TOPIC, ATTITUDE_TOPIC)
 """Topics of numbers that the page receives in addition to those of every client."""
 
-TEXT_TOPIC_BY_NAME = {'mode': 'acu/mode', 'drive': 'adu/state', 'keyhole': 'acu/keyhole', 'blockage': 'acu/blockage'}
+TEXT_TOPIC_BY_NAME = {'keyhole': 'acu/keyhole', 'blockage': 'acu/blockage'}
 """{name on the page: topic of the text}."""
 
 STATION_PARAMETERS, ELEMENT_PARAMETERS = ('latitude_deg', 'longitude_deg', 'height'), (
@@ -34,14 +33,8 @@ SHOWN_PARAMETERS = {'acu': ('graph.start', 'tracker.receiver.beamwidth', 'blocka
                                           *(f'target.leo_pass.{name}' for name in ELEMENT_PARAMETERS))}
 """{node: parameters that the page reads}."""
 
-BUTTON_MODES = tuple(row.name for row in MODE_ROWS if row.button)
-"""Modes with a button; `stop` has a separate button, `rate` is the jog, `slave` is for programs."""
-
 CHART_SPAN_S, CHART_PERIOD_S = 600.0, 0.5
 """Time span of the strip charts, and time between two points [s]."""
-
-REFUSAL_PREFIX = 'refused '
-"""Start of a key in the diagnostics of the control unit, before the name of a mode."""
 
 HISTORY_COLUMNS = ('t', 'cross_elevation', 'elevation', 'azimuth_error', 'elevation_error', 'azimuth_rate',
                    'elevation_rate', *topics.MOTOR_NAMES, 'level')
@@ -78,36 +71,37 @@ def history_row(frame) -> list:
     return [round(frame['t'], 2), *(round(float(value), 5) for value in row)]
 
 
-def status_section(antenna, nodes=('acu', 'adu', 'tracking_receiver', 'ins', 'ship_motion')) -> dict:
-    """Return the slow part of the state: mode and its reason, control, axes, times to the limits, refusals."""
-    acu = antenna.diagnostics_of('acu')
-    texts = {name: antenna.texts.get(topic, '') for name, topic in TEXT_TOPIC_BY_NAME.items()}
-    return {'present': bool(acu), **texts,
-            **{key: acu.get(key, '') for key in ('reason', 'fallback', 'control', 'faults', 'locked', 'coasting')},
-            'axes': [{'limit_s': acu.get(f'{axis} limit_s', ''), 'limited': acu.get(f'{axis} limited', '')}
-                     for axis in topics.AXES],
+def status_section(antenna) -> dict:
+    """Return the state of the antenna for the header, the axes and the buttons: see the module `state`.
+
+    refused: {'holder', 'other', 'supervisor': {command: reason}} for a client with control, without control, and for a
+    supervisor without control.
+    """
+    acu, header = antenna.diagnostics_of('acu'), state.header(antenna)
+    texts = {name: antenna.texts.get(topic, '') if acu else '' for name, topic in TEXT_TOPIC_BY_NAME.items()}
+    return {'present': bool(acu), **texts, 'mode': header['mode'].text if acu else '',
+            **{key: acu.get(key, '') for key in ('control', 'fallback', 'locked')},
+            'header': {name: shown._asdict() for name, shown in header.items()},
+            'axes': [shown._asdict() for shown in state.axis_states(antenna)],
             'steps': acu.get('clock_steps', ''), 'offset_ms': acu.get('offset joint_states_ms', ''),
-            'nodes': {name: antenna.status[name].message if antenna.present(name) else 'silent'
-                      for name in nodes if name in antenna.status},
-            'refused': refusals(acu) if acu else dict.fromkeys((*BUTTON_MODES, 'rate'), 'the control unit is silent')}
-
-
-def refusals(acu) -> dict:
-    """Return {mode: reason of its present refusal} from the diagnostics of the control unit."""
-    return {key.removeprefix(REFUSAL_PREFIX): text for key, text in acu.items() if key.startswith(REFUSAL_PREFIX)}
+            'first_alarm': first_alarm(antenna),
+            'refused': {'holder': state.refusals(antenna, True), 'other': state.refusals(antenna, False),
+                        'supervisor': state.refusals(antenna, False, may_take=True)}}
 
 
 def alarms(antenna) -> list:
     """Return the list of acu/alarms in its order, with times in UTC [s]."""
-    begin = epoch(antenna)
-    found = []
-    for status in antenna.alarms:
-        values = {pair.key: pair.value for pair in status.values}
-        raised = float(values.get('raised_s', 'nan'))
-        found.append({'name': status.name, 'meaning': status.message, 'raised': begin + raised,
-                      **{key: values.get(key, '') for key in ('state', 'priority', 'annunciated', 'first_out', 'cause',
-                                                              'action', 'detail', 'shelved_reason')}})
-    return found
+    return [_dated(antenna, state.alarm(status)) for status in antenna.alarms]
+
+
+def first_alarm(antenna):
+    """Return state.first_alarm with its time in UTC [s]."""
+    first = state.first_alarm(antenna)
+    return first and _dated(antenna, first)
+
+
+def _dated(antenna, alarm):
+    return {**alarm, 'raised': epoch(antenna) + alarm['raised_s']}
 
 
 def epoch(antenna):
@@ -123,7 +117,7 @@ def fixed(antenna) -> dict:
     def degrees(name):
         return math.degrees(p.get(name, math.nan))
     return {'beamwidth': degrees('tracker.receiver.beamwidth'), 'history': HISTORY_COLUMNS, 'span': CHART_SPAN_S,
-            'modes': BUTTON_MODES,
+            'modes': state.BUTTON_MODES,
             'limits': [[degrees(f'{axis}.limits.{end}') for end in ('low', 'high')] for axis in topics.AXES],
             'stow': [degrees(f'{axis}.stow') for axis in topics.AXES],
             'detect': p.get('receiver.acquire_level_dbhz'), 'loss': p.get('receiver.lose_level_dbhz')}

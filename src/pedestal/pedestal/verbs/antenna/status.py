@@ -24,7 +24,7 @@ def main(options: argparse.Namespace) -> int:
         spun.wait_for_node(options.timeout)
         name = spun.remote.beam + 'acu'
         spun.until(lambda: spun.remote.present(name) and spun.remote.present('joint_states'), options.timeout)
-        rows, alarms = state.rows(spun.remote), state.alarms(spun.remote)
+        rows, alarms = state.rows(spun.remote), state.node_reports(spun.remote)
     if options.json:
         table = [{'case': row.group, 'metric': row.name, 'value': row.value, 'unit': row.unit} for row in rows]
         table += [{'case': 'alarm', 'metric': node, 'value': text, 'unit': ''} for node, text in alarms]
