@@ -1,8 +1,9 @@
 """Access to the server of the page by token, name of the host and origin of the request. No ROS, no server.
 
-A token stands for a role. It arrives once in the address of the page, then in a cookie. No script can read the cookie,
-and the browser sends it to this site only. `Host` must be a name of this server. This avoids that a foreign site lets
-its own name point here (DNS rebinding). `Origin` must be this page for every request that can command the antenna.
+A token stands for a role. It arrives once in the address of the page, then in a cookie. No script can read the
+cookie, and the browser sends it to this site only. `Host` must be a name of this server. This avoids that a foreign
+site lets its own name point here (DNS rebinding). `Origin` must be this page for every request that can command the
+antenna.
 
 A browser may reach the server through a proxy or an ssh tunnel. Then the port and the scheme in the browser differ from
 those of the server, so `Host` may have any port, and `Origin` may be http or https.
@@ -63,7 +64,7 @@ class Access:
     def __init__(self, address, port, names=()):
         for name in names:
             if not _is_host(name):
-                raise ValueError(f'names: {name}: must be names of hosts, without scheme and port, separated by commas')
+                raise ValueError(f'names: {name}: must be names of hosts without scheme and port, separated by commas')
         self.tokens = {role: secrets.token_urlsafe(24) for role in PAGE_ROLES}
         known = {address, *names}
         if is_loopback(address):
@@ -77,8 +78,7 @@ class Access:
 
     @staticmethod
     def cookie(host):
-        """Return the name of the cookie for a `Host`. Browsers send a cookie to all ports of a host, so the name has the
-        port."""
+        """Return the name of the cookie for a `Host`, with its port, because browsers send a cookie to all ports."""
         return f'pedestal_page_{host.rpartition("]")[2].partition(":")[2]}'
 
     def role(self, request):
@@ -86,11 +86,11 @@ class Access:
         host, origin = request.host.lower(), request.origin.lower()
         parts = HOST.fullmatch(host)
         if not parts or parts[1] not in self._names:
-            raise Refused(400, f'unknown name of this server in Host, {shown(request.host)}: open {self._url}, or list '
-                               'the name in the parameter `names` (-p names:=NAME)')
+            raise Refused(400, f'unknown name of this server in Host, {shown(request.host)}: open {self._url}, or '
+                               'list the name in the parameter `names` (-p names:=NAME)')
         if origin not in (f'http://{host}', f'https://{host}') and (origin or request.asks):
-            raise Refused(403, f'the request comes from another page, {shown(request.origin)}, than that of this server, '
-                               f'{shown(request.host)}; a proxy must pass on Host unchanged')
+            raise Refused(403, f'the request comes from another page, {shown(request.origin)}, than that of this '
+                               f'server, {shown(request.host)}; a proxy must pass on Host unchanged')
         given = request.token if request.path == '/' and request.token else self._of_cookie(host, request.cookie)
         for role, token in self.tokens.items():
             if hmac.compare_digest(token.encode(), given.encode(errors='replace')):
@@ -151,7 +151,8 @@ def headers(host):
     """Return the headers [(name, value)] of every answer: content of this site only, revalidated, without frames."""
     return [('content-security-policy',
              "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self'; "
-             f"connect-src 'self' ws://{host} wss://{host}; frame-ancestors 'none'; base-uri 'none'; form-action 'none'"),
+             f"connect-src 'self' ws://{host} wss://{host}; "
+             "frame-ancestors 'none'; base-uri 'none'; form-action 'none'"),
             ('cache-control', 'no-cache'), ('x-content-type-options', 'nosniff'), ('x-frame-options', 'DENY'),
             ('referrer-policy', 'no-referrer'), ('cross-origin-resource-policy', 'same-origin'),
             ('cross-origin-opener-policy', 'same-origin')]

@@ -1,6 +1,6 @@
 // Angles, errors, rates and travel of the axes, the signal level, and the dial of the receiver errors.
 import {describe} from './figures.js';
-import {onDraw} from './link.js';
+import {onDraw, state} from './link.js';
 import {draw, keepTextSize, set, show} from './svg.js';
 import {find, number, setText} from './text.js';
 
@@ -75,7 +75,7 @@ class Level {
     this.svg.replaceChildren();
     draw(this.svg, 'rect', {x: 0, y: 3, width, height: 11, class: 'bar'});
     this.bar = draw(this.svg, 'rect', {x: 0, y: 3, width: 0, height: 11, class: 'reach'});
-    for (const [name, mark, y] of [['loss', loss, 44], ['lock', detect, 29]]) {
+    for (const [name, mark, y] of [['loss', loss, 42], ['lock', detect, 28]]) {
       if (mark === null || mark === undefined) continue;
       draw(this.svg, 'line', {x1: this.x(mark), x2: this.x(mark), y1: 1, y2: y - 10, class: 'mark'});
       draw(this.svg, 'text', {x: this.x(mark) + 2, y}, `${name} ${mark.toFixed(0)}`);
@@ -97,14 +97,14 @@ class Dial {
     this.svg = find('dial');
     keepTextSize(this.svg);
     const unit = 100 / DIAL_RADIUS_BEAMWIDTHS;
-    for (const [share, label] of [[0.1, '0.1'], [0.5, '0.5 beamwidth']]) {
+    for (const [share, label] of [[0.1, '0.1'], [0.5, '0.5 beamwidths']]) {
       draw(this.svg, 'circle', {cx: 0, cy: 0, r: share * unit, class: 'ring'});
-      draw(this.svg, 'text', {x: 4, y: -share * unit - 3}, label);
+      draw(this.svg, 'text', {x: 0, y: -share * unit - 4, 'text-anchor': 'middle', class: 'minor'}, label);
     }
     draw(this.svg, 'line', {x1: -100, x2: 100, y1: 0, y2: 0, class: 'line'});
     draw(this.svg, 'line', {x1: 0, x2: 0, y1: -100, y2: 100, class: 'line'});
-    draw(this.svg, 'text', {x: 108, y: -5, 'text-anchor': 'end'}, 'cross-el');
-    draw(this.svg, 'text', {x: 4, y: 107}, 'el');
+    draw(this.svg, 'text', {x: 108, y: -5, 'text-anchor': 'end', class: 'minor'}, 'cross-el');
+    draw(this.svg, 'text', {x: 4, y: 107, class: 'minor'}, 'el');
     this.trail = draw(this.svg, 'polyline', {class: 'trail'});
     this.spot = draw(this.svg, 'circle', {r: 4, class: 'beam'});
     this.none = draw(this.svg, 'text', {x: 0, y: 45, 'text-anchor': 'middle'}, 'no error signal');
@@ -154,17 +154,21 @@ export function begin() {
   const travels = AXES.map((name) => new Travel(`${name}-travel`));
   const level = new Level();
   const dial = new Dial();
-  onDraw((sections, state) => {
+  function showFigures({now, fixed}) {
+    const constants = fixed || {};
+    travels.forEach((travel, i) => {
+      const limits = constants.limits && constants.limits[i];
+      if (limits && limits[0] !== null) travel.scale(limits, constants.stow[i]);
+      travel.show(now.axes[i]);
+    });
+    level.show(now.receiver[2], now.receiver[0] !== null, constants);
+  }
+  const resized = new ResizeObserver(() => { if (state.now) showFigures(state); });
+  for (const id of ['axes', 'level-bar']) resized.observe(find(id));
+  onDraw((sections) => {
     if (!sections.now) return;
     showAxes(state);
-    const fixed = state.fixed || {};
-    travels.forEach((travel, i) => {
-      const limits = fixed.limits && fixed.limits[i];
-      if (limits && limits[0] !== null) travel.scale(limits, fixed.stow[i]);
-      travel.show(sections.now.axes[i]);
-    });
-    const [x, y, strength] = sections.now.receiver;
-    level.show(strength, x !== null, fixed);
-    dial.show([x, y], fixed.beamwidth);
+    showFigures(state);
+    dial.show(state.now.receiver, (state.fixed || {}).beamwidth);
   });
 }

@@ -52,7 +52,7 @@ class Chart {
     const heading = this.place.parentElement.querySelector('h2');
     series.forEach(([label], i) => heading.appendChild(make('i', STYLES[i], label)));
     this.plot = new uPlot({
-      ...this.size(), cursor: {show: false}, legend: {show: false}, padding: [4, 22, 0, 0],
+      ...this.size(), cursor: {show: false}, legend: {show: false}, padding: [8, 22, 0, 0],
       scales: {x: {time: false}, y: {range: (plot, low, high) => Chart.range(low, high)}},
       axes: [{...axis, size: 19, gap: 1, values: (plot, values) => values.map((value) => time(value))},
              {...axis, size: 50, gap: 3, space: 24}],
@@ -106,7 +106,11 @@ export function begin() {
   }
 
   async function fetchHistory() {
-    const rows = await (await fetch('history', {cache: 'no-store'})).json();
+    const rows = await fetch('history', {cache: 'no-store'}).then((answer) => answer.json(), () => null);
+    if (rows === null) {  // no link: the next state requests the history again
+      last = -Infinity;
+      return;
+    }
     data = columns.map((_, i) => rows.map((values) => values[i]));
     last = data[0].at(-1) ?? -Infinity;
     redraw();

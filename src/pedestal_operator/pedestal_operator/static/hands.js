@@ -1,7 +1,7 @@
 // Commands of the operator: modes, preset, jog, control. A grey button would be refused and shows the reason.
 import {Jog} from './jog.js';
 import {me, onState, request, state} from './link.js';
-import {refusal} from './refusals.js';
+import {press, refusal, showMessage} from './refusals.js';
 import {decimal, find, make, setText} from './text.js';
 
 const REFRESH_PERIOD_MS = 500;
@@ -9,30 +9,17 @@ const FALLBACKS = ['coast', 'memory', 'program', 'search', 'preset', 'standby'];
 const RADIANS_PER_DEGREE = Math.PI / 180;
 const MIN_COMMON_COUNT = 3;  // buttons that share a reason, which one line then shows for all of them
 
-function setRefusal(button, reason, text) {
-  button.setAttribute('aria-disabled', String(Boolean(reason)));
+function setRefusal(button, reason, text = '') {
+  if (button.tagName === 'SELECT') button.disabled = Boolean(reason);
+  else button.setAttribute('aria-disabled', String(Boolean(reason)));
   if (button.title !== reason) button.title = reason;
   const small = button.querySelector('small');
   if (small) setText(small, text);
 }
 
-function press(button, verb, act) {
-  button.onclick = (event) => {
-    event.preventDefault();
-    const reason = refusal(verb);
-    if (reason) showMessage(`${verb}: ${reason}`, true); else act();
-  };
-}
-
-function showMessage(text, bad = false) {
-  setText(find('message'), text, bad ? 'warn' : '');
-  find('message').title = text;
-}
-
 function showModes(names) {
   find('modes').replaceChildren(...names.filter((name) => name !== 'preset').map((name) => {
     const button = make('button', '', name);
-    button.dataset.verb = name;
     button.appendChild(make('small'));
     press(button, name, () => request(name));
     return button;
@@ -59,12 +46,10 @@ function showRefusals(jog) {
   const line = [common && `grey: ${common}`, jogReason !== common && jogReason && `jog: ${jogReason}`];
   setText(find('common-refusal'), line.filter(Boolean).join('; '));
   find('common-refusal').title = find('common-refusal').textContent;
-  for (const button of find('authority').children) {
+  for (const button of document.querySelectorAll('#authority button, #alarms [data-verb]')) {
     const reason = refusal(button.dataset.verb);
     setRefusal(button, reason, reason);
   }
-  find('choose-fallback').disabled = Boolean(refusal('fallback'));
-  find('fallback-choice').title = refusal('fallback');
 }
 
 function requestPreset() {

@@ -1,5 +1,6 @@
 // The header: mode and reason, drive, control, link, time, and the first alarm.
 import {condition, me, onState, rename, state} from './link.js';
+import {mayCommand} from './refusals.js';
 import {find, setText, time} from './text.js';
 
 const CELLS = ['mode', 'reason', 'drive', 'control', 'fallback'];
@@ -7,7 +8,8 @@ const CELLS = ['mode', 'reason', 'drive', 'control', 'fallback'];
 function showHeader(status) {
   for (const name of CELLS) {
     const {text, level} = status.header[name];
-    setText(find(name), text || (name === 'reason' ? '' : '-'), level);
+    const held = name === 'control' && !mayCommand(status) ? 'warn' : '';
+    setText(find(name), text || (name === 'reason' ? '' : '-'), level || held);
     find(name).title = text;
   }
 }
@@ -31,7 +33,7 @@ function showLink() {
   setText(find('time-label'), `${now && now.t < 1e8 ? 'time' : 'UTC'}${stepped ? ', clock stepped' : ''}`,
       stepped ? 'label warn' : 'label');
   if (now) setText(find('time'), time(now.t));
-  setText(find('role'), `${me.role || 'page'}, user name`, 'label');
+  setText(find('role'), `you: ${me.role || '-'}`, 'label');
   if (document.activeElement !== find('name')) find('name').value = me.name;
 }
 

@@ -1,6 +1,6 @@
 // STOP, and what the page shows without a link: the overlay before the first state, the dimmed page and the banner later.
 import {age, condition, lossCause, me, onState, request, state} from './link.js';
-import {find, setText, time} from './text.js';
+import {find, setText} from './text.js';
 
 const STOP_REPLY_TIMEOUT_MS = 1500;
 const LOOK_PERIOD_MS = 200;
@@ -22,17 +22,18 @@ function showLoss() {
   }
   showStop();
   const lost = present === 'lost' ? `No link to the antenna. ${lossCause()} ${LOST_STOP}`
-    : present === 'stale' ? 'The state on this page is stale.' : '';
+    : present === 'stale' ? 'No state arrives from the server.' : '';
   const help = stopProblem || present === 'lost' ? EMERGENCY_STOP : '';
   find('banner').hidden = !(stopProblem || lost);
   setText(find('banner-text'), [stopProblem, lost, help].filter(Boolean).join(' '));
-  setText(find('banner-age'), lost ? `Data of ${time(state.now.t)}, ${age().toFixed(0)} s old.` : '');
+  setText(find('banner-age'), lost ? `Data ${age().toFixed(0)} s old` : '');
 }
 
 function showStop() {
   const stop = find('stop');
   stop.disabled = Boolean(state.replay);
   stop.classList.toggle('dead', !me.open || stop.disabled);
+  stop.setAttribute('aria-disabled', String(!me.open || stop.disabled));  // a press still shows the emergency stop
   stop.title = stop.disabled ? 'recording' : me.open ? '' : `${LOST_STOP} ${EMERGENCY_STOP}`;
 }
 

@@ -1,5 +1,6 @@
 // Refusals of commands, as the server derives them from the state of the antenna.
 import {condition, me, state} from './link.js';
+import {find, setText} from './text.js';
 
 // Return true if this user may command: the user holds control, or control is free.
 export function mayCommand({control}) { return control === '' || control.startsWith(`${me.name}@page `); }
@@ -9,6 +10,22 @@ export function refusal(verb) {
   if (state.replay) return 'recording';
   if (condition() !== 'live') return 'no link';
   if (!state.status) return 'no state received';
-  const {holder, other} = state.status.refused;
-  return me.refused[verb] || (mayCommand(state.status) ? holder : other)[verb] || '';
+  const client = mayCommand(state.status) ? 'holder' : me.role === 'supervisor' ? 'supervisor' : 'other';
+  return me.refused[verb] || state.status.refused[client][verb] || '';
+}
+
+// Show a text about the last command.
+export function showMessage(text, bad = false) {
+  setText(find('message'), text, bad ? 'warn' : '');
+  find('message').title = text;
+}
+
+// Let a button act if its command would be accepted, and show the reason of the refusal else.
+export function press(button, verb, act) {
+  button.dataset.verb = verb;
+  button.onclick = (event) => {
+    event.preventDefault();
+    const reason = refusal(verb);
+    if (reason) showMessage(`${verb}: ${reason}`, true); else act();
+  };
 }
