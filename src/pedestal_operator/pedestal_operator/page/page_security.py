@@ -5,8 +5,8 @@ cookie, and the browser sends it to this site only. `Host` must be a name of thi
 site lets its own name point here (DNS rebinding). `Origin` must be this page for every request that can command the
 antenna.
 
-A browser may reach the server through a proxy or an ssh tunnel. Then the port and the scheme in the browser differ from
-those of the server, so `Host` may have any port, and `Origin` may be http or https.
+A browser may reach the server through a proxy or an ssh tunnel. Then the port and the scheme in the browser differ
+from those of the server, so `Host` may have any port, and `Origin` may be http or https.
 """
 import hmac
 import ipaddress

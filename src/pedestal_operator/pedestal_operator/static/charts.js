@@ -54,7 +54,7 @@ class Chart {
     this.plot = new uPlot({
       ...this.size(), cursor: {show: false}, legend: {show: false}, padding: [8, 22, 0, 0],
       scales: {x: {time: false}, y: {range: (plot, low, high) => Chart.range(low, high)}},
-      axes: [{...axis, size: 19, gap: 1, values: (plot, values) => values.map((value) => time(value))},
+      axes: [{...axis, size: 19, gap: 1, space: 72, values: (plot, values) => values.map((value) => time(value))},
              {...axis, size: 50, gap: 3, space: 24}],
       series: [{}, ...series.map((_, i) => ({stroke: colour(COLOURS[i]), width: 1.2, points: {show: false}}))],
       hooks: name === 'error' ? {drawAxes: [(plot) => marks(plot, beamwidth())]} : {},
