@@ -1,6 +1,7 @@
 """The operator's page in Debian's Chromium, on a running realtime graph and on a recording; and who is refused."""
 import contextlib
 import http.client
+import importlib.resources
 import json
 import math
 import os
@@ -9,6 +10,7 @@ import re
 import shutil
 import signal
 import socket
+import ssl
 import statistics
 import subprocess
 import sys
@@ -18,6 +20,7 @@ import urllib.parse
 import limited
 import pytest
 from shared import PATIENCE, PEDESTAL, begins_with, free_port
+from tunnel import Tunnel
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect as connect_web_socket
 
@@ -28,8 +31,14 @@ CHROMIUM = shutil.which('chromium')
 REFERENCE = pathlib.Path(__file__).parents[1] / 'bags' / 'reference' / 'uav_flyby'
 CHEAP = ('--headless', '--no-sandbox', '--disable-gpu', '--disable-software-rasterizer', '--disable-dev-shm-usage',
          '--no-first-run', '--disable-background-networking', '--disable-component-update', '--disable-default-apps',
-         '--disable-extensions', '--disable-sync', '--disable-quic', '--mute-audio')
+         '--disable-extensions', '--disable-sync', '--disable-quic', '--mute-audio',
+         '--host-resolver-rules=MAP *.example 127.0.0.1')
 """Options of a Chromium that does nothing but show pages."""
+SIZES = ((1280, 800), (1024, 768), (768, 1024), (390, 844))
+"""Width and height of a desk, two tablets and a telephone [px]."""
+LAYOUT_FAULTS = pathlib.Path(__file__).with_name('page_layout.js')
+ACCESSIBILITY = ('wcag2a', 'wcag2aa', 'wcag21a', 'wcag21aa', 'wcag22aa')
+"""Rules of axe-core for WCAG 2.2 AA."""
 
 needs_chromium = pytest.mark.skipif(CHROMIUM is None, reason='chromium is not installed')
 
@@ -206,7 +215,7 @@ def browser(tmp_path_factory):
 
 def opened(browser, url, requests=None):
     """A page of the browser; requests: where the addresses it asks for are put."""
-    page = browser.new_context(viewport={'width': 1024, 'height': 700}).new_page()
+    page = browser.new_context(viewport={'width': 1024, 'height': 700}, ignore_https_errors=True).new_page()
     page.set_default_timeout(PATIENCE * 1e3)
     page.errors = []
     page.on('pageerror', lambda error: page.errors.append(str(error)))
@@ -225,6 +234,69 @@ def reads(page, selector, text):
 def holds(page, condition, argument=None):
     """Wait until a condition holds in the page; it is looked at five times a second, as the page is drawn."""
     page.wait_for_function(condition, arg=argument, polling=200)
+
+
+@pytest.fixture(scope='module')
+def tls(tmp_path_factory):
+    """A TLS context with a new certificate for antenna.example."""
+    folder = tmp_path_factory.mktemp('tls')
+    subprocess.run(['openssl', 'req', '-x509', '-newkey', 'ec', '-pkeyopt', 'ec_paramgen_curve:prime256v1', '-nodes',
+                    '-keyout', folder / 'key', '-out', folder / 'certificate', '-subj', '/CN=antenna.example'],
+                   check=True, capture_output=True)
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+    context.load_cert_chain(folder / 'certificate', folder / 'key')
+    return context
+
+
+@pytest.fixture
+def proxied(start_node):
+    """Site of a page without a graph that serves one page, also as antenna.example."""
+    page = start_node('page', '-p', 'port:=0', '-p', 'names:=antenna.example', '-p', 'clients:=1')
+    return Site(begins_with(page.process, 3))
+
+
+@needs_chromium
+def test_a_page_through_a_tunnel_and_through_an_encrypting_proxy(proxied, browser, tls):
+    """Its web socket opens and STOP arrives; a foreign name is refused in words, and so is a second page."""
+    token = urllib.parse.urlsplit(proxied.urls['operator']).query
+    for scheme, host, context in (('http', 'localhost', None), ('https', 'antenna.example', tls)):
+        tunnel, requests = Tunnel(proxied.port, context), []
+        page = opened(browser[1], f'{scheme}://{host}:{tunnel.port}/?{token}', requests)
+        reads(page, '#link', 'no ACU')
+        assert page.locator('#overlay').is_hidden() and page.locator('#stop.dead').count() == 0
+        page.locator('#stop').click()
+        reads(page, '#message', 'did not reply')                             # the server replied; there is no graph
+        assert any(url.startswith(f'ws{scheme[4:]}://{host}:{tunnel.port}/socket') for url in requests)
+        second = opened(browser[1], f'{scheme}://{host}:{tunnel.port}/?{token}')
+        reads(second, '#overlay', 'too many pages are open')
+        stops_in_vain(second)
+        second.goto(f'{scheme}://foreign.example:{tunnel.port}/?{token}')
+        reads(second, 'body', 'in the parameter `names`')
+        tunnel.close()
+        reads(page, '#banner', f'{host}:{tunnel.port} does not answer')
+        stops_in_vain(page)
+        assert page.errors == second.errors == []
+        page.context.close()
+        second.context.close()
+
+
+def stops_in_vain(page):
+    """STOP looks dead, and a press of it shows the emergency stop."""
+    assert page.locator('#stop.dead').is_visible()
+    page.locator('#stop').dispatch_event('click')
+    reads(page, '#banner', 'STOP was not sent: no link. ')
+    reads(page, '#banner', 'Use the emergency stop of the antenna.')
+
+
+@needs_chromium
+def test_a_page_without_its_scripts_says_so(proxied, browser):
+    page = browser[1].new_context().new_page()
+    page.route('**/link.js', lambda route: route.abort())
+    page.goto(proxied.urls['operator'])
+    assert 'have not started' in page.locator('#overlay').text_content()
+    assert 'Use the emergency stop' in page.locator('#overlay').inner_text()
+    assert page.locator('#overlay').is_visible() and page.locator('#stop.dead').is_visible()
+    page.context.close()
 
 
 @needs_chromium
@@ -307,11 +379,16 @@ def test_an_operator_at_the_page(antenna, browser):
     # Both at one moment: the target may fly through the beam of an antenna that stands.
     holds(page, """() => {
         const autotrack = document.querySelector("[data-verb=autotrack]");
-        return autotrack.ariaDisabled === "true" && autotrack.textContent.includes("receiver not locked");
+        return autotrack.ariaDisabled === "true" && autotrack.title.includes("receiver not locked");
     }""")
     press(page, client, '#take', says(page, '#control', 'anna@page'))
-    page.locator('[name=azimuth]').fill('20')
     page.locator('[name=elevation]').fill('30')
+    for text in ('', '0x10', '1e2', '1,000.5', 'NaN', '1 2'):
+        page.locator('[name=azimuth]').fill(text)
+        page.locator('#take').focus()
+        page.evaluate('document.querySelector("#message").textContent = ""')
+        press(page, client, '[data-verb=preset]', says(page, '#message', 'must be decimal numbers'))
+    page.locator('[name=azimuth]').fill('+20,0')
     press(page, client, '[data-verb=preset]', enters(client, 'preset'))
     press(page, client, '[data-verb=preset]', says(page, '#az-actual', '20.000°'))
     page.locator('[name=elevation]').fill('150')
@@ -320,7 +397,9 @@ def test_an_operator_at_the_page(antenna, browser):
     client.trigger('adu/emergency_stop')
     page.locator('[data-alarm="emergency stop"] button', has_text='ack').click()
     page.wait_for_selector('[data-alarm="emergency stop"][data-state=acknowledged]')
-    reads(page, '[data-verb=program] small', 'drive not ready: ')
+    reads(page, '#common-refusal', 'grey: drive not ready: ')
+    assert 'drive not ready: ' in page.locator('[data-verb=program]').get_attribute('title')
+    reads(page, '#urgent', 'emergency stop')
     client.trigger('adu/reset_faults')
     holds(page, '() => document.querySelector("[data-verb=program]").ariaDisabled === "false"')
     press(page, client, '[data-verb=program]', enters(client, 'program'))
@@ -394,6 +473,75 @@ def test_a_jog_ends_with_its_page_or_its_silence(antenna):
         time.sleep(0.6)                                                     # it has seen nothing for so long
         page.send('{"jog": [0.5, 0]}')
         assert 'the state on the page is' in hear(page, reply('rate'))[0]['reply']
+
+
+@needs_chromium
+def test_a_jog_by_keys(antenna, browser):
+    """Space and Enter move the axis while they are held, and no longer than the button has the focus."""
+    _, client, site = antenna
+    page = opened(browser[1], site.urls['operator'])
+    right = page.locator('[data-jog="1 0"]')
+    for key, end in (('Space', lambda: page.keyboard.up('Space')), ('Enter', lambda: page.keyboard.up('Enter')),
+                     ('Space', lambda: page.locator('#name').focus())):
+        holds(page, '() => document.querySelector("[data-jog=\\"1 0\\"]").ariaDisabled === "false"')
+        right.focus()
+        page.keyboard.down(key)
+        client.until(lambda: moving(client))
+        page.keyboard.down(key)                                            # keys repeat themselves while they are held
+        page.keyboard.down('ArrowLeft')
+        page.keyboard.up('ArrowLeft')
+        assert page.locator('button.held').count() == 1
+        end()
+        assert page.locator('button.held').count() == 0
+        client.until(lambda: stands(client))
+        page.keyboard.up(key)
+    assert page.errors == []
+    page.context.close()
+
+
+@needs_chromium
+def test_every_screen_keeps_what_a_fault_needs_and_passes_axe(antenna, browser):
+    """In health, in a fault, and after the loss of the link, at four sizes."""
+    _, client, site = antenna
+    tunnel = Tunnel(site.port)
+    page = opened(browser[1], site.urls['operator'].replace(f':{site.port}', f':{tunnel.port}'))
+    page.locator('#name').fill('anna')
+    page.locator('#name').press('Enter')
+    reads(page, '#link', 'live')
+    look_at_sizes(page)
+    bright = colour(page)
+    client.trigger('adu/emergency_stop')
+    reads(page, '#first-alarm', 'igh alarm: emergency stop→ find the cause')
+    reads(page, '#common-refusal', 'drive not ready: ')
+    look_at_sizes(page)
+    figures = '[...document.querySelectorAll("svg, [id^=chart-]")].map((figure) => figure.ariaLabel)'
+    for label in page.evaluate(figures):
+        assert re.search(r': .*(\d|no error signal)', label), label
+    tunnel.close()
+    reads(page, '#banner', 'No link to the antenna')
+    assert colour(page) != bright
+    holds(page, '() => Number(document.querySelector("#banner-age").textContent.match(/\\d+/)[0]) >= 3')
+    look_at_sizes(page)
+    stops_in_vain(page)
+    client.trigger('adu/reset_faults')
+    assert page.errors == []
+    page.context.close()
+
+
+def colour(page):
+    return page.evaluate('getComputedStyle(document.querySelector("#az-actual")).color')
+
+
+def look_at_sizes(page):
+    """No part of the page is hidden, cut or small (page_layout.js), and axe-core finds no violation."""
+    page.evaluate((importlib.resources.files('axe_playwright_python') / 'axe.min.js').read_text())
+    for width, height in SIZES:
+        page.set_viewport_size({'width': width, 'height': height})
+        page.evaluate('() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))')
+        assert page.evaluate(LAYOUT_FAULTS.read_text()) == [], (width, height)
+        found = page.evaluate('(tags) => axe.run({runOnly: tags})', ACCESSIBILITY)
+        assert [(fault['id'], [node['html'] for node in fault['nodes']]) for fault in found['violations']] == []
+        assert len(found['passes']) > 10
 
 
 @needs_chromium

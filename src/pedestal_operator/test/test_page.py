@@ -21,31 +21,61 @@ def access():
     return Access('127.0.0.1', 8080)
 
 
+def cookie_of(access, host='127.0.0.1:8080'):
+    return f'{access.cookie(host)}={access.tokens["operator"]}'
+
+
 def status(access, **changes):
     """200 or what a request is refused with."""
-    cookie = f'{access.cookie}={access.tokens["operator"]}'
+    request = GOOD._replace(**changes)
     try:
-        access.role(GOOD._replace(**{'cookie': cookie, **changes}))
+        access.role(request if 'cookie' in changes else request._replace(cookie=cookie_of(access, request.host)))
     except Refused as refused:
         return refused.status
     return 200
 
 
 def test_who_is_served(access):
-    assert status(access) == status(access, host='LOCALHOST:8080') == status(access, host='[::1]:8080') == 200
-    for host in ('', '127.0.0.1', '127.0.0.1:80', 'evil.example:8080', '127.0.0.1:8080.evil.example', '127.1:8080'):
+    for host in ('127.0.0.1:8080', 'LOCALHOST:8080', '[::1]:8080', '127.0.0.1', 'localhost:80', '127.0.0.1:9090'):
+        for origin in (f'http://{host}', f'https://{host}'):
+            assert status(access, host=host) == status(access, host=host, origin=origin, changes_state=True) == 200, origin
+    for host in ('', 'evil.example:8080', 'evil.example', '127.0.0.1:8080.evil.example', '127.1:8080', '127.0.0.1:',
+                 '127.0.0.1:8080:80', '127.0.0.1:123456', '127.0.0.1@evil.example', '[::1', '::1'):
         assert status(access, host=host) == 400, host
-    assert status(access, origin='http://127.0.0.1:8080', changes_state=True) == 200
-    for origin in ('http://evil.example', 'null', 'https://127.0.0.1:8080', 'http://127.0.0.1:8081',
-                   'http://localhost:8080'):
+    for origin in ('http://evil.example', 'null', 'http://127.0.0.1:8081', 'http://127.0.0.1', 'http://localhost:8080',
+                   'ws://127.0.0.1:8080'):
         assert status(access, origin=origin) == status(access, origin=origin, changes_state=True) == 403, origin
-    assert status(access, changes_state=True) == 403      # a web socket says where it is from
-    for cookie in ('', 'a', f'{access.cookie}=', f'{access.cookie}=\udcff', 'other=' + access.tokens['operator'],
-                   'x' * 100_000):
+    assert status(access, changes_state=True) == 403                                    # a web socket says where it is from
+    for cookie in ('', 'a', f'{access.cookie(GOOD.host)}=', f'{access.cookie(GOOD.host)}=\udcff',
+                   'other=' + access.tokens['operator'], 'x' * 100_000):
         assert status(access, cookie=cookie) == 401, cookie[:50]
     assert status(access, cookie='', token=access.tokens['monitor']) == 200
     assert status(access, cookie='', token=access.tokens['monitor'], path='/history') == 401
     assert status(access, token='wrong') == 401
+
+
+@pytest.mark.parametrize('address', ('127.0.0.1', '192.0.2.1', '0.0.0.0'))
+def test_a_name_of_the_server_is_served_through_a_proxy_and_another_name_is_not(address):
+    access = Access(address, 8080, ('antenna.example', '2001:db8::7'))
+    for host in ('antenna.example', 'Antenna.Example:443', 'antenna.example:8443', '[2001:db8::7]:8443'):
+        for origin in (f'http://{host}', f'https://{host}'):
+            assert status(access, host=host, origin=origin, changes_state=True) == 200, origin
+            assert status(access, host=host, origin=origin, changes_state=True, cookie='') == 401
+        for origin in ('https://evil.example', f'https://{host}.evil.example', 'https://antenna.example:1'):
+            assert status(access, host=host, origin=origin, changes_state=True) == 403, origin
+    for host in ('evil.example', 'antenna.example.evil.example', 'x.antenna.example', 'antenna.example:x'):
+        assert status(access, host=host, origin=f'https://{host}', changes_state=True) == 400, host
+
+
+def test_a_refusal_names_the_address_and_the_parameter(access):
+    with pytest.raises(Refused, match='evil.example.*http://127.0.0.1:8080/.*`names`'):
+        access.role(GOOD._replace(host='evil.example'))
+    with pytest.raises(Refused) as refused:
+        access.role(GOOD._replace(host='x\n\x1b' * 1000))
+    assert refused.value.reason.isprintable() and len(refused.value.reason) < 400
+    for name in ('https://antenna.example', 'antenna.example:8080', 'a b', 'fade:80'):
+        with pytest.raises(ValueError, match=f'names: {name}: must be names of hosts'):
+            Access('127.0.0.1', 8080, (name,))
 
 
 def test_each_server_and_role_has_a_token_of_its_own(access):
@@ -53,7 +83,7 @@ def test_each_server_and_role_has_a_token_of_its_own(access):
     assert len(set(tokens)) == 6 and min(map(len, tokens)) >= 32
     assert [access.role(GOOD._replace(token=access.tokens[role])) for role in page_security.PAGE_ROLES] == [
         *page_security.PAGE_ROLES]
-    assert Access('192.0.2.1', 1).cookie != access.cookie                       # browsers share them between ports
+    assert len({access.cookie(host) for host in ('localhost', 'localhost:1', '[::1]:2')}) == 3  # ports share cookies
     with pytest.raises(Refused):
         Access('192.0.2.1', 8080).role(GOOD)                                    # not served as 127.0.0.1
 

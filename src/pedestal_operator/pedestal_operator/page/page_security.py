@@ -1,11 +1,16 @@
 """Access to the server of the page by token, name of the host and origin of the request. No ROS, no server.
 
-A token stands for a role. It arrives once in the address of the page, then in a cookie. No script can read the cookie,
-and the browser sends it to this site only. `Host` must be a name of this server. This avoids that a foreign site lets
-its own name point here (DNS rebinding). `Origin` must be this page for every request that can command the antenna.
+A token stands for a role. It arrives once in the address of the page, then in a cookie. No script can read the
+cookie, and the browser sends it to this site only. `Host` must be a name of this server. This avoids that a foreign
+site lets its own name point here (DNS rebinding). `Origin` must be this page for every request that can command the
+antenna.
+
+A browser may reach the server through a proxy or an ssh tunnel. Then the port and the scheme in the browser differ
+from those of the server, so `Host` may have any port, and `Origin` may be http or https.
 """
 import hmac
 import ipaddress
+import re
 import secrets
 import typing
 from http import cookies
@@ -20,6 +25,13 @@ UNRESTRICTED_VERBS = ('stop',)
 
 SUPERVISOR_REQUESTS = (('take', 'role', 'supervisor'),)
 """(command, argument, value) for supervisors only."""
+
+
+HOST = re.compile(r'(\[[0-9a-f:.]+\]|[^\[\]:]+)(?::(\d{1,5}))?')
+"""Name and port of a `Host` in small letters."""
+
+MAX_SHOWN_CHARACTERS = 100
+"""Longest part of a request in a refusal [characters]."""
 
 
 class Refused(Exception):  # noqa: N818  no error of the server
@@ -45,40 +57,54 @@ class Request(typing.NamedTuple):
 
 
 class Access:
-    """New tokens of a server at an address and port. names: further names of the server."""
+    """New tokens of a server at an address and port. names: further names of the server, without scheme and port.
+
+    Raises ValueError for a name that is not the name of a host.
+    """
 
     def __init__(self, address, port, names=()):
+        for name in names:
+            if not _is_host(name):
+                raise ValueError(f'names: {name}: must be names of hosts without scheme and port, separated by commas')
         self.tokens = {role: secrets.token_urlsafe(24) for role in PAGE_ROLES}
-        self.cookie = f'pedestal_page_{port}'
         known = {address, *names}
         if is_loopback(address):
             known |= {'127.0.0.1', 'localhost', '::1'}
-        self._hosts = {f'{_bracketed(name)}:{port}'.lower() for name in known}
-        self._here = _bracketed(address), port
+        self._names = {_bracketed(name).lower() for name in known}
+        self._url = f'http://{_bracketed(address)}:{port}/'
 
     def url(self, role):
         """Return the address of the page for a role, with its token."""
-        host, port = self._here
-        return f'http://{host}:{port}/?token={self.tokens[role]}'
+        return f'{self._url}?token={self.tokens[role]}'
+
+    @staticmethod
+    def cookie(host):
+        """Return the name of the cookie for a `Host`, with its port, because browsers send a cookie to all ports."""
+        return f'pedestal_page_{host.rpartition("]")[2].partition(":")[2]}'
 
     def role(self, request):
         """Return the role of a Request. Raises Refused: 400 wrong host, 403 foreign page, 401 no valid token."""
-        if request.host.lower() not in self._hosts:
-            raise Refused(400, 'unknown name of this server: open the address that the server printed at its start')
-        if request.origin.lower() != f'http://{request.host.lower()}' and (request.origin or request.changes_state):
-            raise Refused(403, 'the request comes from another page than that of this server')
-        given = request.token if request.path == '/' and request.token else self._of_cookie(request.cookie)
+        host, origin = request.host.lower(), request.origin.lower()
+        parts = HOST.fullmatch(host)
+        if not parts or parts[1] not in self._names:
+            raise Refused(400, f'unknown name of this server in Host, {shown(request.host)}: open {self._url}, or '
+                               'list the name in the parameter `names` (-p names:=NAME)')
+        if origin not in (f'http://{host}', f'https://{host}') and (origin or request.changes_state):
+            raise Refused(403, f'the request comes from another page, {shown(request.origin)}, than that of this '
+                               f'server, {shown(request.host)}; a proxy must pass on Host unchanged')
+        given = request.token if request.path == '/' and request.token else self._of_cookie(host, request.cookie)
         for role, token in self.tokens.items():
             if hmac.compare_digest(token.encode(), given.encode(errors='replace')):
                 return role
         raise Refused(401, 'missing or wrong token: open the address that the server printed at its start')
 
-    def _of_cookie(self, header):
+    def _of_cookie(self, host, header):
         try:
             jar = cookies.SimpleCookie(header)
         except cookies.CookieError:
             return ''
-        return jar[self.cookie].value if self.cookie in jar else ''
+        name = self.cookie(host)
+        return jar[name].value if name in jar else ''
 
 
 def refusal_reason(role, verb, arguments) -> str:
@@ -106,6 +132,18 @@ def is_loopback(address):
         return address == 'localhost'
 
 
+def shown(text):
+    """Return a part of a request for the text of a refusal: printable, and not longer than MAX_SHOWN_CHARACTERS."""
+    return ascii(text)[1:-1][:MAX_SHOWN_CHARACTERS] or '(none)'
+
+
+def _is_host(name):
+    try:
+        return bool(re.fullmatch(r'[\w.-]+', name) or ipaddress.IPv6Address(name))
+    except ValueError:
+        return False
+
+
 def _bracketed(name):
     return f'[{name}]' if ':' in name else name
 
@@ -114,7 +152,8 @@ def headers(host):
     """Return the headers [(name, value)] of every answer: content of this site only, revalidated, without frames."""
     return [('content-security-policy',
              "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self'; "
-             f"connect-src 'self' ws://{host}; frame-ancestors 'none'; base-uri 'none'; form-action 'none'"),
+             f"connect-src 'self' ws://{host} wss://{host}; "
+             "frame-ancestors 'none'; base-uri 'none'; form-action 'none'"),
             ('cache-control', 'no-cache'), ('x-content-type-options', 'nosniff'), ('x-frame-options', 'DENY'),
             ('referrer-policy', 'no-referrer'), ('cross-origin-resource-policy', 'same-origin'),
             ('cross-origin-opener-policy', 'same-origin')]

@@ -194,8 +194,8 @@ class PageServer:
         if 'token' not in request.query_params:
             return await StaticFiles(directory=STATIC_FOLDER).get_response('index.html', request.scope)
         answer = RedirectResponse('/', 303)
-        answer.set_cookie(self.access.cookie, self.access.tokens[request.scope['role']], httponly=True,
-                          samesite='strict')
+        answer.set_cookie(self.access.cookie(request.headers['host']), self.access.tokens[request.scope['role']],
+                          httponly=True, samesite='strict')
         return answer
 
     async def _history_answer(self, _):

@@ -1,21 +1,12 @@
 // Angles, errors, rates and travel of the axes, the signal level, and the dial of the receiver errors.
-import {onDraw} from './link.js';
-import {draw, set, show} from './svg.js';
-import {find, number, setText, time} from './text.js';
+import {describe} from './figures.js';
+import {onDraw, state} from './link.js';
+import {draw, keepTextSize, set, show} from './svg.js';
+import {find, number, setText} from './text.js';
 
 const AXES = ['az', 'el'];
-const LIMIT_WARNING_S = 20;  // time to a limit
 const TRAIL_POINTS = 25;  // of the dial
 const DIAL_RADIUS_BEAMWIDTHS = 0.6;
-
-function axisState(status, now, axis) {
-  const {limit_s: limit, limited} = status.axes[axis];
-  if (limited) return [`${limited} limited`, 'warn'];
-  const left = parseFloat(limit);
-  if (Number.isFinite(left) && left < LIMIT_WARNING_S) return [`limit in ${left.toFixed(0)} s`, 'warn'];
-  if (now.axes[axis].actual === null) return ['silent', 'bad'];
-  return [Math.abs(now.axes[axis].rate) < 0.002 ? 'stopped' : 'moving', ''];
-}
 
 function showAxes({now, status, fixed}) {
   AXES.forEach((name, i) => {
@@ -25,7 +16,7 @@ function showAxes({now, status, fixed}) {
     setText(find(`${name}-commanded`), `${number(axis.commanded, 3)}°`);
     setText(find(`${name}-error`), `${number(axis.error, 4)}°`, wide ? 'warn' : '');
     setText(find(`${name}-rate`), `${number(axis.rate, 3)} °/s`);
-    if (status) setText(find(`${name}-state`), ...axisState(status, now, i));
+    if (status) setText(find(`${name}-state`), status.axes[i].text, status.axes[i].level);
   });
 }
 
@@ -50,7 +41,7 @@ class Travel {
     const step = high - low > 400 ? 180 : high - low > 200 ? 90 : 30;
     for (let angle = Math.ceil(low / step) * step; angle <= high; angle += step) {
       draw(this.svg, 'line', {x1: this.x(angle), x2: this.x(angle), y1: 12, y2: 15, class: 'mark'});
-      draw(this.svg, 'text', {x: this.x(angle), y: 24, 'text-anchor': 'middle'}, `${angle}`);
+      draw(this.svg, 'text', {x: this.x(angle), y: 27, 'text-anchor': 'middle'}, `${angle}`);
     }
     if (stow !== null) draw(this.svg, 'line', {x1: this.x(stow), x2: this.x(stow), y1: 2, y2: 13, class: 'stow'});
     this.commanded = draw(this.svg, 'line', {y1: 1, y2: 14, class: 'there'});
@@ -84,9 +75,9 @@ class Level {
     this.svg.replaceChildren();
     draw(this.svg, 'rect', {x: 0, y: 3, width, height: 11, class: 'bar'});
     this.bar = draw(this.svg, 'rect', {x: 0, y: 3, width: 0, height: 11, class: 'reach'});
-    for (const [name, mark, y] of [['loss', loss, 40], ['lock', detect, 27]]) {
+    for (const [name, mark, y] of [['loss', loss, 42], ['lock', detect, 28]]) {
       if (mark === null || mark === undefined) continue;
-      draw(this.svg, 'line', {x1: this.x(mark), x2: this.x(mark), y1: 1, y2: y - 8, class: 'mark'});
+      draw(this.svg, 'line', {x1: this.x(mark), x2: this.x(mark), y1: 1, y2: y - 10, class: 'mark'});
       draw(this.svg, 'text', {x: this.x(mark) + 2, y}, `${name} ${mark.toFixed(0)}`);
     }
   }
@@ -104,15 +95,16 @@ class Level {
 class Dial {
   constructor() {
     this.svg = find('dial');
+    keepTextSize(this.svg);
     const unit = 100 / DIAL_RADIUS_BEAMWIDTHS;
-    for (const [share, label] of [[0.1, '0.1'], [0.5, '0.5 beamwidth']]) {
+    for (const [share, label] of [[0.1, '0.1'], [0.5, '0.5 beamwidths']]) {
       draw(this.svg, 'circle', {cx: 0, cy: 0, r: share * unit, class: 'ring'});
-      draw(this.svg, 'text', {x: 4, y: -share * unit - 3}, label);
+      draw(this.svg, 'text', {x: 0, y: -share * unit - 4, 'text-anchor': 'middle', class: 'minor'}, label);
     }
     draw(this.svg, 'line', {x1: -100, x2: 100, y1: 0, y2: 0, class: 'line'});
     draw(this.svg, 'line', {x1: 0, x2: 0, y1: -100, y2: 100, class: 'line'});
-    draw(this.svg, 'text', {x: 108, y: -5, 'text-anchor': 'end'}, 'cross-el');
-    draw(this.svg, 'text', {x: 4, y: 107}, 'el');
+    draw(this.svg, 'text', {x: 108, y: -5, 'text-anchor': 'end', class: 'minor'}, 'cross-el');
+    draw(this.svg, 'text', {x: 4, y: 107, class: 'minor'}, 'el');
     this.trail = draw(this.svg, 'polyline', {class: 'trail'});
     this.spot = draw(this.svg, 'circle', {r: 4, class: 'beam'});
     this.none = draw(this.svg, 'text', {x: 0, y: 45, 'text-anchor': 'middle'}, 'no error signal');
@@ -134,22 +126,49 @@ class Dial {
   }
 }
 
+const angle = (value) => `${number(value, 2)}°`;
+
+function travelText({now, fixed}, i) {
+  const {actual, commanded} = now.axes[i];
+  const limits = fixed && fixed.limits[i][0] !== null ? `, limits ${fixed.limits[i].map(angle).join(' and ')}` : '';
+  return `actual ${angle(actual)}, commanded ${angle(commanded)}${limits}`;
+}
+
+function levelText({now, fixed}) {
+  const {detect, loss} = fixed || {};
+  return `${number(now.receiver[2], 1)} dB-Hz, lock at ${number(detect, 0)}, loss at ${number(loss, 0)}`;
+}
+
+function dialText({now, fixed}) {
+  const [x, y] = now.receiver;
+  if (x === null || y === null || !fixed || !fixed.beamwidth) return 'no error signal';
+  const [cross, elevation] = [x, y].map((error) => number(error / fixed.beamwidth, 2));
+  return `cross-elevation ${cross}, elevation ${elevation} beamwidths`;
+}
+
 export function begin() {
+  describe('az-travel', 'azimuth travel', (state) => travelText(state, 0));
+  describe('el-travel', 'elevation travel', (state) => travelText(state, 1));
+  describe('level-bar', 'signal level', levelText);
+  describe('dial', 'direction of the target from the beam', dialText);
   const travels = AXES.map((name) => new Travel(`${name}-travel`));
   const level = new Level();
   const dial = new Dial();
-  onDraw((sections, state) => {
+  function showFigures({now, fixed}) {
+    const constants = fixed || {};
+    travels.forEach((travel, i) => {
+      const limits = constants.limits && constants.limits[i];
+      if (limits && limits[0] !== null) travel.scale(limits, constants.stow[i]);
+      travel.show(now.axes[i]);
+    });
+    level.show(now.receiver[2], now.receiver[0] !== null, constants);
+  }
+  const resized = new ResizeObserver(() => { if (state.now) showFigures(state); });
+  for (const id of ['axes', 'level-bar']) resized.observe(find(id));
+  onDraw((sections) => {
     if (!sections.now) return;
     showAxes(state);
-    const fixed = state.fixed || {};
-    travels.forEach((travel, i) => {
-      const limits = fixed.limits && fixed.limits[i];
-      if (limits && limits[0] !== null) travel.scale(limits, fixed.stow[i]);
-      travel.show(sections.now.axes[i]);
-    });
-    const [x, y, strength] = sections.now.receiver;
-    level.show(strength, x !== null, fixed);
-    dial.show([x, y], fixed.beamwidth);
-    setText(find('time'), time(sections.now.t));
+    showFigures(state);
+    dial.show(state.now.receiver, (state.fixed || {}).beamwidth);
   });
 }

@@ -1,12 +1,15 @@
 // Strip charts of the last ten minutes.
+import {describe} from './figures.js';
 import {onDraw} from './link.js';
-import {find, make, time} from './text.js';
+import {find, make, number, time} from './text.js';
 
 const POINT_PERIOD_S = 0.5;  // some hundred pixels show about a thousand points
 const DRAW_PERIOD_MS = 1000;  // the lines move by less than a pixel
 const MAX_GAP_S = 15;  // after a longer gap (hidden page, lost link) the page requests the history
 const COLOURS = ['--first', '--second', '--third', '--fourth'];
 const STYLES = ['first', 'second', 'third', 'fourth'];
+const TITLES = {error: 'receiver error [deg]', rate: 'axis rates [deg/s]', torque: 'motor torques [Nm]',
+                level: 'signal level [dB-Hz]'};
 const CHARTS = {
   error: [['cross-elevation', 'cross_elevation'], ['elevation', 'elevation']],
   rate: [['azimuth', 'azimuth_rate'], ['elevation', 'elevation_rate']],
@@ -45,14 +48,14 @@ class Chart {
   constructor(name, series, beamwidth) {
     this.place = find(`chart-${name}`);
     const axis = {stroke: colour('--dim'), grid: {stroke: colour('--edge'), width: 1}, ticks: {show: false},
-                  font: '10px sans-serif'};
+                  font: '12px system-ui, sans-serif'};
     const heading = this.place.parentElement.querySelector('h2');
     series.forEach(([label], i) => heading.appendChild(make('i', STYLES[i], label)));
     this.plot = new uPlot({
-      ...this.size(), cursor: {show: false}, legend: {show: false}, padding: [4, 22, 0, 0],
+      ...this.size(), cursor: {show: false}, legend: {show: false}, padding: [8, 22, 0, 0],
       scales: {x: {time: false}, y: {range: (plot, low, high) => Chart.range(low, high)}},
-      axes: [{...axis, size: 17, gap: 1, values: (plot, values) => values.map((value) => time(value))},
-             {...axis, size: 44, gap: 2, space: 22}],
+      axes: [{...axis, size: 19, gap: 1, space: 72, values: (plot, values) => values.map((value) => time(value))},
+             {...axis, size: 50, gap: 3, space: 24}],
       series: [{}, ...series.map((_, i) => ({stroke: colour(COLOURS[i]), width: 1.2, points: {show: false}}))],
       hooks: name === 'error' ? {drawAxes: [(plot) => marks(plot, beamwidth())]} : {},
     }, [[], ...series.map(() => [])], this.place);
@@ -78,6 +81,18 @@ export function begin() {
   const charts = Object.entries(CHARTS).map(
     ([name, series]) => ({series, chart: new Chart(name, series, () => beamwidth)}));
 
+  // Return the text alternative of a chart: the last number of each line, and its range.
+  function text(series) {
+    return series.map(([label, column]) => {
+      const values = columns ? data[columns.indexOf(column)] : [];
+      const found = values.filter((value) => value !== null);
+      if (!found.length) return `${label} unknown`;
+      const [low, high] = [found.reduce((a, b) => Math.min(a, b)), found.reduce((a, b) => Math.max(a, b))];
+      return `${label} ${number(values.at(-1), 3)}, in ten minutes ${number(low, 3)} to ${number(high, 3)}`;
+    }).join('; ');
+  }
+  for (const [name, series] of Object.entries(CHARTS)) describe(`chart-${name}`, TITLES[name], () => text(series));
+
   function redraw() {
     const end = data[0].at(-1) ?? 0;
     const begin = Math.max(end - span, data[0][0] ?? 0);
@@ -91,7 +106,11 @@ export function begin() {
   }
 
   async function fetchHistory() {
-    const rows = await (await fetch('history', {cache: 'no-store'})).json();
+    const rows = await fetch('history', {cache: 'no-store'}).then((answer) => answer.json(), () => null);
+    if (rows === null) {  // no link: the next state requests the history again
+      last = -Infinity;
+      return;
+    }
     data = columns.map((_, i) => rows.map((values) => values[i]));
     last = data[0].at(-1) ?? -Infinity;
     redraw();

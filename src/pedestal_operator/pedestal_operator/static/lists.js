@@ -1,18 +1,16 @@
 // Alarms and events. All texts are inserted as text, never as HTML.
-import {me, onDraw, request} from './link.js';
+import {onDraw, request} from './link.js';
+import {press} from './refusals.js';
 import {find, make, setText, time} from './text.js';
 
 const SHELVE_DURATIONS_S = [600, 3600, 28800];
+const URGENT_PRIORITIES = ['critical', 'high'];
 const UNACKNOWLEDGED_STATES = ['unacknowledged', 'returned unacknowledged', 'latched unacknowledged'];
 
-function button(text, act) {
+function button(text, verb, alarm) {
   const made = make('button', '', text);
-  if (me.role === 'monitor') {
-    made.setAttribute('aria-disabled', 'true');
-    made.title = 'the role monitor may send stop only';
-  } else {
-    made.onclick = act;
-  }
+  made.setAttribute('aria-label', `${verb} ${alarm.name}`);
+  press(made, verb, () => request(verb, {alarm: alarm.name}));
   return made;
 }
 
@@ -26,7 +24,7 @@ function shelf(alarm) {
     choice.appendChild(option);
   }
   choice.onchange = () => request('shelve', {alarm: alarm.name, seconds: choice.value, reason: 'from the page'});
-  choice.disabled = me.role === 'monitor';
+  choice.dataset.verb = 'shelve';
   return choice;
 }
 
@@ -46,20 +44,34 @@ function alarmRow(alarm) {
   row.appendChild(name);
   row.appendChild(make('span', 'text', [alarm.detail || alarm.meaning, `→ ${alarm.action}`].join('  ')));
   const hands = make('span', 'hands');
-  if (waits) hands.appendChild(button('ack', () => request('acknowledge', {alarm: alarm.name})));
-  hands.appendChild(shelved ? button('unshelve', () => request('unshelve', {alarm: alarm.name})) : shelf(alarm));
+  if (waits) hands.appendChild(button('ack', 'acknowledge', alarm));
+  hands.appendChild(shelved ? button('unshelve', 'unshelve', alarm) : shelf(alarm));
   row.appendChild(hands);
   return row;
+}
+
+let announced = [];  // unacknowledged alarms that were announced
+
+// Announce the fresh alarms to screen readers: the grave ones at once, the others after the present speech.
+function announce(waiting) {
+  const fresh = waiting.filter((alarm) => !announced.includes(alarm.name));
+  announced = waiting.map((alarm) => alarm.name);
+  for (const [id, grave] of [['urgent', true], ['news', false]]) {
+    const texts = fresh.filter((alarm) => URGENT_PRIORITIES.includes(alarm.priority) === grave)
+        .map((alarm) => `${alarm.priority} alarm at ${time(alarm.raised)}: ${alarm.name}. ${alarm.detail || alarm.meaning}. ${alarm.action}.`);
+    if (texts.length) setText(find(id), texts.join(' '), 'hidden');
+  }
 }
 
 function showAlarms(alarms) {
   const waiting = alarms.filter((alarm) => UNACKNOWLEDGED_STATES.includes(alarm.state));
   const rest = alarms.filter((alarm) => !waiting.includes(alarm));
+  announce(waiting);
   find('alarm-list').replaceChildren(...[...waiting, ...rest].map(alarmRow));
   if (!alarms.length) find('alarm-list').appendChild(make('div', 'none', 'none'));
   setText(find('alarm-count'), alarms.length ? `${waiting.length} of ${alarms.length} unacknowledged` : '',
       waiting.length ? 'warn' : '');
-  find('acknowledge-all').hidden = !waiting.length || me.role === 'monitor';
+  find('acknowledge-all').hidden = !waiting.length;
 }
 
 function eventRow({t, who, text, bad}) {
@@ -73,7 +85,7 @@ function eventRow({t, who, text, bad}) {
 }
 
 export function begin() {
-  find('acknowledge-all').onclick = () => request('acknowledge');
+  press(find('acknowledge-all'), 'acknowledge', () => request('acknowledge'));
   onDraw((sections) => {
     if (sections.alarms) showAlarms(sections.alarms);
     if (sections.log) find('log-list').replaceChildren(...sections.log.slice().reverse().map(eventRow));

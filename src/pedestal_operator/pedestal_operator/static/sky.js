@@ -1,6 +1,7 @@
 // The sky from above: north up, east to the right, the zenith in the middle.
+import {describe} from './figures.js';
 import {onDraw} from './link.js';
-import {draw, points, set, show} from './svg.js';
+import {draw, keepTextSize, points, set, show} from './svg.js';
 import {day, find, make, minute, number, setText, time} from './text.js';
 
 const RADIUS = 96;
@@ -92,8 +93,24 @@ function showPasses({passes, coming}, {status, now}) {
   find('passes').replaceChildren(...lines);
 }
 
+// Return the text alternative of the plot.
+function skyText({now, sky}) {
+  const direction = ([azimuth, elevation]) => `azimuth ${number(azimuth, 1)}°, elevation ${number(elevation, 1)}°`;
+  const parts = [known(now.beam) ? `beam at ${direction(now.beam)}` : 'beam unknown'];
+  if (!sky) return parts[0];
+  const [first, last] = [sky.path[0], sky.path.at(-1)];
+  if (first) parts.push(`program track from ${direction(first)} to ${direction(last)}`);
+  if (sky.hole.length === 2) parts.push(`keyhole from ${time(sky.hole[0])} to ${time(sky.hole[1])}`);
+  if (sky.sectors.length) parts.push(`${sky.sectors.length} hidden sectors`);
+  if (sky.sun.length && sky.sun[1] > 0) parts.push(`sun at ${direction(sky.sun)}`);
+  if (sky.bow.length) parts.push(`bow at azimuth ${number(sky.bow[0], 0)}°`);
+  return parts.join('; ');
+}
+
 export function begin() {
   const svg = find('sky-plot');
+  keepTextSize(svg);
+  describe('sky-plot', 'sky', skyText);
   const still = draw(svg, 'g', {});
   const past = draw(svg, 'polyline', {class: 'past'});
   const beam = draw(svg, 'circle', {r: 5, class: 'beam'});

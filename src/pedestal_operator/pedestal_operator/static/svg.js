@@ -17,6 +17,15 @@ export function set(element, attributes) {
   }
 }
 
+// Keep the text of a figure as large as page.css states it, however the figure is scaled.
+export function keepTextSize(svg) {
+  const {width, height} = svg.viewBox.baseVal;
+  new ResizeObserver(() => {
+    const pixels = Math.min(svg.clientWidth / width, svg.clientHeight / height);
+    if (pixels > 0) svg.style.setProperty('--pixel', 1 / pixels);
+  }).observe(svg);
+}
+
 export function show(element, visible) { set(element, {visibility: visible ? 'visible' : 'hidden'}); }
 
 export const points = (rows) => rows.map(([x, y]) => `${x.toFixed(1)},${y.toFixed(1)}`).join(' ');

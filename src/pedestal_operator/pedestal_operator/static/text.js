@@ -8,6 +8,12 @@ export function number(value, digits) {
   return Number(text) === 0 ? text.replace('-', '') : text;
 }
 
+// Return the number in a decimal text with a point or a comma, null for any other text.
+export function decimal(text) {
+  const plain = text.trim().replace('\u2212', '-').replace(',', '.');
+  return /^[+-]?(\d+\.?\d*|\.\d+)$/.test(plain) ? Number(plain) : null;
+}
+
 // Return the time of day in UTC, or the seconds of a recording that begins at 0.
 export function time(seconds, digits = 0) {
   if (seconds === null || seconds === undefined) return ABSENT;
