@@ -218,7 +218,7 @@ GOOD = [(float(k), 47.4, 8.5, 600.0) for k in range(6)]
     (GOOD[:3] + [(1.5, 47.4, 8.5, 600.0)], r'line 5: time_s = 1.5: -0.5 s after'),
     (GOOD[:3] + [(60.0, 47.4, 8.5, 600.0)], r'line 5: time_s = 60: 58 s after .* at most max_gap = 10 s'),
     (GOOD[:3] + ['3.0,47.4,east,600'], r"line 5: longitude_deg = 'east': must be a number"),
-    (GOOD[:3] + ['3.0,47.4,8.5'], r'line 5: altitude_m = None: must be a number'),
+    (GOOD[:3] + ['3.0,47.4,8.5'], r"line 5: the row ends before the column 'altitude_m'"),
     (GOOD[:3] + ['3.0,47.4,8.5,'], r"line 5: altitude_m = '': must be a number"),
     (GOOD[:3] + ['nan,47.4,8.5,600'], r'line 5: time_s = nan: must be'),
     (GOOD[:3] + ['3.0,47.4,inf,600'], r'line 5: longitude_deg = inf: must be -180 to 360'),
