@@ -92,10 +92,16 @@ def test_a_held_rate_lasts_as_long_as_the_program_and_no_longer(running, termina
     _, client = running
     client.until(lambda: client.heard['joint_states'])
     began = client.heard['joint_states'][-1].position[0]
-    done = terminal('mode', 'rate', '--az', '0.5', '--hold', '2')
+
+    def turned():
+        return client.heard['joint_states'][-1].position[0] - began > math.radians(0.5)    # at least half of the time
+    for _ in range(5):  # refused in the moment in which a busy machine holds the drive up
+        done = terminal('mode', 'rate', '--az', '0.5', '--hold', '2')
+        if done.returncode == 0:
+            break
     assert (done.returncode, done.stdout) == (0, 'acu: mode is rate\n'), done.stderr
+    client.until(turned, 20.0)
     client.until(lambda: abs(client.heard['joint_states'][-1].velocity[0]) < 1e-3)
-    assert client.heard['joint_states'][-1].position[0] - began > math.radians(0.5)  # at least half of the time
 
 
 @pytest.fixture
