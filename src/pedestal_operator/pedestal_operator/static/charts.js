@@ -106,7 +106,7 @@ export function begin() {
   }
 
   async function fetchHistory() {
-    const rows = await fetch('history', {cache: 'no-store'}).then((answer) => answer.json(), () => null);
+    const rows = await fetch('history', {cache: 'no-store'}).then((answer) => answer.json()).catch(() => null);
     if (rows === null) {  // no link: the next state requests the history again
       last = -Infinity;
       return;

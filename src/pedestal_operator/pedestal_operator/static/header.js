@@ -18,8 +18,8 @@ function showFirstAlarm({first_alarm: alarm}, count) {
   const place = find('first-alarm');
   const [name, text] = place.children;
   place.className = alarm ? alarm.priority : '';
-  setText(name, alarm ? `${alarm.priority} alarm: ${alarm.name}` : 'no alarms');
-  setText(text, alarm ? `→ ${alarm.action}${count > 1 ? ` (1 of ${count} alarms)` : ''}` : '');
+  setText(name, alarm ? `${alarm.priority} alarm: ${alarm.name}${count > 1 ? ` (1 of ${count})` : ''}` : 'no alarms');
+  setText(text, alarm ? `→ ${alarm.action}` : '');
   place.title = alarm ? alarm.detail || alarm.meaning : '';
 }
 
