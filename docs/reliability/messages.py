@@ -151,7 +151,8 @@ class Stranger:
             if info['source_timestamp'] > self.sent_until.get(name, 0):     # else it may be our own
                 with contextlib.suppress(ValueError):
                     take(messages.deserialize(data, topic.type))
-        self.node.create_subscription(middleware.message_class(topic.type), name, subscriptions.pair(callback),
+        self.node.create_subscription(middleware.message_class(topic.type), name,
+                                      subscriptions.two_argument_callback(callback),
                                       middleware.qos(topic.rate, 'recorded'), raw=True)
 
     def _joints(self, name, message):
