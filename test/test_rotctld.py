@@ -211,9 +211,8 @@ def test_a_program_that_connects_for_each_set_point_is_one_program(antenna, serv
                        capture_output=True)
         client.spin(max(due - time.monotonic(), 0.2))
     azimuths = itertools.count()
-    client.until(lambda: shot(next(azimuths)) or any(arguments['azimuth_rate'] > 0.0 for _, arguments in presets()),
-                 60.0)
-    assert len({who for who, _ in presets()}) > 2
+    client.until(lambda: shot(next(azimuths)) or len({who for who, arguments in presets()
+                                                      if arguments['azimuth_rate'] > 0.0}) > 1, 60.0)
     if kind == 'easycomm':                                                  # an angle that a line leaves out
         far = next(azimuths) + 60
         shot(far)
@@ -231,8 +230,12 @@ def test_a_program_that_connects_for_each_set_point_is_one_program(antenna, serv
             other.sendall(b'AZ50 EL40\n')
             return ask(other, 'GS') == b'GS8\n'
         client.until(is_refused, 60.0)
+        # A stop ends the motion, and with it the control that later tests need.
         if kind == 'rotctld':
-            assert ask(other, 'S') == b'RPRT 0\n' and granted(other, 'P 50 40')  # a stop ends the motion
+            assert ask(other, 'S') == b'RPRT 0\n' and granted(other, 'P 50 40')
+        else:
+            other.sendall(b'SA SE\n')
+            client.until(lambda: ask(other, 'GS') == b'GS1\n', 60.0)
 
 
 def test_clients_that_misbehave_disturb_nobody(antenna):
@@ -266,13 +269,13 @@ def test_easycomm_over_tcp_and_a_serial_device(antenna, start_process):
     connected(port).close()
     os.set_blocking(end, False)
     client.until(lambda: _serial(end, b'AZ EL \n').startswith(b'AZ'), 60.0)
-    assert _serial(end, b'AZ21.0\n') == b''                                  # the elevation stays as it is
-    client.until(lambda: _serial(end, b'AZ \n') == b'AZ21.0\n', 60.0)
+    # The elevation stays as it is. A line is sent again, because another client may still be in control at first.
+    client.until(lambda: _serial(end, b'AZ21.0\n') == b'' and _serial(end, b'AZ \n') == b'AZ21.0\n', 60.0)
     assert float(_serial(end, b'EL \n')[2:]) > 5.0
     assert _serial(end, b'AZ21.0 EL37.0\n') == b''
     client.until(lambda: _serial(end, b'AZ EL \n') == b'AZ21.0 EL37.0\n', 60.0)
     client.until(lambda: _serial(end, b'GS\n') == b'GS1\n', 60.0)
-    assert client.heard['acu/mode'][-1].data == 'preset'
+    client.until(lambda: client.heard['acu/mode'][-1].data == 'preset', 60.0)
     for line in (b'AZ25.0 EL3x\n', b'AZ25.0EL39.0\n', b'AZ 25.0 EL 39.0\n', b'AZ25.0 EL200\n', b'AZ25,0 ELnan\n'):
         assert _serial(end, line) == b'' and _serial(end, b'GS\n') == b'GS8\n', line  # never half of a line
         assert _serial(end, b'AZ EL \n') == b'AZ21.0 EL37.0\n', line
