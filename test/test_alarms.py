@@ -107,3 +107,35 @@ def test_a_fault_is_told_with_its_consequences_under_it(fault, first, others):
 def test_a_receiver_without_numbers_or_with_the_same_again_is_told(fault, expected):
     _, acu = under_way(f'tracking_receiver.inject=6 {fault}')
     assert expected in annunciated(acu)
+
+
+TO_270_DEG = ['acu.initial_mode=preset', 'acu.azimuth.preset=4.71238898', 'adu.initial_azimuth=3.5',
+              'adu.initial_elevation=0.7']
+"""A preset at the end of the travel, reached after 0.6 s."""
+
+NOT_RELEASED = {'azimuth brake not released', 'elevation brake not released'}
+
+
+@pytest.mark.parametrize('gust', (
+    '4 gust torque=3000 duration=2', '4 gust torque=-3500 duration=2', '0 gust torque=-4000 duration=5',
+    '4 gust axis=elevation torque=3500 duration=2'))
+def test_a_gust_that_the_motors_hold_is_no_brake(gust):
+    """Gusts on an axis that holds its place, and against a slew."""
+    loop = closed_loop.Loop(scenario.load('leo_pass', [*TO_270_DEG, f'adu.inject={gust}'], duration=7.0))
+    run = loop.run()
+    assert np.abs(run['joint_states']['effort']).max() > 3400.0 and run['acu/mode'][-1] == Mode.PRESET
+    assert not raised(loop.units['acu']) & NOT_RELEASED
+
+
+@pytest.mark.parametrize('inject', ('6 gust torque=4000 duration=3', '6 gust torque=-4000 duration=3'))
+def test_a_gust_while_the_target_is_followed_is_no_brake(inject):
+    run, acu = under_way(f'adu.inject={inject}', duration=12.0)
+    assert run['acu/mode'][-1] == Mode.AUTOTRACK and not raised(acu) & NOT_RELEASED
+
+
+@pytest.mark.parametrize('onset', (0.0, 0.3))
+def test_brakes_that_drag_on_a_slew_are_told(onset):
+    loop = closed_loop.Loop(scenario.load('leo_pass', [
+        *TO_270_DEG, f'adu.inject={onset} brake_stuck axis=azimuth state=on'], duration=1.3))
+    loop.run()
+    assert 'azimuth brake not released' in raised(loop.units['acu'])

@@ -96,6 +96,7 @@ def test_without_an_antenna_no_answer_is_a_position(start_process, complaints):
             assert ask(probe, line) == b'RPRT -6\n', line
         assert ask(probe, '+p') == b'get_pos:\nRPRT -6\n'
         assert ask(probe, '_') == b'pedestal, no control unit\n'
+        assert ask(probe, '?').startswith(b'p: get_pos\nP: set_pos\n')
     if ROTCTL:
         for command in (['p'], ['P', '10', '20'], ['S']):
             assert subprocess.run([ROTCTL, '-m', '2', '-r', f'127.0.0.1:{ports["rotctld"]}', *command],

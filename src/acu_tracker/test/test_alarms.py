@@ -1,4 +1,5 @@
 """What raises the alarms, from the laws to the whole control unit, and what an operator can do about them."""
+import collections
 import math
 
 import numpy as np
@@ -180,14 +181,51 @@ def test_an_axis_that_does_not_move_and_one_that_pushes(moving):
     assert told(moving) >= {'azimuth immobile', 'azimuth brake not released'}
 
 
-def test_an_axis_whose_brakes_drag_pushes_on_where_it_turns_back():
-    d = detector()
-    for k in range(400):
-        torque = 5800.0 * min(max(30.0 * np.sin(2.0 * np.pi * k * T / 0.8), -1.0), 1.0)
-        assert detectors.excess_torque(d, torque, 60.0, T) or k < 20
-    for _ in range(60):
-        pushes = detectors.excess_torque(d, 0.0, 60.0, T)
-    assert not pushes and not detectors.excess_torque(d, np.nan, 60.0, T)
+FORWARD = collections.namedtuple('Forward', 'inertia friction')(288.0, 60.0)
+"""Inertia [kg m2] and Coulomb friction [Nm] of an axis."""
+
+
+def not_released(d, torque, rates, high, low):
+    """Findings of the detector over the torques (n,) [Nm] and rates (n,) [rad/s] of an axis."""
+    found = []
+    for T_k, dy in zip(torque, rates):
+        found.append(detectors.brake_not_released(d, T_k, dy, high, low, FORWARD, T))
+        d['dy'] = dy
+    return np.array(found)
+
+
+def test_an_axis_whose_brakes_drag_is_found_also_where_it_turns_back():
+    """The rate is a sine of 0.8 s; the brakes resist with 5800 Nm."""
+    d, rates = detector(), 0.1 * np.sin(2.0 * np.pi * T * np.arange(400) / 0.8)
+    torque = 5800.0 * np.clip(300.0 * rates, -1.0, 1.0) + FORWARD.inertia * np.gradient(rates, T)
+    found = not_released(d, torque, rates, 0.1, -0.1)
+    assert found[80:].all() and not found[:40].any()
+    found = not_released(d, np.zeros(60), np.zeros(60), 0.0, 0.0)
+    assert not found[-1] and not not_released(d, [np.nan], [0.0], 0.0, 0.0).any()
+
+
+@pytest.mark.parametrize(('torque', 'command', 'expected'), (
+    (4000.0, 0.01, True), (-4000.0, -0.01, True), (-4000.0, 0.01, False), (4000.0, 0.0, False), (2900.0, 0.01, False)))
+def test_an_axis_that_stands_counts_only_if_it_is_pushed_where_it_is_commanded(torque, command, expected):
+    found = not_released(detector(), np.full(400, torque), np.zeros(400), command, command)
+    assert found[-1] == expected
+
+
+@pytest.mark.parametrize(('rate', 'expected'), ((0.02, False), (-0.02, True)))
+def test_a_load_that_drives_the_axis_against_its_motors_is_no_brake(rate, expected):
+    found = not_released(detector(), np.full(400, -6000.0), np.full(400, rate), rate, rate)
+    assert found[-1] == expected
+
+
+@pytest.mark.parametrize('true_inertia', (0.55, 1.0, 1.9))
+def test_braking_of_a_load_with_an_uncertain_inertia_is_no_gust(true_inertia):
+    """The axis slows down from 2 rad/s at 10 rad/s2, with the friction of the bearing."""
+    d, rates = detector(), np.linspace(2.0, 0.0, 41)
+    d['dy'] = rates[0] + 10.0 * T
+    torque = -10.0 * true_inertia * FORWARD.inertia + FORWARD.friction
+    for dy in rates:
+        assert not detectors.pushed_by_wind(d, torque, dy, FORWARD.inertia, 50.0 * FORWARD.friction, T)
+        d['dy'] = dy
 
 
 def test_brakes_that_do_not_hold(Rig):

@@ -51,6 +51,12 @@ def test_nothing_is_answered_to_what_asks_nothing():
     assert [read(line) for line in ('', '  ', '\r', '# a comment', '+')] == [None] * 5
 
 
+def test_a_question_mark_is_answered_by_the_commands():
+    told = answer(read('?'), RESULT_OK, rotctld.HELP).decode().splitlines()
+    assert told[:2] == ['p: get_pos', 'P: set_pos'] and '\\dump_state' in told and len(told) == len(rotctld.COMMANDS)
+    assert read('?p').separator == '?'
+
+
 def test_answers_are_the_references_to_the_byte():
     at = rotctld.position(1.0, 2.0)
     assert answer(read('p'), RESULT_OK, at) == b'1.00\n2.00\n'

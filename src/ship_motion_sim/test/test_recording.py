@@ -148,6 +148,11 @@ HEAD = 'time_s,roll_deg,pitch_deg,heading_deg\n'
     (HEAD + '0,1,1,1\n1,1\n', {}, "line 3: the row ends before the column 'pitch_deg'"),
     (HEAD.replace('time_s', 'time_utc') + '2026-06-01T12:00:00Z,1,1,1\n', {},
      "line 2: time_utc = '2026-06-01T12:00:00Z': must be a number of seconds, as in a column time_s"),
+    (HEAD + '2026-06-01T12:00:00Z,1,1,1\n', {},
+     "time_s = '2026-06-01T12:00:00Z': must be a number of seconds, as in a column time_s, because only tracks have "
+     'dates: write the seconds since the first row'),
+    (HEAD.replace('time_s', 'Timestamp') + '01.06.2026 12:00:00,1,1,1\n', {},
+     "column 'time_s' is missing: write the seconds since the first row in it, because 'Timestamp' may hold dates"),
     (HEAD + '0,1,,1\n', {}, "line 2: pitch_deg = '': must be a number"),
     (HEAD + '0,1,1,1\n1,1,1,1\n', {}, '2 rows, must be at least 4'),
     (HEAD + 5 * '0,1,1,1\n', {}, '1 rows, must be at least 4, passed over 4 x row that repeats the row before'),

@@ -159,7 +159,18 @@ def test_one_satellite_goes_without_a_name(tmp_path):
         elements.read(path, 'ISS')
 
 
+def test_an_omm_of_sgp4_may_omit_bstar_and_begin_with_a_comment(tmp_path):
+    path = tmp_path / 'a.omm'
+    path.write_text('COMMENT of an exporter\n' + kvn([{key: value for key, value in ISS.items() if key != 'BSTAR'}]))
+    chosen = elements.read(path)
+    assert chosen.name == 'ISS (ZARYA)' and orbit.satellite(LeoPassParameters(**chosen.values)).bstar == 0.0
+    assert chosen.remark == 'a.omm: line 2: BSTAR is missing: taken as 0, without drag'
+
+
 REFUSED = {
+    'no drag term': (lambda: kvn([{key: value for key, value in ISS.items()
+                                   if key not in ('BSTAR', 'MEAN_ELEMENT_THEORY')}]), '',
+                     'line 1: BSTAR is missing: only an OMM with MEAN_ELEMENT_THEORY = SGP4 may omit it'),
     'unknown': (lambda: kvn(ALL), 'STARLINK-4470', "is in it 0 times; did you mean 'STARLINK-44"),
     'theory': (lambda: kvn([{**ISS, 'MEAN_ELEMENT_THEORY': 'SGP4-XP'}]), '', "line 1: MEAN_ELEMENT_THEORY = 'SG"),
     'type': (lambda: json.dumps([{**ISS, 'EPHEMERIS_TYPE': 4}]), '', 'line 1: ephemeris type 4: .*needs SGP4-XP'),

@@ -243,6 +243,14 @@ def test_a_table_of_directions_is_followed(name, tmp_path):
     assert found['duration'] == pytest.approx(599.95, abs=0.06) and found['receiver.reference_range'] == 7e5
 
 
+def test_an_oem_that_begins_with_a_comment_and_repeats_states(tmp_path):
+    text = swapped(oem_text(interpolation=CONSISTENT), ROW, lambda m: m[0] + '\n' + m[0])
+    built = flown(tmp_path / 'iss.oem', 'COMMENT of an exporter\n\nCOMMENT = 2\n' + text)
+    assert apart(built, TIMES) < 0.01
+    assert built.summary[0].endswith(': 30 states in EME2000, LAGRANGE of degree 9, passed over 1 x state that '
+                                     'repeats the one above')
+
+
 def swapped(text, old, new, count=1):
     assert re.search(old, text), old
     return re.sub(old, new, text, count=count)
@@ -259,6 +267,10 @@ REFUSED = {
     'few states': (lambda: oem_text(count=3), 'line 15: 3 states in the segment that begins'),
     'back': (lambda: swapped(oem_text(), ROW, lambda m: m[0].replace('16:38', '16:36')),
              r'line 24, column 1: the time is -60 s after that of the state above'),
+    'two states': (lambda: swapped(oem_text(), ROW, lambda m: m[0] + '\n' + m[0][:-1] + '7'),
+                   'line 25, column 1: the state differs from the one above, at the same epoch; must be one state'),
+    'sp3': (lambda: '#dP2019 12  9  0  0  0.00000000      96 ORBIT IGS14 HLM  IGS\n',
+            'an SP3 file of precise orbits: convert the orbit of one satellite to a CCSDS OEM'),
     'gap': (lambda: re.sub(r'(?m)^2019-12-09T16:(38|39|40|41).*\n', '', oem_text()), 'line 24: gap of 300 s'),
     'nan': (lambda: swapped(oem_text(), ROW, lambda m: m[0][:27] + 'nan 1 1 1 1 1'),
             r"line 24, column 28: x = 'nan': must be a number"),

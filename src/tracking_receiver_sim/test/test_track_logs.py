@@ -232,7 +232,8 @@ def test_a_packed_log_is_named(tmp_path):
 
 
 @pytest.mark.parametrize('text, expected', [
-    ('1532340000', BEGIN), ('1532340000.25', BEGIN + 0.25), ('2018-07-23T10:00:00', BEGIN),
+    ('1532340000', BEGIN), ('1532340000.25', BEGIN + 0.25), ('1532340000250', BEGIN + 0.25),
+    ('1532340000250000', BEGIN + 0.25), ('2018-07-23T10:00:00', BEGIN),
     ('2018-07-23 10:00:00+00:00', BEGIN), ('2018-07-23T12:00:00.5+02:00', BEGIN + 0.5),
     ('2018-07-23T10:00:00.123456789Z', BEGIN + 0.123456789), ('2018-07-23 10:00:00,5 UTC', BEGIN + 0.5)])
 def test_instants(text, expected):
@@ -240,7 +241,8 @@ def test_instants(text, expected):
 
 
 @pytest.mark.parametrize('text', ['', 'noon', '2018-13-01T00:00:00', '2018-07-23', '10:00:00', '1e999', 'nan', '-5',
-                                  '1532340000000', '9999-12-31T23:59:59Z', '2018-07-23T10:00:00+99:99'])
+                                  '15323400000000', '-1532340000000', '9999-12-31T23:59:59Z',
+                                  '2018-07-23T10:00:00+99:99'])
 def test_no_instants(text):
     with pytest.raises(csv_table.TableError, match='a.csv: line 2: timestamp = '):
         instant.seconds('a.csv', 2, 'timestamp', text)
@@ -272,6 +274,8 @@ BOMB = ('<?xml version="1.0"?>\n<!DOCTYPE gpx [<!ENTITY a "aaaaaaaaaa">' + ''.jo
     (gpx().replace(clock(3), 'noon'), "line 8: time = 'noon': must be UTC as ISO 8601"),
     (gpx(points=['']), '0 fixes, must be at least 4'),
     ('<html><body>404</body></html>', "line 1: element 'html': must be gpx"),
+    ('AXCS123Soarer\r\nHFDTE230718\r\nB1000004722000N00830000EA0150001500\r\n',
+     'an IGC log of a glider: convert it to GPX, for example with gpsbabel -i igc'),
     (BOMB, 'line 2: a document type declaration: GPX has none'),
     ('<gpx>' + '<a>' * 200, 'line 1: must be at most 100 nested elements'),
     (nmea([gga(k, altitude='high' if k == 2 else None) for k in range(N)]), "line 4: altitude = 'high': must be a"),

@@ -33,8 +33,8 @@ TLE_EPOCH_COLUMNS = slice(18, 32)
 
 
 class Elements(typing.NamedTuple):
-    """Elements of a satellite. values: {parameter line_1, line_2 or omm: text}; remark: choice from a history, ''
-    without one."""
+    """Elements of a satellite. values: {parameter line_1, line_2 or omm: text}; remark: choice from a history, and
+    values that were missing; '' without one."""
     name: str
     values: dict
     remark: str = ''
@@ -97,6 +97,9 @@ def read(path, name='', when=None) -> Elements:
             remedy = f'{count}; name it by its number' if history else f'{count};{hint}'.removesuffix(';')
         raise TargetError(f'TLE file {path}: satellites: {len(names)} found, {listed}: {remedy}')
     satellite, remark = _nearest(path, history, when)
+    if not (satellite.lines or satellite.fields.get('BSTAR')):
+        remark = '; '.join(filter(None, (remark, f'{pathlib.Path(path).name}: line {satellite.line}: BSTAR is '
+                                         'missing: taken as 0, without drag')))
     line_1, line_2 = satellite.lines or ('', '')
     values = LeoPassParameters(line_1=line_1, line_2=line_2, omm='' if satellite.lines else _omm_text(path, satellite))
     try:
@@ -144,7 +147,7 @@ def _reader(beginning):
         return _xml
     if beginning.startswith(('{', '[')):
         return _json
-    if beginning.startswith('CCSDS_OMM_VERS'):
+    if lines.begins_with(beginning, 'CCSDS_OMM_VERS'):
         return _kvn
     try:
         names = csv_table.Table('', beginning).fieldnames

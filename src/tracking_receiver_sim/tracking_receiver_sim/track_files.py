@@ -2,10 +2,11 @@
 
 The first row of FILE_FORMATS that matches the beginning of a file gives its reader and its kind.
 """
+import re
 import typing
 
 from pedestal_common.text_files import content, csv_table
-from tracking_receiver_sim.ephemeris import course, directions, oem, stk
+from tracking_receiver_sim.ephemeris import course, directions, lines, oem, stk
 from tracking_receiver_sim.track import fixes, flight, gpx, nmea, place, tables
 
 FORMAT_PROBE_BYTES = 65536
@@ -48,7 +49,7 @@ def _read_object(read):
 
 
 FILE_FORMATS = (
-    FileFormat('CCSDS OEM', ORBIT_KIND, lambda beginning: beginning.startswith(oem.FILE_SIGNATURE),
+    FileFormat('CCSDS OEM', ORBIT_KIND, lambda beginning: lines.begins_with(beginning, oem.FILE_SIGNATURE),
                _read_object(oem.read)),
     FileFormat('STK ephemeris', ORBIT_KIND, stk.FILE_SIGNATURE_PATTERN.match, _read_object(stk.read)),
     FileFormat('GPX', LOG_KIND, lambda beginning: beginning.startswith('<'), _read_log(gpx.rows)),
@@ -58,6 +59,13 @@ FILE_FORMATS = (
                _read_object(directions.read_table)),
     FileFormat('CSV', LOG_KIND, lambda beginning: True, _read_log(tables.rows)))
 """Formats in the order in which a file is compared with them; the last one takes every other file."""
+
+FOREIGN_FORMATS = (
+    (re.compile(r'A[A-Z0-9]{3}[^\n]*\n(?:[^\n]*\n){0,200}?(?:HFDTE|B\d{13}[NS]\d{8}[EW][AV])'),
+     'an IGC log of a glider: convert it to GPX, for example with gpsbabel -i igc -f FLIGHT.igc -o gpx -F FLIGHT.gpx'),
+    (re.compile(r'#[a-d][PV]\d{4} '),
+     'an SP3 file of precise orbits: convert the orbit of one satellite to a CCSDS OEM (KEYWORD = value)'))
+"""(pattern of the beginning, name and remedy) of text formats that are not read."""
 
 DERIVED_PARAMETERS = (*place.STATION_FIELDS, 'receiver.reference_range', 'duration')
 """Parameters that a track file gives if the scenario does not: of the receiver, and the duration of the run."""
@@ -70,6 +78,9 @@ def read(track):
                                    + ', '.join(form.name for form in FILE_FORMATS))
     with csv_table.stream(track.path) as stream:
         beginning = content.beginning(stream.read(FORMAT_PROBE_BYTES)).lstrip()
+    for pattern, name in FOREIGN_FORMATS:
+        if pattern.match(beginning):
+            raise csv_table.TableError(f'{track.path}: {name}')
     form = next(form for form in FILE_FORMATS if form.matches(beginning))
     return form.kind, form.read(track)
 

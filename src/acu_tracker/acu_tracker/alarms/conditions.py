@@ -70,7 +70,7 @@ def _of_motors(d, i, u, envelope, p, facts):
         bits |= table.Bit.AZIMUTH_ENCODER_STUCK
     if detectors.disagreement(d, x, facts.dt):
         bits |= table.Bit.AZIMUTH_ENCODER_DISAGREEMENT
-    if detectors.excess_torque(d, u.torque[i], p.feedforward.friction, facts.dt):
+    if detectors.brake_not_released(d, u.torque[i], dy, high, low, p.feedforward, facts.dt):
         bits |= table.Bit.AZIMUTH_BRAKE_NOT_RELEASED
     if detectors.immobile(d, dy, high, low):
         bits |= table.Bit.AZIMUTH_IMMOBILE

@@ -12,7 +12,8 @@ AXIS_DETECTORS_DTYPE = np.dtype([
     ('y', 'f8'), ('dy', 'f8'),                              # of the previous step [rad], [rad/s]; NaN: no value
     ('mismatch', 'f8'), ('disagrees', 'i8'),                        # of `disagreement` [rad]
     ('turned', 'f8'), ('moved', 'f8'), ('stuck', 'i8'),             # of motors and encoder, in this test [rad]
-    ('immobile', 'i8'), ('mean_torque', 'f8'), ('overloaded', 'i8'), ('behind', 'i8'), ('moves', 'i8'),
+    ('immobile', 'i8'), ('mean_torque', 'f8'), ('overloaded', 'i8'), ('resisted', 'f8'),    # of `brake_not_released`
+    ('work', 'f8'), ('pushed', 'f8'), ('behind', 'i8'), ('moves', 'i8'),
     ('e', 'f8'), ('area', 'f8'), ('half_waves', 'f8'), ('oscillates', 'i8'),    # of `oscillation` [rad], [rad s], [-]
 ], align=True)
 
@@ -32,10 +33,33 @@ IMMOBILE_RATE_SHARE = 0.1
 """Share of the commanded rate below which an axis is immobile."""
 
 EXCESS_TORQUE_RATIO = 50.0
-"""Ratio of torque to Coulomb friction that no free axis needs for long.
+"""Ratio of torque to Coulomb friction that no free axis needs for long without a gust.
 
 It is half of the torque that the brakes hold, and twice that of a strong wind.
 """
+
+DRAG_TORQUE_RATIO = 80.0
+"""Ratio of torque to Coulomb friction above which brakes drag on an axis that moves with its motors.
+
+It is five sixths of the torque that the brakes hold. Because a head wind and weaker brakes take the same work from the
+motors, only their amount distinguishes them.
+"""
+
+MIN_DRAG_RATE_RAD_S = 2e-4
+"""Rate above which an axis moves with its motors [rad/s]: twice the resolution of the rate."""
+
+MIN_RESISTED_TIME_S = 0.2
+"""Time for which a brake must have resisted the motors while their torque was in excess [s]."""
+
+WIND_TORQUE_SHARE = 0.5
+"""Share of the excess torque above which the work of the load on the motors counts as that of a gust."""
+
+MIN_GIVE_RAD = 1e-4
+"""Motion against the excess torque that shows a gust [rad]: 200 times the resolution of the motors' encoders over a
+step, and a tenth of the motion under a gust of 3000 Nm."""
+
+INERTIA_UNCERTAINTY = 2.0
+"""Largest ratio of the inertia of an axis to `feedforward.inertia`, and the inverse of the smallest."""
 
 TORQUE_TIME_CONSTANT_S = 0.1
 """Time constant of the mean of the absolute torque [s].
@@ -78,7 +102,7 @@ def beyond(was, x, on, off):
 @compiled
 def initialise(d, y, dy):
     """Begin at the encoder's angle [rad] and the motors' rate [rad/s], after a gap or an invalid encoder."""
-    d.y, d.dy, d.turned, d.moved, d.mismatch, d.e, d.area = y, dy, 0.0, 0.0, 0.0, 0.0, 0.0
+    d.y, d.dy, d.turned, d.moved, d.mismatch, d.e, d.area, d.work = y, dy, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
 
 
 @compiled
@@ -144,16 +168,71 @@ def immobile(d, dy, high, low):
 
 
 @compiled
-def excess_torque(d, T, friction, dt):
-    """Return True if the mean of the absolute torque on the load is far above the Coulomb friction, both [Nm].
+def excess_torque(d, T, limit, dt):
+    """Return True if the mean of the absolute torque on the load is above its limit, both [Nm].
 
     The time constant of the mean is TORQUE_TIME_CONSTANT_S.
     """
     if math.isfinite(T):
         d.mean_torque += (abs(T) - d.mean_torque) * min(dt / TORQUE_TIME_CONSTANT_S, 1.0)
-    limit = EXCESS_TORQUE_RATIO * friction
     d.overloaded = beyond(d.overloaded, d.mean_torque, limit, 0.5 * limit)
     return d.overloaded != 0
+
+
+@compiled
+def pushed_by_wind(d, T, dy, inertia, limit, dt):
+    """Return True if the load has moved the axis against the torque T of its motors [Nm], as only a gust does.
+
+    A brake takes work from an axis and never does work on it. The work that the load has done since its least value is
+
+        W_k = max(W_k-1 - T dy dt + f (E_k - E_k-1), 0),    E = J dy^2 / 2
+
+    f is INERTIA_UNCERTAINTY while the axis slows down, and its inverse while the axis accelerates. An inertia that
+    differs by this factor from J, `inertia` [kg m2], therefore does not look like a gust. W counts while the torque
+    has one sign and is above WIND_TORQUE_SHARE of its limit. The finding lasts as long.
+    """
+    least = WIND_TORQUE_SHARE * limit
+    if d.pushed * T < least:
+        d.pushed = 0.0
+    if not abs(T) > least:
+        d.work = 0.0
+        return False
+    energy = 0.5 * inertia * (dy * dy - d.dy * d.dy)
+    factor = INERTIA_UNCERTAINTY if energy < 0.0 else 1.0 / INERTIA_UNCERTAINTY
+    d.work = max(d.work - T * dy * dt + factor * energy, 0.0)
+    if d.work > limit * MIN_GIVE_RAD:
+        d.pushed = math.copysign(1.0, T)
+    return d.pushed != 0.0
+
+
+@compiled
+def resists(T, dy, high, low, friction):
+    """Return True if an axis with excess torque stands in spite of its command, or its motors drag it along.
+
+    The axis stands if its commands and its torque have one sign, the commands are above STANDSTILL_RATE_RAD_S, and the
+    rate is below IMMOBILE_RATE_SHARE of the least of them. high, low: envelope of the commands
+    (servo.uncommanded_motion).
+    """
+    if abs(dy) > MIN_DRAG_RATE_RAD_S and abs(T) > DRAG_TORQUE_RATIO * friction:
+        return T * dy > 0.0
+    u = low if low > 0.0 else min(high, 0.0)
+    return T * u > 0.0 and abs(u) > STANDSTILL_RATE_RAD_S and abs(dy) < IMMOBILE_RATE_SHARE * abs(u)
+
+
+@compiled
+def brake_not_released(d, T, dy, high, low, p, dt):
+    """Return True if a brake resists the motors of an axis with excess torque, and no gust explains the torque.
+
+    T: torque of the motors on the load [Nm]; dy: their rate [rad/s]; high, low: envelope of the commands
+    (servo.uncommanded_motion); p: record of FeedforwardParameters. The finding lasts as long as the excess torque.
+    """
+    limit = EXCESS_TORQUE_RATIO * p.friction
+    pushed = pushed_by_wind(d, T, dy, p.inertia, limit, dt)
+    if not excess_torque(d, T, limit, dt):
+        d.resisted = 0.0
+    elif not pushed and resists(T, dy, high, low, p.friction):
+        d.resisted += dt
+    return d.resisted > MIN_RESISTED_TIME_S and not pushed
 
 
 @compiled

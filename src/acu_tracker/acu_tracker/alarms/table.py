@@ -99,9 +99,10 @@ ALARMS = (
               'constant of 2 s',
               'compare the encoders; inspect gear, couplings and cables; then reset',
               cause=('time jump', '* encoder jump', '* encoder stuck')),
-    *_of_axes('brake not released', 'high', 0.5, 1.0, False,
-              'the mean of the absolute torque has been above 50 times the Coulomb friction (`feedforward.friction`) '
-              'for half a second, with the axis in motion or at rest',
+    *_of_axes('brake not released', 'high', 0.3, 1.0, False,
+              'the mean of the absolute torque is above 50 times the Coulomb friction (`feedforward.friction`), and '
+              'for half a second the axis has stood in spite of its command, or has moved at 80 times the friction. '
+              'A gust that pushes the axis back does not count',
               'go to standby; inspect the brakes; check for an obstacle that blocks the axis', judged='moving'),
     *_of_axes('immobile', 'high', 0.3, 1.0, False,
               'the motors of the axis turn at less than a tenth of the commanded rate',

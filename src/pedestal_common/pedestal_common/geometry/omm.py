@@ -23,6 +23,8 @@ DEFAULT_FIELDS = {'MEAN_MOTION_DOT': '0', 'MEAN_MOTION_DDOT': '0'}
 ALLOWED_VALUES = {'CENTER_NAME': ('EARTH',), 'REF_FRAME': ('TEME',), 'TIME_SYSTEM': ('UTC',),
                   'MEAN_ELEMENT_THEORY': ('SGP4', 'SGP/SGP4')}
 """{keyword: allowed values}; the first one is the default."""
+BSTAR_OPTIONAL_THEORIES = ALLOWED_VALUES['MEAN_ELEMENT_THEORY']
+"""Theories that an OMM must name in order to omit BSTAR, which is then 0."""
 SGP4_TYPES = ('', '0', '2')
 """Ephemeris types of elements of SGP4."""
 OTHER_TYPES = {'1': 'SGP', '3': 'PPT3', '4': 'SGP4-XP', '6': 'numerical propagation'}
@@ -66,6 +68,9 @@ def checked(fields):
     for keyword in OTHER_KEYWORDS:
         if float(fields.get(keyword) or 0.0):
             raise ValueError(f'{keyword} = {fields[keyword]!r:.60}: must be absent, because it needs SGP4-XP')
+    without_drag = not fields.get('BSTAR')
+    if without_drag:
+        fields['BSTAR'] = '0'
     for keyword, (low, high) in NUMBER_LIMITS.items():
         try:
             value = float(fields.get(keyword, '').replace('_', ' '))  # float() passes over _ between digits
@@ -73,6 +78,8 @@ def checked(fields):
             raise ValueError(f'{keyword} = {fields.get(keyword)!r:.60}: must be a number') from None
         if not low <= value <= high:
             raise ValueError(f'{keyword} = {value:g}: must be {low:g} to {high:g}')
+    if without_drag and fields.get('MEAN_ELEMENT_THEORY', '').upper() not in BSTAR_OPTIONAL_THEORIES:
+        raise ValueError('BSTAR is missing: only an OMM with MEAN_ELEMENT_THEORY = SGP4 may omit it')
     return {**fields, 'NORAD_CAT_ID': catalogue_number(fields.get('NORAD_CAT_ID', ''))}
 
 

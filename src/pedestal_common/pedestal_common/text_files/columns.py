@@ -104,6 +104,11 @@ def find(names, wanted, required=True):
     return found[0] if found else None
 
 
+def is_time(unit):
+    """Return True for a unit of time, with or without a date."""
+    return unit == UTC or unit in _UNIT_NAMES['s']
+
+
 def named(names, wanted):
     """Return True if one of the names of a table begins with the quantity, whatever follows."""
     return any(unit_of(name, wanted) is not None for name in names)

@@ -40,6 +40,9 @@ REPEATED_ROW = 'row that repeats the row before'
 """Name of the rows that are passed over because they repeat the row before them."""
 
 _DIGIT_FIRST_PATTERN = re.compile(r'[-+]?\.?\d', re.ASCII)
+_DATE_PATTERN = re.compile(r'\d{1,2}:|\d{4}[-/]\d|\d{1,2}[-/ .]\w+[-/ .]\d|\d{8}T', re.ASCII)
+_DATE_NAME_PATTERN = re.compile(r'(date|utc|gmt|timestamp|epoch)(?![a-z])|datetime', re.IGNORECASE)
+"""Beginning of a date or of a time of day, and of the name of a column of them."""
 _DECIMAL_COMMA_PATTERN = re.compile(r'[-+]?\d+,\d+(?:[eE][-+]?\d+)?', re.ASCII)
 
 
@@ -194,7 +197,10 @@ class Table:
 
     def missing(self, name):
         """Return the TableError of a column that is not in the table."""
-        return TableError(f'{self.path}: line {self.head_line}: column {name!r} is missing; '
+        dates = next(filter(_DATE_NAME_PATTERN.match, self.fieldnames), '') if name == 'time_s' else ''
+        remedy = (f': write the seconds since the first row in it, because {dates!r:.60} may hold dates' if dates
+                  else '')
+        return TableError(f'{self.path}: line {self.head_line}: column {name!r} is missing{remedy}; '
                           f'{self._listed()}')
 
     def _listed(self):
@@ -207,9 +213,10 @@ class Table:
         """
         if cell is None:
             raise TableError(f'{self.path}: line {self.line_num}: the row ends before the column {column.name!r:.60}')
-        if column.unit == _columns.UTC and ':' in cell:
+        if _columns.is_time(column.unit) and _DATE_PATTERN.match(cell):
             raise TableError(f'{self.path}: line {self.line_num}: {column.name} = {cell!r:.60}: must be a number of '
-                             'seconds, as in a column time_s, because only tracks have dates')
+                             'seconds, as in a column time_s, because only tracks have dates: write the seconds since '
+                             'the first row')
         return column.size * number(self.path, self.line_num, column.name, self.point(column.name, cell),
                                     low / column.size, high / column.size)
 

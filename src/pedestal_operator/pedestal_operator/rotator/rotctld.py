@@ -32,6 +32,9 @@ COMMANDS = (Row('p', 'get_pos'), Row('P', 'set_pos', 2, True), Row('S', 'stop', 
             Row('R', 'reset', 1, True), Row('M', 'move', 2, True), Row('_', 'get_info'), Row('s', 'get_status'),
             Row('1', 'dump_caps'), Row('', 'dump_state'), Row('q', 'quit'), Row('Q', 'quit'))
 
+HELP = tuple(('', f'{row.letter}: {row.name}' if row.letter else f'\\{row.name}') for row in COMMANDS)
+"""Lines of the answer to `?`: the commands."""
+
 SET_COMMANDS = tuple(row.name for row in COMMANDS if row.sets)
 """Commands that are answered by RPRT only."""
 
@@ -76,6 +79,8 @@ def read(line) -> Request | None:
     if not line or line.startswith('#'):
         return None
     separator = ''
+    if line == '?':
+        return Request('help')
     if not (line[0].isalnum() or line[0] in '\\_'):
         separator, line = ('\n' if line[0] == '+' else line[0]), line[1:].strip()
     words = line.split()

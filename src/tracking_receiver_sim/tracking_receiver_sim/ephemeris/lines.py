@@ -19,6 +19,13 @@ YEAR_LIMITS = 1957, 2199
 """Range of the years of a time."""
 
 
+def begins_with(beginning, signature):
+    """Return True if the first line of a text that is no COMMENT of the CCSDS books begins with a signature."""
+    texts = map(str.strip, beginning.splitlines())
+    first = next((text for text in texts if text and text.split()[0] != 'COMMENT'), '')
+    return first.startswith(signature)
+
+
 def wrong(path, line, column, problem):
     """Return a TableError at a line and column of a file, both counted from 1."""
     return csv_table.TableError(f'{path}: line {line}, column {column}: {problem}')

@@ -15,6 +15,8 @@ STATE_LIMITS = {**dict.fromkeys('xyz', (-2e6, 2e6)), **dict.fromkeys(('vx', 'vy'
 LINE_COLUMN, DAY_COLUMN, SECOND_COLUMN, FIRST_NUMBER_COLUMN = range(4)
 """Columns of a row: line in the file, days since 1970, seconds of the day, first number of STATE_LIMITS."""
 COLUMN_COUNT = FIRST_NUMBER_COLUMN + len(STATE_LIMITS)
+REPEATED_STATE = 'state that repeats the one above'
+"""Name of the states that are passed over because they repeat epoch and numbers of the state above."""
 MAX_SEGMENTS = 1000
 """Largest number of segments of a file."""
 REQUIRED_KEYWORDS = ('OBJECT_NAME', 'OBJECT_ID', 'CENTER_NAME', 'REF_FRAME', 'TIME_SYSTEM')
@@ -55,10 +57,11 @@ def read(path, wanted='') -> states.Ephemeris:
             place = meta.get('USEABLE_START_TIME', meta['OBJECT_NAME'])
             raise lines.wrong(path, place.line, place.column, 'the segment begins before the end of the one above')
     first = of_object[0][0]
-    count = sum(len(segment.t) for segment in segments)
+    count, given = sum(len(segment.t) for segment in segments), sum(len(rows) for _, rows in of_object)
+    passed_over = f', passed over {given - count} x {REPEATED_STATE}' if given > count else ''
     return states.Ephemeris(path, midnight, segments,
                             f'CCSDS OEM of {first["OBJECT_NAME"]:.40} ({first["OBJECT_ID"]:.40}): {count} states in '
-                            f'{first["REF_FRAME"]}, {segments[0].method} of degree {segments[0].degree}')
+                            f'{first["REF_FRAME"]}, {segments[0].method} of degree {segments[0].degree}{passed_over}')
 
 
 def _blocks(path):
@@ -139,8 +142,22 @@ def _segment(path, meta, rows, midnight):
     method, degree = _interpolation(path, meta)
     lines_of_rows, metres = rows[:, LINE_COLUMN], 1e3 * rows[:, FIRST_NUMBER_COLUMN:]
     times = seconds(lines_of_rows, 1, rows[:, DAY_COLUMN], rows[:, SECOND_COLUMN])
-    table = np.column_stack((lines_of_rows, times, metres))
+    table = _without_repetitions(path, np.column_stack((lines_of_rows, times, metres)))
     return states.segment(path, meta['line'], table, frame, method, degree, *span)
+
+
+def _without_repetitions(path, table):
+    """Return the rows (line, time, numbers) without those that repeat time and numbers of the row above. Raises
+    TableError for different states at one time."""
+    step = np.diff(table[:, 1:], axis=0)
+    at_once = step[:, 0] == 0.0
+    repeated = at_once & (step == 0.0).all(axis=1)
+    different = np.flatnonzero(at_once & ~repeated)
+    if different.size:
+        i = int(different[0]) + 1
+        raise lines.wrong(path, int(table[i, 0]), 1, 'the state differs from the one above, at the same epoch; must '
+                          'be one state for each epoch')
+    return table[np.append(True, ~repeated)[:len(table)]]
 
 
 def _interpolation(path, meta):

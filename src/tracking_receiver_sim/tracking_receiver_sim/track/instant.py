@@ -27,6 +27,10 @@ ISO_TIME_PATTERN = re.compile(
     r'(\d{4}-\d\d-\d\d)[T ](\d\d):(\d\d):(\d\d)(?:[.,](\d{1,9}))?(?: ?(?:Z|UTC|([+-])(\d\d):?(\d\d)))?', re.ASCII)
 
 
+FINE_UNIX_TIME_PATTERN = re.compile(r'[1-9](?:\d{12}|\d{15})(?:\.0*)?', re.ASCII)
+"""Milliseconds or microseconds since 1970, of the years 2001 to 2286. In seconds, such a number is no date."""
+
+
 @functools.cache
 def timescale():
     """Return the timescale of skyfield."""
@@ -62,12 +66,15 @@ def second_of_day(hours, minutes, seconds):
 
 def seconds(path, line, name, text):
     """Return the instant of a text: a date, see `dates` (without a zone: UTC), or a number of seconds since 1970
-    without leap seconds. Raises TableError."""
+    without leap seconds, also in milliseconds (13 digits) or microseconds (16 digits). Raises TableError."""
     text = dates.iso(text)
     match = ISO_TIME_PATTERN.fullmatch(text)
     try:
         if not match:
-            return of_unix_time(csv_table.number(path, line, name, float(text.replace('_', ' ')),
+            size = 1.0
+            if FINE_UNIX_TIME_PATTERN.fullmatch(text):
+                size = 1e-3 if len(text.partition('.')[0]) == 13 else 1e-6
+            return of_unix_time(csv_table.number(path, line, name, size * float(text.replace('_', ' ')),
                                                  *UNIX_TIME_LIMITS_S))
         return _of_iso(*match.groups())
     except csv_table.TableError:

@@ -63,7 +63,7 @@ class Times:
             self.dated = True
             return julian(*place, table.point(column.name, cell), column.unit == columns.MODIFIED_JULIAN_DATE)
         dated = column.unit == columns.UTC or column.unit == 's' and bool(
-            instant.ISO_TIME_PATTERN.fullmatch(dates.iso(cell)))
+            instant.ISO_TIME_PATTERN.fullmatch(dates.iso(cell)) or instant.FINE_UNIX_TIME_PATTERN.fullmatch(cell))
         if self.dated not in (None, dated):
             raise csv_table.TableError(f'{table.path}: line {table.line_num}: {column.name} = {cell!r:.60}: must be '
                                        f'{"UTC as ISO 8601" if self.dated else "a number"} as in the lines above')
