@@ -8,10 +8,18 @@ import shutil
 import sys
 import textwrap
 
-EXIT_WRONG_COMMAND = 2
-"""Exit code of a verb with wrong arguments."""
-EXIT_DISTURBED = 3
-"""Exit code of a run that was disturbed, for example by lost steps."""
+EXIT_ERROR, EXIT_WRONG_COMMAND, EXIT_DISTURBED, EXIT_FAILED_RUN, EXIT_STOPPED = 1, 2, 3, 4, 130
+EXIT_CODES = {
+    0: 'the run came to its planned end, and the recording is complete',
+    EXIT_ERROR: 'the run did not start, a node failed, or the recording is not complete; the last line states the '
+                'reason',
+    EXIT_WRONG_COMMAND: 'the command line has a wrong argument',
+    EXIT_DISTURBED: 'a realtime run ended early, or its drive lost more than 1 % of its steps (steps in the 5 s after '
+                    'a node died are not counted)',
+    EXIT_FAILED_RUN: 'the drive tripped, a command of the scenario was refused, or a target was to be tracked and '
+                     'never was; the verdict above the table states which',
+    EXIT_STOPPED: 'the run was stopped, for example by Ctrl-C'}
+"""{exit code of `pedestal run`: meaning}. Codes 1, 3 and 130 take precedence over 4."""
 
 STDOUT_PATH = pathlib.Path('/dev/stdout')
 """Path that --json without a file, or with -, selects."""
@@ -116,6 +124,12 @@ def show_list(rows):
             print(f'{head:{indent - 2}}  {first}', *(' ' * indent + line for line in more), sep='\n')
 
 
+def exit_codes():
+    """Return the lines of EXIT_CODES for a help text."""
+    return '\n'.join(textwrap.fill(f'{code}: {meaning}', 100, initial_indent='  ', subsequent_indent='      ')
+                     for code, meaning in EXIT_CODES.items())
+
+
 def show_results(title, columns, results, whole, marks=()):
     """Print a table of metrics.
 
@@ -187,11 +201,13 @@ def show_study(title, rows, missed):
 
 
 def show_trials(title, rows):
-    """Print the statistics of each result over the trials: rows of trials.statistics."""
+    """Print the statistics of each result over the trials: rows of trials.statistics, with its `coverage`."""
     from rich.box import SIMPLE_HEAD
     from rich.console import Console
     from rich.table import Table
     from rich.text import Text
+
+    from pedestal_analysis.trials.statistics import coverage
     of_results, others = {}, []
     for row in rows:
         metric, _, key = row['metric'].rpartition('/')
@@ -205,9 +221,9 @@ def show_trials(title, rows):
     for (case, metric, unit), found in of_results.items():
         mean = found['mean']
         table.add_row(case, metric, number(mean['value']), interval(mean),
-                      *(number(found[key]['value']) for key in ('p05', 'p50', 'p95', 'max')), str(mean['runs']), unit)
+                      *(number(found[key]['value']) for key in ('p05', 'p50', 'p95', 'max')), coverage(mean), unit)
     for row in others:
         table.add_row(row['case'], row['metric'], number(row['value']), interval(row), '', '', '', '',
-                      str(row['runs']), row['unit'])
+                      coverage(row), row['unit'])
     longest = max((len(row['case']) for row in rows), default=0)
     Console(width=max(Console().width, MIN_TABLE_COLUMNS + longest)).print(table)

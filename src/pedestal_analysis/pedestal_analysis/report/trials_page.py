@@ -157,7 +157,7 @@ def _estimates(rows, head):
     lines = [[row['case'], row['metric'], elements.number(row['value'] if row['value'] is not None else math.nan,
                                                           row['unit']),
               '' if row['ci_low'] is None and row['ci_high'] is None else
-              f'{_bound(row["ci_low"])} to {_bound(row["ci_high"])}', str(row['runs'])] for row in rows]
+              f'{_bound(row["ci_low"])} to {_bound(row["ci_high"])}', statistics.coverage(row)] for row in rows]
     return elements.table(head, lines)
 
 

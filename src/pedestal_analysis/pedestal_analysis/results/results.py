@@ -6,13 +6,15 @@ encoders    tracking.Tracking with the true direction of the dish beside the enc
 filter      consistency.Consistency                     isolation   isolation.Isolation
 attitude    known_attitude.KnownAttitude                keyholes    tracking.keyholes
 run         start.Outcome                               supervised  start.Outcome in realtime
+MODE        errors of mode_pointing.read, for each of its FOLLOWING_MODES
 Errors are taken per axis and sample. "Both axes together" pools the samples of both axes; the result is not the angle
 between beam and target.
 """
+import itertools
 import math
 import typing
 
-from pedestal_analysis.results import consistency, isolation, known_attitude, tracking
+from pedestal_analysis.results import consistency, isolation, known_attitude, mode_pointing, tracking
 from pedestal_analysis.results.tracking import DEG_PER_RAD, known_rms, largest
 
 
@@ -35,6 +37,15 @@ class Result(typing.NamedTuple):
     mark: typing.Callable = lambda part: ''
 
 
+def _of_mode(mode):
+    """Return the rows of the pointing error in a mode of mode_pointing.FOLLOWING_MODES."""
+    against = 'requested angles minus true beam' if mode == 'preset' else 'true target minus true beam'
+    return (Result(f'{mode}_pointing_rms_deg', 'deg', mode, known_rms,
+                   f'Rms of the true pointing error ({against}), both axes together, in settled `{mode}`.'),
+            Result(f'{mode}_pointing_max_deg', 'deg', mode, largest,
+                   f'Largest true pointing error ({against}) of either axis in settled `{mode}`.'))
+
+
 RESULTS = (
     Result('azimuth_following_rms_deg', 'deg', 'motors', lambda run: known_rms(run.following[:, 0]),
            'Rms following error (reference minus encoder) in azimuth, over all steps outside standby.'),
@@ -48,6 +59,7 @@ RESULTS = (
            'Rms of the true pointing error (true target minus true beam), both axes together, in settled autotrack.'),
     Result('pointing_max_deg', 'deg', 'tracking', lambda run: run.pointing(largest),
            'Largest true pointing error of either axis in settled autotrack.'),
+    *itertools.chain.from_iterable(map(_of_mode, mode_pointing.FOLLOWING_MODES)),
     Result('cross_elevation_rms_deg', 'deg', 'tracking', lambda run: run.pointing(known_rms, 0),
            'Rms of the true pointing error in cross-elevation, in settled autotrack.'),
     Result('elevation_rms_deg', 'deg', 'tracking', lambda run: run.pointing(known_rms, 1),
@@ -160,20 +172,31 @@ def of_bag(bag):
 
     Raises ValueError if the bag has no joint_states or no target/truth.
     """
-    run = tracking.read(bag)
-    return {**of_tracking(run), 'filter': consistency.read(bag, run), 'keyholes': tracking.keyholes(bag),
-            'isolation': isolation.read(bag, run), 'attitude': known_attitude.read(bag)}
+    return of_run(bag, tracking.read(bag))
+
+
+def of_run(bag, run):
+    """Return the parts {part: record} of a bag.Bag with one beam and its tracking.Tracking."""
+    return {**of_tracking(run), **mode_pointing.read(bag, run), 'filter': consistency.read(bag, run),
+            'keyholes': tracking.keyholes(bag), 'isolation': isolation.read(bag, run),
+            'attitude': known_attitude.read(bag)}
 
 
 def measured(parts, table=RESULTS) -> dict:
     """Return {name: (value, unit)} of the results of a table whose part exists, in the order of the table."""
     return {result.name: (result.measure(parts[result.part]), result.unit) for result in table
-            if parts.get(result.part)}
+            if _exists(parts, result)}
+
+
+def _exists(parts, result):
+    """Return True if the part of a Result exists and is not empty."""
+    part = parts.get(result.part)
+    return part is not None and (not isinstance(part, list | dict) or bool(part))
 
 
 def marks(parts, table=RESULTS) -> dict:
     """Return {name: note} of the results whose value is off."""
-    found = {result.name: result.mark(parts[result.part]) for result in table if parts.get(result.part)}
+    found = {result.name: result.mark(parts[result.part]) for result in table if _exists(parts, result)}
     return {name: text for name, text in found.items() if text}
 
 

@@ -1,10 +1,9 @@
 """run a scenario as separate nodes and record it
 
-Starts a process for each node, records every topic in a new bag, and prints the results.
+Starts a process for each node, records every topic in a new bag, and prints a verdict and the results.
 
-Exit code 0: the run is complete. 1: the run failed, or the recording is not complete. 3: a realtime run ended early,
-or its drive lost more than 1 % of its steps (steps in the 5 s after a node died are not counted). 130: the run was
-stopped, for example by Ctrl-C.
+Exit codes (1, 3 and 130 take precedence over 4):
+
 """
 import argparse
 import sys
@@ -13,6 +12,8 @@ import typing
 from pedestal import stop
 from pedestal.verbs import arguments
 from pedestal_analysis import console
+
+__doc__ += console.exit_codes()
 
 if typing.TYPE_CHECKING:
     from pedestal_bringup.scenario.scenario import Scenario
@@ -64,7 +65,7 @@ def main(options: argparse.Namespace) -> int:
         print(line)
     outcome = graph.run(plan, bag, console.progress_of_run(chosen.header.duration), servers)
     # Because these modules import scipy, which takes half a second, they are loaded after the run.
-    from pedestal_analysis.results import results
+    from pedestal_analysis.results import results, tracking, verdict
     from pedestal_recording.bag import read
     from pedestal_recording.verify import verify
     if outcome.stopped:
@@ -73,11 +74,16 @@ def main(options: argparse.Namespace) -> int:
             return stop.STOP_EXIT_CODE
     recording = read(bag)
     beams = [prefix[:-1] for prefix in chosen.prefixes]
-    parts = [results.of_bag(recording.view(beam)) for beam in beams]
+    views = [recording.view(beam) for beam in beams]
+    runs = [tracking.read(view) for view in views]
+    verdicts = [verdict.of(view, run) for view, run in zip(views, runs)]
+    parts = [results.of_run(view, run) for view, run in zip(views, runs)]
     of_beams = [results.measured(part) for part in parts]
     realtime = chosen.header.pacing == 'realtime'
     whole = results.measured({'run': outcome, 'supervised': outcome if realtime else None})
     lost, steps = whole['lost_steps'][0], outcome.drive.get('steps')
+    for beam, found in zip(beams, verdicts):
+        print(f'{beam}: {found.text}' if beam else found.text)
     console.show_results(f'{chosen.name}: {chosen.header.title}', beams, of_beams,
                          {**whole, 'lost_steps': (lost, f'of {steps}' if lost and steps else 'steps')},
                          [results.marks(part) for part in parts])
@@ -87,6 +93,7 @@ def main(options: argparse.Namespace) -> int:
     rows = [row for beam, values in zip(beams, of_beams)
             for row in results.rows(f'{chosen.name}/{beam}'.rstrip('/'), values)]
     console.write_json(options.json, {'name': chosen.name, 'rows': rows + results.rows(chosen.name, whole),
+                                      'verdicts': {beam: found._asdict() for beam, found in zip(beams, verdicts)},
                                       'mcap_sha256': outcome.recorder['sha256']})
     if outcome.stopped:
         return stop.STOP_EXIT_CODE
@@ -103,7 +110,9 @@ def main(options: argparse.Namespace) -> int:
                          f'{MAX_LOST_STEP_SHARE:.0%}, outside announced restarts')
     for reason in disturbed:
         print(f'pedestal: {reason}', file=sys.stderr)
-    return console.EXIT_DISTURBED if disturbed else 0
+    if disturbed:
+        return console.EXIT_DISTURBED
+    return console.EXIT_FAILED_RUN if any(found.failed for found in verdicts) else 0
 
 
 def _chosen(options: argparse.Namespace) -> 'Scenario | None':

@@ -82,6 +82,9 @@ def main(options: argparse.Namespace) -> int:
     file = folder / 'trials.html'
     file.write_text(trials_page.page(shown, rows), encoding='utf-8')
     console.show_trials(f'{plans[0].runs} trials: {" against ".join(names)}', rows)
+    for name, table in zip(names, tables):
+        if line := statistics.failures(table):
+            print(f'{name}: {line}')
     print('\n'.join(_correlation_lines(rows, ranking)))
     print(f'the worst trials by {ranking}:')
     for i in shown.worst:
