@@ -23,15 +23,20 @@ SECONDS = 5.0
 @pytest.mark.parametrize('word', RUNS)
 def test_a_run_begins_its_results_with_a_verdict(start_run, word):
     name, changes, text = RUNS[word]
-    run = start_run(name, '--duration', SECONDS, *(part for change in changes for part in ('--param', change)))
-    done = run.finish()
     failed = word != 'no target'
+    run = start_run(name, '--duration', SECONDS, *(part for change in changes for part in ('--param', change)),
+                    *([] if failed else ['--all']))
+    done = run.finish()
     assert done.returncode == (console.EXIT_FAILED_RUN if failed else 0), done.stderr
     printed = done.stdout.splitlines()
     said = next(i for i, line in enumerate(printed) if line.startswith(text))
     assert printed[said + 1].startswith(f'{name}: ')     # the title of the table
-    written = json.loads(run.json.read_text())['verdicts']['']
+    content = json.loads(run.json.read_text())
+    written = content['verdicts']['']
     assert (written['word'], written['text']) == (word, printed[said])
+    shown = [row['metric'] for row in content['rows'] if any(f' {row["metric"]} ' in line for line in printed)]
+    assert len(shown) == (results.BRIEF_COUNT if failed else len(content['rows']))
+    assert ('not measured' in done.stdout) != failed and ('--all prints all results' in done.stdout) == failed
     recording = memory_recording.record(scenario.load(name, changes, duration=SECONDS))
     bag = bags.read(run.bag)
     again, of_bag = ((results.tracking.read(source), source) for source in (recording, bag))

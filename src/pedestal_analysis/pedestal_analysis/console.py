@@ -126,7 +126,7 @@ def show_list(rows):
 
 def exit_codes():
     """Return the lines of EXIT_CODES for a help text."""
-    return '\n'.join(textwrap.fill(f'{code}: {meaning}', 100, initial_indent='  ', subsequent_indent='      ')
+    return '\n'.join(textwrap.fill(f'{code}: {meaning}.', 100, initial_indent='  ', subsequent_indent='      ')
                      for code, meaning in EXIT_CODES.items())
 
 
@@ -139,7 +139,7 @@ def show_results(title, columns, results, whole, marks=()):
     from rich.console import Console
     from rich.table import Table
     from rich.text import Text
-    table = Table(title=Text(title), title_justify='left')
+    table = Table()
     table.add_column('metric')
     for column in columns:
         table.add_column(column or 'value', justify='right')
@@ -150,12 +150,15 @@ def show_results(title, columns, results, whole, marks=()):
             marked.setdefault(metric, []).append(f'{column}: {text}' if column else text)
     if marked:
         table.add_column('off')
-    for metric, (_, unit) in results[0].items():
-        table.add_row(metric, *(measured(values[metric][0]) for values in results), unit,
+    units = {metric: unit for values in results for metric, (_, unit) in values.items()}
+    for metric, unit in units.items():
+        table.add_row(metric, *(measured(values.get(metric, (math.nan,))[0]) for values in results), unit,
                       *([', '.join(marked.get(metric, ()))] if marked else ()))
     for metric, (value, unit) in whole.items():
         table.add_row(metric, measured(value), *[''] * (len(columns) - 1), unit)
-    Console(width=max(Console().width, MIN_TABLE_COLUMNS) if len(columns) > 1 else None).print(table)
+    screen = Console(width=max(Console().width, MIN_TABLE_COLUMNS) if len(columns) > 1 else None)
+    screen.print(Text(title))
+    screen.print(table)
 
 
 def measured(value):
@@ -163,6 +166,11 @@ def measured(value):
     if not math.isfinite(value):
         return 'not measured'
     return f'{value:,.0f}' if abs(value) >= 1e4 and value == int(value) else number(value)
+
+
+def add_all(parser, what='all results; default: the eight most important ones'):
+    """Add the option --all to the parser of a verb that prints results. what: its help."""
+    parser.add_argument('--all', action='store_true', help=what)
 
 
 def add_explain(parser):
@@ -200,8 +208,12 @@ def show_study(title, rows, missed):
     Console(width=max(Console().width, MIN_TABLE_COLUMNS)).print(table)
 
 
-def show_trials(title, rows):
-    """Print the statistics of each result over the trials: rows of trials.statistics, with its `coverage`."""
+def show_trials(title, rows, metrics=None):
+    """Print the statistics of each result over the trials: rows of trials.statistics, with its `coverage`.
+
+    metrics: names of the printed results in their order, of which the first also has the rows of its comparison; None
+    for all rows.
+    """
     from rich.box import SIMPLE_HEAD
     from rich.console import Console
     from rich.table import Table
@@ -211,19 +223,40 @@ def show_trials(title, rows):
     of_results, others = {}, []
     for row in rows:
         metric, _, key = row['metric'].rpartition('/')
+        if metrics is not None and metric not in metrics:
+            continue
         if key in ('mean', 'p05', 'p50', 'p95', 'max'):
             of_results.setdefault((row['case'], metric, row['unit']), {})[key] = row
-        elif key in ('rate', 'difference', 'gain', 'wins'):
+        elif key in ('rate', 'difference', 'gain', 'wins') and (metrics is None or metric == metrics[0]):
             others.append(row)
+    order = metrics or list(dict.fromkeys(metric for _, metric, _ in of_results))
     table = Table(title=Text(title), title_justify='left', box=SIMPLE_HEAD, padding=(0, 1, 0, 0), pad_edge=False)
-    for name in ('case', 'result', 'mean', '95 % interval', '5 %', 'median', '95 %', 'largest', 'trials', 'unit'):
+    for name in ('result', 'case', 'mean', '95 % interval', '5 %', 'median', '95 %', 'largest', 'trials', 'unit'):
         table.add_column(name, justify='left' if name in ('case', 'result', 'unit') else 'right', no_wrap=True)
-    for (case, metric, unit), found in of_results.items():
+    for case, metric, unit in sorted(of_results, key=lambda key: order.index(key[1])):
+        found = of_results[case, metric, unit]
         mean = found['mean']
-        table.add_row(case, metric, number(mean['value']), interval(mean),
+        table.add_row(metric, case, number(mean['value']), interval(mean),
                       *(number(found[key]['value']) for key in ('p05', 'p50', 'p95', 'max')), coverage(mean), unit)
     for row in others:
-        table.add_row(row['case'], row['metric'], number(row['value']), interval(row), '', '', '', '',
+        table.add_row(row['metric'], row['case'], number(row['value']), interval(row), '', '', '', '',
                       coverage(row), row['unit'])
     longest = max((len(row['case']) for row in rows), default=0)
     Console(width=max(Console().width, MIN_TABLE_COLUMNS + longest)).print(table)
+
+
+def show_tried(key, unit, tried):
+    """Print the values of a search, with the mean of the result at each: solve.Tried in order."""
+    from rich.box import SIMPLE_HEAD
+    from rich.console import Console
+    from rich.table import Table
+
+    from pedestal_analysis.trials.solve import reason
+    table = Table(box=SIMPLE_HEAD, padding=(0, 1, 0, 0), pad_edge=False)
+    for name in (f'{key} {f"[{unit}]" if unit else ""}'.strip().replace('[', r'\['), 'mean', '95 % interval', 'unit',
+                 'trials'):
+        table.add_column(name, justify='left' if name in ('unit', 'trials') else 'right', no_wrap=True)
+    for one in tried:
+        cells = (number(one.row['value']), interval(one.row), one.row['unit']) if one.row else ('', '', '')
+        table.add_row(f'{one.value:.6g}', *cells, reason(one))
+    Console(width=max(Console().width, MIN_TABLE_COLUMNS)).print(table)

@@ -14,7 +14,7 @@ import itertools
 import math
 import typing
 
-from pedestal_analysis.results import consistency, isolation, known_attitude, mode_pointing, tracking
+from pedestal_analysis.results import consistency, isolation, known_attitude, mode_pointing, pointing_loss, tracking
 from pedestal_analysis.results.tracking import DEG_PER_RAD, known_rms, largest
 
 
@@ -26,6 +26,7 @@ class Result(typing.NamedTuple):
     label          name in the report, '' if the report does not show the result
     target         text or None
     mark           mark(part) -> note on a value that is not as expected, else ''
+    brief          True for a result that a run prints by default
     """
     name: str
     unit: str
@@ -35,6 +36,15 @@ class Result(typing.NamedTuple):
     label: str = ''
     target: str | None = None
     mark: typing.Callable = lambda part: ''
+    brief: bool = False
+
+
+BRIEF_COUNT = 8
+"""Number of results that a run prints by default."""
+
+MARK_MEANINGS = {'too sure': 'the errors are larger than it states',
+                 'too careful': 'the errors are smaller than it states'}
+"""{note of consistency.mark: its meaning for the filter}."""
 
 
 def _of_mode(mode):
@@ -56,9 +66,16 @@ RESULTS = (
     Result('elevation_following_max_deg', 'deg', 'motors', lambda run: largest(run.following[:, 1]),
            'Largest following error (reference minus encoder) in elevation, over all steps outside standby.'),
     Result('pointing_rms_deg', 'deg', 'tracking', lambda run: run.pointing(known_rms),
-           'Rms of the true pointing error (true target minus true beam), both axes together, in settled autotrack.'),
+           'Rms of the true pointing error (true target minus true beam), both axes together, in settled autotrack.',
+           brief=True),
     Result('pointing_max_deg', 'deg', 'tracking', lambda run: run.pointing(largest),
-           'Largest true pointing error of either axis in settled autotrack.'),
+           'Largest true pointing error of either axis in settled autotrack.', brief=True),
+    Result('pointing_loss_mean_db', 'dB', 'tracking', pointing_loss.mean_db,
+           'Loss of the mean received power by the true pointing error, from the pattern of the beam, in settled '
+           'autotrack.', brief=True),
+    Result('pointing_loss_max_db', 'dB', 'tracking', pointing_loss.max_db,
+           'Largest loss of received power by the true pointing error, from the pattern of the beam, in settled '
+           'autotrack.', brief=True),
     *itertools.chain.from_iterable(map(_of_mode, mode_pointing.FOLLOWING_MODES)),
     Result('cross_elevation_rms_deg', 'deg', 'tracking', lambda run: run.pointing(known_rms, 0),
            'Rms of the true pointing error in cross-elevation, in settled autotrack.'),
@@ -94,14 +111,15 @@ RESULTS = (
     Result('noise_reduction', '-', 'tracking', lambda run: known_rms(run.noise) / known_rms(run.filter_error),
            'Noise of one receiver sample, divided by the error of the filtered line of sight, both axes together.'),
     Result('lock_time_s', 's', 'tracking', lambda run: run.lock_time,
-           'Time of the first lock of the receiver.', 'first lock'),
+           'Time of the first lock of the receiver.', 'first lock', brief=True),
     Result('autotrack_time_s', 's', 'tracking', lambda run: run.autotrack_time,
            'Total time of the ACU in autotrack.', 'time in autotrack'),
     Result('tracked_percent', '%', 'tracking', lambda run: run.tracked_percent,
-           'Share of the run in autotrack.'),
+           'Share of the run in autotrack.', brief=True),
     Result('loss_s', 's', 'tracking', lambda run: run.loss,
            'Total time, in any mode, with the target further than half a beamwidth off the beam, counted from '
-           'the first step in settled autotrack.', 'time with the target further than half a beamwidth off'),
+           'the first step in settled autotrack.', 'time with the target further than half a beamwidth off',
+           brief=True),
     Result('evaluated_time_s', 's', 'tracking', lambda run: run.evaluated_time,
            f'Total time in settled autotrack: from {tracking.HANDOVER_SETTLING_S:g} s after the first hand-over to '
            'autotrack.', 'evaluated time'),
@@ -151,7 +169,7 @@ RESULTS = (
            'level error after alignment, rms per axis'),
     Result('lost_steps', 'steps', 'run', lambda run: float(run.drive.get('lost_steps', math.nan)),
            'Number of steps of the drive that were missed, or made without the command of the previous step.',
-           target='0'),
+           target='0', brief=True),
     Result('realtime_factor', 's/s', 'run', lambda run: run.drive.get('realtime_factor', math.nan),
            'Ratio of the time of the drive to wall time.', target='>= 4 in lockstep'),
     Result('messages', 'messages', 'run', lambda run: float(run.recorder['messages']), 'Number of recorded messages.'),
@@ -198,6 +216,28 @@ def marks(parts, table=RESULTS) -> dict:
     """Return {name: note} of the results whose value is off."""
     found = {result.name: result.mark(parts[result.part]) for result in table if _exists(parts, result)}
     return {name: text for name, text in found.items() if text}
+
+
+def brief(columns, count=BRIEF_COUNT) -> list:
+    """Return the names of the results that are printed by default, in the order of the table.
+
+    columns: {name: (value, unit)} of each beam and of the run, as from `measured`. The results with the flag `brief`
+    come first; where fewer than `count` of them were measured, others that were fill the rest.
+    """
+    found = [result for result in RESULTS
+             if any(name == result.name and math.isfinite(value) for values in columns
+                    for name, (value, _) in values.items())]
+    chosen = sorted(found, key=lambda result: not result.brief)[:count]
+    return [result.name for result in found if result in chosen]
+
+
+def remarks(noted, values) -> list:
+    """Return a line for each note on the filter; noted: {name: note} of `marks`, values: of `measured`."""
+    found: dict[str, list[str]] = {}
+    for name, note in noted.items():
+        found.setdefault(note, []).append(f'{name} {values[name][0]:.3g}')
+    return [f'the filter is {note} ({MARK_MEANINGS.get(note, note)}): {", ".join(names)}'
+            for note, names in found.items()]
 
 
 def row(case, metric, value, unit='', target=None):

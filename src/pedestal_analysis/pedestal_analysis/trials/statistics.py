@@ -10,6 +10,7 @@ sensitivity  of a result to a varied parameter: Spearman's rank correlation r, -
 """
 import collections
 import math
+import re
 import typing
 
 import numpy as np
@@ -48,6 +49,56 @@ TRIAL_QUESTIONS = (
                f'{result.name} is {result.target}.')
       for result in results.RESULTS if result.target and result.part not in ('run', 'supervised')),
 )
+
+
+class Requirement(typing.NamedTuple):
+    """Criterion of the user on a result: text as given; name of the result; target of intervals.meets."""
+    text: str
+    result: str
+    target: str
+
+
+_REQUIRED = re.compile(r'\s*(\S+)\s*(<=|>=|<|>)\s*(\S+)\s*')
+
+
+def requirement(text, known) -> Requirement:
+    """Return the Requirement of a text such as 'pointing_max_deg < 0.1'; known: results. Raises ValueError."""
+    match = _REQUIRED.fullmatch(text)
+    usage = f"--require {text!r}: must be RESULT < LIMIT, with <, <=, > or >=, such as 'pointing_max_deg < 0.1'"
+    if not match:
+        raise ValueError(usage)
+    name, sign, limit = match.groups()
+    if name not in known and name not in map(nodes.plain, known):
+        raise ValueError(f'--require {text!r}: no trial has a result {name!r};{did_you_mean(name, known)} '
+                         '`pedestal run --all --explain` explains the results')
+    if math.isnan(number(limit)):
+        raise ValueError(usage)
+    return Requirement(f'{name} {sign} {limit}', name, f'{sign} {limit}')
+
+
+def number(text) -> float:
+    """Return the number in a text, NaN where there is none."""
+    try:
+        return float(text)
+    except ValueError:
+        return math.nan
+
+
+def of_requirements(case, table, requirements):
+    """Return the rows of the rates at which the trials of a table.Table meet some Requirements.
+
+    A trial without the result does not meet its requirement.
+    """
+    found = []
+    for required in requirements:
+        for name in table.results:
+            own, metric = case_of(case, name)
+            if required.result in (name, metric):
+                values = table.column(name)
+                met = [bool(math.isfinite(value) and intervals.meets(value, required.target)) for value in values]
+                found.append(intervals.estimated(own, f'require({required.text})/rate', rate(sum(met), len(met)), '%',
+                                                 len(met)))
+    return found
 
 
 def percentile(values, share):
@@ -90,10 +141,14 @@ def case_of(case, name):
 
 def words_of(table, name, chosen):
     """Return {first word of `why`: count} of some trials (n,), a mask, of the beam of a column of a table.Table."""
-    prefix = f'{nodes.beam_of(name)}/'.lstrip('/')
     return dict(collections.Counter(
         why.partition(':')[0] or 'not measured'
-        for why, is_chosen in zip(table.text(f'{prefix}{WHY}'), chosen) if is_chosen).most_common())
+        for why, is_chosen in zip(table.text(why_column(name)), chosen) if is_chosen).most_common())
+
+
+def why_column(name):
+    """Return the column WHY of the beam of a column of results."""
+    return f'{nodes.beam_of(name)}/{WHY}'.lstrip('/')
 
 
 def coverage(row):

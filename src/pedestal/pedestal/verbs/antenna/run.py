@@ -8,6 +8,7 @@ Exit codes (1, 3 and 130 take precedence over 4):
 import argparse
 import sys
 import typing
+from collections.abc import Collection
 
 from pedestal import stop
 from pedestal.verbs import arguments
@@ -31,6 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         'value of the scenario')
     arguments.add_new_bag(parser)
     console.add_json(parser)
+    console.add_all(parser)
     console.add_explain(parser)
     arguments.add_param(parser)
     arguments.add_elements(parser)
@@ -84,11 +86,18 @@ def main(options: argparse.Namespace) -> int:
     lost, steps = whole['lost_steps'][0], outcome.drive.get('steps')
     for beam, found in zip(beams, verdicts):
         print(f'{beam}: {found.text}' if beam else found.text)
-    console.show_results(f'{chosen.name}: {chosen.header.title}', beams, of_beams,
-                         {**whole, 'lost_steps': (lost, f'of {steps}' if lost and steps else 'steps')},
-                         [results.marks(part) for part in parts])
+    shown = [*of_beams[0], *whole] if options.all else results.brief([*of_beams, whole])
+    noted = [results.marks(part) for part in parts]
+    printed = {**whole, 'lost_steps': (lost, f'of {steps}' if lost and steps else 'steps')}
+    console.show_results(f'{chosen.name}: {chosen.header.title}', beams, [_some(values, shown) for values in of_beams],
+                         _some(printed, shown), noted if options.all else ())
+    if not options.all:
+        for beam, notes, values in zip(beams, noted, of_beams):
+            for line in results.remarks(notes, values):
+                print(f'{beam}: {line}' if beam else line)
+        print('--all prints all results, --explain their definitions')
     if options.explain:
-        console.explain(results.RESULTS, {*of_beams[0], *whole})
+        console.explain(results.RESULTS, shown)
     print(f'{bag}  mcap sha256 {outcome.recorder["sha256"]}')
     rows = [row for beam, values in zip(beams, of_beams)
             for row in results.rows(f'{chosen.name}/{beam}'.rstrip('/'), values)]
@@ -113,6 +122,11 @@ def main(options: argparse.Namespace) -> int:
     if disturbed:
         return console.EXIT_DISTURBED
     return console.EXIT_FAILED_RUN if any(found.failed for found in verdicts) else 0
+
+
+def _some(values: dict[str, tuple], names: Collection[str]) -> dict[str, tuple]:
+    """Return the results of some names."""
+    return {name: value for name, value in values.items() if name in names}
 
 
 def _chosen(options: argparse.Namespace) -> 'Scenario | None':
@@ -158,6 +172,6 @@ def _chosen(options: argparse.Namespace) -> 'Scenario | None':
 def _refuse_with_list(options: argparse.Namespace) -> None:
     """Raise ValueError for an option of a run beside --pass list, which runs nothing."""
     from pedestal_bringup.graph import operator_servers
-    for name in ('bag', 'json', 'explain', 'duration', 'seed', 'pacing', *operator_servers.SERVERS):
+    for name in ('bag', 'json', 'all', 'explain', 'duration', 'seed', 'pacing', *operator_servers.SERVERS):
         if not (getattr(options, name) is None or getattr(options, name) is False):
             raise ValueError(f'--{name}: has no effect with --pass list, which runs nothing')
