@@ -166,12 +166,12 @@ def _never_tracked(bag, run, near, acu):
     if np.sum(near) * run.period >= allowance:
         return NOT_LOCKED, best
     distance = np.hypot(run.cross_elevation, run.elevation_error)
-    off = f'{distance[-1] * DEG_PER_RAD:.3g} deg off the target'
+    away = f'{distance[-1] * DEG_PER_RAD:.3g} deg away'
     if left < allowance or near[-1] or _approaches(run, distance):
-        return ON_THE_WAY, f'ended on the way to the target, {off}, before the receiver could lock'
+        return ON_THE_WAY, f'ended on the way to the target, {away}, before the receiver could lock'
     due = _next_command(acu, run.t[-1])
     if due:
-        return ON_THE_WAY, f'ended before the command {due}, {off}'
+        return ON_THE_WAY, f'ended before the command {due}, the target {away}'
     return NOT_LOCKED, f'{best}; the beam came within {np.nanmin(distance) * DEG_PER_RAD:.3g} deg of the target'
 
 

@@ -1,10 +1,12 @@
 """Search for the value of a parameter at which the mean of a result over trials reaches a limit.
 
 First the trials run at values that fill the range. Where exactly one pair of neighbours has the limit between its
-means, the pair is bisected. All values have the same seeds and draws, so the mean is a smooth function of the value
-wherever the law is.
+means, the pair is bisected. Without such a pair the search goes to the edges of the values at which the result is
+measured, because a drive that trips may hide the limit. All values have the same seeds and draws, so the mean is a
+smooth function of the value wherever the law is.
 """
 import contextlib
+import itertools
 import math
 import typing
 
@@ -156,7 +158,7 @@ class Search:
     def run(self) -> Solution:
         """Search and return the Solution."""
         wanted, aim = self._wanted, self._aim
-        crossings = self._crossings(self._try(_grid(wanted)))
+        crossings = self._crossings(self._try(_grid(wanted))) or self._at_edges()
         what = f'{aim.result} = {aim.limit:g}'
         if not crossings:
             return self._never(what)
@@ -179,14 +181,28 @@ class Search:
         return [(a, b) for a, b in zip(tried, tried[1:]) if a.measured and b.measured
                 and (a.mean < self._aim.limit) != (b.mean < self._aim.limit)]
 
+    def _at_edges(self):
+        """Bisect each pair of neighbours of which one has the result. Return the first crossings found."""
+        for a, b in [(a, b) for a, b in zip(self.tried, self.tried[1:]) if a.measured != b.measured]:
+            while (middle := self._middle(a, b)) is not None:
+                one, = self._try([middle])
+                if crossings := self._crossings(self.tried):
+                    return crossings
+                a, b = (one, b) if one.measured == a.measured else (a, one)
+        return []
+
+    def _middle(self, low, high):
+        """Return the value between two Tried, None if they are as near as TOLERANCE."""
+        middle = _between(low.value, high.value, _in_ratios(self._wanted))
+        middle = round(middle) if self._wanted.whole else float(f'{middle:.6g}')
+        near = high.value - low.value <= TOLERANCE * max(abs(low.value), abs(high.value))
+        return None if near or not low.value < middle < high.value else middle
+
     def _bisected(self, low, high):
         """Return the narrowest bracket (Tried, Tried) inside a pair of neighbours; (None, None) if it has a gap."""
         for _ in range(MAX_BISECTIONS):
-            middle = _between(low.value, high.value, _in_ratios(self._wanted))
-            middle = round(middle) if self._wanted.whole else float(f'{middle:.6g}')
-            if not low.value < middle < high.value:
-                break
-            if high.value - low.value <= TOLERANCE * max(abs(low.value), abs(high.value)):
+            middle = self._middle(low, high)
+            if middle is None:
                 break
             one, = self._try([middle])
             if not one.measured:
@@ -213,8 +229,12 @@ class Search:
 
     def _gaps(self):
         """Return the text of the values at which fewer than half of the trials have the result, '' for none."""
-        lost = [f'{one.value:.4g}' for one in self.tried if not one.measured]
-        return f'; most trials have no {self._aim.result} at {", ".join(lost)}' if lost else ''
+        parts = []
+        for measured, group in itertools.groupby(self.tried, key=lambda one: one.measured):
+            values = [f'{one.value:.4g}' for one in group]
+            if not measured:
+                parts.append(f'at {values[0]}' if len(values) == 1 else f'from {values[0]} to {values[-1]}')
+        return f'; most trials have no {self._aim.result} {", ".join(parts)}' if parts else ''
 
 
 def reason(one):
