@@ -5,6 +5,7 @@ import pytest
 
 from acu_tracker.alarms import report, table
 from acu_tracker.modes import Mode
+from pedestal_analysis.console import EXIT_FAILED_RUN
 from pedestal_bringup.loop import closed_loop
 from pedestal_bringup.scenario import scenario
 from pedestal_recording import bag as bags
@@ -21,7 +22,7 @@ TRIP = ['adu.azimuth.faults.overspeed=1.5',
 def tripped(start_run):
     run = start_run('servo_sine', '--duration', '2.0', '--param', TRIP[0], '--param', TRIP[1])
     result = run.finish()
-    assert result.returncode == 0, result.stderr
+    assert result.returncode == EXIT_FAILED_RUN, result.stderr
     return bags.read(run.bag)
 
 

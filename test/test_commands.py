@@ -4,6 +4,7 @@ import re
 import pytest
 from shared import PEDESTAL
 
+from pedestal_analysis.console import EXIT_FAILED_RUN
 from pedestal_bringup.loop import closed_loop
 from pedestal_bringup.scenario import scenario
 from pedestal_common.wire import commands, messages
@@ -25,7 +26,8 @@ def replies(path):
 def scheduled(start_run):
     run = start_run('uav_flyby', '--duration', str(SECONDS), '--param', SCHEDULE)
     result = run.finish()
-    assert result.returncode == 0, result.stderr
+    assert result.returncode == EXIT_FAILED_RUN, result.stderr
+    assert 'preset at 2.5 s refused: ' in result.stdout
     return run.bag
 
 

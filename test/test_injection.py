@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from pedestal_analysis.console import EXIT_FAILED_RUN
 from pedestal_bringup.loop import closed_loop
 from pedestal_bringup.scenario import scenario
 from pedestal_common.wire import commands, messages
@@ -26,7 +27,8 @@ def injected(start_run):
     params = [word for fault in FAULTS for word in ('--param', fault)]
     run = start_run('ship_pass', '--duration', str(SECONDS), *params)
     result = run.finish()
-    assert result.returncode == 0, result.stderr
+    assert result.returncode == EXIT_FAILED_RUN, result.stderr
+    assert 'drive fault elevation encoder disagreement at 3' in result.stdout
     return run.bag
 
 

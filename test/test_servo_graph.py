@@ -44,4 +44,5 @@ def test_a_run_that_never_tracks_tells_how_it_followed(runs):
     assert values['azimuth_following_rms_deg'] == pytest.approx(np.sqrt(np.mean(error**2)), rel=1e-2)
     assert values['elevation_following_max_deg'] < 0.01
     assert values['pointing_rms_deg'] is None
-    assert 'not measured' in runs['r1-step'].output
+    assert 'not measured' not in runs['r1-step'].output and ' pointing_rms_deg' not in runs['r1-step'].output
+    assert 'azimuth_following_max_deg' in runs['r1-step'].output

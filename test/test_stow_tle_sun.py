@@ -7,6 +7,7 @@ import pytest
 
 from acu_tracker import modes
 from acu_tracker.alarms.table import ALARM_NAMES
+from pedestal_analysis.console import EXIT_FAILED_RUN
 from pedestal_bringup.loop import closed_loop
 from pedestal_bringup.scenario import scenario
 from pedestal_common.wire import commands, messages
@@ -39,7 +40,7 @@ def replies(path):
 def recorded(start_run):
     run = start_run('leo_pass', '--duration', str(SECONDS), *(word for text in GIVEN for word in ('--param', text)))
     result = run.finish()
-    assert result.returncode == 0, result.stderr
+    assert result.returncode == EXIT_FAILED_RUN, result.stderr
     return run.bag
 
 

@@ -11,6 +11,7 @@ from acu_tracker import modes
 from acu_tracker.alarms import table as alarms
 from acu_tracker.estimation.filters.kinds import FILTER_KINDS
 from adu_drive.controller import faults
+from pedestal_analysis import console
 from pedestal_analysis.reprocess import what_if
 from pedestal_analysis.results import results
 from pedestal_bringup.scenario import scenario
@@ -21,7 +22,8 @@ from pedestal_studies.numbers import published
 from pedestal_studies.rigs.fault_expectations import FAULT_EXPECTATIONS
 
 GENERATED_PAGES = ('README.md', *(f'docs/{name}.md' for name in (
-    'acquisition', 'budget', 'faults', 'graph', 'measured', 'operating', 'papers', 'parameters', 'studies', 'tools')))
+    'acquisition', 'budget', 'faults', 'graph', 'measured', 'operating', 'papers', 'parameters', 'studies', 'tools',
+    'troubleshooting')))
 """Files with generated tables."""
 TABLE_PARAMETERS = (
     'scenario.pacing', 'scenario.seed', 'adu.period', 'adu.transport_delay', 'adu.command_timeout',
@@ -175,11 +177,17 @@ def result_table(table=results.RESULTS):
                    results.documented(table)])
 
 
+def exit_code_table():
+    """Return the table of the exit codes of `pedestal run`."""
+    return _table(('exit code', 'meaning'), [(str(code), meaning) for code, meaning in console.EXIT_CODES.items()])
+
+
 REFERENCE_TABLES = {'nodes': node_table, 'studies': study_table, 'scenarios': scenario_table, 'topics': topic_table,
                     'services': service_table, 'modes': mode_table, 'commands': command_table,
                     'faults that can be injected': injection_table, 'expected of faults': expectation_table,
                     'filter kinds': filter_table, 'drive faults': fault_table, 'alarms': alarm_table,
-                    'results': result_table, 'recomputed results': lambda: result_table(what_if.COMPARISON_RESULTS),
+                    'results': result_table, 'exit codes': exit_code_table,
+                    'recomputed results': lambda: result_table(what_if.COMPARISON_RESULTS),
                     'first parameters': parameter_table}
 """{name of a table: function -> its lines}."""
 

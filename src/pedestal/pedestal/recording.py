@@ -12,6 +12,7 @@ from pedestal.panels import draw
 from pedestal.scenario import Scenario
 from pedestal_analysis.report import run_data
 from pedestal_analysis.results import results, tracking
+from pedestal_analysis.results import verdict as verdicts
 from pedestal_bringup.loop import memory_recording
 from pedestal_common.graph import layouts
 from pedestal_recording import bag as bags
@@ -97,6 +98,15 @@ class Run:
         1.08
         """
         return {name: float(value) for name, (value, _) in results.measured(results.of_bag(self._source)).items()}
+
+    @functools.cached_property
+    def verdict(self) -> str:
+        """Sentence on the run as in `pedestal run`: the share that was tracked, or the reason why not.
+
+        >>> pedestal.run(pedestal.load('leo_pass', {'acu.initial_mode': 'standby'}, duration=1.0)).verdict
+        'no target was to be tracked: standby 100 %'
+        """
+        return verdicts.of(self._source, self.tracking).text
 
     def plot(self, figure: str, axes: Axes) -> None:
         """Draw a figure of the report on axes of the caller; panels.PANELS lists the figures.

@@ -8,10 +8,18 @@ import shutil
 import sys
 import textwrap
 
-EXIT_WRONG_COMMAND = 2
-"""Exit code of a verb with wrong arguments."""
-EXIT_DISTURBED = 3
-"""Exit code of a run that was disturbed, for example by lost steps."""
+EXIT_ERROR, EXIT_WRONG_COMMAND, EXIT_DISTURBED, EXIT_FAILED_RUN, EXIT_STOPPED = 1, 2, 3, 4, 130
+EXIT_CODES = {
+    0: 'the run came to its planned end, and the recording is complete',
+    EXIT_ERROR: 'the run did not start, a node failed, or the recording is not complete; the last line states the '
+                'reason',
+    EXIT_WRONG_COMMAND: 'the command line has a wrong argument',
+    EXIT_DISTURBED: 'a realtime run ended early, or its drive lost more than 1 % of its steps (steps in the 5 s after '
+                    'a node died are not counted)',
+    EXIT_FAILED_RUN: 'the drive tripped, a command of the scenario was refused, or a target was to be tracked and '
+                     'never was; the verdict above the table states which',
+    EXIT_STOPPED: 'the run was stopped, for example by Ctrl-C'}
+"""{exit code of `pedestal run`: meaning}. Codes 1, 3 and 130 take precedence over 4."""
 
 STDOUT_PATH = pathlib.Path('/dev/stdout')
 """Path that --json without a file, or with -, selects."""
@@ -116,6 +124,12 @@ def show_list(rows):
             print(f'{head:{indent - 2}}  {first}', *(' ' * indent + line for line in more), sep='\n')
 
 
+def exit_codes():
+    """Return the lines of EXIT_CODES for a help text."""
+    return '\n'.join(textwrap.fill(f'{code}: {meaning}.', 100, initial_indent='  ', subsequent_indent='      ')
+                     for code, meaning in EXIT_CODES.items())
+
+
 def show_results(title, columns, results, whole, marks=()):
     """Print a table of metrics.
 
@@ -125,7 +139,7 @@ def show_results(title, columns, results, whole, marks=()):
     from rich.console import Console
     from rich.table import Table
     from rich.text import Text
-    table = Table(title=Text(title), title_justify='left')
+    table = Table()
     table.add_column('metric')
     for column in columns:
         table.add_column(column or 'value', justify='right')
@@ -136,12 +150,15 @@ def show_results(title, columns, results, whole, marks=()):
             marked.setdefault(metric, []).append(f'{column}: {text}' if column else text)
     if marked:
         table.add_column('off')
-    for metric, (_, unit) in results[0].items():
-        table.add_row(metric, *(measured(values[metric][0]) for values in results), unit,
+    units = {metric: unit for values in results for metric, (_, unit) in values.items()}
+    for metric, unit in units.items():
+        table.add_row(metric, *(measured(values.get(metric, (math.nan,))[0]) for values in results), unit,
                       *([', '.join(marked.get(metric, ()))] if marked else ()))
     for metric, (value, unit) in whole.items():
         table.add_row(metric, measured(value), *[''] * (len(columns) - 1), unit)
-    Console(width=max(Console().width, MIN_TABLE_COLUMNS) if len(columns) > 1 else None).print(table)
+    screen = Console(width=max(Console().width, MIN_TABLE_COLUMNS) if len(columns) > 1 else None)
+    screen.print(Text(title))
+    screen.print(table)
 
 
 def measured(value):
@@ -149,6 +166,11 @@ def measured(value):
     if not math.isfinite(value):
         return 'not measured'
     return f'{value:,.0f}' if abs(value) >= 1e4 and value == int(value) else number(value)
+
+
+def add_all(parser, what='all results; default: the eight most important ones'):
+    """Add the option --all to the parser of a verb that prints results. what: its help."""
+    parser.add_argument('--all', action='store_true', help=what)
 
 
 def add_explain(parser):
@@ -186,28 +208,55 @@ def show_study(title, rows, missed):
     Console(width=max(Console().width, MIN_TABLE_COLUMNS)).print(table)
 
 
-def show_trials(title, rows):
-    """Print the statistics of each result over the trials: rows of trials.statistics."""
+def show_trials(title, rows, metrics=None):
+    """Print the statistics of each result over the trials: rows of trials.statistics, with its `coverage`.
+
+    metrics: names of the printed results in their order, of which the first also has the rows of its comparison; None
+    for all rows.
+    """
     from rich.box import SIMPLE_HEAD
     from rich.console import Console
     from rich.table import Table
     from rich.text import Text
+
+    from pedestal_analysis.trials.statistics import coverage
     of_results, others = {}, []
     for row in rows:
         metric, _, key = row['metric'].rpartition('/')
+        if metrics is not None and metric not in metrics:
+            continue
         if key in ('mean', 'p05', 'p50', 'p95', 'max'):
             of_results.setdefault((row['case'], metric, row['unit']), {})[key] = row
-        elif key in ('rate', 'difference', 'gain', 'wins'):
+        elif key in ('rate', 'difference', 'gain', 'wins') and (metrics is None or metric == metrics[0]):
             others.append(row)
+    order = metrics or list(dict.fromkeys(metric for _, metric, _ in of_results))
     table = Table(title=Text(title), title_justify='left', box=SIMPLE_HEAD, padding=(0, 1, 0, 0), pad_edge=False)
-    for name in ('case', 'result', 'mean', '95 % interval', '5 %', 'median', '95 %', 'largest', 'trials', 'unit'):
+    for name in ('result', 'case', 'mean', '95 % interval', '5 %', 'median', '95 %', 'largest', 'trials', 'unit'):
         table.add_column(name, justify='left' if name in ('case', 'result', 'unit') else 'right', no_wrap=True)
-    for (case, metric, unit), found in of_results.items():
+    for case, metric, unit in sorted(of_results, key=lambda key: order.index(key[1])):
+        found = of_results[case, metric, unit]
         mean = found['mean']
-        table.add_row(case, metric, number(mean['value']), interval(mean),
-                      *(number(found[key]['value']) for key in ('p05', 'p50', 'p95', 'max')), str(mean['runs']), unit)
+        table.add_row(metric, case, number(mean['value']), interval(mean),
+                      *(number(found[key]['value']) for key in ('p05', 'p50', 'p95', 'max')), coverage(mean), unit)
     for row in others:
-        table.add_row(row['case'], row['metric'], number(row['value']), interval(row), '', '', '', '',
-                      str(row['runs']), row['unit'])
+        table.add_row(row['metric'], row['case'], number(row['value']), interval(row), '', '', '', '',
+                      coverage(row), row['unit'])
     longest = max((len(row['case']) for row in rows), default=0)
     Console(width=max(Console().width, MIN_TABLE_COLUMNS + longest)).print(table)
+
+
+def show_tried(key, unit, tried):
+    """Print the values of a search, with the mean of the result at each: solve.Tried in order."""
+    from rich.box import SIMPLE_HEAD
+    from rich.console import Console
+    from rich.table import Table
+
+    from pedestal_analysis.trials.solve import reason
+    table = Table(box=SIMPLE_HEAD, padding=(0, 1, 0, 0), pad_edge=False)
+    for name in (f'{key} {f"[{unit}]" if unit else ""}'.strip().replace('[', r'\['), 'mean', '95 % interval', 'unit',
+                 'trials'):
+        table.add_column(name, justify='left' if name in ('unit', 'trials') else 'right', no_wrap=True)
+    for one in tried:
+        cells = (number(one.row['value']), interval(one.row), one.row['unit']) if one.row else ('', '', '')
+        table.add_row(f'{one.value:.6g}', *cells, reason(one))
+    Console(width=max(Console().width, MIN_TABLE_COLUMNS)).print(table)

@@ -1,12 +1,14 @@
 """The table of results: what a run is measured by stands in it once, and only there."""
+import dataclasses
 import math
 import pathlib
 
+import numpy as np
 import pytest
 
 from pedestal_analysis import console
 from pedestal_analysis.reprocess import what_if
-from pedestal_analysis.results import consistency, results
+from pedestal_analysis.results import consistency, pointing_loss, results, tracking
 from pedestal_recording import bag
 
 REFERENCES = pathlib.Path(__file__).parents[3] / 'bags' / 'reference'
@@ -74,3 +76,40 @@ def test_a_filter_that_is_off_is_marked_in_the_table(capsys):
     judged = leo['filter'].axes
     assert ('azimuth_nees_mean' in results.marks(leo)) == bool(
         consistency.mark(judged[0].nees, consistency.NEES_FREEDOMS, judged[0].nees_band))
+
+
+def test_the_eight_results_come_first_and_others_fill_their_places():
+    leo = results.measured(results.of_bag(bag.read(REFERENCES / 'leo_pass')))
+    flagged = [result.name for result in results.RESULTS if result.brief]
+    assert len(flagged) == results.BRIEF_COUNT
+    run = {'lost_steps': (0.0, 'steps'), 'messages': (4.0, 'messages')}
+    assert results.brief([leo, run]) == flagged
+    lost = {name: (math.nan if name in flagged else value, unit) for name, (value, unit) in leo.items()}
+    filled = results.brief([lost, run])
+    assert len(filled) == results.BRIEF_COUNT and filled[0] == 'azimuth_following_rms_deg'
+    assert 'lost_steps' in filled and 'pointing_rms_deg' not in filled
+
+
+def test_a_filter_that_is_off_is_told_in_a_plain_sentence():
+    values = {'azimuth_nees_mean': (3.456, '-'), 'elevation_nees_mean': (0.5, '-'), 'elevation_nis_mean': (1.5, '-')}
+    noted = {'azimuth_nees_mean': 'too sure', 'elevation_nees_mean': 'too careful', 'elevation_nis_mean': 'too sure'}
+    assert results.remarks(noted, values) == [
+        'the filter is too sure (the errors are larger than it states): azimuth_nees_mean 3.46, '
+        'elevation_nis_mean 1.5',
+        'the filter is too careful (the errors are smaller than it states): elevation_nees_mean 0.5']
+    assert results.remarks({}, values) == []
+
+
+def test_the_loss_at_half_a_beamwidth_is_half_of_the_power():
+    run = tracking.read(bag.read(REFERENCES / 'leo_pass'))
+    on = np.flatnonzero(run.tracking)
+    off = np.zeros(run.t.size)
+    off[on[len(on) // 2:]] = 0.5 * run.beamwidth
+    for error, loss in ((np.full(run.t.size, 0.5 * run.beamwidth), (3.01, 3.01)),
+                        (off, (10.0 * math.log10(1.0 / 0.75), 3.01)), (np.zeros(run.t.size), (0.0, 0.0))):
+        for swapped in (False, True):
+            first, second = (np.zeros(run.t.size), error)[::-1 if swapped else 1]
+            moved = dataclasses.replace(run, cross_elevation=first, elevation_error=second)
+            assert (pointing_loss.mean_db(moved), pointing_loss.max_db(moved)) == pytest.approx(loss, abs=0.02)
+    assert math.isnan(pointing_loss.mean_db(dataclasses.replace(run, tracking=np.zeros(run.t.size, bool))))
+    assert math.isnan(pointing_loss.max_db(dataclasses.replace(run, beamwidth=math.nan)))

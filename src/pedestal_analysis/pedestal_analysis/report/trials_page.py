@@ -16,7 +16,7 @@ from pedestal_analysis.report.figures import (
     new_panels,
 )
 from pedestal_analysis.results import tracking
-from pedestal_analysis.trials import comparison, statistics
+from pedestal_analysis.trials import statistics
 from pedestal_bringup.loop import memory_recording
 from pedestal_common.graph import nodes
 
@@ -34,7 +34,8 @@ class Trials:
     by           name of the result that ranks the trials
     worst        numbers of the worst trials, the worst first
     runs         [(title, tracking.Tracking)] of the worst and the median trial
-    sides        comparison.Sides or None
+    sides        comparison.Sides of the two best sides, or None
+    sentences    lines on the comparison and on the requirements
     command      command line
     """
     plan: object
@@ -43,10 +44,11 @@ class Trials:
     worst: list
     runs: list
     sides: object
+    sentences: list
     command: str
 
 
-def read(plan, table, by, sides, command, count=10) -> Trials:
+def read(plan, table, by, sides, sentences, command, count=10) -> Trials:
     """Return the Trials of a plan and its table; run the worst and the median trial again for their signals."""
     places = statistics.ranking(by, table.column(by)).tolist()
     # Trials without the result rank as the worst, so the median is that of the trials that have the result.
@@ -55,7 +57,7 @@ def read(plan, table, by, sides, command, count=10) -> Trials:
     beam = nodes.beam_of(by)
     runs = [(f'{name}: trial {i}', tracking.read(memory_recording.record(plan.scenario(i), beam)))
             for name, i in chosen.items()]
-    return Trials(plan, table, by, places[:count], runs, sides, command)
+    return Trials(plan, table, by, places[:count], runs, sides, sentences, command)
 
 
 def _label(name):
@@ -157,7 +159,7 @@ def _estimates(rows, head):
     lines = [[row['case'], row['metric'], elements.number(row['value'] if row['value'] is not None else math.nan,
                                                           row['unit']),
               '' if row['ci_low'] is None and row['ci_high'] is None else
-              f'{_bound(row["ci_low"])} to {_bound(row["ci_high"])}', str(row['runs'])] for row in rows]
+              f'{_bound(row["ci_low"])} to {_bound(row["ci_high"])}', statistics.coverage(row)] for row in rows]
     return elements.table(head, lines)
 
 
@@ -173,8 +175,7 @@ def page(trials, rows):
              for i in trials.worst]
     head = ['case', 'metric', 'value', '95 % interval', 'trials']
     parts = [f'<h1>{html.escape(title)}</h1>', elements.table(None, [['made by', trials.command]], 'meta')]
-    if trials.sides is not None:
-        parts.append(f'<p><b>{html.escape(comparison.sentence(trials.sides, trials.by))}</b></p>')
+    parts += [f'<p><b>{html.escape(line)}</b></p>' for line in trials.sentences]
     parts += ['<h2 id="figures">Figures</h2>', *(elements.figure(spec, trials, reason)
                                                 for spec, reason in _figures(trials)),
               f'<h2 id="worst-trials">Worst trials by {html.escape(trials.by)}</h2>',

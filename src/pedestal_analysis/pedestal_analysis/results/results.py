@@ -6,13 +6,15 @@ encoders    tracking.Tracking with the true direction of the dish beside the enc
 filter      consistency.Consistency                     isolation   isolation.Isolation
 attitude    known_attitude.KnownAttitude                keyholes    tracking.keyholes
 run         start.Outcome                               supervised  start.Outcome in realtime
+MODE        errors of mode_pointing.read, for each of its FOLLOWING_MODES
 Errors are taken per axis and sample. "Both axes together" pools the samples of both axes; the result is not the angle
 between beam and target.
 """
+import itertools
 import math
 import typing
 
-from pedestal_analysis.results import consistency, isolation, known_attitude, tracking
+from pedestal_analysis.results import consistency, isolation, known_attitude, mode_pointing, pointing_loss, tracking
 from pedestal_analysis.results.tracking import DEG_PER_RAD, known_rms, largest
 
 
@@ -24,6 +26,7 @@ class Result(typing.NamedTuple):
     label          name in the report, '' if the report does not show the result
     target         text or None
     mark           mark(part) -> note on a value that is not as expected, else ''
+    brief          True for a result that a run prints by default
     """
     name: str
     unit: str
@@ -33,6 +36,24 @@ class Result(typing.NamedTuple):
     label: str = ''
     target: str | None = None
     mark: typing.Callable = lambda part: ''
+    brief: bool = False
+
+
+BRIEF_COUNT = 8
+"""Number of results that a run prints by default."""
+
+MARK_MEANINGS = {'too sure': 'the errors are larger than it states',
+                 'too careful': 'the errors are smaller than it states'}
+"""{note of consistency.mark: its meaning for the filter}."""
+
+
+def _of_mode(mode):
+    """Return the rows of the pointing error in a mode of mode_pointing.FOLLOWING_MODES."""
+    against = 'requested angles minus true beam' if mode == 'preset' else 'true target minus true beam'
+    return (Result(f'{mode}_pointing_rms_deg', 'deg', mode, known_rms,
+                   f'Rms of the true pointing error ({against}), both axes together, in settled `{mode}`.'),
+            Result(f'{mode}_pointing_max_deg', 'deg', mode, largest,
+                   f'Largest true pointing error ({against}) of either axis in settled `{mode}`.'))
 
 
 RESULTS = (
@@ -45,9 +66,17 @@ RESULTS = (
     Result('elevation_following_max_deg', 'deg', 'motors', lambda run: largest(run.following[:, 1]),
            'Largest following error (reference minus encoder) in elevation, over all steps outside standby.'),
     Result('pointing_rms_deg', 'deg', 'tracking', lambda run: run.pointing(known_rms),
-           'Rms of the true pointing error (true target minus true beam), both axes together, in settled autotrack.'),
+           'Rms of the true pointing error (true target minus true beam), both axes together, in settled autotrack.',
+           brief=True),
     Result('pointing_max_deg', 'deg', 'tracking', lambda run: run.pointing(largest),
-           'Largest true pointing error of either axis in settled autotrack.'),
+           'Largest true pointing error of either axis in settled autotrack.', brief=True),
+    Result('pointing_loss_mean_db', 'dB', 'tracking', pointing_loss.mean_db,
+           'Loss of the mean received power by the true pointing error, from the pattern of the beam, in settled '
+           'autotrack.', brief=True),
+    Result('pointing_loss_max_db', 'dB', 'tracking', pointing_loss.max_db,
+           'Largest loss of received power by the true pointing error, from the pattern of the beam, in settled '
+           'autotrack.', brief=True),
+    *itertools.chain.from_iterable(map(_of_mode, mode_pointing.FOLLOWING_MODES)),
     Result('cross_elevation_rms_deg', 'deg', 'tracking', lambda run: run.pointing(known_rms, 0),
            'Rms of the true pointing error in cross-elevation, in settled autotrack.'),
     Result('elevation_rms_deg', 'deg', 'tracking', lambda run: run.pointing(known_rms, 1),
@@ -82,14 +111,15 @@ RESULTS = (
     Result('noise_reduction', '-', 'tracking', lambda run: known_rms(run.noise) / known_rms(run.filter_error),
            'Noise of one receiver sample, divided by the error of the filtered line of sight, both axes together.'),
     Result('lock_time_s', 's', 'tracking', lambda run: run.lock_time,
-           'Time of the first lock of the receiver.', 'first lock'),
+           'Time of the first lock of the receiver.', 'first lock', brief=True),
     Result('autotrack_time_s', 's', 'tracking', lambda run: run.autotrack_time,
            'Total time of the ACU in autotrack.', 'time in autotrack'),
     Result('tracked_percent', '%', 'tracking', lambda run: run.tracked_percent,
-           'Share of the run in autotrack.'),
+           'Share of the run in autotrack.', brief=True),
     Result('loss_s', 's', 'tracking', lambda run: run.loss,
            'Total time, in any mode, with the target further than half a beamwidth off the beam, counted from '
-           'the first step in settled autotrack.', 'time with the target further than half a beamwidth off'),
+           'the first step in settled autotrack.', 'time with the target further than half a beamwidth off',
+           brief=True),
     Result('evaluated_time_s', 's', 'tracking', lambda run: run.evaluated_time,
            f'Total time in settled autotrack: from {tracking.HANDOVER_SETTLING_S:g} s after the first hand-over to '
            'autotrack.', 'evaluated time'),
@@ -139,7 +169,7 @@ RESULTS = (
            'level error after alignment, rms per axis'),
     Result('lost_steps', 'steps', 'run', lambda run: float(run.drive.get('lost_steps', math.nan)),
            'Number of steps of the drive that were missed, or made without the command of the previous step.',
-           target='0'),
+           target='0', brief=True),
     Result('realtime_factor', 's/s', 'run', lambda run: run.drive.get('realtime_factor', math.nan),
            'Ratio of the time of the drive to wall time.', target='>= 4 in lockstep'),
     Result('messages', 'messages', 'run', lambda run: float(run.recorder['messages']), 'Number of recorded messages.'),
@@ -160,21 +190,54 @@ def of_bag(bag):
 
     Raises ValueError if the bag has no joint_states or no target/truth.
     """
-    run = tracking.read(bag)
-    return {**of_tracking(run), 'filter': consistency.read(bag, run), 'keyholes': tracking.keyholes(bag),
-            'isolation': isolation.read(bag, run), 'attitude': known_attitude.read(bag)}
+    return of_run(bag, tracking.read(bag))
+
+
+def of_run(bag, run):
+    """Return the parts {part: record} of a bag.Bag with one beam and its tracking.Tracking."""
+    return {**of_tracking(run), **mode_pointing.read(bag, run), 'filter': consistency.read(bag, run),
+            'keyholes': tracking.keyholes(bag), 'isolation': isolation.read(bag, run),
+            'attitude': known_attitude.read(bag)}
 
 
 def measured(parts, table=RESULTS) -> dict:
     """Return {name: (value, unit)} of the results of a table whose part exists, in the order of the table."""
     return {result.name: (result.measure(parts[result.part]), result.unit) for result in table
-            if parts.get(result.part)}
+            if _exists(parts, result)}
+
+
+def _exists(parts, result):
+    """Return True if the part of a Result exists and is not empty."""
+    part = parts.get(result.part)
+    return part is not None and (not isinstance(part, list | dict) or bool(part))
 
 
 def marks(parts, table=RESULTS) -> dict:
     """Return {name: note} of the results whose value is off."""
-    found = {result.name: result.mark(parts[result.part]) for result in table if parts.get(result.part)}
+    found = {result.name: result.mark(parts[result.part]) for result in table if _exists(parts, result)}
     return {name: text for name, text in found.items() if text}
+
+
+def brief(columns, count=BRIEF_COUNT) -> list:
+    """Return the names of the results that are printed by default, in the order of the table.
+
+    columns: {name: (value, unit)} of each beam and of the run, as from `measured`. The results with the flag `brief`
+    come first; where fewer than `count` of them were measured, others that were fill the rest.
+    """
+    found = [result for result in RESULTS
+             if any(name == result.name and math.isfinite(value) for values in columns
+                    for name, (value, _) in values.items())]
+    chosen = sorted(found, key=lambda result: not result.brief)[:count]
+    return [result.name for result in found if result in chosen]
+
+
+def remarks(noted, values) -> list:
+    """Return a line for each note on the filter; noted: {name: note} of `marks`, values: of `measured`."""
+    found: dict[str, list[str]] = {}
+    for name, note in noted.items():
+        found.setdefault(note, []).append(f'{name} {values[name][0]:.3g}')
+    return [f'the filter is {note} ({MARK_MEANINGS.get(note, note)}): {", ".join(names)}'
+            for note, names in found.items()]
 
 
 def row(case, metric, value, unit='', target=None):

@@ -1,4 +1,4 @@
-"""Comparison of two scenarios, or of two settings of one, trial by trial; a pair has the same seed and draws.
+"""Comparison of scenarios, or of settings of one, trial by trial; a pair has the same seed and draws.
 
 gain   improvement of the mean of A over that of B, [%] of B:
 
@@ -12,6 +12,7 @@ import typing
 import numpy as np
 
 from pedestal_analysis.results.intervals import estimated, interval
+from pedestal_analysis.trials import plan as trial_plans
 from pedestal_analysis.trials import statistics
 
 
@@ -39,10 +40,41 @@ class Sides(typing.NamedTuple):
         return both[0][known], both[1][known]
 
 
-def names(plan_a, plan_b):
-    """Return the names of the sides of two plan.Plans: the scenario, and the overrides that only this side has."""
-    return tuple(' '.join((own.name, *(change for change in own.overrides if change not in other.overrides)))
-                 for own, other in ((plan_a, plan_b), (plan_b, plan_a)))
+def names(*plans) -> tuple:
+    """Return a name for each of some plan.Plans: its scenario and the parameters of --param, as far as they differ.
+
+    Plans that do not differ have the name of their scenario.
+    """
+    firsts = [plan.scenario(0) for plan in plans]
+    keys = dict.fromkeys(change.partition('=')[0] for plan in plans for change in plan.overrides
+                         if change.partition('=')[0] not in plan.varied)
+    given = {key: [_value(chosen, key) for chosen in firsts] for key in keys}
+    different = {key: values for key, values in given.items() if len(set(values)) > 1}
+    several = len({plan.name for plan in plans}) > 1
+    return tuple(' '.join([plan.name] * several + [f'{key}={values[i]}' for key, values in different.items()
+                                                   if values[i]]) or plan.name for i, plan in enumerate(plans))
+
+
+def _value(chosen, key):
+    """Return the text of a parameter node.key in a scenario.Scenario, '' for a node that takes no part."""
+    try:
+        value = trial_plans.value_in(chosen, key)
+    except (KeyError, ValueError):
+        return ''
+    return f'{value:.7g}' if isinstance(value, float) else str(value)
+
+
+def ranked(tables, by) -> list:
+    """Return the places of table.Tables from the best to the worst by the mean of a result over their common trials.
+
+    Without a common trial the order stays.
+    """
+    columns = np.array([table.column(by) for table in tables])
+    common = np.isfinite(columns).all(axis=0)
+    if not common.any():
+        return list(range(len(tables)))
+    means = columns[:, common].mean(axis=1)
+    return [int(place) for place in np.argsort(-means if statistics.larger_is_better(by) else means, kind='stable')]
 
 
 def gain(a, b, larger):
@@ -88,21 +120,25 @@ def rows(sides):
 
 
 def sentence(sides, by):
-    """Return one sentence on which side is better by a result."""
+    """Return one sentence on which side is better by a result; the better side is named first."""
+    if ranked((sides.a, sides.b), by)[0] == 1:
+        sides = Sides(sides.name_b, sides.name_a, sides.b, sides.a)
     a, b = sides.pairs(by)
+    total = len(sides.a.column(by))
+    count = f'{len(a)} pairs' if len(a) == total else f'{len(a)} of {total} pairs'
+    if np.array_equal(sides.a.column(by), sides.b.column(by), equal_nan=True):
+        return f'Both sides have identical values of {by}: nothing that was changed has an effect on it.'
     if len(a) < 2:
-        return f'{sides.case}: {by} was measured in {len(a)} pairs, which are too few for a comparison.'
+        return f'{sides.case}: {by} was measured in {count}, which are too few for a comparison.'
     larger = statistics.larger_is_better(by)
     if has_gain(by, a, b):
         (value, low, high), unit = gain(a, b, larger), '%'
     else:
         (value, low, high), unit = interval(a - b if larger else b - a), statistics.unit(by)
-    half = 0.5 * (high - low)
-    share, least, most = wins(a, b, larger)
-    pairs = f'{by}, {len(a)} pairs, 95 % interval'
+    half, (share, least, most) = 0.5 * (high - low), wins(a, b, larger)
+    what, wins_in = f'({by}, {count}, 95 % interval)', f'{share:.0f} % ({least:.0f} to {most:.0f} %) of the pairs'
     if low <= 0.0 <= high:
         return (f'{sides.name_a} is neither better nor worse than {sides.name_b}: by {value:.2g} +- {half:.2g} {unit} '
-                f'({pairs}); it wins in {share:.0f} % ({least:.0f} to {most:.0f} %) of the pairs.')
-    word = 'better' if value > 0.0 else 'worse'
-    return (f'{sides.name_a} is {word} than {sides.name_b} by {abs(value):.2g} +- {half:.2g} {unit} ({pairs}), and '
-            f'wins in {share:.0f} % ({least:.0f} to {most:.0f} %) of the pairs.')
+                f'{what}; it wins in {wins_in}.')
+    return (f'{sides.name_a} is better than {sides.name_b} by {value:.2g} +- {half:.2g} {unit} {what}, and wins in '
+            f'{wins_in}.')

@@ -9,8 +9,9 @@ import functools
 
 import numpy as np
 
-from pedestal_analysis.results import results
+from pedestal_analysis.results import results, tracking, verdict
 from pedestal_analysis.trials import monte_carlo
+from pedestal_analysis.trials.statistics import WHY
 from pedestal_analysis.trials.table import Table
 from pedestal_bringup.loop import closed_loop, memory_recording, side_by_side
 from pedestal_common.wire import records
@@ -25,8 +26,8 @@ TRIAL_RESULTS = tuple(result.name for result in results.RESULTS if result.part n
 """Names of the results of a trial: those of `pedestal run` except the results on its processes."""
 
 MEASURED_TOPICS = ('joint_states', 'adu/truth', 'tracking_receiver/angle_error', 'target/truth', 'acu/rate_command',
-                   'acu/estimate', 'acu/reference', 'acu/filter', 'acu/mode')
-"""Topics that the results ashore need.
+                   'acu/estimate', 'acu/reference', 'acu/filter', 'acu/mode', 'adu/state')
+"""Topics that the results and verdicts ashore need.
 
 acu/rate_command is in the list although no result reads its numbers: a change of acu/mode has the stamp of the
 acu/rate_command of its step (pedestal_common.node.unit.announced).
@@ -41,7 +42,8 @@ def open_table(plan, folder, name='trials') -> Table:
     """Return the table.Table of the trials of a plan.Plan in a folder; its context opens the files."""
     prefixes = plan.scenario(0).prefixes
     heads = [f'{prefix}{result}' for prefix in prefixes for result in TRIAL_RESULTS]
-    return Table(folder, name, {**plan.identity, 'sources': monte_carlo.sources()}, plan.varied, heads)
+    return Table(folder, name, {**plan.identity, 'sources': monte_carlo.sources()}, plan.varied, heads,
+                 [f'{prefix}{WHY}' for prefix in prefixes])
 
 
 @contextlib.contextmanager
@@ -65,9 +67,9 @@ def _memory(trials, steps):
 def _batch(plan):
     """Return the results of each trial of the part of a Plan that one worker gets.
 
-    The order is that of TRIAL_RESULTS for each beam; None for a missing result.
+    The order is that of TRIAL_RESULTS for each beam, None for a missing result, then the column WHY of each beam.
     """
-    scenarios, found = [], [[] for _ in range(plan.runs)]
+    scenarios, found, whys = [], [[] for _ in range(plan.runs)], [[] for _ in range(plan.runs)]
     for i in range(plan.runs):
         with _trial(plan, i):
             scenarios.append(plan.scenario(i))
@@ -81,9 +83,12 @@ def _batch(plan):
                 if side_by_side.can_run_parallel(loops) else (loop.run() for loop in loops))
         for i, chosen in enumerate(scenarios):
             with _trial(plan, i):
-                values = results.measured(results.of_bag(memory_recording.MemoryRecording(chosen, next(runs))))
+                recording = memory_recording.MemoryRecording(chosen, next(runs))
+                run = tracking.read(recording)
+                values = results.measured(results.of_run(recording, run))
                 found[i] += [values.get(name, (None,))[0] for name in TRIAL_RESULTS]
-    return found
+                whys[i].append(verdict.of(recording, run).why)
+    return [values + why for values, why in zip(found, whys)]
 
 
 def _batch_size(plan):

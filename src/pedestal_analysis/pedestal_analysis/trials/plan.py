@@ -108,7 +108,7 @@ def plan(source, runs=None, vary=(), overrides=(), seed=None, duration=None, sob
               for k, (column, distribution) in enumerate(drawn.items())}
     for table in rows:
         for column, values in table.items():
-            _field(nominal, column)
+            field(nominal, column)
             if len(values) < runs:
                 raise VaryError(f'--runs {runs}: must be at most {len(values)}, the rows of the table')
             varied[column] = values[:runs]
@@ -154,19 +154,19 @@ def _points(first, runs, count, sobol):
                      for i in range(runs)])
 
 
-def _field(nominal, column):
+def field(nominal, column, option='--vary'):
     """Return the dataclass field of a parameter node.key that trials can vary. Raises VaryError, ScenarioError."""
     node, _, key = column.partition('.')
     scenario.parameters_of(node)
     if node == 'scenario' and key in PLAN_HEADER_KEYS:
-        raise VaryError(f'--vary {column}: cannot vary, because trials share it or derive it from their number')
+        raise VaryError(f'{option} {column}: cannot vary, because trials share it or derive it from their number')
     present = dict.fromkeys((*map(nodes.plain, nominal.nodes), *nominal.nodes, 'scenario'))
     present.pop('operator', None)  # the operator has only the parameters of the header
     if node not in present:
-        raise VaryError(f'--vary {column}: {node} is not in {nominal.name}; must be one of {", ".join(present)}')
+        raise VaryError(f'{option} {column}: {node} is not in {nominal.name}; must be one of {", ".join(present)}')
     fields = dict(parameters.flatten(type(_parameters(nominal, node))))
     if key not in fields:
-        raise VaryError(f'--vary {column}: unknown parameter {key!r};{parameters.did_you_mean(key, fields)}')
+        raise VaryError(f'{option} {column}: unknown parameter {key!r};{parameters.did_you_mean(key, fields)}')
     return fields[key]
 
 
@@ -175,17 +175,17 @@ def _parameters(nominal, node):
     return nominal.header if node == 'scenario' else nominal.node_parameters(node)
 
 
-def _nominal_value(nominal, column):
-    """Return the value of node.key in the scenario."""
+def value_in(nominal, column):
+    """Return the value of node.key in a scenario.Scenario."""
     node, _, key = column.partition('.')
     return parameters.as_dict(_parameters(nominal, node))[key]
 
 
 def _values(nominal, column, distribution, u):
     """Return the values of a drawn parameter in the trials, at u (runs,)."""
-    whole = _field(nominal, column).type is int
+    whole = field(nominal, column).type is int
     if distribution.factor:
-        value = _nominal_value(nominal, column)
+        value = value_in(nominal, column)
         if isinstance(value, bool | str) or value == 0:
             raise VaryError(f'--vary {column}={distribution.text}: a factor of {value!r} varies nothing')
         values = value * distribution.draw(u)
@@ -205,9 +205,9 @@ def _check(nominal, made, column, distribution):
     numbers = all(isinstance(value, int | float) and not isinstance(value, bool) for value in values)
     extremes = [min(values), max(values)] if numbers else list(dict.fromkeys(values))
     if distribution and distribution.extremes:
-        scaled = (np.array(distribution.extremes, object) * (_nominal_value(nominal, column) if distribution.factor
+        scaled = (np.array(distribution.extremes, object) * (value_in(nominal, column) if distribution.factor
                                                              else 1))
-        extremes += _rounded(scaled.tolist(), _field(nominal, column).type is int)
+        extremes += _rounded(scaled.tolist(), field(nominal, column).type is int)
     for value in extremes:
         try:
             scenario.parse(made.name, made.content, [*made.overrides, scenario.override(column, value)], made.seed,

@@ -8,13 +8,15 @@ sensitivity  of a result to a varied parameter: Spearman's rank correlation r, -
 
              of Bonett and Wright (Psychometrika 65 (2000) 23); texts rank in the order of their first appearance
 """
+import collections
 import math
+import re
 import typing
 
 import numpy as np
 from scipy import stats
 
-from pedestal_analysis.results import intervals, results
+from pedestal_analysis.results import intervals, results, verdict
 from pedestal_common.graph import nodes
 from pedestal_common.parameters import did_you_mean
 
@@ -22,6 +24,10 @@ PERCENTILES = (1, 5, 25, 50, 75, 95, 99)
 """Reported percentiles [%]."""
 Z = float(stats.norm.ppf(0.5 + 0.5 * intervals.CONFIDENCE_LEVEL))
 """Standard normal quantile of the confidence level [-]."""
+
+
+WHY = 'why'
+"""Column with the verdict on a trial that did not track, '' for a trial that tracked; of each beam."""
 
 
 class Question(typing.NamedTuple):
@@ -43,6 +49,56 @@ TRIAL_QUESTIONS = (
                f'{result.name} is {result.target}.')
       for result in results.RESULTS if result.target and result.part not in ('run', 'supervised')),
 )
+
+
+class Requirement(typing.NamedTuple):
+    """Criterion of the user on a result: text as given; name of the result; target of intervals.meets."""
+    text: str
+    result: str
+    target: str
+
+
+_REQUIRED = re.compile(r'\s*(\S+)\s*(<=|>=|<|>)\s*(\S+)\s*')
+
+
+def requirement(text, known) -> Requirement:
+    """Return the Requirement of a text such as 'pointing_max_deg < 0.1'; known: results. Raises ValueError."""
+    match = _REQUIRED.fullmatch(text)
+    usage = f"--require {text!r}: must be RESULT < LIMIT, with <, <=, > or >=, such as 'pointing_max_deg < 0.1'"
+    if not match:
+        raise ValueError(usage)
+    name, sign, limit = match.groups()
+    if name not in known and name not in map(nodes.plain, known):
+        raise ValueError(f'--require {text!r}: no trial has a result {name!r};{did_you_mean(name, known)} '
+                         '`pedestal run --all --explain` explains the results')
+    if math.isnan(number(limit)):
+        raise ValueError(usage)
+    return Requirement(f'{name} {sign} {limit}', name, f'{sign} {limit}')
+
+
+def number(text) -> float:
+    """Return the number in a text, NaN where there is none."""
+    try:
+        return float(text)
+    except ValueError:
+        return math.nan
+
+
+def of_requirements(case, table, requirements):
+    """Return the rows of the rates at which the trials of a table.Table meet some Requirements.
+
+    A trial without the result does not meet its requirement.
+    """
+    found = []
+    for required in requirements:
+        for name in table.results:
+            own, metric = case_of(case, name)
+            if required.result in (name, metric):
+                values = table.column(name)
+                met = [bool(math.isfinite(value) and intervals.meets(value, required.target)) for value in values]
+                found.append(intervals.estimated(own, f'require({required.text})/rate', rate(sum(met), len(met)), '%',
+                                                 len(met)))
+    return found
 
 
 def percentile(values, share):
@@ -83,19 +139,53 @@ def case_of(case, name):
     return f'{case}/{beam}'.rstrip('/'), plain
 
 
+def words_of(table, name, chosen):
+    """Return {first word of `why`: count} of some trials (n,), a mask, of the beam of a column of a table.Table."""
+    return dict(collections.Counter(
+        why.partition(':')[0] or 'not measured'
+        for why, is_chosen in zip(table.text(why_column(name)), chosen) if is_chosen).most_common())
+
+
+def why_column(name):
+    """Return the column WHY of the beam of a column of results."""
+    return f'{nodes.beam_of(name)}/{WHY}'.lstrip('/')
+
+
+def coverage(row):
+    """Return the text of the number of trials behind a row, such as '23 of 24, 1 tripped'."""
+    if row.get('of', row['runs']) == row['runs']:
+        return str(row['runs'])
+    reasons = [f'{count} {word}' for word, count in row['left_out'].items()]
+    return ', '.join((f'{row["runs"]} of {row["of"]}', *reasons))
+
+
+def failures(table):
+    """Return one line on the trials of a table.Table that failed, '' for none."""
+    words = [text.partition(':')[0] for name in table.texts for text in table.text(name)]
+    count = collections.Counter(word for word in words if word in verdict.FAILURES)
+    told = ', '.join(f'{number} {word}' for word, number in count.most_common())
+    return f'{sum(count.values())} of {len(words)} runs failed: {told}; column `{WHY}` of the table' if count else ''
+
+
 def of_results(case, table):
-    """Return the rows of mean, smallest value, percentiles and largest value of each result of a table.Table."""
+    """Return the rows of mean, smallest value, percentiles and largest value of each result of a table.Table.
+
+    Each row states the number `of` trials, and of the trials without the result how many were `left_out` by the first
+    word of their column `why`.
+    """
     found = []
     for name in table.measured_results:
         values = table.column(name)
-        values = values[np.isfinite(values)]
+        known = np.isfinite(values)
+        left_out = {'of': known.size, 'left_out': words_of(table, name, ~known)}
+        values = values[known]
         own, metric = case_of(case, name)
         if not values.size:
             continue
         estimates = {'mean': intervals.interval(values), 'min': (values.min(), math.nan, math.nan),
                      **{f'p{share:02d}': percentile(values, share) for share in PERCENTILES},
                      'max': (values.max(), math.nan, math.nan)}
-        found += [intervals.estimated(own, f'{metric}/{key}', estimate, unit(name), values.size)
+        found += [{**intervals.estimated(own, f'{metric}/{key}', estimate, unit(name), values.size), **left_out}
                   for key, estimate in estimates.items()]
     return found
 

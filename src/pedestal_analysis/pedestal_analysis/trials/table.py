@@ -24,22 +24,23 @@ class TableError(ValueError):
 class Table:
     """Rows of the trials of a plan.Plan in the file FOLDER/NAME.csv; FOLDER/NAME.json describes the trials.
 
-    identity: {key: text} that distinguishes these trials from others; varied, results: heads of the columns.
+    identity: {key: text} that distinguishes these trials from others; varied, results, texts: heads of the columns of
+    parameters, numbers and sentences.
     Use as a context; the open file is locked against other processes. Raises TableError if the file exists and belongs
     to other trials.
     """
 
-    def __init__(self, folder, name, identity, varied, results):
+    def __init__(self, folder, name, identity, varied, results, texts=()):
         folder = pathlib.Path(folder)
         self.file, self._description_file = folder / f'{name}.csv', folder / f'{name}.json'
-        self.varied, self.results = list(varied), list(results)
+        self.varied, self.results, self.texts = list(varied), list(results), list(texts)
         self._identity = {**identity, 'columns': ' '.join(self.head)}
         self._stream, self.rows = None, []
 
     @property
     def head(self):
         """Heads of all columns."""
-        return [*LEADING_COLUMNS, *self.varied, *self.results]
+        return [*LEADING_COLUMNS, *self.varied, *self.results, *self.texts]
 
     def __enter__(self):
         self.file.parent.mkdir(parents=True, exist_ok=True)
@@ -111,6 +112,12 @@ class Table:
         except ValueError:
             places = {text: float(place) for place, text in enumerate(dict.fromkeys(cells))}
             return np.array([places[cell] for cell in cells])
+
+    def text(self, name):
+        """Return the texts [n] of a column of sentences; '' for each trial in a table without that column."""
+        if name not in self.texts:
+            return [''] * len(self.rows)
+        return [row[self.head.index(name)] for row in self.rows]
 
     @property
     def measured_results(self):

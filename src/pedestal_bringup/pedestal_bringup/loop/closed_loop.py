@@ -98,12 +98,14 @@ class Run:
     stamps     stamps of the steps (n,) [ns]
     units      {name: Unit}
     forecasts  [(stamp [ns], announcement.numbers)] at every whole second, as in the control unit's diagnostics
+    replies    {topic of replies: [(stamp [ns], Command, Reply)]} to the scheduled commands
     """
     steps: np.ndarray
     truth: np.ndarray
     stamps: np.ndarray
     units: dict
     forecasts: list
+    replies: dict = dataclasses.field(default_factory=dict)
 
     @property
     def t(self):
@@ -160,18 +162,21 @@ class Loop:
         for topic, message in Plan(scenario).tracks.items():
             if topic.startswith(prefix):
                 self.units['acu'].decode(nodes.plain(topic), message)
+        self.replies = {}
         period = self.units[nodes.DRIVE_NODE].parameters.period
         self.period_ns = round(period * NS_PER_SECOND)
         self.steps = round(scenario.header.duration / period) + 1
 
     def before_step(self, first, forecasts):
         """Prepare step `first`: add to forecasts where a second begins, execute the scheduled commands of the
-        units."""
+        units and keep the replies."""
         stamp = first * self.period_ns
         if stamp // NS_PER_SECOND > (stamp - self.period_ns) // NS_PER_SECOND:
             forecasts.append((stamp, announcement.numbers(self.units['acu'].parts['state']['guidance']['lookahead'])))
         for unit in self.units.values():
             unit.execute_due(stamp)
+            while unit.pending_replies:
+                self.replies.setdefault(unit.NODE.replies, []).append((stamp, *unit.pending_replies.popleft()))
 
     def next_event_step(self, first):
         """Return the first step after `first` that needs `before_step`."""
@@ -201,4 +206,5 @@ class Loop:
                              for name in UNIT_ORDER)
             loop(memories, first, self.period_ns, before, injected[part], steps[part], truth[part])
             first = last
-        return Run(steps, truth, np.arange(self.steps) * self.period_ns, self.units, forecasts)
+        return Run(steps, truth, np.arange(self.steps) * self.period_ns, self.units, forecasts,
+                   self.replies)

@@ -6,7 +6,7 @@ import numpy as np
 from pedestal_bringup.loop import closed_loop
 from pedestal_common.graph.steps import NS_PER_SECOND
 from pedestal_common.parameters import as_dict
-from pedestal_common.wire import messages
+from pedestal_common.wire import commands, messages
 
 DIAGNOSTICS_TOPIC = 'diagnostics'
 
@@ -22,15 +22,17 @@ def record(scenario, beam=''):
 class MemoryRecording:
     """closed_loop.Run of a scenario.Scenario, as the view of one beam of its recording.
 
-    Of the diagnostics it holds the keyhole forecasts of the control unit, because no result uses anything else of
-    them.
+    Of the diagnostics it holds the keyhole forecasts of the control unit and the last values, because no result uses
+    anything else of them.
     """
 
     def __init__(self, scenario, run):
         receiver = run.units['tracking_receiver'].parameters
         self.path, self.beams = scenario.name, int(scenario.header.beam)
         self.metadata = {'beamwidth': str(receiver.antenna.beamwidth)}
-        self.configuration = {'parameters': {'tracking_receiver': as_dict(receiver)}}
+        self.beam = ''
+        self.configuration = {'parameters': {'tracking_receiver': as_dict(receiver),
+                                             'acu': as_dict(run.units['acu'].parameters)}}
         self._run, self.start, self.end = run, 0, run.t[-1]      # time 0 of the scenario, time of the last step [s]
         self._tables = {}
         self._keyholes = [(stamp, values) for stamp, values in run.forecasts if KEYHOLE_ENTRY in values]
@@ -39,12 +41,17 @@ class MemoryRecording:
     def topics(self):
         """{name: type} of its topics."""
         of_diagnostics = {DIAGNOSTICS_TOPIC: messages.DiagnosticArray.__msgtype__} if self._keyholes else {}
-        return {**self._run.topics, **of_diagnostics}
+        of_replies = dict.fromkeys(self._run.replies, messages.DiagnosticStatus.__msgtype__)
+        return {**self._run.topics, **of_replies, **of_diagnostics}
 
     def table(self, topic):
         """Return {column: array (n,)} of a topic, as of a bag (columns.table)."""
         if topic == DIAGNOSTICS_TOPIC:
             return {'t': np.array([stamp for stamp, _ in self._keyholes]) / NS_PER_SECOND}
+        if topic in self._run.replies:
+            replies = self._run.replies[topic]
+            return {'t': np.array([stamp for stamp, *_ in replies]) / NS_PER_SECOND,
+                    'level': np.array([float(not reply.granted) for *_, reply in replies])}
         if topic not in self._tables:
             self._tables[topic] = self._run.table(topic)
         return self._tables[topic]
@@ -53,8 +60,16 @@ class MemoryRecording:
         """Return the indices 0 ... n - 1 of the messages of a topic."""
         return np.arange(len(self.table(topic)['t']))
 
+    def last_values(self, node):
+        """Return {key: value} of the diagnostics of a node at the end of the run, as of a bag."""
+        return dict(self._run.units[node].diagnose().values)
+
     def messages(self, topic):
-        """Yield (topic, log time, publish time [ns], message) of the diagnostics."""
+        """Yield (topic, log time, publish time [ns], message) of the diagnostics or of a topic of replies."""
+        for stamp, command, reply in self._run.replies.get(topic, ()):
+            yield topic, stamp, stamp, commands.reply_message(command, reply)
+        if topic != DIAGNOSTICS_TOPIC:
+            return
         for stamp, values in self._keyholes:
             status = messages.DiagnosticStatus(level=0, name='acu', message='', hardware_id='',
                                                values=[messages.KeyValue(key=key, value=value) for key, value in

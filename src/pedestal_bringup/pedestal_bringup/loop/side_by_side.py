@@ -169,5 +169,5 @@ def runs(loops, names, kept=None):
               ControlUnits(acu_record, Tables(*tables), np.array(ends)), first, last, period_ns, steps, keeps)
         first = last
     lanes.from_lanes(moving, drive_record)
-    return [Run(steps, np.zeros(0, TRUTH_DTYPE), np.arange(count) * period_ns, loop.units, forecast)
+    return [Run(steps, np.zeros(0, TRUTH_DTYPE), np.arange(count) * period_ns, loop.units, forecast, loop.replies)
             for loop, steps, forecast in zip(loops, kept, forecasts)]

@@ -1,18 +1,20 @@
 """run a scenario as separate nodes and record it
 
-Starts a process for each node, records every topic in a new bag, and prints the results.
+Starts a process for each node, records every topic in a new bag, and prints a verdict and the results.
 
-Exit code 0: the run is complete. 1: the run failed, or the recording is not complete. 3: a realtime run ended early,
-or its drive lost more than 1 % of its steps (steps in the 5 s after a node died are not counted). 130: the run was
-stopped, for example by Ctrl-C.
+Exit codes (1, 3 and 130 take precedence over 4):
+
 """
 import argparse
 import sys
 import typing
+from collections.abc import Collection
 
 from pedestal import stop
 from pedestal.verbs import arguments
 from pedestal_analysis import console
+
+__doc__ += console.exit_codes()
 
 if typing.TYPE_CHECKING:
     from pedestal_bringup.scenario.scenario import Scenario
@@ -30,6 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         'value of the scenario')
     arguments.add_new_bag(parser)
     console.add_json(parser)
+    console.add_all(parser)
     console.add_explain(parser)
     arguments.add_param(parser)
     arguments.add_elements(parser)
@@ -64,7 +67,7 @@ def main(options: argparse.Namespace) -> int:
         print(line)
     outcome = graph.run(plan, bag, console.progress_of_run(chosen.header.duration), servers)
     # Because these modules import scipy, which takes half a second, they are loaded after the run.
-    from pedestal_analysis.results import results
+    from pedestal_analysis.results import results, tracking, verdict
     from pedestal_recording.bag import read
     from pedestal_recording.verify import verify
     if outcome.stopped:
@@ -73,20 +76,33 @@ def main(options: argparse.Namespace) -> int:
             return stop.STOP_EXIT_CODE
     recording = read(bag)
     beams = [prefix[:-1] for prefix in chosen.prefixes]
-    parts = [results.of_bag(recording.view(beam)) for beam in beams]
+    views = [recording.view(beam) for beam in beams]
+    runs = [tracking.read(view) for view in views]
+    verdicts = [verdict.of(view, run) for view, run in zip(views, runs)]
+    parts = [results.of_run(view, run) for view, run in zip(views, runs)]
     of_beams = [results.measured(part) for part in parts]
     realtime = chosen.header.pacing == 'realtime'
     whole = results.measured({'run': outcome, 'supervised': outcome if realtime else None})
     lost, steps = whole['lost_steps'][0], outcome.drive.get('steps')
-    console.show_results(f'{chosen.name}: {chosen.header.title}', beams, of_beams,
-                         {**whole, 'lost_steps': (lost, f'of {steps}' if lost and steps else 'steps')},
-                         [results.marks(part) for part in parts])
+    for beam, found in zip(beams, verdicts):
+        print(f'{beam}: {found.text}' if beam else found.text)
+    shown = [*of_beams[0], *whole] if options.all else results.brief([*of_beams, whole])
+    noted = [results.marks(part) for part in parts]
+    printed = {**whole, 'lost_steps': (lost, f'of {steps}' if lost and steps else 'steps')}
+    console.show_results(f'{chosen.name}: {chosen.header.title}', beams, [_some(values, shown) for values in of_beams],
+                         _some(printed, shown), noted if options.all else ())
+    if not options.all:
+        for beam, notes, values in zip(beams, noted, of_beams):
+            for line in results.remarks(notes, values):
+                print(f'{beam}: {line}' if beam else line)
+        print('--all prints all results, --explain their definitions')
     if options.explain:
-        console.explain(results.RESULTS, {*of_beams[0], *whole})
+        console.explain(results.RESULTS, shown)
     print(f'{bag}  mcap sha256 {outcome.recorder["sha256"]}')
     rows = [row for beam, values in zip(beams, of_beams)
             for row in results.rows(f'{chosen.name}/{beam}'.rstrip('/'), values)]
     console.write_json(options.json, {'name': chosen.name, 'rows': rows + results.rows(chosen.name, whole),
+                                      'verdicts': {beam: found._asdict() for beam, found in zip(beams, verdicts)},
                                       'mcap_sha256': outcome.recorder['sha256']})
     if outcome.stopped:
         return stop.STOP_EXIT_CODE
@@ -103,7 +119,14 @@ def main(options: argparse.Namespace) -> int:
                          f'{MAX_LOST_STEP_SHARE:.0%}, outside announced restarts')
     for reason in disturbed:
         print(f'pedestal: {reason}', file=sys.stderr)
-    return console.EXIT_DISTURBED if disturbed else 0
+    if disturbed:
+        return console.EXIT_DISTURBED
+    return console.EXIT_FAILED_RUN if any(found.failed for found in verdicts) else 0
+
+
+def _some(values: dict[str, tuple], names: Collection[str]) -> dict[str, tuple]:
+    """Return the results of some names."""
+    return {name: value for name, value in values.items() if name in names}
 
 
 def _chosen(options: argparse.Namespace) -> 'Scenario | None':
@@ -149,6 +172,6 @@ def _chosen(options: argparse.Namespace) -> 'Scenario | None':
 def _refuse_with_list(options: argparse.Namespace) -> None:
     """Raise ValueError for an option of a run beside --pass list, which runs nothing."""
     from pedestal_bringup.graph import operator_servers
-    for name in ('bag', 'json', 'explain', 'duration', 'seed', 'pacing', *operator_servers.SERVERS):
+    for name in ('bag', 'json', 'all', 'explain', 'duration', 'seed', 'pacing', *operator_servers.SERVERS):
         if not (getattr(options, name) is None or getattr(options, name) is False):
             raise ValueError(f'--{name}: has no effect with --pass list, which runs nothing')

@@ -9,14 +9,25 @@ an x after the distribution, as in normal(1, 0.1)x, the drawn number is a factor
 form --vary FILE.csv reads the trials from a file with a column for each parameter and a row for each trial.
 
 Rows are written to OUTPUT/trials.csv as soon as they exist. Repeat the command to continue after Ctrl-C or a crash.
---against and --against-param compare two variants. Trial i of both variants has the same seed and drawn values.
+The column `why` of the table holds the verdict on each trial that did not track.
+
+--side NAME NODE.KEY=VALUE ... adds a side to a comparison and may be repeated; --against and --against-param add one
+side. Trial i of all sides has the same seed and drawn values. The best side by --by is printed first.
+
+--require 'RESULT < LIMIT' prints the share of the trials that meet a criterion, with its 95 % interval. A trial
+without the result does not meet it.
+
+--solve NODE.KEY=LOW:HIGH --until 'RESULT = LIMIT' searches for the value of a parameter at which the mean of a result
+reaches a limit. Without LOW:HIGH the search covers the range of the parameter.
 """
 import argparse
 import contextlib
+import math
 import pathlib
+import re
 import sys
 import typing
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 
 from pedestal.verbs import arguments
 from pedestal_analysis import console
@@ -27,11 +38,15 @@ if typing.TYPE_CHECKING:
 WORST_TRIAL_COUNT = 10
 """Number of the worst trials whose commands are printed."""
 
+BASE_SIDE = 'base'
+"""Label of the side with the parameters of --param alone, beside labels of --side."""
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add scenario, varied parameters, number and processes of the trials, and the other side of a comparison."""
+    """Add scenario, varied parameters, number and processes of the trials, sides of a comparison, criteria, search."""
     arguments.add_scenario(parser)
-    parser.add_argument('--runs', type=int, metavar='N', help='number of trials; default: 100, or the rows of a .csv')
+    parser.add_argument('--runs', type=int, metavar='N', help='number of trials; default: 100, or the rows of a .csv; '
+                        'at each value of --solve: 12')
     parser.add_argument('--vary', action='append', default=[], metavar='NODE.KEY=DISTRIBUTION|FILE.csv',
                         help="varied parameter, for example 'adu.azimuth.load.inertia=normal(1, 0.1)x', or file of "
                         'trials; may be repeated')
@@ -42,27 +57,53 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         'scenario')
     arguments.add_param(parser)
     arguments.add_params_file(parser)
+    parser.add_argument('--side', action='append', nargs='+', default=[], metavar=('NAME', 'NODE.KEY=VALUE'),
+                        help='side of a comparison: its name, then the parameters that it changes; may be repeated')
     parser.add_argument('--against', metavar='SCENARIO', help='scenario of the second variant')
     parser.add_argument('--against-param', action='append', default=[], metavar='NODE.KEY=VALUE',
                         help='parameter of the second variant and its value; may be repeated')
     parser.add_argument('--by', metavar='RESULT', help='result that ranks the trials and decides a comparison; '
                         'default: pointing_rms_deg')
+    parser.add_argument('--require', action='append', default=[], metavar="'RESULT < LIMIT'", help="criterion for a "
+                        "trial, with <, <=, > or >=, for example 'pointing_max_deg < 0.1'; may be repeated")
+    parser.add_argument('--solve', metavar='NODE.KEY[=LOW:HIGH]', help='parameter whose value is searched, and the '
+                        'range of the search')
+    parser.add_argument('--until', metavar="'RESULT = LIMIT'", help="limit that the mean of a result reaches at the "
+                        "value of --solve, for example 'pointing_rms_deg = 0.02'")
     arguments.add_workers(parser)
     parser.add_argument('--output', type=pathlib.Path, metavar='DIR', help='output folder; default: '
                         'trials/SCENARIO')
+    console.add_all(parser, 'statistics of all results; default: of the result of --by and of the most important ones')
     console.add_json(parser)
 
 
 def main(options: argparse.Namespace) -> int:
     """Run the trials, print their statistics, write table, page and rows. Return exit code 0."""
-    from pedestal_analysis.report import trials_page
-    from pedestal_analysis.trials import comparison, ensemble, monte_carlo, statistics
-    plans = _plans(options)
+    _check_together(options)
     console.check_json(options.json)
+    return _solve(options) if options.solve else _compare(options)
+
+
+def _check_together(options: argparse.Namespace) -> None:
+    """Raise ValueError for options that exclude or need each other."""
+    if bool(options.solve) != bool(options.until):
+        raise ValueError(f'--{"solve" if options.solve else "until"}: needs --{"until" if options.solve else "solve"}')
+    for name in ('side', 'against', 'against_param', 'require', 'by'):
+        if options.solve and getattr(options, name):
+            raise ValueError(f'--{name.replace("_", "-")}: has no effect with --solve')
+
+
+def _compare(options: argparse.Namespace) -> int:
+    """Run the trials of all sides. Return exit code 0."""
+    from pedestal_analysis.report import trials_page
+    from pedestal_analysis.results import results
+    from pedestal_analysis.trials import comparison, ensemble, monte_carlo, statistics
+    plans, labels, files = _sides(options)
+    known = _result_names(plans[0])
+    required = [statistics.requirement(text, known) for text in options.require]
     folder = options.output or pathlib.Path('trials', plans[0].name)
     with contextlib.ExitStack() as stack:
-        tables = [stack.enter_context(ensemble.open_table(plan, folder, name))
-                  for plan, name in zip(plans, ('trials', 'against'))]
+        tables = [stack.enter_context(ensemble.open_table(plan, folder, file)) for plan, file in zip(plans, files)]
         pool = stack.enter_context(monte_carlo.Pool(options.workers, options.scheduler))
         progress = stack.enter_context(console.progress_of_trials())
         try:
@@ -71,37 +112,118 @@ def main(options: argparse.Namespace) -> int:
             print(f'pedestal: {sum(len(table.rows) for table in tables)} of {sum(plan.runs for plan in plans)} trials '
                   f'are in {folder}; the same command continues', file=sys.stderr)
             raise
-    names = comparison.names(*plans) if len(plans) > 1 else (plans[0].name,)
-    sides = comparison.Sides(*names, *tables) if len(plans) > 1 else None
+    differences = comparison.names(*plans)
+    names = [label or text for label, text in zip(labels, differences)]
+    full = [f'{label} ({text})' if label else text for label, text in zip(labels, differences)]
     ranking = statistics.ranked_by(tables[0], options.by)
-    rows = comparison.rows(sides) if sides else []
-    for name, table in zip(names, tables):
-        rows += [*statistics.of_results(name, table), *statistics.of_questions(name, table),
-                 *statistics.of_sensitivity(name, table)]
-    shown = trials_page.read(plans[0], tables[0], ranking, sides, options.command, WORST_TRIAL_COUNT)
+    order = comparison.ranked(tables, ranking) if len(plans) > 1 else [0]
+    best = order[0]
+
+    def pair(first: int, second: int, names: Sequence[str] = full) -> comparison.Sides:
+        return comparison.Sides(names[first], names[second], tables[first], tables[second])
+
+    rows = [row for other in range(1, len(plans)) for row in comparison.rows(pair(0, other, names))]
+    for place in order:
+        name, table = names[place], tables[place]
+        rows += [*statistics.of_results(name, table), *statistics.of_requirements(name, table, required),
+                 *statistics.of_questions(name, table), *statistics.of_sensitivity(name, table)]
+    lines = [comparison.sentence(pair(best, other), ranking) for other in order[1:]]
+    lines += _requirement_lines(rows, required)
+    shown = trials_page.read(plans[0], tables[0], ranking, pair(best, order[1]) if lines and len(plans) > 1 else None,
+                             lines, options.command, WORST_TRIAL_COUNT)
     file = folder / 'trials.html'
     file.write_text(trials_page.page(shown, rows), encoding='utf-8')
-    console.show_trials(f'{plans[0].runs} trials: {" against ".join(names)}', rows)
-    print('\n'.join(_correlation_lines(rows, ranking)))
+    print('\n'.join(lines), end='\n' if lines else '')
+    for name, table in zip(names, tables):
+        if line := statistics.failures(table):
+            print(f'{name}: {line}')
+    by = ranking.rpartition('/')[2]
+    shown_names = [by, *(result.name for result in results.RESULTS if result.brief and result.name != by)]
+    title = f'{plans[0].runs} trials of {plans[0].name}'
+    console.show_trials(f'{title}: {" against ".join(names)}' if len(names) > 1 else title, rows,
+                        None if options.all else shown_names)
+    if correlations := _correlation_lines(rows, by):
+        print('\n'.join(correlations))
     print(f'the worst trials by {ranking}:')
+    values, whys = tables[0].column(ranking), tables[0].text(statistics.why_column(ranking))
     for i in shown.worst:
-        print(f'{console.number(tables[0].column(ranking)[i]):>10}  {plans[0].command(i)}')
-    if sides:
-        print(comparison.sentence(sides, ranking))
-    print(f'table {tables[0].file}, page {file}')
+        value = console.number(values[i] if math.isfinite(values[i]) else None)
+        print(f'{value:>10}  {plans[0].command(i)}' + (f'  # {whys[i]}' if whys[i] else ''))
+    print(f'table {tables[0].file}, page {file}' + ('' if options.all else '; --all prints all results'))
     console.write_json(options.json, {'name': plans[0].name, 'rows': rows})
     return 0
 
 
-def _plans(options: argparse.Namespace) -> 'list[Plan]':
-    """Return the Plan of the trials and, for a comparison, the Plan of the other side."""
+def _solve(options: argparse.Namespace) -> int:
+    """Search for the value of --solve. Return exit code 0."""
+    from pedestal_analysis.trials import monte_carlo, solve
+    from pedestal_analysis.trials.plan import plan
+    changes = arguments.changes(options)
+
+    def make_plan(more: Sequence[str]) -> 'Plan':
+        return plan(options.scenario, options.runs or solve.DEFAULT_RUNS, options.vary, (*changes, *more),
+                    options.seed, options.duration, options.sobol)
+
+    nominal = make_plan(())
+    wanted = solve.search_range(options.solve, nominal.scenario(0))
+    if wanted.key in nominal.varied:
+        raise ValueError(f'--solve {wanted.key}: the parameter is varied too')
+    aim = solve.goal(options.until, _result_names(nominal))
+    folder = options.output or pathlib.Path('trials', nominal.name)
+    with contextlib.ExitStack() as stack:
+        pool = stack.enter_context(monte_carlo.Pool(options.workers, options.scheduler))
+        progress = stack.enter_context(console.progress_of_trials())
+        found = solve.Search(make_plan, wanted, aim, folder, pool, progress).run()
+    print(found.sentence)
+    console.show_tried(wanted.key, wanted.unit, found.tried)
+    print(f'tables {folder}/solve_{wanted.key.replace("/", "_")}_*.csv')
+    console.write_json(options.json, {
+        'name': nominal.name, 'rows': [one.row for one in found.tried if one.row], 'parameter': wanted.key,
+        'value': found.value if math.isfinite(found.value) else None, 'unit': wanted.unit, 'sentence': found.sentence})
+    return 0
+
+
+def _sides(options: argparse.Namespace) -> 'tuple[list[Plan], list[str], list[str]]':
+    """Return (Plans, labels, names of the tables) of the trials and of all other sides. Raises ValueError."""
     from pedestal_analysis.trials.plan import plan
     changes = arguments.changes(options)
     first = plan(options.scenario, options.runs, options.vary, changes, options.seed, options.duration, options.sobol)
-    if not (options.against or options.against_param):
-        return [first]
-    return [first, plan(options.against or options.scenario, first.runs, options.vary,
-                        (*changes, *options.against_param), first.seed, options.duration, options.sobol)]
+    plans, labels, files = [first], [BASE_SIDE if options.side else ''], ['trials']
+
+    def add(source: str, more: Sequence[str], label: str, file: str) -> None:
+        plans.append(plan(source, first.runs, options.vary, (*changes, *more), first.seed, options.duration,
+                          options.sobol))
+        labels.append(label)
+        files.append(file)
+
+    if options.against or options.against_param:
+        add(options.against or options.scenario, options.against_param, '', 'against')
+    for name, *more in options.side:
+        if not re.fullmatch(r'[\w.-]+', name) or name in labels:
+            raise ValueError(f'--side {name}: must be a name of letters, digits, -, _ and ., other than '
+                             f'{", ".join(filter(None, labels))}')
+        if not more:
+            raise ValueError(f'--side {name}: needs at least one NODE.KEY=VALUE')
+        add(options.scenario, more, name, f'side_{name}')
+    return plans, labels, files
+
+
+def _result_names(plan: 'Plan') -> list[str]:
+    """Return the names of the results of the trials of a Plan, with the names of its beams."""
+    from pedestal_analysis.trials.ensemble import TRIAL_RESULTS
+    return [f'{prefix}{result}' for prefix in plan.scenario(0).prefixes for result in TRIAL_RESULTS]
+
+
+def _requirement_lines(rows: Iterable[Mapping[str, typing.Any]], required: Iterable[typing.Any]) -> list[str]:
+    """Return a line for each requirement and case: the share of the trials that meet it."""
+    found = []
+    for one in required:
+        for row in rows:
+            if row['metric'] == f'require({one.text})/rate':
+                count = round(row['value'] * row['runs'] / 100.0)
+                found.append(f'{row["case"]}: {one.text} in {count} of {row["runs"]} trials, {row["value"]:.3g} % '
+                             f'({console.interval(row)} %)')
+    return found
 
 
 def _correlation_lines(rows: Iterable[Mapping[str, typing.Any]], ranking: str) -> list[str]:

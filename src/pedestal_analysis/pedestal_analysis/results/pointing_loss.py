@@ -1,0 +1,41 @@
+"""Loss of received power by the pointing error, from the sum pattern of the beam (tracking_receiver_sim.monopulse)."""
+import math
+
+import numpy as np
+
+from pedestal_common.compiled import compiled
+from tracking_receiver_sim.monopulse import sum_pattern
+
+LEAST_POWER = 1e-12
+"""Least received power over that of the beam axis, in a null of the pattern [-]."""
+
+
+@compiled
+def _fill(error, beamwidth, power):
+    """Fill the received power (n,) over that of the beam axis at errors (n, 2) [rad]."""
+    for k in range(len(error)):
+        voltage = sum_pattern(error[k, 0] / beamwidth) * sum_pattern(error[k, 1] / beamwidth)
+        power[k] = voltage * voltage
+
+
+def _power(run):
+    """Return the received power (k,) over that of the beam axis in the evaluated part of a tracking.Tracking."""
+    if not math.isfinite(run.beamwidth):
+        return np.zeros(0)
+    error = np.concatenate((run.true, run.begun[run.tracking])) if run.electronic else run.true
+    error = np.ascontiguousarray(error[np.isfinite(error).all(axis=1)])
+    power = np.empty(len(error))
+    _fill(error, run.beamwidth, power)
+    return np.maximum(power, LEAST_POWER)
+
+
+def mean_db(run) -> float:
+    """Return the loss [dB] of the mean received power of a tracking.Tracking; NaN without an evaluated part."""
+    power = _power(run)
+    return -10.0 * math.log10(power.mean()) if power.size else math.nan
+
+
+def max_db(run) -> float:
+    """Return the largest loss [dB] of a tracking.Tracking; NaN without an evaluated part."""
+    power = _power(run)
+    return -10.0 * math.log10(power.min()) if power.size else math.nan

@@ -1,0 +1,191 @@
+"""Verdict on a run: one sentence on what happened, from the recording alone.
+
+A run has failed if its drive tripped, if a command of the scenario was refused, or if a target was to be tracked and
+never was. It has not failed if no mode was to track, or if it ended on the way to the target, before the receiver
+could lock.
+"""
+import contextlib
+import math
+import typing
+
+import numpy as np
+
+from acu_tracker.modes import REASON_TEXTS
+from pedestal_analysis.results.tracking import DEG_PER_RAD
+from pedestal_common.graph import modes, nodes
+from pedestal_common.graph.steps import NS_PER_SECOND
+from pedestal_common.wire import commands
+
+TRIPPED, REFUSED, NOT_LOCKED, NOT_TRACKED = 'tripped', 'refused', 'never locked', 'never tracked'
+TRACKED, ON_THE_WAY, NO_TARGET = 'tracked', 'ended on the way', 'no target'
+FAILURES = TRIPPED, REFUSED, NOT_LOCKED, NOT_TRACKED
+"""Words of the verdicts on a failed run; the other words are of runs that did what was commanded."""
+
+TRACKING_MODES = 'autotrack', 'steptrack'
+"""Modes in which the antenna tracks by the receiver."""
+
+DRIVE_STATE_TOPIC, EMERGENCY_STOP = 'adu/state', 'emergency stop'
+REPLY_TOPICS = tuple(node.replies for node in nodes.NODES if node.replies)
+
+WAITING_REASONS = tuple(REASON_TEXTS[name] for name in ('DRIVE_NOT_READY', 'INS_ALIGNING', 'ATTITUDE_INVALID',
+                                                        'BEFORE_PROGRAM'))
+"""Reasons of the control unit for which a mode waits and then begins."""
+
+LOCK_ALLOWANCE_S = 1.0
+"""Time for which the target must be in the beam, beside the parameters `acquire_time` and `lock_count`, before the
+receiver counts as one that cannot lock [s]."""
+APPROACH_WINDOW_S, MIN_APPROACH = 0.5, 0.1
+"""A beam is on the way while its distance to the target shrinks by this many beamwidths in this time [s]."""
+
+
+class Verdict(typing.NamedTuple):
+    """word: one of the words above; text: the sentence."""
+    word: str
+    text: str
+
+    @property
+    def failed(self) -> bool:
+        """True if the run failed."""
+        return self.word in FAILURES
+
+    @property
+    def why(self) -> str:
+        """Word and sentence of a run that did not track, '' for a run that tracked."""
+        return '' if self.word == TRACKED else f'{self.word}: {self.text.removeprefix(f"{self.word}: ")}'
+
+
+def of(bag, run) -> Verdict:
+    """Return the Verdict on a bag.Bag of one beam (Bag.view) and its tracking.Tracking."""
+    trip, refused = _trip(bag), _refusals(bag)
+    word, text = _tracking(bag, run)
+    if not (trip or refused):
+        return Verdict(word, text)
+    if trip:
+        percent = run.tracked_percent
+        share = f'tracked {percent:.3g} %: ' if word != NO_TARGET and math.isfinite(percent) else ''
+        return Verdict(TRIPPED, share + '; '.join((trip, *refused)))
+    return Verdict(REFUSED, '; '.join((*refused, *[text] * (word != NO_TARGET))))
+
+
+def _trip(bag) -> str:
+    """Return the fault on which the drive tripped first, with its time, or ''."""
+    if DRIVE_STATE_TOPIC not in bag.topics:
+        return ''
+    table = bag.table(DRIVE_STATE_TOPIC)
+    for t, state in zip(table['t'], table['data']):
+        if 'fault: ' in state or state.startswith(EMERGENCY_STOP):
+            return f'drive {state.replace("fault: ", "fault ")} at {t:.3f} s'
+    return ''
+
+
+def _replies(bag):
+    """Yield (time [s], Command, Reply) of all replies in a bag."""
+    for topic in REPLY_TOPICS:
+        for _, log, _, message in bag.messages(topic) if topic in bag.topics else ():
+            with contextlib.suppress(ValueError):  # the message is no reply
+                yield ((log - bag.start) / NS_PER_SECOND, *commands.of_reply(message))
+
+
+def _refusals(bag) -> list[str]:
+    """Return a text for each refused command of the scenario."""
+    return [f'{command.verb} at {t:.4g} s refused: {_reason(reply.text)}' for t, command, reply in _replies(bag)
+            if command.who == commands.SCHEDULE_CLIENT and not reply.granted]
+
+
+def _reason(text):
+    """Return the reason in the text of a refusal."""
+    return text.removeprefix('refused: ').partition('; mode is ')[0]
+
+
+def _leads_to_tracking(mode, handover):
+    """Return True if a mode tracks, or hands over to a mode that does; handover: a predicted track may hand over."""
+    row = next((row for row in modes.MODE_ROWS if row.name == mode), None)
+    if row is None or mode in TRACKING_MODES:
+        return row is not None
+    return bool(row.handover) and (handover or not row.table) and _leads_to_tracking(row.handover, handover)
+
+
+def _tracking(bag, run) -> tuple[str, str]:
+    """Return (word, sentence) on the tracking of a run, without its faults and refusals."""
+    acu = bag.configuration['parameters'].get('acu', {})
+    wanted = {acu.get('initial_mode', 'standby'), *(command.verb for _, command, _ in _replies(bag)),
+              *np.unique(run.mode[run.known_mode]).tolist()}
+    shares = {mode: 100.0 * float(np.mean(run.mode == mode)) for mode in modes.MODES if (run.mode == mode).any()}
+    near = np.hypot(run.cross_elevation, run.elevation_error) < 0.5 * run.beamwidth
+    by_level = run.mode == 'steptrack'
+    if 'autotrack' in shares:
+        since = '' if math.isnan(run.lock_time) else f', first lock at {run.lock_time:.4g} s'
+        return TRACKED, f'tracked {run.tracked_percent:.3g} % of {run.t[-1] - run.t[0]:.4g} s{since}'
+    if by_level.any() and (near[by_level].any() or not math.isfinite(run.beamwidth)):
+        return TRACKED, f'tracked by its level for {shares["steptrack"]:.3g} % of {run.t[-1] - run.t[0]:.4g} s'
+    if not any(_leads_to_tracking(mode, acu.get('tracker.handover', True)) for mode in wanted):
+        return NO_TARGET, _without_target(shares, acu)
+    if not any(modes.MODE_ROWS[modes.MODES.index(mode)].follows for mode in shares):
+        return _never_began(bag, acu.get('initial_mode', 'standby'))
+    return _never_tracked(bag, run, near, acu)
+
+
+def _without_target(shares, acu):
+    """Return the sentence on a run that was not to track; shares: {mode: %}."""
+    begun = acu.get('initial_mode', 'standby')
+    if not shares:
+        return 'no mode is recorded'
+    return ('no target was to be tracked: ' + ', '.join(f'{mode} {share:.3g} %' for mode, share in shares.items())
+            + ('' if begun in shares else f'; {begun} was never entered'))
+
+
+def _never_began(bag, mode):
+    """Return (word, sentence) on a run in which no mode that follows a target was entered."""
+    values = bag.last_values(f'{bag.beam}acu')
+    reason = values.get(f'refused {mode}', '')
+    if not reason or reason.startswith(WAITING_REASONS):
+        return ON_THE_WAY, f'ended before mode {mode} was entered' + (f': {reason}' if reason else '')
+    return NOT_TRACKED, f'tracked 0 %: mode {mode} was never entered: {reason}'
+
+
+def _never_tracked(bag, run, near, acu):
+    """Return (word, sentence) on a run that followed a direction and never tracked; near (n,): target in the beam."""
+    receiver = bag.configuration['parameters'].get('tracking_receiver', {})
+    count = acu.get('tracker.lock_count', 0) * run.period
+    follows = np.isin(run.mode, [row.name for row in modes.MODE_ROWS if row.follows])
+    left = float(run.t[-1] - run.t[follows][0])
+    locked = np.isfinite(run.measured[:, 0])
+    if locked.any():
+        first = float(run.t[locked][0])
+        if run.t[-1] - first < count + LOCK_ALLOWANCE_S:
+            return ON_THE_WAY, f'ended {run.t[-1] - first:.2g} s after the first lock, before autotrack'
+        reason = bag.last_values(f'{bag.beam}acu').get('refused autotrack', '')
+        lost = f'locked for {np.sum(locked) * run.period:.3g} s from {first:.4g} s on, but never in autotrack'
+        return NOT_TRACKED, f'tracked 0 %: {lost}' + (f': {reason}' if reason else '')
+    allowance = receiver.get('receiver.acquire_time', 0.0) + LOCK_ALLOWANCE_S
+    level, needed = run.cn0[np.isfinite(run.cn0)], receiver.get('receiver.acquire_level_dbhz', math.nan)
+    best = (f'never locked: best level {level.max():.3g} dB-Hz, lock at {needed:.3g}'
+            if level.size else 'never locked: no level was recorded')
+    if not (run.target_earth[:, 1] > receiver.get('receiver.horizon_mask', 0.0)).any():
+        return NOT_LOCKED, f'{best}: the target was below the horizon'
+    if np.sum(near) * run.period >= allowance:
+        return NOT_LOCKED, best
+    distance = np.hypot(run.cross_elevation, run.elevation_error)
+    away = f'{distance[-1] * DEG_PER_RAD:.3g} deg away'
+    if left < allowance or near[-1] or _approaches(run, distance):
+        return ON_THE_WAY, f'ended on the way to the target, {away}, before the receiver could lock'
+    due = _next_command(acu, run.t[-1])
+    if due:
+        return ON_THE_WAY, f'ended before the command {due}, the target {away}'
+    return NOT_LOCKED, f'{best}; the beam came within {np.nanmin(distance) * DEG_PER_RAD:.3g} deg of the target'
+
+
+def _next_command(acu, end):
+    """Return the next scheduled command after the end [s] of a run that leads to tracking, with its time, or ''."""
+    for entry in filter(None, map(str.split, acu.get('commands', '').split(';'))):
+        at, verb = float(entry[0]), entry[1]
+        if at > end and _leads_to_tracking(verb, acu.get('tracker.handover', True)):
+            return f'{verb} at {at:g} s'
+    return ''
+
+
+def _approaches(run, distance):
+    """Return True if the beam approaches the target at the end; distance (n,) [rad]."""
+    window = round(APPROACH_WINDOW_S / run.period)
+    return (distance.size > window and run.mode[-1] not in ('', 'standby')
+            and distance[-1 - window] - distance[-1] > MIN_APPROACH * run.beamwidth)

@@ -1,0 +1,242 @@
+"""Search for the value of a parameter at which the mean of a result over trials reaches a limit.
+
+First the trials run at values that fill the range. Where exactly one pair of neighbours has the limit between its
+means, the pair is bisected. Without such a pair the search goes to the edges of the values at which the result is
+measured, because a drive that trips may hide the limit. All values have the same seeds and draws, so the mean is a
+smooth function of the value wherever the law is.
+"""
+import contextlib
+import itertools
+import math
+import typing
+
+import numpy as np
+
+from pedestal_analysis.results import intervals
+from pedestal_analysis.trials import ensemble, statistics
+from pedestal_analysis.trials import plan as plans
+from pedestal_bringup.scenario import scenario
+from pedestal_common.graph import nodes
+from pedestal_common.parameters import did_you_mean
+
+DEFAULT_RUNS = 12
+"""Number of trials at each value, unless the user gives another."""
+GRID_COUNT, MAX_BISECTIONS = 9, 12
+"""Number of values that fill the range, and largest number of bisections."""
+TOLERANCE = 0.01
+"""Width of the last bracket over its upper end at which the search ends [-]."""
+MAX_LINEAR_RATIO = 20.0
+"""Largest ratio of the ends of a positive range that is filled evenly; a wider range is filled in equal ratios."""
+MIN_MEASURED_SHARE = 0.5
+"""Smallest share of the trials with the result at a value whose mean counts [-]."""
+
+
+class Goal(typing.NamedTuple):
+    """Limit that a result is to reach: its name and its value."""
+    result: str
+    limit: float
+
+
+class Range(typing.NamedTuple):
+    """Parameter 'node.key' with the ends of its range; whole: True for an integer parameter; unit."""
+    key: str
+    low: float
+    high: float
+    whole: bool
+    unit: str
+
+
+class Tried(typing.NamedTuple):
+    """Trials at a value: the row of intervals.estimated of the mean, None if the scenario refused the value; why: the
+    text of the refusal; measured: True if the mean counts."""
+    value: float
+    row: dict | None
+    why: str
+    measured: bool
+
+    @property
+    def mean(self):
+        """Mean of the result, NaN where it does not count."""
+        return self.row['value'] if self.measured else math.nan
+
+
+class Solution(typing.NamedTuple):
+    """value: found value, NaN without one; tried: all Tried in order of their values; sentence."""
+    value: float
+    tried: list
+    sentence: str
+
+
+def goal(text, known) -> Goal:
+    """Return the Goal of a text such as 'pointing_rms_deg = 0.02'; known: names of results. Raises ValueError."""
+    name, _, rest = map(str.strip, text.partition('='))
+    limit = statistics.number(rest)
+    if not (name and math.isfinite(limit)):
+        raise ValueError(f"--until {text!r}: must be RESULT = LIMIT, such as 'pointing_rms_deg = 0.02'")
+    if name not in known and name not in map(nodes.plain, known):
+        raise ValueError(f'--until {text!r}: no trial has a result {name!r};{did_you_mean(name, known)} '
+                         '`pedestal run --all --explain` explains the results')
+    return Goal(name, limit)
+
+
+def search_range(text, chosen) -> Range:
+    """Return the Range of a text NODE.KEY or NODE.KEY=LOW:HIGH in a scenario.Scenario. Raises VaryError.
+
+    Without ends the range is that of the parameter.
+    """
+    key, equals, ends = text.partition('=')
+    field = plans.field(chosen, key, '--solve')
+    if field.type not in (int, float):
+        raise plans.VaryError(f'--solve {key}: must be a parameter with a number')
+    low, high = (statistics.number(end) for end in ends.split(':', 1)) if ends.count(':') == 1 else (math.nan,) * 2
+    if not equals:
+        low, high = field.metadata.get('low', -math.inf), field.metadata.get('high', math.inf)
+    if not (math.isfinite(low) and math.isfinite(high) and low < high):
+        raise plans.VaryError(f'--solve {text}: must be NODE.KEY=LOW:HIGH, LOW below HIGH')
+    return Range(key, float(low), float(high), field.type is int, field.metadata.get('unit', ''))
+
+
+def _between(low, high, ratio):
+    return math.sqrt(low * high) if ratio else 0.5 * (low + high)
+
+
+def _in_ratios(wanted):
+    return wanted.low > 0.0 and wanted.high / wanted.low > MAX_LINEAR_RATIO
+
+
+def _grid(wanted):
+    """Return the values that fill a Range, in order."""
+    fill = np.geomspace if _in_ratios(wanted) else np.linspace
+    values = fill(wanted.low, wanted.high, GRID_COUNT)
+    values[[0, -1]] = wanted.low, wanted.high
+    return list(dict.fromkeys(round(value) for value in values)) if wanted.whole else values.tolist()
+
+
+class Search:
+    """Search over a Range for a Goal.
+
+    make_plan(overrides) -> plan.Plan of the trials with these changes; folder: for the tables, one for each value;
+    pool: monte_carlo.Pool; progress: as of ensemble.run_missing_trials.
+    """
+
+    def __init__(self, make_plan, wanted, aim, folder, pool, progress=lambda done, total: None):
+        self._make_plan, self._wanted, self._aim = make_plan, wanted, aim
+        self._folder, self._pool, self._progress = folder, pool, progress
+        self.tried: list = []
+
+    def _try(self, values):
+        """Run the trials at some values, all together. Return their Tried."""
+        made, refused = {}, {}
+        for value in values:
+            try:
+                made[value] = self._make_plan([scenario.override(self._wanted.key, value)])
+            except scenario.ScenarioError as error:
+                refused[value] = str(error)
+        found = [Tried(value, None, text, False) for value, text in refused.items()]
+        with contextlib.ExitStack() as stack:
+            tables = [stack.enter_context(ensemble.open_table(plan, self._folder, self._name(value)))
+                      for value, plan in made.items()]
+            if tables:
+                ensemble.run_missing_trials(list(made.values()), tables, self._pool, self._progress)
+        found += [self._tried(value, table) for value, table in zip(made, tables)]
+        self.tried = sorted((*self.tried, *found), key=lambda one: one.value)
+        return sorted(found, key=lambda one: one.value)
+
+    def _name(self, value):
+        return f'solve_{self._wanted.key.replace("/", "_")}_{value!r}'
+
+    def _tried(self, value, table):
+        name = next(name for name in table.results if self._aim.result in (name, nodes.plain(name)))
+        values = table.column(name)
+        known = np.isfinite(values)
+        estimate = intervals.interval(values[known]) if known.any() else (math.nan,) * 3
+        row = {**intervals.estimated(f'{self._wanted.key}={value:.6g}', f'{nodes.plain(name)}/mean', estimate,
+                                     statistics.unit(name), int(known.sum())),
+               'of': known.size, 'left_out': statistics.words_of(table, name, ~known)}
+        return Tried(value, row, '', bool(known.mean() >= MIN_MEASURED_SHARE))
+
+    def run(self) -> Solution:
+        """Search and return the Solution."""
+        wanted, aim = self._wanted, self._aim
+        crossings = self._crossings(self._try(_grid(wanted))) or self._at_edges()
+        what = f'{aim.result} = {aim.limit:g}'
+        if not crossings:
+            return self._never(what)
+        if len(crossings) > 1:
+            return self._unsteady(what, crossings)
+        low, high = self._bisected(*crossings[0])
+        if low is None:
+            return self._unsteady(what, crossings)
+        if len(self._crossings(self.tried)) > 1:
+            return self._unsteady(what, self._crossings(self.tried))
+        slope = high.mean - low.mean
+        value = low.value + (aim.limit - low.mean) / slope * (high.value - low.value) if slope else low.value
+        value = round(value) if wanted.whole else value
+        return Solution(value, self.tried, f'{wanted.key} = {value:.4g} {wanted.unit}'.rstrip()
+                        + f': {what} is reached between {low.value:.4g} and {high.value:.4g}, with '
+                        f'{statistics.coverage(low.row)} trials{self._gaps()}')
+
+    def _crossings(self, tried):
+        """Return the pairs of neighbours with the limit between their means, or on the first of them."""
+        return [(a, b) for a, b in zip(tried, tried[1:]) if a.measured and b.measured
+                and (a.mean < self._aim.limit) != (b.mean < self._aim.limit)]
+
+    def _at_edges(self):
+        """Bisect each pair of neighbours of which one has the result. Return the first crossings found."""
+        for a, b in [(a, b) for a, b in zip(self.tried, self.tried[1:]) if a.measured != b.measured]:
+            while (middle := self._middle(a, b)) is not None:
+                one, = self._try([middle])
+                if crossings := self._crossings(self.tried):
+                    return crossings
+                a, b = (one, b) if one.measured == a.measured else (a, one)
+        return []
+
+    def _middle(self, low, high):
+        """Return the value between two Tried, None if they are as near as TOLERANCE."""
+        middle = _between(low.value, high.value, _in_ratios(self._wanted))
+        middle = round(middle) if self._wanted.whole else float(f'{middle:.6g}')
+        near = high.value - low.value <= TOLERANCE * max(abs(low.value), abs(high.value))
+        return None if near or not low.value < middle < high.value else middle
+
+    def _bisected(self, low, high):
+        """Return the narrowest bracket (Tried, Tried) inside a pair of neighbours; (None, None) if it has a gap."""
+        for _ in range(MAX_BISECTIONS):
+            middle = self._middle(low, high)
+            if middle is None:
+                break
+            one, = self._try([middle])
+            if not one.measured:
+                return None, None
+            if (one.mean < self._aim.limit) == (low.mean < self._aim.limit):
+                low = one
+            else:
+                high = one
+        return low, high
+
+    def _never(self, what):
+        """Return the Solution of a result that does not reach its limit."""
+        wanted, known = self._wanted, [one for one in self.tried if one.measured]
+        text = f'{what} is not reached for {wanted.key} from {wanted.low:g} to {wanted.high:g} {wanted.unit}'.rstrip()
+        if known:
+            least, most = (choose(known, key=lambda one: one.mean) for choose in (min, max))
+            text += f': the mean is {least.mean:.3g} at {least.value:.4g} to {most.mean:.3g} at {most.value:.4g}'
+        return Solution(math.nan, self.tried, text + self._gaps())
+
+    def _unsteady(self, what, crossings):
+        """Return the Solution of a result that reaches its limit at several values, or beside values without it."""
+        places = ', '.join(f'between {a.value:.4g} and {b.value:.4g}' for a, b in crossings)
+        return Solution(math.nan, self.tried, f'{what} is not reached steadily: {places}{self._gaps()}')
+
+    def _gaps(self):
+        """Return the text of the values at which fewer than half of the trials have the result, '' for none."""
+        parts = []
+        for measured, group in itertools.groupby(self.tried, key=lambda one: one.measured):
+            values = [f'{one.value:.4g}' for one in group]
+            if not measured:
+                parts.append(f'at {values[0]}' if len(values) == 1 else f'from {values[0]} to {values[-1]}')
+        return f'; most trials have no {self._aim.result} {", ".join(parts)}' if parts else ''
+
+
+def reason(one):
+    """Return the text of the trials behind a Tried."""
+    return one.why or statistics.coverage(one.row)
