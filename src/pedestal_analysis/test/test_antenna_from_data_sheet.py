@@ -63,7 +63,6 @@ def test_what_ships_is_made_by_the_commands_in_its_head(pedestal, tmp_path, name
 
 
 @pytest.mark.parametrize('arguments, expected', [
-    (('--rate-azimuth', '400'), 'adu.azimuth: limits.rate = 6.98132 rad/s: must be at most'),
     (('--mirror', '400'), 'mirror = 400 m: must be 0.1 to 40'),
     (('--like', 'leo_pas'), "like = 'leo_pas': must be one of leo_pass, uav_flyby, ship_pass"),
     (('--motor-torque', '0.2'), 'adu.azimuth: motor_1.resistance = 128.706 ohm: must be 0.01 to 100'),
@@ -73,6 +72,25 @@ def test_a_sheet_that_cannot_be_is_refused(pedestal, tmp_path, arguments, expect
     code, output, errors = pedestal('new', 'my.yaml', *arguments)
     assert (code, output) == (1, '') and expected in errors and errors.count('\n') == 1
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize('arguments, axis, expected', [
+    (('--rate-azimuth', '400'), 'azimuth', '--rate-azimuth 400: the motors reach 162 deg/s at ratio 64; '),
+    (('--ratio-elevation', '300'), 'elevation', '--rate-elevation 97: the motors reach 34.6 deg/s at ratio 300; '),
+    (('--inertia-azimuth', '40000'), 'azimuth',
+     '--rate-azimuth 140: the motors can stop the axis within half of its travel from 63.5 deg/s; '),
+    (('--mirror', '13', '--inertia-azimuth', '140000', '--ratio-azimuth', '1500', '--motor-torque', '45'), 'azimuth',
+     '--rate-azimuth 140: the motors reach 6.92 deg/s at ratio 1500; '),
+])
+def test_a_rate_out_of_reach_becomes_nine_tenths_of_what_is_reached(pedestal, tmp_path, arguments, axis, expected):
+    """The verb says so, and the file says it too."""
+    code, output, _ = pedestal('new', 'my.yaml', *arguments)
+    [line] = (line for line in output.splitlines() if line.startswith(expected))
+    reached, taken = (float(part.rpartition(' deg/s')[0].split()[-1]) for part in
+                      (line.partition(' at ratio')[0].partition(';')[0], line))
+    rate = getattr(scenario.load(tmp_path / 'my.yaml').node_parameters('adu'), axis).limits.rate
+    assert code == 0 and f'# {line}' in (tmp_path / 'my.yaml').read_text()
+    assert taken == pytest.approx(0.9 * reached, rel=0.01) and math.degrees(rate) == pytest.approx(taken, rel=1e-3)
 
 
 def test_no_file_is_overwritten(pedestal, tmp_path):

@@ -49,6 +49,20 @@ def test_what_is_asked_is_the_crossover_of_the_position_loop():
         assert rows['position']['crossover_hz'][0] == pytest.approx(asked, rel=0.12)
 
 
+def test_an_axis_slower_than_the_rate_of_the_measurement():
+    """2 deg/s in azimuth, 1 deg/s in elevation: the same loops as of the fast axis. The friction of a motor that turns
+    below 1 rad/s damps the speed loop by 2 to 5 deg more."""
+    asked, slow = loops.LoopRequirements(), {'azimuth': math.radians(2.0), 'elevation': math.radians(1.0)}
+    found = []
+    for changes in ((), [f'adu.{axis}.limits.rate={rate}' for axis, rate in slow.items()]):
+        each = loops.Loops('leo_pass', changes)
+        found.append([margins for *_, margins in loops.design(each, loops.AXES, asked, lambda share, text: None)])
+        assert each.gains['acu.azimuth.feedforward.bandwidth'] == pytest.approx(22.0, rel=0.01)
+    for fast, slow in zip(*found):
+        assert slow['phase_margin_deg'][0] == pytest.approx(fast['phase_margin_deg'][0], abs=6.0)
+        assert slow['crossover_hz'][0] == pytest.approx(fast['crossover_hz'][0], rel=0.05)
+
+
 def test_the_design_is_that_of_a_rigid_drive():
     """J dw/dt = T for one motor and its half of the load: crossover of K_p / (J s) at w_s."""
     plant = loops.Loops('leo_pass').plants['azimuth']

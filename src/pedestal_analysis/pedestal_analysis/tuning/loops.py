@@ -29,6 +29,9 @@ from pedestal_recording import configuration
 DEFAULT_SPEED_CROSSOVER_HZ, CROSSOVER_RATIO = 28.0, 8.0
 """Default crossover of the speed loop [Hz], and ratio of the crossovers of speed and position loop [-]."""
 
+TORQUE_SHARE, SHAPER_RATE_SHARE = 0.75, 0.94
+"""Shares of the shaper in the acceleration and in the rate of the axis [-]."""
+
 SLOWDOWN_FACTOR, MAX_SLOWDOWNS = 0.85, 12
 """Factor by which a loop without its margins is made slower, and number of tried crossovers."""
 
@@ -106,6 +109,11 @@ class Plant:
                 ) / self.whole_inertia
 
 
+def rate_slope(plant):
+    """Return the largest change of the rate command [rad/s2], a quarter of the torque below the limits."""
+    return 1.3 * TORQUE_SHARE * plant.acceleration
+
+
 def drive_gains(plant, w_s):
     """Return {key of adu.AXIS: value} for a crossover w_s [rad/s] of the speed loop."""
     K_p, rated = w_s * plant.inertia, plant.axis.thermal.rated_torque
@@ -116,11 +124,12 @@ def drive_gains(plant, w_s):
 
 def control_gains(plant, w_s, w_p):
     """Return {key of acu.AXIS: value} for crossovers w_s, w_p [rad/s] of the speed and the position loop."""
-    a = 0.75 * plant.acceleration
+    a = TORQUE_SHARE * plant.acceleration
     return {'controller': 'feedforward', 'feedforward.bandwidth': w_p, 'feedforward.inertia': plant.whole_inertia,
-            'feedforward.friction': plant.axis.friction.coulomb, 'shaper.rate': 0.94 * plant.axis.limits.rate,
-            'shaper.acceleration': a, 'shaper.jerk': 0.75 * a * w_s, 'shaper.h0': 3.5 / w_s,
-            'limits.rate': plant.axis.limits.rate, 'limits.acceleration': 1.3 * a}
+            'feedforward.friction': plant.axis.friction.coulomb,
+            'shaper.rate': SHAPER_RATE_SHARE * plant.axis.limits.rate, 'shaper.acceleration': a,
+            'shaper.jerk': 0.75 * a * w_s, 'shaper.h0': 3.5 / w_s,
+            'limits.rate': plant.axis.limits.rate, 'limits.acceleration': rate_slope(plant)}
 
 
 def _rounded(gains):
