@@ -7,7 +7,8 @@ of 210 kg m2). The scaling keeps the resonance frequencies of gears and motors:
                 rated torque; inertia with the torque to the power 5/3; friction and brake with the torque
     gear, load  stiffness, damping and viscous friction with the load's inertia; other friction and unbalance with
                 the inertia to the power 2/3
-    loops       the rigid design of tuning/loops.py; `pedestal tune --loops` then measures the loops
+    structure   the data sheet's lowest frequency, or the average of antennas of this diameter (data_sheet_format)
+    loops       the design of tuning/loops.py; `pedestal tune --loops` then measures the loops
 
 A rate of the data sheet that the axis cannot reach becomes RATE_SHARE of the rate that it reaches.
 """
@@ -60,6 +61,9 @@ def axis(sheet, name):
     values |= {f'friction.{key}': known[f'friction.{key}'] * share**(2.0 / 3.0)
                for key in ('coulomb', 'breakaway', 'stiffness', 'damping')}
     values['load.unbalance'] = known['load.unbalance'] * share**(2.0 / 3.0)
+    if sheet.mode_share:
+        values |= {'structure.inertia_share': sheet.mode_share,
+                   'structure.frequency': float(f'{sheet.structural_frequency:.3g}')}
     return values | _softer(name, values)
 
 
@@ -70,17 +74,17 @@ def _softer(name, values):
     """
     known, h = getattr(AduParameters(), name), PLANT_PERIOD_S
     J, N = values['load.inertia'], values['gear_train.reducer_ratio'] * known.gear_train.pinion_ratio
-    M = mesh_inertia(values['motor_1.inertia'], N, J)
+    M = mesh_inertia(values['motor_1.inertia'], N, (1.0 - values.get('structure.inertia_share', 0.0)) * J)
     return {'gear_train.damping': min(values['gear_train.damping'], M / h),
             'gear_train.stiffness': min(values['gear_train.stiffness'], M / h**2)}
 
 
-def _plant(name, values):
+def _plant(sheet, name, values):
     """Return the loops.Plant of an axis with `values` {key: value}. Raises ParameterError, LoopError."""
     from pedestal_analysis.tuning import loops
     known = getattr(AduParameters(), name)
     try:
-        return loops.Plant(name, build(type(known), {**as_dict(known), **values}))
+        return loops.Plant(name, build(type(known), {**as_dict(known), **values}), beamwidth=sheet.theta)
     except ParameterError as error:
         raise ParameterError(f'adu.{name}: {error}') from None
 
@@ -97,7 +101,7 @@ def attainable(sheet):
         asked, ratio = math.radians(getattr(sheet, f'rate_{name}')), getattr(sheet, f'ratio_{name}')
         values = axis(sheet, name)
         turning = min(motor.reachable_rate(ratio) for motor in _motors(name, values))
-        plant = _plant(name, {**values, 'limits.rate': min(asked, RATE_SHARE * turning)})
+        plant = _plant(sheet, name, {**values, 'limits.rate': min(asked, RATE_SHARE * turning)})
         limits = getattr(acu, name).limits
         braking = dataclasses.replace(limits, acceleration=loops.rate_slope(plant)).deceleration
         stopping = ends.stopping_rate(0.5 * (limits.high - limits.low), braking, acu.reaction)
@@ -136,10 +140,10 @@ def sections(sheet, title):
     w_s = 2.0 * math.pi * loops.DEFAULT_SPEED_CROSSOVER_HZ
     for name in AXES:
         values = axis(sheet, name)
-        plant = _plant(name, values)
+        plant = _plant(sheet, name, values)
         values |= loops.drive_gains(plant, w_s)
         found['adu'] |= {f'{name}.{key}': value for key, value in values.items()}
-        gains = loops.control_gains(plant, w_s, w_s / loops.CROSSOVER_RATIO)
+        gains = loops.control_gains(plant, w_s, loops.position_crossover(plant, w_s))
         found['acu'] |= {f'{name}.{key}': value for key, value in gains.items()}
     rounded = {node: {key: float(f'{value:.4g}') if isinstance(value, float) else value for key, value in own.items()}
                for node, own in found.items()}

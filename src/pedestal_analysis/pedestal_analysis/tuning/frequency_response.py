@@ -85,6 +85,9 @@ CURRENT_SWEEP = Sweep(period=0.1, lowest=10.0, highest=4000.0, points=60, droppe
 SPEED_SWEEP = Sweep(period=1.0, lowest=1.0, highest=900.0, points=120, dropped=2, kept=4, peak=0.015)
 """Sweep of the speed loop; peak in rad/s of the load: 6 Nm of a motor, less than the bias torque."""
 
+FLEXIBLE_SPEED_SWEEP = dataclasses.replace(SPEED_SWEEP, period=8.0, lowest=0.25, points=400, dropped=3, kept=2)
+"""Sweep of the speed loop of a flexible axis, whose swing is narrow and decays slowly."""
+
 POSITION_SWEEP = Sweep(period=8.0, lowest=0.25, highest=95.0, points=300, dropped=2, kept=3, peak=0.012)
 """Sweep of the position loop, up to nearly half of 1 / 5 ms; peak in rad/s.
 
@@ -162,10 +165,10 @@ def current(drive, sweep=CURRENT_SWEEP):
             for j, motor in enumerate(MOTOR_FIELDS)}
 
 
-def speed(drive, sweep=SPEED_SWEEP):
-    """Return the Responses {name: Response} of the speed loops of both axes."""
+def speed(drive, sweep=SPEED_SWEEP, axes=AXES):
+    """Return the Responses {name: Response} of the speed loops of some axes."""
     responses = {}
-    for i, name in enumerate(AXES):
+    for i, name in ((AXES.index(name), name) for name in axes):
         rate = _rate(i, getattr(drive, name).limits.rate)
         command = rate + _at_most(sweep, rate).signal(axis.SPEED_LOOP_PERIOD_S)
         measured, _, _ = _run_inner(drive, i, command, np.zeros(len(command) * axis.CURRENT_LOOP_STEP_COUNT))
@@ -225,10 +228,10 @@ def _crossings(f, y, angle):
     return f[i] * (f[i + 1] / f[i]) ** share, angle[i] + share * change
 
 
-def margins(measured):
+def margins(measured, last=False):
     """Return {metric: (value, unit)} of a Response; NaN if the band has no such frequency.
 
-    crossover     first frequency at which |L| falls below 1
+    crossover     first (`last`: last) frequency at which |L| falls below 1
     phase_margin  smallest phase shift, of either sign, that moves a point of |L| = 1 to -1
     gain_margin   smallest gain that moves a point to -1
     bandwidth     first frequency at which |T| falls below -3 dB
@@ -244,7 +247,7 @@ def margins(measured):
     at_minus = at_minus[at_minus < 0.0]
     below = _crossings(f, np.log(T) - 0.5 * math.log(0.5), T)[0]
     return {'bandwidth_hz': (below[0] if below.size else math.nan, 'Hz'),
-            'crossover_hz': (crossover[0] if crossover.size else math.nan, 'Hz'),
+            'crossover_hz': (crossover[-int(last)] if crossover.size else math.nan, 'Hz'),
             'gain_margin_db': (-20.0 / math.log(10.0) * at_minus.max() if at_minus.size else math.nan, 'dB'),
             'phase_margin_deg': (math.degrees(margin.min()) if margin.size else math.nan, 'deg'),
             'peak_db': (20.0 * math.log10(T.max()), 'dB')}
