@@ -107,6 +107,15 @@ def test_a_rate_out_of_reach_becomes_nine_tenths_of_what_is_reached(pedestal, tm
     assert taken == pytest.approx(0.9 * reached, rel=0.01) and math.degrees(rate) == pytest.approx(taken, rel=1e-3)
 
 
+def test_an_assumed_structure_is_announced(pedestal, tmp_path):
+    expected = 'no --mode: 4.3 Hz, the average of antennas of 9 m, is taken for the structure'
+    for name, options, assumed in (('average', (), True), ('given', ('--mode', '5'), False),
+                                   ('rigid', ('--mode-share', '0'), False)):
+        _, output, _ = pedestal('new', f'{name}.yaml', '--mirror', '9', *options)
+        assert (expected in output.splitlines()) == assumed
+        assert (f'# {expected}' in (tmp_path / f'{name}.yaml').read_text()) == assumed
+
+
 def test_no_file_is_overwritten(pedestal, tmp_path):
     (tmp_path / 'my.yaml').write_text('mine')
     assert 'already exists' in pedestal('new', 'my.yaml')[2] and (tmp_path / 'my.yaml').read_text() == 'mine'

@@ -173,11 +173,14 @@ def text(found, head):
 
 
 def new(sheet, name, command):
-    """Return the text of the scenario file of a DataSheet, and a line for each value of the sheet that was changed.
+    """Return the text of the scenario file of a DataSheet, and a line for each changed or assumed value.
 
     Raises ScenarioError for values that contradict each other.
     """
     sheet, remarks = attainable(sheet)
+    if sheet.mode_share and not sheet.mode:
+        remarks.append(f'no --mode: {sheet.structural_frequency:.3g} Hz, the average of antennas of '
+                       f'{sheet.mirror:g} m, is taken for the structure')
     title = f'{sheet.mirror:g} m antenna, beam {math.degrees(sheet.theta):.3g} deg, on the mission of {sheet.like}'
     found = sections(sheet, title)
     content = text(found, (f'made by: {command}', 'Values that are not in the data sheet are scaled from the antenna '

@@ -228,10 +228,10 @@ def _crossings(f, y, angle):
     return f[i] * (f[i + 1] / f[i]) ** share, angle[i] + share * change
 
 
-def margins(measured, last=False):
+def margins(measured, above=0.0):
     """Return {metric: (value, unit)} of a Response; NaN if the band has no such frequency.
 
-    crossover     first (`last`: last) frequency at which |L| falls below 1
+    crossover     first frequency from `above` [Hz] on at which |L| falls below 1
     phase_margin  smallest phase shift, of either sign, that moves a point of |L| = 1 to -1
     gain_margin   smallest gain that moves a point to -1
     bandwidth     first frequency at which |T| falls below -3 dB
@@ -240,6 +240,7 @@ def margins(measured, last=False):
     f, L, T = measured.frequency, measured.open_loop, np.abs(measured.closed_loop)
     gain, from_minus_one = np.log(np.abs(L)), np.angle(-L)
     crossover, margin = _crossings(f, gain, from_minus_one)
+    crossover = crossover[crossover >= above]
     margin = np.abs(np.angle(np.exp(1j * margin)))
     # Points of L on the negative real axis, by the logarithm of their gain; a gain above 1 (log above 0) is left out.
     near = np.where(np.abs(from_minus_one) < 0.5 * math.pi, from_minus_one, np.nan)
@@ -247,7 +248,7 @@ def margins(measured, last=False):
     at_minus = at_minus[at_minus < 0.0]
     below = _crossings(f, np.log(T) - 0.5 * math.log(0.5), T)[0]
     return {'bandwidth_hz': (below[0] if below.size else math.nan, 'Hz'),
-            'crossover_hz': (crossover[-int(last)] if crossover.size else math.nan, 'Hz'),
+            'crossover_hz': (crossover[0] if crossover.size else math.nan, 'Hz'),
             'gain_margin_db': (-20.0 / math.log(10.0) * at_minus.max() if at_minus.size else math.nan, 'dB'),
             'phase_margin_deg': (math.degrees(margin.min()) if margin.size else math.nan, 'deg'),
             'peak_db': (20.0 * math.log10(T.max()), 'dB')}

@@ -133,6 +133,11 @@ class Plant:
         return structure.frequency if structure.inertia_share > 0.0 else 0.0
 
     @property
+    def free_mode(self):
+        """Frequency of the structure on a free axis [Hz], 0 if no structure is declared."""
+        return self.mode / math.sqrt(1.0 - self.axis.structure.inertia_share)
+
+    @property
     def gear_inertia(self):
         """Inertia that one motor moves above the frequency of the structure, on its shaft [kg m2]."""
         on_gear = (1.0 - self.axis.structure.inertia_share) * self.axis.load.inertia
@@ -273,8 +278,8 @@ class Loops:
         found = self.response(loop, name, corner)
         if found is None:
             return None
-        # The dish holds a flexible axis at its own frequency. There |L| falls below 1 before it does at the crossover.
-        return frequency.margins(found, last=loop == 'speed' and self.plants[name].mode > 0.0)
+        # The dish holds a flexible axis at its own frequency. There |L| falls below 1 long before the crossover.
+        return frequency.margins(found, above=corner[1] * self.plants[name].free_mode if loop == 'speed' else 0.0)
 
     def close(self, loop, name, required, set_to, fastest):
         """Return (w, rows) of the first loop, from crossover `fastest` [rad/s] down, that meets LoopRequirements.
