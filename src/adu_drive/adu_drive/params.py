@@ -14,6 +14,9 @@ from pedestal_common.parameters import ParameterError, Parameters, choice, flag,
 SPEED_LOOP_PERIOD_S = 0.5e-3
 """Period of the speed loop, five periods of the current loop [s]."""
 
+PLANT_PERIOD_S = 50e-6
+"""Step of the simulated plant, half a period of the current loop [s]."""
+
 MAX_TRANSPORT_DELAY_S = 0.1
 """Longest transport delay [s]."""
 
@@ -30,6 +33,12 @@ def whole_speed_periods(name, value):
     if abs(value / SPEED_LOOP_PERIOD_S - periods) > 1e-6:
         raise ParameterError(f'{name} = {value:g} s: must be a multiple of {SPEED_LOOP_PERIOD_S:g} s (the speed loop)')
     return periods
+
+
+def mesh_inertia(motor, ratio, load):
+    """Return the inertia [kg m2] that swings in a mesh, at the load: a motor in series with half of the load on the
+    gears; inertias in kg m2."""
+    return 1.0 / (1.0 / (motor * ratio**2) + 2.0 / load)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -64,6 +73,11 @@ class MotorParameters(Parameters):
     def torque_constant(self):
         """Torque per torque-making current, 3/2 p psi [Nm/A]."""
         return 1.5 * self.pole_pairs * self.flux_linkage
+
+    def reachable_rate(self, ratio):
+        """Return the rate of the axis [rad/s] that the motor reaches at its voltage; ratio: turns per turn of the
+        axis."""
+        return 0.98 * self.voltage / (self.pole_pairs * self.flux_linkage * ratio)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -105,8 +119,8 @@ class GearTrainParameters(Parameters):
     reducer_ratio: float = parameter(8.0, 1.0, 1000.0, '', 'ratio of the planetary reducer')
     pinion_ratio: float = parameter(8.0, 1.0, 100.0, '', 'ratio of bull gear to pinion')
     lash: float = parameter(1e-3, 0.0, 0.05, 'rad', 'total lash of one mesh on the load axis')
-    stiffness: float = parameter(5e6, 1e3, 1e9, 'Nm/rad', 'stiffness of one mesh on the load axis')
-    damping: float = parameter(5e3, 0.0, 1e6, 'Nms/rad', 'damping of one mesh on the load axis')
+    stiffness: float = parameter(5e6, 1e3, 1e12, 'Nm/rad', 'stiffness of one mesh on the load axis')
+    damping: float = parameter(5e3, 0.0, 1e9, 'Nms/rad', 'damping of one mesh on the load axis')
     runout: float = parameter(0.0, 0.0, 0.01, 'rad', 'transmission error on the load axis, once per pinion turn')
     tooth_error: float = parameter(0.0, 0.0, 0.01, 'rad', 'transmission error on the load axis, once per tooth')
     pinion_teeth: int = parameter(20, 5, 200, '', 'number of teeth of each pinion')
@@ -275,12 +289,26 @@ class AxisParameters(Parameters):
     faults: FaultParameters = group(FaultParameters)
 
     def check(self):
-        """Raise ParameterError for a rate that the motors cannot reach at their voltage."""
+        """Raise ParameterError for a rate that the motors cannot reach at their voltage, or for a mesh that the
+        simulation cannot follow."""
         for motor in (self.motor_1, self.motor_2):
-            top = 0.98 * motor.voltage / (motor.pole_pairs * motor.flux_linkage * self.gear_train.ratio)
+            top = motor.reachable_rate(self.gear_train.ratio)
             if self.limits.rate > top:
                 raise ParameterError(f'limits.rate = {self.limits.rate:g} rad/s: must be at most {top:g}, which '
                                      f'the motors reach at ratio {self.gear_train.ratio:g} and {motor.voltage:g} V')
+            self._check_mesh(motor)
+
+    def _check_mesh(self, motor):
+        """Raise ParameterError if a mesh is unstable in the simulation, semi-implicit Euler: 2 h c + h^2 k > 4 M."""
+        g, h = self.gear_train, PLANT_PERIOD_S
+        inertia = 4.0 * mesh_inertia(motor.inertia, g.ratio, (1.0 - self.structure.inertia_share) * self.load.inertia)
+        for name, part, other, unit in (('damping', 2.0 * h, 0.0, 'Nms/rad'),
+                                        ('stiffness', h * h, 2.0 * h * g.damping, 'Nm/rad')):
+            highest = (inertia - other) / part
+            if getattr(g, name) > highest:
+                raise ParameterError(f'gear_train.{name} = {getattr(g, name):g} {unit}: must be at most {highest:g} '
+                                     f'for the step of the simulated plant, {h:g} s, with the inertia of the motors '
+                                     f'at ratio {g.ratio:g}')
 
 
 @dataclasses.dataclass(frozen=True)

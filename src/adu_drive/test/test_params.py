@@ -4,6 +4,7 @@ import pytest
 
 from adu_drive import drive_unit
 from adu_drive.params import (
+    PLANT_PERIOD_S,
     AduParameters,
     AxisParameters,
     BeamParameters,
@@ -34,6 +35,8 @@ def test_table_1_of_paper_000():
     (lambda: LimitParameters(lower=1.0, upper=1.0), 'upper = 1'),
     (lambda: FrictionParameters(breakaway=50.0), 'breakaway = 50'),
     (lambda: AxisParameters(motor_1=MotorParameters(voltage=200.0)), 'limits.rate = 2.45'),
+    (lambda: build(AduParameters, {'azimuth.gear_train.stiffness': 1e11}), 'gear_train.stiffness = 1e+11 Nm/rad'),
+    (lambda: build(AduParameters, {'azimuth.gear_train.damping': 2e6}), 'gear_train.damping = 2e+06 Nms/rad'),
     (lambda: EncoderParameters(load_bits=math.nan), 'load_bits'),
     (lambda: BeamParameters(period=0.01, transport_delay=0.021), 'transport_delay = 0.021 s: must be a multiple of'),
     (lambda: BeamParameters(period=1e-4, transport_delay=0.3), 'transport_delay = 0.3 s: must be below 511 periods'),
@@ -45,6 +48,22 @@ def test_bad_parameters_are_named(make, words):
     with pytest.raises(ParameterError) as error:
         make()
     assert words in str(error.value)
+
+
+def test_a_mesh_is_refused_where_the_simulated_plant_becomes_unstable():
+    """One motor and half of the load on a spring, 2000 steps of semi-implicit Euler on both sides of the limit."""
+    with pytest.raises(ParameterError) as error:
+        build(AduParameters, {'azimuth.gear_train.stiffness': 1e12})
+    highest = float(str(error.value).split('at most ')[1].split()[0])
+    p = AduParameters().azimuth
+    M, J, c = p.motor_1.inertia * p.gear_train.ratio**2, 0.5 * p.load.inertia, p.gear_train.damping
+    for k, stable in ((0.99 * highest, True), (1.01 * highest, False)):
+        x, v, largest = 1e-6, 0.0, 0.0
+        for _ in range(2000):
+            v -= PLANT_PERIOD_S * (k * x + c * v) * (1.0 / M + 1.0 / J)
+            x += PLANT_PERIOD_S * v
+            largest = max(largest, abs(x))
+        assert (largest < 1e-4) == stable
 
 
 def test_names_reach_the_constants():

@@ -16,7 +16,7 @@ SHIPPED = ('uav_tracker_3m', 'leo_station_7m', 'ship_terminal_1m2')
 
 def test_the_data_sheet_of_the_known_antenna_gives_it_back():
     """Paper 000's motor and the plant around it, but for what the scaling rounds: 3 % of inductance and resistance."""
-    found = antenna_from_data_sheet.sections(DataSheet(), 'known')
+    found = antenna_from_data_sheet.sections(DataSheet(mode_share=0.0), 'known')
     chosen = scenario.parse('known', antenna_from_data_sheet.text(found, ['known']))
     for axis in loops.AXES:
         known = as_dict(getattr(scenario.load('leo_pass').node_parameters('adu'), axis))
@@ -25,6 +25,19 @@ def test_the_data_sheet_of_the_known_antenna_gives_it_back():
             if isinstance(value, float) and not key.startswith(('speed_loop', 'bias', 'limits.deceleration')):
                 lash = key == 'gear_train.lash' and axis == 'elevation'  # 0.8 mrad there, one number in the sheet
                 assert lash or made[key] == pytest.approx(value, rel=0.03), (axis, key)
+
+
+def test_the_structure_of_the_data_sheet_goes_into_the_plant():
+    """Without --mode the average frequency of antennas of the diameter: 34 m have about 2 Hz, 70 m about 1 Hz."""
+    for sheet, expected in ((DataSheet(mode=4.0, mode_share=0.4), 4.0), (DataSheet(mirror=13.0), 3.32),
+                            (DataSheet(mirror=34.0), 1.69)):
+        text = antenna_from_data_sheet.text(antenna_from_data_sheet.sections(sheet, 'flexible'), [])
+        drive = scenario.parse('flexible', text).node_parameters('adu')
+        for axis in loops.AXES:
+            structure = getattr(drive, axis).structure
+            assert structure.frequency == expected and structure.inertia_share == sheet.mode_share
+    assert 'structure' not in antenna_from_data_sheet.text(
+        antenna_from_data_sheet.sections(DataSheet(mode_share=0.0), 'rigid'), [])
 
 
 def test_a_motor_turns_at_its_rated_speed_and_torque():
@@ -63,8 +76,8 @@ def test_what_ships_is_made_by_the_commands_in_its_head(pedestal, tmp_path, name
 
 
 @pytest.mark.parametrize('arguments, expected', [
-    (('--rate-azimuth', '400'), 'adu.azimuth: limits.rate = 6.98132 rad/s: must be at most'),
     (('--mirror', '400'), 'mirror = 400 m: must be 0.1 to 40'),
+    (('--mode', '0.5'), 'mode = 0.5 Hz: must be 1 to 200'),
     (('--like', 'leo_pas'), "like = 'leo_pas': must be one of leo_pass, uav_flyby, ship_pass"),
     (('--motor-torque', '0.2'), 'adu.azimuth: motor_1.resistance = 128.706 ohm: must be 0.01 to 100'),
     (('--motor-torque', '1', '--inertia-azimuth', '40000'), 'adu.azimuth: the motors cannot move the axis'),
@@ -73,6 +86,34 @@ def test_a_sheet_that_cannot_be_is_refused(pedestal, tmp_path, arguments, expect
     code, output, errors = pedestal('new', 'my.yaml', *arguments)
     assert (code, output) == (1, '') and expected in errors and errors.count('\n') == 1
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize('arguments, axis, expected', [
+    (('--rate-azimuth', '400'), 'azimuth', '--rate-azimuth 400: the motors reach 162 deg/s at ratio 64; '),
+    (('--ratio-elevation', '300'), 'elevation', '--rate-elevation 97: the motors reach 34.6 deg/s at ratio 300; '),
+    (('--inertia-azimuth', '40000'), 'azimuth',
+     '--rate-azimuth 140: the motors can stop the axis within half of its travel from 63.5 deg/s; '),
+    (('--mirror', '13', '--inertia-azimuth', '140000', '--ratio-azimuth', '1500', '--motor-torque', '45'), 'azimuth',
+     '--rate-azimuth 140: the motors reach 6.92 deg/s at ratio 1500; '),
+])
+def test_a_rate_out_of_reach_becomes_nine_tenths_of_what_is_reached(pedestal, tmp_path, arguments, axis, expected):
+    """The verb says so, and the file says it too."""
+    code, output, _ = pedestal('new', 'my.yaml', *arguments)
+    [line] = (line for line in output.splitlines() if line.startswith(expected))
+    reached, taken = (float(part.rpartition(' deg/s')[0].split()[-1]) for part in
+                      (line.partition(' at ratio')[0].partition(';')[0], line))
+    rate = getattr(scenario.load(tmp_path / 'my.yaml').node_parameters('adu'), axis).limits.rate
+    assert code == 0 and f'# {line}' in (tmp_path / 'my.yaml').read_text()
+    assert taken == pytest.approx(0.9 * reached, rel=0.01) and math.degrees(rate) == pytest.approx(taken, rel=1e-3)
+
+
+def test_an_assumed_structure_is_announced(pedestal, tmp_path):
+    expected = 'no --mode: 4.3 Hz, the average of antennas of 9 m, is taken for the structure'
+    for name, options, assumed in (('average', (), True), ('given', ('--mode', '5'), False),
+                                   ('rigid', ('--mode-share', '0'), False)):
+        _, output, _ = pedestal('new', f'{name}.yaml', '--mirror', '9', *options)
+        assert (expected in output.splitlines()) == assumed
+        assert (f'# {expected}' in (tmp_path / f'{name}.yaml').read_text()) == assumed
 
 
 def test_no_file_is_overwritten(pedestal, tmp_path):

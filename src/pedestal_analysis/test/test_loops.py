@@ -3,7 +3,9 @@ import math
 
 import pytest
 
+from pedestal_analysis.results import results
 from pedestal_analysis.tuning import loops
+from pedestal_bringup.loop import memory_recording
 from pedestal_bringup.scenario import scenario
 
 SOFT = ('adu.azimuth.gear_train.stiffness=8e5', 'adu.azimuth.gear_train.damping=400')
@@ -47,6 +49,66 @@ def test_what_is_asked_is_the_crossover_of_the_position_loop():
         rows = {loop: margins for loop, _, _, margins in loops.design(
             each, ('azimuth',), loops.LoopRequirements(28.0, asked), lambda share, text: None)}
         assert rows['position']['crossover_hz'][0] == pytest.approx(asked, rel=0.12)
+
+
+def test_an_axis_slower_than_the_rate_of_the_measurement():
+    """2 deg/s in azimuth, 1 deg/s in elevation: the same loops as of the fast axis. The friction of a motor that turns
+    below 1 rad/s damps the speed loop by 2 to 5 deg more."""
+    asked, slow = loops.LoopRequirements(), {'azimuth': math.radians(2.0), 'elevation': math.radians(1.0)}
+    found = []
+    for changes in ((), [f'adu.{axis}.limits.rate={rate}' for axis, rate in slow.items()]):
+        each = loops.Loops('leo_pass', changes)
+        found.append([margins for *_, margins in loops.design(each, loops.AXES, asked, lambda share, text: None)])
+        assert each.gains['acu.azimuth.feedforward.bandwidth'] == pytest.approx(22.0, rel=0.01)
+    for fast, slow in zip(*found):
+        assert slow['phase_margin_deg'][0] == pytest.approx(fast['phase_margin_deg'][0], abs=6.0)
+        assert slow['crossover_hz'][0] == pytest.approx(fast['crossover_hz'][0], rel=0.05)
+
+
+NINE_METRES = ('--mirror', '9', '--inertia-azimuth', '28000', '--inertia-elevation', '21000', '--ratio-azimuth', '700',
+               '--ratio-elevation', '800', '--motor-torque', '25', '--rate-azimuth', '10', '--rate-elevation', '10')
+"""A dish of 9 m whose structure is at 4 Hz."""
+
+
+def test_a_flexible_dish_is_tracked_also_if_inertia_and_frequency_are_wrong(pedestal, tmp_path):
+    """40 % of the dish swing at 4 Hz. The shaper of a rigid dish with these motors loses the target in a second."""
+    assert pedestal('new', 'dish.yaml', *NINE_METRES, '--mode', '4', '--mode-share', '0.4')[0] == 0
+    code, output, _ = pedestal('tune', 'dish.yaml', '--loops')
+    assert code == 0 and sum('worst' in line for line in output.splitlines()) == 4
+    tuned = scenario.file_overrides(tmp_path / 'dish-loops.yaml')
+
+    def tracked(changes):
+        overrides = [*tuned, *(f'{key}={value}' for key, value in changes.items())]
+        chosen = scenario.load(tmp_path / 'dish.yaml', overrides, duration=60.0)
+        return results.measured(results.of_bag(memory_recording.record(chosen)))
+
+    antenna = scenario.load(tmp_path / 'dish.yaml').node_parameters('tracking_receiver').antenna
+    for inertia, mode in ((1.0, 1.0), (1.3, 0.8), (0.7, 0.8)):
+        changes = {f'adu.{axis}.load.inertia': inertia * J for axis, J in (('azimuth', 28e3), ('elevation', 21e3))}
+        found = tracked({**changes, **{f'adu.{axis}.structure.frequency': 4.0 * mode for axis in loops.AXES}})
+        assert found['tracked_percent'][0] > 90.0 and found['loss_s'][0] == 0.0
+        assert found['pointing_rms_deg'][0] < 0.01 * math.degrees(antenna.beamwidth)
+    rigid = {'acceleration': 2.2, 'jerk': 300.0, 'h0': 0.02}
+    lost = tracked({f'acu.{axis}.shaper.{key}': value for axis in loops.AXES for key, value in rigid.items()})
+    assert lost['tracked_percent'][0] < 10.0
+
+
+def test_the_shaper_of_a_flexible_dish_leaves_no_swing():
+    """A dish on a spring, base accelerated to a with the jerk: after the rise it hangs back by a / w^2, and swings by
+    nothing if its frequency is as declared, by a quarter of that if it is 20 % off."""
+    plant = loops.Loops('leo_pass', [f'adu.azimuth.structure.{key}' for key in ('inertia_share=0.4', 'frequency=4')]
+                        ).plants['azimuth']
+    gains = loops.shaper_gains(plant, 176.0)
+    a, bend = gains['acceleration'], gains['acceleration'] / (2.0 * math.pi * 4.0)**2
+    assert bend == pytest.approx(0.8e-3) and gains['h0'] == pytest.approx(0.2)
+    for mode, swing in ((4.0, 0.01), (3.2, 0.26), (4.8, 0.26)):
+        w, x, v, dt, after = 2.0 * math.pi * mode, 0.0, 0.0, 1e-4, []
+        for k in range(20000):
+            v += dt * (-w * w * x - min(gains['jerk'] * k * dt, a))
+            x += dt * v
+            if gains['jerk'] * k * dt > a:
+                after.append(x + a / w**2)
+        assert max(map(abs, after)) < swing * a / w**2
 
 
 def test_the_design_is_that_of_a_rigid_drive():

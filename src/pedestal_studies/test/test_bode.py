@@ -2,7 +2,7 @@
 
 The model is sampled exactly: windings, rotors, load and meshes under voltages held for 100 us, the controllers' sums
 at their own periods. It leaves out friction (constant at a constant rate), encoder counts and the plant's own step,
-which turns the phase by what 50 us are at a frequency (semi-implicit Euler: a rate acts in the step that made it).
+which turns the phase by what its length is at a frequency (semi-implicit Euler: a rate acts in the step that made it).
 """
 import dataclasses
 import json
@@ -14,10 +14,16 @@ import pytest
 
 from adu_drive.params import AduParameters
 from pedestal_analysis.results import tracking
+from pedestal_analysis.tuning import antenna_from_data_sheet, loops
 from pedestal_analysis.tuning import frequency_response as frequency
+from pedestal_analysis.tuning.data_sheet_format import DataSheet
+from pedestal_bringup.scenario import scenario
+from pedestal_common.parameters import as_dict, build
 from pedestal_studies.system import bode
 
-PLANT_PERIOD, CURRENT_PERIOD, SPEED_PERIOD = 5e-5, 1e-4, 5e-4
+CURRENT_PERIOD, SPEED_PERIOD = 1e-4, 5e-4
+RUN_STEP, FINE_STEP = 0.5 * CURRENT_PERIOD, CURRENT_PERIOD / frequency.SUB_STEP_COUNT
+"""Step of the plant in a run, and while the current and speed loops are measured [s]."""
 
 
 def held(system, times, dt):
@@ -145,25 +151,25 @@ def turning(p, f):
     return 1.0 / (1.0 + m.pole_pairs * m.flux_linkage / (m.inductance * s + m.resistance) * M(s) * (1.0 - D))
 
 
-def agrees(measured, loop, low, high, gain, phase, factor=None):
-    """Return True if L is within gain (relative) and phase [deg] (and 50 us) of the model from low to high [Hz]."""
+def agrees(measured, loop, low, high, gain, phase, factor=None, step=FINE_STEP):
+    """Return True if L is within gain (relative) and phase [deg] (and a step) of the model from low to high [Hz]."""
     band = (low <= measured.frequency) & (measured.frequency <= high)
     f = measured.frequency[band]
     ratio = measured.open_loop[band] / model_at(loop, f) / (factor(f) if factor else 1.0)
-    early = 360.0 * f * PLANT_PERIOD
+    early = 360.0 * f * step
     turned = np.degrees(np.angle(ratio))
     return np.all(np.abs(np.abs(ratio) - 1.0) < gain) and np.all((-phase < turned) & (turned < early + phase))
 
 
-def margins_agree(measured, loop, lowest):
-    """Margins within 1 dB and 3 deg of python-control's on a fine grid of the model from `lowest` [Hz]."""
+def margins_agree(measured, loop, lowest, gain=1.0, phase=3.0):
+    """Margins within gain [dB] and phase [deg] of python-control's on a fine grid of the model from `lowest` [Hz]."""
     f = np.geomspace(lowest, 0.45 / loop.dt, 20000)
     gm, pm, _, _, w_pm, _ = control.stability_margins(
         control.frd(model_at(loop, f), 2.0 * math.pi * f, smooth=True), returnall=True)
     ours = {metric: value for metric, (value, _) in frequency.margins(measured).items()}
     return (ours['crossover_hz'] == pytest.approx(np.min(w_pm) / (2.0 * math.pi), rel=0.01)
-            and ours['gain_margin_db'] == pytest.approx(20.0 * math.log10(np.min(gm[gm > 1.0])), abs=1.0)
-            and ours['phase_margin_deg'] == pytest.approx(np.min(np.abs(pm)), abs=3.0))
+            and ours['gain_margin_db'] == pytest.approx(20.0 * math.log10(np.min(gm[gm > 1.0])), abs=gain)
+            and ours['phase_margin_deg'] == pytest.approx(np.min(np.abs(pm)), abs=phase))
 
 
 def test_current_loops():
@@ -183,7 +189,24 @@ def test_speed_loops():
     for name, measured in frequency.speed(p, dataclasses.replace(frequency.SPEED_SWEEP, points=60, kept=3)).items():
         loop = open_speed_loop(getattr(p, name.partition('/')[2]))
         assert agrees(measured, loop, 2.0, 300.0, 0.015, 0.7)
-        assert margins_agree(measured, loop, 1.0)
+        assert margins_agree(measured, loop, 1.0, gain=0.3, phase=0.7)
+
+
+def test_speed_loops_of_a_new_antenna_near_its_required_margins():
+    """A 3 m dish with light motors: 46.3 deg and 7.6 dB in azimuth at the step of a run, in truth 43.3 and 6.7."""
+    sheet = DataSheet(mirror=3.0, inertia_azimuth=350.0, inertia_elevation=260.0, ratio_azimuth=110.0,
+                      ratio_elevation=120.0, motor_torque=12.0, rate_azimuth=30.0, rate_elevation=30.0, mode_share=0.0)
+    text = antenna_from_data_sheet.text(antenna_from_data_sheet.sections(sheet, 'a3'), [])
+    drive = scenario.parse('a3', text).node_parameters('adu')
+    slower = loops.drive_gains(loops.Plant('azimuth', drive.azimuth), loops.SLOWDOWN_FACTOR * 2.0 * math.pi * 28.0)
+    drive = build(type(drive), {**as_dict(drive), **{f'azimuth.{key}': value for key, value in slower.items()}})
+    found = frequency.speed(drive, dataclasses.replace(frequency.SPEED_SWEEP, peak=0.004))
+    for axis, phase, gain in (('azimuth', 43.3, 6.72), ('elevation', 49.9, 8.38)):
+        measured, loop = found[f'speed/{axis}'], open_speed_loop(getattr(drive, axis))
+        assert margins_agree(measured, loop, 1.0, gain=0.3, phase=0.8)
+        ours = {metric: value for metric, (value, _) in frequency.margins(measured).items()}
+        assert ours['phase_margin_deg'] == pytest.approx(phase, abs=0.8)
+        assert ours['gain_margin_db'] == pytest.approx(gain, abs=0.3)
 
 
 QUICK = dataclasses.replace(frequency.POSITION_SWEEP, points=80)
@@ -197,7 +220,8 @@ def test_position_loops():
     assert set(measured) == {'position/azimuth/feedforward', 'position/elevation/feedforward'}
     for name in axes:
         loop = open_position_loop(getattr(drive, name), pi_controller(getattr(acu, name).feedforward, T), T)
-        assert agrees(measured[f'position/{name}/feedforward'], loop, 0.25, 40.0, 0.025, 0.7)
+        assert agrees(measured[f'position/{name}/feedforward'], loop, 0.25, 40.0, 0.025, 0.7,
+                      step=RUN_STEP)
         assert margins_agree(measured[f'position/{name}/feedforward'], loop, 0.25)
 
 
@@ -209,7 +233,7 @@ def test_position_loop_of_the_paper():
     loop = open_position_loop(loaded.node_parameters('adu').azimuth,
                               pd_controller(c.bandwidth, c.derivative, c.derivative_time, T), T)
     measured = frequency.position(case, axes, QUICK)['position/azimuth/paper-r1']
-    assert agrees(measured, loop, 0.5, 40.0, 0.02, 0.7)
+    assert agrees(measured, loop, 0.5, 40.0, 0.02, 0.7, step=RUN_STEP)
     assert margins_agree(measured, loop, 0.25)
 
 
@@ -224,11 +248,33 @@ def test_flexible_structure_and_the_notch_against_it():
         if acu.notch.frequency > 0.0:
             loop = loop * notch_filter(acu.notch, T)
         measured = frequency.position(case, axes)[f'position/azimuth/{name}']
-        assert agrees(measured, loop, 0.25, 40.0, 0.04, 2.0)
+        assert agrees(measured, loop, 0.25, 40.0, 0.04, 2.0, step=RUN_STEP)
         assert margins_agree(measured, loop, 0.25)
         ours[name] = {metric: value for metric, (value, _) in frequency.margins(measured).items()}
     assert ours['structure']['phase_margin_deg'] < 20.0 and ours['structure']['gain_margin_db'] < 5.0
     assert ours['structure-notch']['phase_margin_deg'] > 40.0 and ours['structure-notch']['gain_margin_db'] > 10.0
+
+
+def test_loops_of_a_flexible_dish_hold_their_margins_with_another_inertia_and_frequency(tmp_path):
+    """The exact model of the 3 m dish with 40 % at 4 Hz: 45 deg and 6 dB with inertia +-30 % and frequency +-20 %."""
+    sheet = DataSheet(mirror=3.0, inertia_azimuth=350.0, inertia_elevation=260.0, ratio_azimuth=110.0,
+                      ratio_elevation=120.0, motor_torque=12.0, rate_azimuth=30.0, rate_elevation=30.0, mode=4.0,
+                      mode_share=0.4)
+    file = tmp_path / 'a3.yaml'
+    file.write_text(antenna_from_data_sheet.text(antenna_from_data_sheet.sections(sheet, 'a3'), []))
+    tuned = loops.Loops(file)
+    loops.design(tuned, ('azimuth',), loops.LoopRequirements(), lambda share, text: None)
+    changes = [scenario.override(*gain) for gain in tuned.gains.items()]
+    for inertia, mode in ((1.0, 1.0), *loops.CORNERS):
+        changed = scenario.load(file, [*changes, f'adu.azimuth.load.inertia={350.0 * inertia}',
+                                       f'adu.azimuth.structure.frequency={4.0 * mode}'])
+        p, c = changed.node_parameters('adu').azimuth, changed.node_parameters('acu').azimuth.feedforward
+        for loop in (open_speed_loop(p), open_position_loop(p, pi_controller(c, 5e-3), 5e-3)):
+            f = np.geomspace(0.2, 0.45 / loop.dt, 20000)
+            found = frequency.margins(frequency.Response(f, model_at(loop, f), np.zeros(len(f))))
+            assert found['phase_margin_deg'][0] > 43.0 and found['gain_margin_db'][0] > 5.7
+            # The angle of the axis, outside the speed loop, has its pole at 1.
+            assert np.abs(control.feedback(loop, 1).poles()).max() < 1.0 + 1e-9
 
 
 def known(loop):

@@ -7,11 +7,16 @@ of 210 kg m2). The scaling keeps the resonance frequencies of gears and motors:
                 rated torque; inertia with the torque to the power 5/3; friction and brake with the torque
     gear, load  stiffness, damping and viscous friction with the load's inertia; other friction and unbalance with
                 the inertia to the power 2/3
-    loops       the rigid design of tuning/loops.py; `pedestal tune --loops` then measures the loops
+    structure   the data sheet's lowest frequency, or the average of antennas of this diameter (data_sheet_format)
+    loops       the design of tuning/loops.py; `pedestal tune --loops` then measures the loops
+
+A rate of the data sheet that the axis cannot reach becomes RATE_SHARE of the rate that it reaches.
 """
+import dataclasses
 import math
 
-from adu_drive.params import AduParameters
+from acu_tracker.servo import ends
+from adu_drive.params import PLANT_PERIOD_S, AduParameters, mesh_inertia
 from pedestal_bringup.scenario import scenario
 from pedestal_bringup.scenario.program import Plan
 from pedestal_common.graph.topics import AXES
@@ -20,6 +25,9 @@ from pedestal_common.text_files import parameter_file
 
 BACK_EMF_SHARE, RESISTANCE_VOLTAGE_SHARE, INDUCTANCE_VOLTAGE_SHARE = 0.85, 0.033, 0.24
 """Shares of the phase voltage: back-EMF at rated speed, drops over resistance and inductance at rated torque [-]."""
+
+RATE_SHARE = 0.9
+"""Ratio of the rate that replaces an unreachable rate to the rate that an axis reaches [-]."""
 
 
 def motor(sheet, known):
@@ -53,7 +61,71 @@ def axis(sheet, name):
     values |= {f'friction.{key}': known[f'friction.{key}'] * share**(2.0 / 3.0)
                for key in ('coulomb', 'breakaway', 'stiffness', 'damping')}
     values['load.unbalance'] = known['load.unbalance'] * share**(2.0 / 3.0)
-    return values
+    if sheet.mode_share:
+        values |= {'structure.inertia_share': sheet.mode_share,
+                   'structure.frequency': float(f'{sheet.structural_frequency:.3g}')}
+    return values | _softer(name, values)
+
+
+def _softer(name, values):
+    """Return stiffness and damping of the meshes {key: value}, not above what the step of the simulated plant allows.
+
+    A gear that is scaled with a heavy load is too stiff for small motors.
+    """
+    known, h = getattr(AduParameters(), name), PLANT_PERIOD_S
+    J, N = values['load.inertia'], values['gear_train.reducer_ratio'] * known.gear_train.pinion_ratio
+    M = mesh_inertia(values['motor_1.inertia'], N, (1.0 - values.get('structure.inertia_share', 0.0)) * J)
+    return {'gear_train.damping': min(values['gear_train.damping'], M / h),
+            'gear_train.stiffness': min(values['gear_train.stiffness'], M / h**2)}
+
+
+def _plant(sheet, name, values):
+    """Return the loops.Plant of an axis with `values` {key: value}. Raises ParameterError, LoopError."""
+    from pedestal_analysis.tuning import loops
+    known = getattr(AduParameters(), name)
+    try:
+        return loops.Plant(name, build(type(known), {**as_dict(known), **values}), beamwidth=sheet.theta)
+    except ParameterError as error:
+        raise ParameterError(f'adu.{name}: {error}') from None
+
+
+def attainable(sheet):
+    """Return a DataSheet with rates that its axes reach, and a line for each rate that was changed.
+
+    An axis reaches the rate that its motors have at their voltage, and must stop from it within half of its travel.
+    Raises ScenarioError, ParameterError, LoopError.
+    """
+    from pedestal_analysis.tuning import loops
+    acu, remarks = scenario.load(sheet.like).node_parameters('acu'), []
+    for name in AXES:
+        asked, ratio = math.radians(getattr(sheet, f'rate_{name}')), getattr(sheet, f'ratio_{name}')
+        values = axis(sheet, name)
+        turning = min(motor.reachable_rate(ratio) for motor in _motors(name, values))
+        plant = _plant(sheet, name, {**values, 'limits.rate': min(asked, RATE_SHARE * turning)})
+        limits = getattr(acu, name).limits
+        braking = dataclasses.replace(limits, acceleration=loops.rate_slope(plant)).deceleration
+        stopping = ends.stopping_rate(0.5 * (limits.high - limits.low), braking, acu.reaction)
+        stopping /= loops.SHAPER_RATE_SHARE
+        if asked > min(turning, stopping):
+            reached = math.degrees(min(turning, stopping))
+            taken = float(f'{RATE_SHARE * reached:.3g}')
+            why = (f'the motors reach {reached:.3g} deg/s at ratio {ratio:g}' if turning <= stopping else
+                   f'the motors can stop the axis within half of its travel from {reached:.3g} deg/s')
+            remarks.append(f'--rate-{name} {math.degrees(asked):.4g}: {why}; {taken:g} deg/s is taken')
+            sheet = dataclasses.replace(sheet, **{f'rate_{name}': taken})
+    return sheet, remarks
+
+
+def _motors(name, values):
+    """Return both MotorParameters of an axis with `values` {key: value}."""
+    known = getattr(AduParameters(), name)
+    for number in (1, 2):
+        own = {key.partition('.')[2]: value for key, value in values.items() if key.startswith(f'motor_{number}.')}
+        default = getattr(known, f'motor_{number}')
+        try:
+            yield build(type(default), {**as_dict(default), **own})
+        except ParameterError as error:
+            raise ParameterError(f'adu.{name}: motor_{number}.{error}') from None
 
 
 def sections(sheet, title):
@@ -68,14 +140,10 @@ def sections(sheet, title):
     w_s = 2.0 * math.pi * loops.DEFAULT_SPEED_CROSSOVER_HZ
     for name in AXES:
         values = axis(sheet, name)
-        known = getattr(AduParameters(), name)
-        try:
-            plant = loops.Plant(name, build(type(known), {**as_dict(known), **values}))
-        except ParameterError as error:
-            raise ParameterError(f'adu.{name}: {error}') from None
+        plant = _plant(sheet, name, values)
         values |= loops.drive_gains(plant, w_s)
         found['adu'] |= {f'{name}.{key}': value for key, value in values.items()}
-        gains = loops.control_gains(plant, w_s, w_s / loops.CROSSOVER_RATIO)
+        gains = loops.control_gains(plant, w_s, loops.position_crossover(plant, w_s))
         found['acu'] |= {f'{name}.{key}': value for key, value in gains.items()}
     rounded = {node: {key: float(f'{value:.4g}') if isinstance(value, float) else value for key, value in own.items()}
                for node, own in found.items()}
@@ -105,13 +173,19 @@ def text(found, head):
 
 
 def new(sheet, name, command):
-    """Return the text of the scenario file of a DataSheet. Raises ScenarioError for values that contradict each
-    other."""
+    """Return the text of the scenario file of a DataSheet, and a line for each changed or assumed value.
+
+    Raises ScenarioError for values that contradict each other.
+    """
+    sheet, remarks = attainable(sheet)
+    if sheet.mode_share and not sheet.mode:
+        remarks.append(f'no --mode: {sheet.structural_frequency:.3g} Hz, the average of antennas of '
+                       f'{sheet.mirror:g} m, is taken for the structure')
     title = f'{sheet.mirror:g} m antenna, beam {math.degrees(sheet.theta):.3g} deg, on the mission of {sheet.like}'
     found = sections(sheet, title)
     content = text(found, (f'made by: {command}', 'Values that are not in the data sheet are scaled from the antenna '
                            'of the product: replace them by known values.',
                            f'Next: pedestal tune {name}.yaml --loops, then pedestal run {name}.yaml --params-file '
-                           f'{name}-loops.yaml'))
+                           f'{name}-loops.yaml', *remarks))
     scenario.parse(name, content)
-    return content
+    return content, remarks

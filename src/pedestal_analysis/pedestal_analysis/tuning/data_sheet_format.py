@@ -2,10 +2,13 @@
 import dataclasses
 import math
 
-from pedestal_common.parameters import Parameters, choice, parameter
+from pedestal_common.parameters import ParameterError, Parameters, choice, parameter
 
 LIGHT_SPEED_M_GHZ = 0.299792458
 """Speed of light [m GHz]."""
+
+MIN_MODE_HZ = 1.0
+"""Lowest frequency of a structure in the simulated plant [Hz]."""
 
 TEMPLATE_SCENARIOS = ('leo_pass', 'uav_flyby', 'ship_pass')
 """Scenarios that provide target and site."""
@@ -28,8 +31,29 @@ class DataSheet(Parameters):
     lash: float = parameter(1.0, 0.0, 50.0, 'mrad', 'lash of one gear mesh, referred to the load axis')
     rate_azimuth: float = parameter(140.0, 0.6, 1000.0, 'deg/s', 'largest rate of azimuth')
     rate_elevation: float = parameter(97.0, 0.6, 1000.0, 'deg/s', 'largest rate of elevation')
+    mode: float = parameter(0.0, 0.0, 200.0, 'Hz', 'lowest structural frequency with locked motors, 1 to 200; 0: '
+                            'computed as 20 Hz times the diameter in m to the power -0.7')
+    mode_share: float = parameter(0.5, 0.0, 0.9, '', 'share of the load inertia that swings with the lowest '
+                                  'structural frequency; 0: rigid structure')
     encoder_bits: int = parameter(22, 8, 32, 'bit', 'resolution of the load encoders, per turn')
     like: str = choice('leo_pass', TEMPLATE_SCENARIOS, 'scenario that provides target and site')
+
+    def check(self):
+        """Raise ParameterError for a structure that the plant cannot have."""
+        if 0.0 < self.mode < MIN_MODE_HZ:
+            raise ParameterError(f'mode = {self.mode:g} Hz: must be {MIN_MODE_HZ:g} to 200, or 0 for the average of '
+                                 'antennas of this diameter')
+
+    @property
+    def structural_frequency(self):
+        """Lowest frequency of the structure with locked motors [Hz]; without `mode` the average of antennas of this
+        diameter, 20 d^-0.7.
+
+        Source: W. Gawronski, Control and Pointing Challenges of Antennas and (Radio) Telescopes, IPN Progress Report
+        42-159 (JPL, 2004), and Modeling and Control of Antennas and Telescopes (Springer, 2008). Because single
+        antennas differ from the average, a measured frequency takes precedence.
+        """
+        return self.mode or 20.0 * self.mirror**-0.7
 
     @property
     def theta(self):

@@ -12,6 +12,18 @@ it has them. Per motor on its shaft, with the inertia J_m of a motor, J_L of the
     bias torque: 0.4 of the rated torque, held up to a torque of 0.47, zero at 1.5 of the rated torque
 
 T_load is the sum of friction, unbalance and mean wind. A quarter of the torque is a reserve for a heavier load.
+
+A declared structure (`adu.AXIS.structure`, inertia_share above 0) swings with the frequency f on locked motors. The
+receiver sees this swing as a motion of the target, and the shaper must not pass it on:
+
+    speed loop: J without the share of the dish, because the dish does not follow above f
+    position loop: at most K_p = 2 pi f / 3
+    shaper: a that bends the structure by a / (2 pi f)^2 of at most 0.8 mrad and a tenth of the beamwidth, and needs
+            half of the torque, up to which the bias torque keeps the teeth closed; jerk a f, so that the acceleration
+            rises within one period of the swing and leaves no swing behind; h0 = 0.8 / f
+
+Each of these values is the smaller one of the two designs (of h0 the larger one). The margins are then measured with
+the structure in the plant, also with the load inertia changed by 30 % and f by 20 %, and the smallest margins count.
 """
 import dataclasses
 import math
@@ -28,6 +40,26 @@ from pedestal_recording import configuration
 
 DEFAULT_SPEED_CROSSOVER_HZ, CROSSOVER_RATIO = 28.0, 8.0
 """Default crossover of the speed loop [Hz], and ratio of the crossovers of speed and position loop [-]."""
+
+TORQUE_SHARE, SHAPER_RATE_SHARE = 0.75, 0.94
+"""Shares of the shaper in the acceleration and in the rate of the axis [-]."""
+
+MAX_BEND_RAD, BEND_SHARE = 0.8e-3, 0.1
+"""Largest bend of a structure under the shaper's acceleration [rad], and its largest ratio to the beamwidth [-]."""
+
+CLOSED_TEETH_SHARE = 0.5
+"""Share of the torque limit that the shaper uses on a flexible structure: `bias.out`, above which no bias torque keeps
+the teeth closed [-]."""
+
+MODE_H0, MODE_RATIO = 0.8, 3.0
+"""Filter step of the shaper times the frequency of the structure, and least ratio of that frequency to the crossover
+of the position loop [-]."""
+
+CORNERS = tuple((inertia, mode) for inertia in (0.7, 1.3) for mode in (0.8, 1.2))
+"""Factors of load inertia and frequency of the structure with which the loops must hold their margins, too [-]."""
+
+WORST_SUFFIX = ', worst'
+"""Suffix of the name of a loop in the row with its smallest margins in all CORNERS."""
 
 SLOWDOWN_FACTOR, MAX_SLOWDOWNS = 0.85, 12
 """Factor by which a loop without its margins is made slower, and number of tried crossovers."""
@@ -65,13 +97,14 @@ class LoopRequirements:
 
 @dataclasses.dataclass(frozen=True)
 class Plant:
-    """Rigid model of one axis, from its adu_drive.params.AxisParameters and the mean wind torque [Nm].
+    """Model of one axis, from its adu_drive.params.AxisParameters, the mean wind torque [Nm] and the beamwidth [rad].
 
     Raises LoopError if the motors cannot move the axis.
     """
     name: str
     axis: object
     wind: float = 0.0
+    beamwidth: float = math.inf
 
     def __post_init__(self):
         if self.acceleration <= 0.0:
@@ -94,6 +127,23 @@ class Plant:
         return self.motor_inertia + self.axis.load.inertia / (2.0 * self.ratio**2)
 
     @property
+    def mode(self):
+        """Frequency of the structure on locked motors [Hz], 0 if no structure is declared."""
+        structure = self.axis.structure
+        return structure.frequency if structure.inertia_share > 0.0 else 0.0
+
+    @property
+    def free_mode(self):
+        """Frequency of the structure on a free axis [Hz], 0 if no structure is declared."""
+        return self.mode / math.sqrt(1.0 - self.axis.structure.inertia_share)
+
+    @property
+    def gear_inertia(self):
+        """Inertia that one motor moves above the frequency of the structure, on its shaft [kg m2]."""
+        on_gear = (1.0 - self.axis.structure.inertia_share) * self.axis.load.inertia
+        return self.motor_inertia + on_gear / (2.0 * self.ratio**2)
+
+    @property
     def whole_inertia(self):
         """Inertia of load and motors, seen at the load [kg m2]."""
         return 2.0 * self.inertia * self.ratio**2
@@ -106,25 +156,51 @@ class Plant:
                 ) / self.whole_inertia
 
 
+def rate_slope(plant):
+    """Return the largest change of the rate command [rad/s2], a quarter of the torque below the limits."""
+    return 1.3 * TORQUE_SHARE * plant.acceleration
+
+
 def drive_gains(plant, w_s):
     """Return {key of adu.AXIS: value} for a crossover w_s [rad/s] of the speed loop."""
-    K_p, rated = w_s * plant.inertia, plant.axis.thermal.rated_torque
+    K_p, rated = w_s * plant.gear_inertia, plant.axis.thermal.rated_torque
     return {'speed_loop.proportional': K_p, 'speed_loop.integral': K_p * w_s / 5.0,
             'speed_loop.load_inertia': plant.axis.load.inertia, 'bias.torque': 0.4 * rated, 'bias.hold': 0.47 * rated,
             'bias.out': 1.5 * rated, 'limits.deceleration': 0.5 * plant.acceleration}
 
 
+def position_crossover(plant, w_s):
+    """Return the crossover [rad/s] of the position loop that follows from that of the speed loop and the structure."""
+    w_p = w_s / CROSSOVER_RATIO
+    return min(w_p, 2.0 * math.pi * plant.mode / MODE_RATIO) if plant.mode else w_p
+
+
+def shaper_gains(plant, w_s):
+    """Return {key of acu.AXIS.shaper: value} for a crossover w_s [rad/s] of the speed loop."""
+    a, f = TORQUE_SHARE * plant.acceleration, plant.mode
+    if not f:
+        return {'acceleration': a, 'jerk': 0.75 * a * w_s, 'h0': 3.5 / w_s}
+    bend = min(MAX_BEND_RAD, BEND_SHARE * plant.beamwidth)
+    a = min(a, CLOSED_TEETH_SHARE * plant.acceleration, bend * (2.0 * math.pi * f) ** 2)
+    return {'acceleration': a, 'jerk': a * min(0.75 * w_s, f), 'h0': max(3.5 / w_s, MODE_H0 / f)}
+
+
 def control_gains(plant, w_s, w_p):
     """Return {key of acu.AXIS: value} for crossovers w_s, w_p [rad/s] of the speed and the position loop."""
-    a = 0.75 * plant.acceleration
+    shaper = {f'shaper.{key}': value for key, value in shaper_gains(plant, w_s).items()}
     return {'controller': 'feedforward', 'feedforward.bandwidth': w_p, 'feedforward.inertia': plant.whole_inertia,
-            'feedforward.friction': plant.axis.friction.coulomb, 'shaper.rate': 0.94 * plant.axis.limits.rate,
-            'shaper.acceleration': a, 'shaper.jerk': 0.75 * a * w_s, 'shaper.h0': 3.5 / w_s,
-            'limits.rate': plant.axis.limits.rate, 'limits.acceleration': 1.3 * a}
+            'feedforward.friction': plant.axis.friction.coulomb,
+            'shaper.rate': SHAPER_RATE_SHARE * plant.axis.limits.rate, **shaper,
+            'limits.rate': plant.axis.limits.rate, 'limits.acceleration': rate_slope(plant)}
 
 
 def _rounded(gains):
     return {key: value if isinstance(value, str) else float(f'{value:.4g}') for key, value in gains.items()}
+
+
+def smallest(every):
+    """Return the smallest value of each metric in several frequency.margins; NaN only if no margin has the metric."""
+    return {key: (np.fmin.reduce([margins[key][0] for margins in every]), unit) for key, (_, unit) in every[0].items()}
 
 
 def meets_margins(margins, required):
@@ -148,16 +224,23 @@ class Loops:
             raise LoopError(f'scenario {chosen.name}: an electronic beam has no loops to tune')
         self.source, self.overrides, self.name = source, tuple(overrides), chosen.name
         drive = chosen.node_parameters('adu')
-        self.plants = {name: Plant(name, getattr(drive, name), getattr(drive.wind, name)) for name in AXES}
+        beamwidth = chosen.node_parameters('tracking_receiver').antenna.beamwidth
+        self.plants = {name: Plant(name, getattr(drive, name), getattr(drive.wind, name), beamwidth) for name in AXES}
         self.gains = {}
 
     def set(self, node, name, gains):
         """Set gains {key: value} of an axis of a node."""
         self.gains |= {f'{node}.{name}.{key}': value for key, value in _rounded(gains).items()}
 
-    def _case(self):
+    def _case(self, corner=(1.0, 1.0)):
+        """Return the Case of a measurement; corner: factors of load inertia and frequency of flexible axes."""
         given = dict(text.split('=', 1) for text in self.overrides)
-        return frequency.case(self.name, self.source, {**given, **self.gains, **STILL_AIR_PARAMETERS})
+        changed = {}
+        for name, plant in self.plants.items():
+            if plant.mode and corner != (1.0, 1.0):
+                changed |= {f'adu.{name}.load.inertia': corner[0] * plant.axis.load.inertia,
+                            f'adu.{name}.structure.frequency': corner[1] * plant.mode}
+        return frequency.case(self.name, self.source, {**given, **self.gains, **changed, **STILL_AIR_PARAMETERS})
 
     def _sweep(self, axis, sweep, period):
         """Return a sweep with limited peak and frequency.
@@ -169,12 +252,13 @@ class Loops:
         return dataclasses.replace(sweep, peak=min(sweep.peak, peak or sweep.peak),
                                    highest=min(sweep.highest, 0.475 / period))
 
-    def response(self, loop, name):
+    def response(self, loop, name, corner=(1.0, 1.0)):
         """Return the frequency.Response of a loop of an axis with the present gains, None if the drive trips.
 
-        loop: 'current' (of the motor with the smaller phase margin), 'speed' or 'position'.
+        loop: 'current' (of the motor with the smaller phase margin), 'speed' or 'position'; corner: see CORNERS.
         """
-        drive = self._case().loaded().node_parameters('adu')
+        case = self._case(corner)
+        drive = case.loaded().node_parameters('adu')
         axis = getattr(drive, name)
         if loop == 'current':
             travel = drive.azimuth.limits
@@ -182,28 +266,37 @@ class Loops:
             found = frequency.current(dataclasses.replace(drive, azimuth=dataclasses.replace(axis, limits=limits)))
             return min(found.values(), key=lambda response: frequency.margins(response)['phase_margin_deg'][0])
         if loop == 'speed':
-            return frequency.speed(drive, self._sweep(axis, frequency.SPEED_SWEEP,
-                                                      SPEED_LOOP_PERIOD_S))[f'speed/{name}']
+            sweep = frequency.FLEXIBLE_SPEED_SWEEP if self.plants[name].mode else frequency.SPEED_SWEEP
+            return frequency.speed(drive, self._sweep(axis, sweep, SPEED_LOOP_PERIOD_S), (name,))[f'speed/{name}']
         sweep = self._sweep(axis, frequency.POSITION_SWEEP, drive.period)
-        found = frequency.position(self._case(), (name,), sweep)[f'position/{name}/{self.name}']
+        found = frequency.position(case, (name,), sweep)[f'position/{name}/{self.name}']
         # A tripped drive returns no signal.
         return found if np.isfinite(found.open_loop).all() and found.open_loop.all() else None
 
-    def measured(self, loop, name):
+    def measured(self, loop, name, corner=(1.0, 1.0)):
         """Return the frequency.margins of `response`, None if the drive trips."""
-        found = self.response(loop, name)
-        return frequency.margins(found) if found else None
+        found = self.response(loop, name, corner)
+        if found is None:
+            return None
+        # The dish holds a flexible axis at its own frequency. There |L| falls below 1 long before the crossover.
+        return frequency.margins(found, above=corner[1] * self.plants[name].free_mode if loop == 'speed' else 0.0)
 
     def close(self, loop, name, required, set_to, fastest):
-        """Return (w, margins) of the first loop, from crossover `fastest` [rad/s] down, that meets LoopRequirements.
+        """Return (w, rows) of the first loop, from crossover `fastest` [rad/s] down, that meets LoopRequirements.
 
+        rows: [(name of the loop, margins)], with the smallest values in all CORNERS if a structure is declared.
         set_to(w) sets the gains for w. Raises LoopError if no loop meets the requirements.
         """
         for w in fastest * SLOWDOWN_FACTOR**np.arange(MAX_SLOWDOWNS):
             set_to(w)
-            margins = self.measured(loop, name)
-            if margins and meets_margins(margins, required):
-                return w, margins
+            every = []
+            for corner in ((1.0, 1.0), *(CORNERS if self.plants[name].mode else ())):
+                margins = self.measured(loop, name, corner)
+                every.append(margins)
+                if not (margins and meets_margins(margins, required)):
+                    break
+            else:
+                return w, [(loop, every[0]), (f'{loop}{WORST_SUFFIX}', smallest(every))][:1 + (len(every) > 1)]
         found = 'the drive trips'
         if margins:
             phase, gain = margins['phase_margin_deg'][0], margins['gain_margin_db'][0]
@@ -224,7 +317,7 @@ def design(loops, axes, required, progress):
     for name in AXES:  # both axes are designed first, because both move in a measurement
         plant = loops.plants[name]
         loops.set('adu', name, drive_gains(plant, wanted_s))
-        loops.set('acu', name, control_gains(plant, wanted_s, wanted_s / CROSSOVER_RATIO))
+        loops.set('acu', name, control_gains(plant, wanted_s, position_crossover(plant, wanted_s)))
     for i, name in enumerate(axes):
         plant = loops.plants[name]
         progress(i / len(axes), f'{name}: current and speed loop')
@@ -233,19 +326,18 @@ def design(loops, axes, required, progress):
 
         def set_speed(w, name=name, plant=plant):
             loops.set('adu', name, drive_gains(plant, w))
-        reached[name], margins = loops.close('speed', name, required, set_speed, wanted_s)
-        rows.append(('speed', name, wanted_s / (2.0 * math.pi), margins))
+        reached[name], closed = loops.close('speed', name, required, set_speed, wanted_s)
+        rows += [(loop, name, wanted_s / (2.0 * math.pi), margins) for loop, margins in closed]
     for i, name in enumerate(axes):
         progress((i + 0.5) / len(axes), f'{name}: position loop')
         plant, w_s = loops.plants[name], reached[name]
-        w_p = min(2.0 * math.pi * required.position if required.position else math.inf, wanted_s / CROSSOVER_RATIO)
-        if not required.position:
-            w_p = w_s / CROSSOVER_RATIO
+        w_p = (min(2.0 * math.pi * required.position, wanted_s / CROSSOVER_RATIO) if required.position
+               else position_crossover(plant, w_s))
 
         def set_position(w, name=name, plant=plant, w_s=w_s):
             loops.set('acu', name, control_gains(plant, w_s, w))
-        _, margins = loops.close('position', name, required, set_position, w_p)
-        rows.append(('position', name, w_p / (2.0 * math.pi), margins))
+        _, closed = loops.close('position', name, required, set_position, w_p)
+        rows += [(loop, name, w_p / (2.0 * math.pi), margins) for loop, margins in closed]
     return rows
 
 
@@ -256,13 +348,14 @@ def refuse_outside(loops):
 
 def table(rows, required):
     """Return lines: each loop with measured and required values."""
-    lines = [f'{"loop":20} {"required":>9} {"crossover":>10} {"bandwidth":>10} {"phase margin":>21} '
+    width = max(20, *(len(f'{name} {loop}') for loop, name, *_ in rows))
+    lines = [f'{"loop":{width}} {"required":>9} {"crossover":>10} {"bandwidth":>10} {"phase margin":>21} '
              f'{"gain margin":>20}']
     for loop, name, wanted, margins in rows:
         values = {key: value for key, (value, _) in margins.items()}
         limits = required.phase_margin, required.gain_margin
         floor = [f'(>= {limit:g})' for limit in limits] if loop != 'current' else ('', '')
-        lines.append(f'{f"{name} {loop}":20} {wanted:6.3g} Hz {_text(values["crossover_hz"]):>7} Hz '
+        lines.append(f'{f"{name} {loop}":{width}} {wanted:6.3g} Hz {_text(values["crossover_hz"]):>7} Hz '
                      f'{_text(values["bandwidth_hz"]):>7} Hz {_text(values["phase_margin_deg"]):>9} deg {floor[0]:>7} '
                      f'{_text(values["gain_margin_db"]):>9} dB {floor[1]:>7}')
     return lines

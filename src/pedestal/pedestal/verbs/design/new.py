@@ -31,6 +31,8 @@ def main(options: argparse.Namespace) -> int:
     if options.file.exists():
         raise FileExistsError(f'{options.file} already exists and is not overwritten')
     sheet = DataSheet(**{name: getattr(options, name) for name, _ in parameters.flatten(DataSheet)})
-    options.file.write_text(antenna_from_data_sheet.new(sheet, options.file.stem, options.command))
+    content, remarks = antenna_from_data_sheet.new(sheet, options.file.stem, options.command)
+    options.file.write_text(content)
+    print(*remarks, sep='\n', end='\n' if remarks else '')
     print(f'written: {options.file}  (pedestal tune {options.file} --loops)')
     return 0
