@@ -236,6 +236,71 @@ def test_a_rate_of_none_and_of_all_has_the_closed_form():
     assert statistics.rate(40, 40) == pytest.approx((100.0, 100.0 - end, 100.0))
 
 
+def test_texts_have_no_order(tmp_path):
+    """Eta squared of three kinds against the analysis of variance of the ranks; the same in any order of the rows."""
+    rng = np.random.default_rng(6)
+    kinds = np.repeat(['imm', 'ca', 'cv'], 20)
+    values = np.repeat([1.0, 1.6, 0.6], 20) + 0.4 * rng.standard_normal(60)
+    ranks = stats.rankdata(values)
+    between = sum(20 * (ranks[kinds == kind].mean() - ranks.mean())**2 for kind in ('imm', 'ca', 'cv'))
+    share = between / np.sum((ranks - ranks.mean())**2)
+    expected, found = 1.0 - (1.0 - share) * 59 / 57, []
+    for name, order in (('first', np.arange(60)), ('mixed', rng.permutation(60))):
+        with Table(tmp_path, name, {}, ['acu.azimuth.filter.kind'], ['pointing_rms_deg']) as table:
+            table.append([[i, i, kinds[k], float(values[k])] for i, k in enumerate(order)])
+        rows = statistics.of_sensitivity('leo_pass', table)
+        assert [row['metric'] for row in rows] == ['pointing_rms_deg/eta_squared(acu.azimuth.filter.kind)']
+        found.append(rows[0])
+    assert found[0]['value'] == pytest.approx(expected, rel=1e-12) and expected > 0.4
+    assert found[0]['value'] == pytest.approx(found[1]['value'], rel=1e-12)
+    assert 0.2 < found[0]['ci_low'] < expected < found[0]['ci_high'] < 0.8
+
+
+def test_the_interval_of_eta_squared_holds_the_truth_as_often_as_it_says():
+    """Three kinds, with no effect and with one; the truth is that of 100,000 trials each."""
+    rng = np.random.default_rng(8)
+    for effect in (0.0, 0.8):
+        shift = effect * np.array([0.0, 1.0, 2.0])
+        x, y = np.repeat(np.arange(3), 100000), np.repeat(shift, 100000) + rng.standard_normal(300000)
+        truth, hit = statistics.eta_squared(x, y)[0] if effect else 0.0, 0
+        for _ in range(300):
+            x = np.repeat(np.arange(3), 12)
+            _, low, high = statistics.eta_squared(x, shift[x] + rng.standard_normal(36))
+            hit += low <= truth <= high
+        assert hit >= 277
+
+
+def test_categories_that_explain_everything_or_nothing():
+    x = np.repeat([0.0, 1.0], 5)
+    assert statistics.eta_squared(x, x)[0] == pytest.approx(1.0)
+    assert statistics.eta_squared(x, np.tile(np.arange(5.0), 2))[0] == 0.0
+    for constant in (statistics.eta_squared(x, np.ones(10)), statistics.eta_squared(np.ones(10), x),
+                     statistics.eta_squared(np.arange(10.0), x)):
+        assert np.isnan(constant).all()
+
+
+def test_trials_that_never_track_say_so(tmp_path):
+    with Table(tmp_path, 'never', {}, [], ['lock_time_s', 'pointing_rms_deg']) as table:
+        table.append([[0, 0, 12.5, None]])
+    with pytest.raises(ValueError, match='^no trial ever tracked .* a longer --duration, .* --by: lock_time_s$'):
+        statistics.ranked_by(table)
+    with pytest.raises(ValueError, match='^--by pointing_rms_deg: no trial has this result'):
+        statistics.ranked_by(table, 'pointing_rms_deg')
+
+
+def test_a_filter_kind_as_a_choice(pedestal, tmp_path):
+    """Through the command line: the line, the row and the page name eta squared, and no rank correlation."""
+    kind = 'acu.azimuth.filter.kind'
+    code, output, errors = pedestal('trials', 'leo_pass', '--runs', 6, '--duration', 5, '--vary',
+                                    f'{kind}=choice(ca, cv)', '--workers', 1, '--json', 'rows.json')
+    assert (code, errors) == (0, '') and f'pointing_rms_deg/eta_squared({kind}): ' in output
+    rows = {row['metric']: row for row in json.loads((tmp_path / 'rows.json').read_text())['rows']}
+    assert 0.0 <= rows[f'pointing_rms_deg/eta_squared({kind})']['value'] <= 1.0
+    page = (tmp_path / 'trials' / 'leo_pass' / 'trials.html').read_text()
+    assert f'pointing_rms_deg/eta_squared({kind})' in page
+    assert not any('rank_correlation' in text for text in (output, page, *rows))
+
+
 def sides(tmp_path, a, b):
     tables = [Table(tmp_path, name, {}, [], ['pointing_rms_deg', 'isolation_db']) for name in 'ab']
     for table, values in zip(tables, (a, b)):

@@ -99,6 +99,8 @@ def scatter(trials):
         axes.plot(given, values, '.', color=RAW_COLOUR, markersize=3)
         axes.plot(given[trials.worst], values[trials.worst], 'o', color=TRUTH_COLOUR, markersize=4)
         axes.margins(0.03)
+        if categories := trials.table.categories(name):
+            axes.set_xticks(range(len(categories)), categories)
         axes.set_xlabel(name)
         axes.set_ylabel(_label(trials.by), fontsize=8)
     for axes in panels.flat[len(varied):]:

@@ -6,7 +6,15 @@ sensitivity  of a result to a varied parameter: Spearman's rank correlation r, -
 
                  tanh(artanh r -+ 1.96 sqrt((1 + r^2 / 2) / (n - 3)))
 
-             of Bonett and Wright (Psychometrika 65 (2000) 23); texts rank in the order of their first appearance
+             of Bonett and Wright (Psychometrika 65 (2000) 23). A parameter whose values are texts has no order. Its
+             sensitivity is the share eta squared, 0 to 1, of the variance of the result's ranks that the texts
+             explain:
+
+                 (H - k + 1) / (n - k)
+
+             H is the statistic of Kruskal and Wallis, k the number of texts, n the number of trials (Tomczak, Tomczak,
+             Trends in Sport Sciences 1 (2014) 19). The interval is that of an analysis of variance of the ranks, by
+             its noncentral F (Steiger, Psychological Methods 9 (2004) 164)
 """
 import collections
 import math
@@ -14,7 +22,7 @@ import re
 import typing
 
 import numpy as np
-from scipy import stats
+from scipy import optimize, stats
 
 from pedestal_analysis.results import intervals, results, verdict
 from pedestal_common.graph import nodes
@@ -128,6 +136,38 @@ def rank_correlation(x, y):
     return r, math.tanh(middle - half), math.tanh(middle + half)
 
 
+def eta_squared(x, y):
+    """Return (eta squared, low, high) of the ranks of y (n,) over the categories x (n,).
+
+    All are NaN if x or y does not vary, or if each trial has a category of its own; low and high are NaN if the
+    categories explain everything.
+    """
+    n, kinds = len(x), np.unique(x)
+    k = len(kinds)
+    if not 1 < k < n or not np.ptp(y) > 0.0:
+        return math.nan, math.nan, math.nan
+    h = float(stats.kruskal(*(y[x == kind] for kind in kinds)).statistic)
+    share = min(max((h - k + 1) / (n - k), 0.0), 1.0)
+    unexplained = 1.0 - h / (n - 1)
+    if unexplained < 1e-12:
+        return share, math.nan, math.nan
+    f = (1.0 - unexplained) / (k - 1) / (unexplained / (n - k))
+
+    def bound(probability):
+        """Return the share of the noncentral F that stays below f with a probability."""
+        def excess(noncentrality):
+            return stats.ncf.cdf(f, k - 1, n - k, noncentrality) - probability
+        high = 1.0
+        if stats.f.cdf(f, k - 1, n - k) < probability:
+            return 0.0
+        while excess(high) > 0.0:
+            high *= 2.0
+        noncentrality = optimize.brentq(excess, 1e-9, high)
+        return noncentrality / (noncentrality + n)
+
+    return share, bound(0.5 + 0.5 * intervals.CONFIDENCE_LEVEL), bound(0.5 - 0.5 * intervals.CONFIDENCE_LEVEL)
+
+
 def unit(name):
     """Return the unit of a column of a table, such as beam_2/loss_s."""
     return results.RESULT_BY_NAME[nodes.plain(name)].unit
@@ -204,20 +244,21 @@ def of_questions(case, table):
 
 
 def of_sensitivity(case, table):
-    """Return the rows of the rank correlation of each result with each varied parameter of a table.Table.
+    """Return the rows of the sensitivity of each result to each varied parameter of a table.Table.
 
-    A result that does not vary has no row.
+    It is eta_squared for a parameter of texts, else rank_correlation. A result that does not vary has no row.
     """
     found = []
-    varied = {name: table.column(name) for name in table.varied}
+    varied = {name: (eta_squared if table.categories(name) else rank_correlation, table.column(name))
+              for name in table.varied}
     for name in table.measured_results:
         own, metric = case_of(case, name)
         values = table.column(name)
         known = np.isfinite(values)
-        for parameter, given in varied.items():
-            estimate = rank_correlation(given[known], values[known])
+        for parameter, (measure, given) in varied.items():
+            estimate = measure(given[known], values[known])
             if math.isfinite(estimate[0]):
-                found.append(intervals.estimated(own, f'{metric}/rank_correlation({parameter})', estimate, '',
+                found.append(intervals.estimated(own, f'{metric}/{measure.__name__}({parameter})', estimate, '',
                                                  int(known.sum())))
     return found
 
@@ -244,5 +285,8 @@ def ranked_by(table, result=None):
             if name in (column, nodes.plain(column)) and (result or np.isfinite(table.column(column)).any()):
                 return column
     known = table.measured_results
-    raise ValueError(f'--by {result}: no trial has this result;{did_you_mean(result or "", known)} must be one '
+    if not result:
+        raise ValueError('no trial ever tracked its target or followed a command: try a longer --duration, or choose '
+                         f'a result with --by: {", ".join(known)}')
+    raise ValueError(f'--by {result}: no trial has this result;{did_you_mean(result, known)} must be one '
                      f'of {", ".join(known)}')

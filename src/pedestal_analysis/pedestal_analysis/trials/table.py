@@ -107,11 +107,18 @@ class Table:
         """
         i = self.head.index(name)
         cells = [row[i] for row in self.rows]
+        if categories := self.categories(name):
+            return np.array([float(categories.index(cell)) for cell in cells])
+        return np.array([float(cell) if cell else math.nan for cell in cells])
+
+    def categories(self, name):
+        """Return the different texts of a column in the order of first appearance; [] for a column of numbers."""
+        cells = [row[self.head.index(name)] for row in self.rows]
         try:
-            return np.array([float(cell) if cell else math.nan for cell in cells])
+            [float(cell) for cell in cells if cell]
         except ValueError:
-            places = {text: float(place) for place, text in enumerate(dict.fromkeys(cells))}
-            return np.array([places[cell] for cell in cells])
+            return list(dict.fromkeys(cells))
+        return []
 
     def text(self, name):
         """Return the texts [n] of a column of sentences; '' for each trial in a table without that column."""

@@ -142,8 +142,8 @@ def _compare(options: argparse.Namespace) -> int:
     title = f'{plans[0].runs} trials of {plans[0].name}'
     console.show_trials(f'{title}: {" against ".join(names)}' if len(names) > 1 else title, rows,
                         None if options.all else shown_names)
-    if correlations := _correlation_lines(rows, by):
-        print('\n'.join(correlations))
+    if sensitivities := _sensitivity_lines(rows, by):
+        print('\n'.join(sensitivities))
     print(f'the worst trials by {ranking}:')
     values, whys = tables[0].column(ranking), tables[0].text(statistics.why_column(ranking))
     for i in shown.worst:
@@ -226,8 +226,9 @@ def _requirement_lines(rows: Iterable[Mapping[str, typing.Any]], required: Itera
     return found
 
 
-def _correlation_lines(rows: Iterable[Mapping[str, typing.Any]], ranking: str) -> list[str]:
-    """Return lines with the correlation of the ranking result with each varied parameter, the strongest first."""
-    found = [row for row in rows if row['metric'].startswith(f'{ranking}/rank_correlation(')]
+def _sensitivity_lines(rows: Iterable[Mapping[str, typing.Any]], ranking: str) -> list[str]:
+    """Return lines with the sensitivity of the ranking result to each varied parameter, the strongest first."""
+    strength = {f'{ranking}/rank_correlation': abs, f'{ranking}/eta_squared': math.sqrt}
+    found = [row for row in rows if row['metric'].partition('(')[0] in strength]
     return [f'{row["metric"]}: {console.number(row["value"])} ({console.interval(row)})'
-            for row in sorted(found, key=lambda row: -abs(row['value']))]
+            for row in sorted(found, key=lambda row: -strength[row['metric'].partition('(')[0]](row['value']))]
