@@ -228,7 +228,7 @@ def _requirement_lines(rows: Iterable[Mapping[str, typing.Any]], required: Itera
 
 def _sensitivity_lines(rows: Iterable[Mapping[str, typing.Any]], ranking: str) -> list[str]:
     """Return lines with the sensitivity of the ranking result to each varied parameter, the strongest first."""
-    strength = {f'{ranking}/rank_correlation': abs, f'{ranking}/eta_squared': math.sqrt}
-    found = [row for row in rows if row['metric'].partition('(')[0] in strength]
+    powers = {f'{ranking}/rank_correlation': 1.0, f'{ranking}/eta_squared': 0.5}
+    found = [row for row in rows if row['metric'].partition('(')[0] in powers]
     return [f'{row["metric"]}: {console.number(row["value"])} ({console.interval(row)})'
-            for row in sorted(found, key=lambda row: -strength[row['metric'].partition('(')[0]](row['value']))]
+            for row in sorted(found, key=lambda row: -abs(row['value'])**powers[row['metric'].partition('(')[0]])]
