@@ -1,4 +1,6 @@
-"""Active disturbance rejection: TD, ESO and NLC of paper 001 (docs/papers.md), equations (7) to (11), for a drive with a rate loop.
+"""Active disturbance rejection: TD, ESO and NLC of paper 001, equations (7) to (11), for a drive with a rate loop.
+
+docs/papers.md names the paper.
 
     TD, ESO, NLC   tracking differentiator, extended state observer, nonlinear control law
     y, u           encoder angle [rad], rate command [rad/s]
@@ -13,8 +15,9 @@ forward gives it the acceleration v3 of the reference:
 
     y'' = w_s (u - y') + v3 + z3
 
-The observer's model contains the known part w_s (u - y') + v3, so that z3 holds the disturbance only. The paper's y'' = z3 + b0 u
-leaves -w_s y' and v3 to z3 as well; these change as the target moves, and the observer follows them with a lag.
+The observer's model contains the known part w_s (u - y') + v3, so that z3 holds the disturbance only. The paper's
+y'' = z3 + b0 u leaves -w_s y' and v3 to z3 as well; these change as the target moves, and the observer follows them
+with a lag.
 
 TD (7)(8)   the shaper: fhan with the target's own rate and acceleration fed forward; v1, v2, v3 are its result
 ESO (9)     linear instead of fal, all poles at exp(-w_o h); its input is the limited command

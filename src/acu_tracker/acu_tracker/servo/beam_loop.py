@@ -18,8 +18,8 @@ The paper prints R + R T in the first line. Because the unit of R T is not that 
 paper prints s(k/k-1) in eq. 6. It is read as R(k/k-1), the only predicted angle of the loop.
 
 On a ramp the rate v is constant in the steady state. Then nu = 0, because beta / T nu is the change of v. Therefore
-error = v T, whatever alpha, delay and smoothing are. In type_2 the beam points at R(k+1/k), so that the error itself is
-the innovation and a ramp is met without error.
+error = v T, whatever alpha, delay and smoothing are. In type_2 the beam points at R(k+1/k), so that the error itself
+is the innovation and a ramp is met without error.
 
 `tracked`, the third form, needs no law of its own, and `step` computes only the other two. The target's filter takes
 y = beam in force + error. The beam is the filter's prediction for the middle of the interval in which the beam will be

@@ -17,8 +17,12 @@ MAX_HELD_NUMBERS = 32
 MESSAGE_FAULT_DTYPE = np.dtype([('drop', 'i8'), ('freeze', 'i8'), ('nan', 'i8'), ('holds', 'i8'),
                                 ('held', 'f8', (MAX_HELD_NUMBERS,)),
                                 ('sigma', 'f8'), ('seed', 'i8')], align=True)
-"""Faults in force. drop, freeze, nan: 1 while in force; held: the numbers of the first frozen step, holds: 1 once they
-are stored; sigma (in the unit of the numbers) and seed of white noise, sigma 0: none."""
+"""Faults in force.
+
+    drop, freeze, nan    1 while in force
+    held                 numbers of the first frozen step; holds: 1 once they are stored
+    sigma, seed          1 sigma of white noise, in the unit of the numbers, 0 for none; its seed
+"""
 
 
 @compiled

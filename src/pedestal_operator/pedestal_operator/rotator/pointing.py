@@ -105,8 +105,8 @@ class Pointing:
         self._check('azimuth', azimuth, -MAX_AZIMUTH_DEG, MAX_AZIMUTH_DEG)
         self._check('elevation', elevation, low, high)
         self.earth_angles()     # Only for its check: it raises Refused without a fresh position.
-        # On a ship the first `near` is a deck angle and not an earth angle. This is sufficient, because the whole turns
-        # of an earth azimuth matter only from one set-point to the next.
+        # On a ship the first `near` is a deck angle and not an earth angle. This is sufficient, because the whole
+        # turns of an earth azimuth matter only from one set-point to the next.
         near = (self._filter.set_point if self.continues(now) else self._remote.angles('joint_states'))[0]
         if self.on_ship:
             return near + (azimuth - near + 180.0) % 360.0 - 180.0, elevation
@@ -136,7 +136,7 @@ class Pointing:
         self._filter = SetPointFilter()
 
     def _request(self, angles, rates=(0.0, 0.0), moves=0.0):
-        """Request angles [deg] that move at rates [deg/s] for `moves` [s]; on a ship they are valid for `holds` [s]."""
+        """Request angles [deg] that move at rates [deg/s] for `moves` [s]; on a ship valid for `holds` [s]."""
         names = (*topics.AXES, *(f'{axis}_rate' for axis in topics.AXES))
         arguments = {**dict(zip(names, np.radians((*angles, *rates)))), 'moves': moves}
         if self.on_ship:

@@ -49,7 +49,8 @@ def step(s, k, v_east, v_north, h, w_c):
     not affect the estimate, because the observer receives its exact commands.
     """
     o = s.observer
-    # The wanted velocity error is zero. v1 and v2 start at zero and stay there. The differentiator is that of paper 001.
+    # The wanted velocity error is zero, so v1 and v2 start at zero and stay there. The differentiator is that of the
+    # paper.
     for i in range(2):
         s.v1[i], s.v2[i] = levelling.differentiated(s.v1[i], s.v2[i], 0.0, h)
     extended_observer.predict(o, h)

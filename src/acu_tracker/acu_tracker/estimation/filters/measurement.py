@@ -15,9 +15,14 @@ Measurement = namedtuple('Measurement', 'stamp axis range range_variance')
 """stamp [s]; axis: the AxisMeasurement of both; range [m] and its variance, NaN if it was not measured."""
 
 AxisInnovation = namedtuple('AxisInnovation', 'nu S chi_square rate rate_chi_square')
-"""nu: innovation of the angle [rad]; S: its variance; chi_square = nu^2 / S; rate: innovation of the rate [rad/s], NaN
-where none was used. rate_chi_square: NIS of angle and rate together, minus chi_square. chi_square and rate_chi_square
-each follow a chi-square distribution of one degree of freedom."""
+"""Innovation of an axis.
+
+    nu                 innovation of the angle [rad]; S: its variance; chi_square = nu^2 / S
+    rate               innovation of the rate [rad/s], NaN where none was used
+    rate_chi_square    NIS of angle and rate together, minus chi_square
+
+Both chi_square and rate_chi_square follow a chi-square distribution of one degree of freedom.
+"""
 
 Innovation = namedtuple('Innovation', 'axis range_nu range_S')
 """axis: the AxisInnovation of both; range_nu [m] and its variance range_S; NaN where nothing was compared."""
@@ -54,10 +59,11 @@ def attitude_variances(verticals, tilt, heading):
     """Return the variances (across, along) of a direction that follow from the variances of the
     attitude, in their unit.
 
-    across, along: unit vectors at a right angle to the direction, in which its azimuth and its elevation grow.
-    verticals: components of both unit vectors along the earth's vertical, see estimate_frame.verticals. tilt, heading:
-    variance of the attitude about every horizontal axis, and about the vertical. A turn about `along` moves the
-    direction across, and a turn about `across` moves it along.
+        across, along    unit vectors at a right angle to the direction: that of growing azimuth, of growing elevation
+        verticals        their components along the earth's vertical, see estimate_frame.verticals
+        tilt, heading    variance of the attitude about every horizontal axis, and about the vertical
+
+    A turn about `along` moves the direction across, and a turn about `across` moves it along.
     """
     across, along = verticals
     return tilt + along * along * (heading - tilt), tilt + across * across * (heading - tilt)
