@@ -3,9 +3,9 @@ and a range is measured.
 
 The Cartesian filter starts from the estimate of the axes' filters, at a measured range whose standard deviation is at
 most ukf.range_share of it. An axis uses the Cartesian filter once its standard deviation of the rate is at most half
-of that of the axis's own filter. This margin avoids a hand-over that gains little. The axes' filters keep running beside
-the Cartesian filter. The Cartesian filter stops when the standard deviation of its own range exceeds the same share.
-The axes' filters then continue from its estimate. Measured rates go to the axes' filters only.
+of that of the axis's own filter. This margin avoids a hand-over that gains little. The axes' filters keep running
+beside the Cartesian filter. The Cartesian filter stops when the standard deviation of its own range exceeds the same
+share. The axes' filters then continue from its estimate. Measured rates go to the axes' filters only.
 
 f, c: records of FILTER_DTYPE and of CONSTANTS_DTYPE; m: a Measurement.
 """
