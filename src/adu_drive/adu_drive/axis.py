@@ -131,8 +131,14 @@ def initial_state(p, theta, external):
     """Return the state of an axis at rest at theta [rad], in balance with an external torque [Nm]: nested dictionary.
 
     reading        counts of the load encoder at t_k
-    external       torque on the load [Nm], constant over a control period
+    external       torque on the load [Nm], constant over a control period; it includes `deck`
+    deck           part of it from the motion of the deck and of the other axis [Nm]; base and dish
+                   get it by their shares of the inertia
     commanded_rate, commanded_torque    command that is executed in a speed-loop period [rad/s, Nm]
+    stopping       1 if the axis was not enabled in the control period: ramp to standstill, then hold
+    ramping        1 from a stop until the rate has reached the command again, within the deceleration of the ramp
+    faults         latched fault word, see faults.AXIS_FAULTS; present: faults whose cause was there in this period
+    late           number of successive speed-loop periods with a rate error above the limit of the following error
 
     Fields of injected faults:
 
@@ -155,7 +161,7 @@ def initial_state(p, theta, external):
             'deck': 0.0, 'commanded_rate': 0.0, 'commanded_torque': 0.0,
             'bias': T_b, 'rate': 0.0, 'omega_hat': 0.0, 'd_hat': -T if observed else 0.0,
             'torque_limited': 0, 'voltage_limited': 0, 'end_stop': 0, 'stopping': 0,
-            'faults': 0, 'present': 0, 'late': 0, 'slewing': 0, 'braked': 0, 'reading': 0.0,
+            'faults': 0, 'present': 0, 'late': 0, 'ramping': 0, 'braked': 0, 'reading': 0.0,
             'motor_lost': np.zeros(2, np.int64), 'jump': 0.0, 'stuck': 0, 'brake_stuck': BRAKE_WORKING, 'toothless': 0,
             'teeth': np.zeros(2), 'gust': 0.0}
 
@@ -222,6 +228,8 @@ def _torque_control(s, c, omega, feed_forward):
         T_1, T_2 = speed_loop.shared(T_1, T_2, s.bias, m1.measured, m2.measured, c.K_d)
     m1.torque_ref, m2.torque_ref = speed_loop.limited(T_1, k1.limit), speed_loop.limited(T_2, k2.limit)
 
+    # Anti-windup: the excess is the demanded minus the realised torque (pi.integral). With one speed loop for both
+    # motors, both integrals get the mean excess, so that they stay equal.
     limited = m1.torque_ref != T_1 or m2.torque_ref != T_2
     excess_1 = excess_2 = 0.0
     if limited or m1.limited or m2.limited:
@@ -258,7 +266,7 @@ def _supervise(s, c, omega, free):
 def _remove_torque(s, omega, free):
     """Remove the torque. Once the brakes hold, keep the integrals, which the motors need when the brakes open."""
     s.motor_1.torque_ref = s.motor_2.torque_ref = s.motor_1.i_ref = s.motor_2.i_ref = 0.0
-    s.motor_1.inhibited = s.motor_2.inhibited = s.stopping = s.slewing = 1
+    s.motor_1.inhibited = s.motor_2.inhibited = s.stopping = s.ramping = 1
     s.rate, s.bias, s.omega_hat = 0.0, 0.0, omega
     if free:
         s.motor_1.sum = s.motor_2.sum = s.d_hat = 0.0
@@ -286,15 +294,15 @@ def speed_control(s, c, rate, torque, enable, powered, free):
     feed_forward = 0.0
     if enable:
         wanted = min(max(rate, -c.rate_max), c.rate_max)
-        if s.slewing:       # The commands continued while the drive stopped: reach the command within the ramp.
-            slewed = s.rate + min(max(wanted - s.rate, -c.ramp), c.ramp)
-            s.slewing = slewed != wanted
-            wanted = slewed
+        if s.ramping:       # The commands continued while the drive stopped: reach the command within the ramp.
+            ramped = s.rate + min(max(wanted - s.rate, -c.ramp), c.ramp)
+            s.ramping = ramped != wanted
+            wanted = ramped
         else:
             feed_forward = torque * c.per_2N
     else:
         wanted = s.rate - min(max(s.rate, -c.ramp), c.ramp)
-        s.stopping = s.slewing = 1
+        s.stopping = s.ramping = 1
     position = c.rad * _load_counts(s, c)
     s.rate = min(max(wanted, -travel.approach_rate(position - c.lower, c.K, c.a)),
                  travel.approach_rate(c.upper - position, c.K, c.a))
@@ -314,11 +322,16 @@ def speed_control(s, c, rate, torque, enable, powered, free):
 
 @compiled
 def begin_period(s, c, grip):
-    """Begin a control period: brakes, winding temperatures, constant inertia, and cleared flags."""
+    """Begin a control period: brakes, winding temperatures, constant inertia, and cleared flags.
+
+    grip: True if the brakes grip by their command; a stuck brake ignores it.
+    """
     m1, m2, k1, k2 = s.motor_1, s.motor_2, c.motor_1, c.motor_2
     if not c.varying:
         s.h_J, s.q_B, s.h_J_dish = c.h_J, c.q_B, c.h_J_dish
-    s.braked = (1 if grip else 0) if s.brake_stuck == BRAKE_WORKING else 1 if s.brake_stuck == BRAKE_STUCK_ON else 0
+    s.braked = 1 if grip else 0
+    if s.brake_stuck != BRAKE_WORKING:
+        s.braked = 1 if s.brake_stuck == BRAKE_STUCK_ON else 0
     m1.q_R = thermal.damping(k1.h_R_L, k1.rise, m1.heat)
     m2.q_R = thermal.damping(k2.h_R_L, k2.rise, m2.heat)
     s.torque_limited = s.voltage_limited = s.end_stop = s.stopping = s.present = 0

@@ -51,7 +51,8 @@ class Table(Mapping[str, np.ndarray]):
 class Run:
     """A run: run[topic] is the Table of a topic.
 
-    name: name of the scenario or of the recording; beam: name of the beam, '' for an antenna with a single beam.
+    name: name of the scenario or of the recording; beam: name of the beam, '' for an antenna with a single beam, and
+    for the first beam of a recording.
     """
 
     def __init__(self, source: memory_recording.MemoryRecording | bags.Bag, name: str, beam: str = '') -> None:
@@ -59,7 +60,9 @@ class Run:
 
     @property
     def topics(self) -> tuple[str, ...]:
-        """Names of the topics with numbers or texts.
+        """Names of the topics with numbers or texts, which form a table.
+
+        `diagnostics` and `acu/program_track` form none, because their messages differ in length.
 
         >>> pedestal.run(pedestal.load('leo_pass', duration=1.0)).topics[:3]
         ('clock', 'joint_states', 'adu/truth')
@@ -129,7 +132,8 @@ class Run:
 def run(scenario: Scenario, beam: str = '') -> Run:
     """Run a scenario in memory. beam: name of a beam of several, '' for the first.
 
-    Equal scenarios give equal numbers, and the numbers of the lockstep recording of `pedestal run`.
+    Equal scenarios give equal numbers, and the numbers of the lockstep recording of `pedestal run`. Raises ValueError
+    for a name that is none of the scenario's beams.
 
     >>> first, second = (pedestal.run(pedestal.load('leo_pass', duration=1.0, seed=2)) for _ in range(2))
     >>> bool((first['joint_states']['azimuth.position'] == second['joint_states']['azimuth.position']).all())

@@ -24,8 +24,8 @@ RESULT_BY_OUTCOME = {outcomes.OUTCOME_DONE: RESULT_OK, outcomes.OUTCOME_REFUSED:
                      outcomes.OUTCOME_NO_POSITION: rotctld.RESULT_IO_ERROR}
 """{outcome of a request: result of the protocol}."""
 
-VERB_BY_COMMAND = {'park': 'stow', 'reset': 'acu/reset_faults'}
-"""{command of rotctld: command of the control unit}."""
+ANTENNA_COMMAND_BY_NAME = {'park': 'stow', 'reset': 'acu/reset_faults'}
+"""{name of a command of rotctld: command or service of the control unit}."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -50,7 +50,7 @@ class RotctldNode(ServerNode):
 
     def serve(self, client, now):
         """Answer the lines in order; a command of the antenna is answered after the reply of the control unit."""
-        client.end_line(rotctld.is_complete)
+        client.end_line(rotctld.is_complete)    # gpredict for Windows sends no line end.
         while client.pending or client.lines:
             if client.pending:
                 outcome = client.pending.look(self, now)
@@ -62,7 +62,7 @@ class RotctldNode(ServerNode):
                 self._begin(client, client.lines.popleft(), now)
 
     def _begin(self, client, line, now):
-        """Answer a line, None for a line that is too long, or begin its request."""
+        """Answer a line, or begin its request. line: None if it was longer than rotctld.MAX_LINE_BYTES."""
         request = rotctld.Request('', error=RESULT_INVALID) if line is None else rotctld.read(line)
         if request is None:
             return
@@ -98,12 +98,13 @@ class RotctldNode(ServerNode):
             client.pending = control.go(name, *request.values, now)
         elif request.name == 'move':
             direction, percent = request.values
+            # A percentage of -1 means that none was given.
             rate = self.parameters.jog_rate * (50 if percent == -1 else percent) / 100.0
             client.pending = control.jog(name, [rate * part for part in rotctld.MOVE_DIRECTIONS[direction]], now)
         elif request.name == 'stop':
             client.pending = control.stop(name, now)
         else:
-            client.pending = control.do(name, VERB_BY_COMMAND[request.name], now)
+            client.pending = control.do(name, ANTENNA_COMMAND_BY_NAME[request.name], now)
 
     def _lines(self, request):
         """Return [(name, text)], the values in the answer to a request without motion. Raises Refused."""

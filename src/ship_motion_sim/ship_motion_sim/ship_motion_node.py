@@ -1,8 +1,9 @@
 """ROS node of the ship: its truth and the data of its IMU at every step of the drive; NMEA for other equipment.
 
-The unit ship_unit.ShipMotion (ship_motion_sim/ship_unit.py) holds the law; change the ship and its IMU there. This
-module adds the NMEA datagrams. `entry` is imported first because a signal during the other imports would end the
-process with a traceback.
+The unit ship_unit.ShipMotion holds the law. To change the model of the ship or of its IMU, edit
+ship_motion_sim/ship_unit.py. This module adds the NMEA datagrams. They contain the true attitude, because they stand
+for an instrument of the ship whose errors are not modelled. `entry` is imported first because a signal during the
+other imports would end the process with a traceback.
 """
 import pedestal_common.entry  # noqa: F401
 
@@ -50,6 +51,7 @@ class ShipMotionNode(unit_node.UnitNode):
         datagram to missing equipment succeeds.
         """
         period_ns = round(1e9 / self.parameters.nmea.rate)
+        # Datagrams are due at whole multiples of the period: the next multiple after this stamp.
         self.next_datagram_ns = stamp - stamp % period_ns + period_ns
         truth = self.unit.parts['truth']
         try:

@@ -55,7 +55,7 @@ def test_riccati_limit_is_the_posterior_of_all_measurements_at_once():
     k = K.copy()
     k['velocity_density'] = r * h
     for _ in range(n):
-        riccati_eso.limit(state[0], k, h)
+        riccati_eso.advance_covariance(state[0], k, h)
     np.testing.assert_allclose(p, [batch[0, 0], batch[0, 1], batch[0, 2], batch[1, 1], batch[1, 2], batch[2, 2]],
                                rtol=1e-6)
 

@@ -4,6 +4,9 @@
     recursion       eq. (1) as printed: a first-order low-pass, x = (n - 1) / n x + 1 / n y. Its bandwidth (eq. 2) is
                     1 / ((n - 1) T) rad/s, its mean delay n - 1 samples
     moving_average  the text of the paper, not its eq. (1): the mean of the last n samples, delay (n - 1) / 2 samples
+
+y: sample of the error [rad]; x: smoothed error [rad]; n: number of samples [-]; T: time between two samples [s]. A
+`kind` is a code, one of SMOOTHING_NONE ..., in the compiled laws, and its name in `delay` and `steps_back`.
 """
 import numpy as np
 
@@ -52,13 +55,17 @@ def smoothed(s, kind, samples, n):
 
 
 def delay(kind, samples, n):
-    """Return the mean delay of a kind of SMOOTHING_KINDS, in samples before the newest."""
+    """Return the mean delay of a kind, a name of SMOOTHING_KINDS, in samples before the newest."""
     return {'none': 0.5 * (samples - 1), 'recursion': n - 1.0, 'moving_average': 0.5 * (n - 1)}[kind]
 
 
 def steps_back(kind, samples, n):
     """Return the mean age of the steps whose samples are in the result, in drive steps of `samples`; 0 for the last
-    step."""
+    step.
+
+    A beam that is held within a step has one direction in each step. The control unit therefore needs the age in whole
+    steps to know where the beam was, beside the age of the samples for the place of the target.
+    """
     if kind == 'none':
         return 0.0
     if kind == 'recursion':

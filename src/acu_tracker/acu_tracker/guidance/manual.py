@@ -55,7 +55,8 @@ def step(m, i, shaper, ends, valid, dt):
     """Move the commanded point of axis i on by dt [s].
 
     shaper: record of its ShaperParameters; valid: whether the commanded rates are valid. The point stops at the Ends
-    of the axis, which are those of its travel or of the floor. From there the way back begins at once.
+    of the axis, which are those of its travel or of the floor (the lowest elevation of each azimuth). From there the
+    way back begins at once.
     """
     wanted = min(max(m.requested[i], -shaper.rate), shaper.rate) if valid else 0.0
     step = ACCELERATION_SHARE * shaper.acceleration * dt
@@ -71,6 +72,9 @@ def step(m, i, shaper, ends, valid, dt):
 
 @compiled
 def motion(m, later):
-    """Return the Motion of the commanded point, `later` [s] after the last step."""
+    """Return the Motion of the commanded point, `later` [s] after the last step.
+
+    The acceleration does not enter the angle, because the ramp may end within this time.
+    """
     return Motion(AxisMotion(m.angle[0] + m.rate[0] * later, m.rate[0], m.acceleration[0]),
                   AxisMotion(m.angle[1] + m.rate[1] * later, m.rate[1], m.acceleration[1]))

@@ -4,9 +4,13 @@ Off target the level z has a mean m and a variance V, learnt over the last `lear
 
     w = max(1/n, T / learn_time),    d = z - m,    m += w d,    V = (1 - w) (V + w d^2)
 
-(Finch, Incremental calculation of weighted mean and variance, 2009, section 9). There are three thresholds above it:
-detect = m + 4 sqrt(V), track = detect + 1 dB, loss = detect - 2 dB. The threshold loss is at least m + 2 sqrt(V),
-because below that the noise itself would hold the target.
+(Finch, Incremental calculation of weighted mean and variance, 2009, section 9). There are three thresholds above m:
+
+    detect = m + 4 sqrt(V)    a level above it for acquire_time begins the mode acquire
+    track  = detect + 1 dB    after a level above it for acquire_time, a target is present
+    loss   = detect - 2 dB    after a level below it for loss_time, no target is present
+
+The threshold loss is at least m + 2 sqrt(V), because below that the noise itself would hold the target.
 
 s, p: records of LEVEL_DTYPE and of AcquisitionParameters.
 """
@@ -67,7 +71,7 @@ def learn(s, p, z, T):
 
 @compiled
 def take(s, p, z, stamp, locked):
-    """Take the level z [dB-Hz] of a stamp [s]; a stamp that is not newer has no effect.
+    """Take the level z [dB-Hz] of a stamp [s]; an older stamp has no effect, an equal stamp adds no time.
 
     locked: whether the receiver measures angle errors. Until the noise is known, only this shows a target.
     """
@@ -83,6 +87,7 @@ def take(s, p, z, stamp, locked):
     s.above_detect = s.above_detect + T if z > at.detect else 0.0
     s.above_track = s.above_track + T if z > at.track else 0.0
     s.below_loss = s.below_loss + T if z < at.loss else 0.0
+    # With an acquire_time or a loss_time of 0, only a time above 0 shows that the level was beyond its threshold.
     if s.present == 0:
         s.present = s.above_track >= p.acquire_time and s.above_track > 0.0
     elif s.below_loss >= p.loss_time and s.below_loss > 0.0:
@@ -91,7 +96,7 @@ def take(s, p, z, stamp, locked):
 
 @compiled
 def detected(s, p):
-    """Return True if the level has been above the noise for acquire_time, so that acquire begins."""
+    """Return True if the level has been above the threshold detect for acquire_time, so that acquire begins."""
     return s.above_detect >= p.acquire_time and s.above_detect > 0.0
 
 

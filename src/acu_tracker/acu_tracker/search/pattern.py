@@ -5,9 +5,11 @@ of a pitch. The beam moves at a constant speed
 
     v <= b / (4 tau)
 
-along its path, so that the target is within the beam for about four time constants of the level. b: beamwidth [rad];
+along its path, so that the target is within the beam for about four time constants of the level. After four time
+constants a smoothed level has 98 % of its final value. b: beamwidth [rad];
 tau: time constant with which the receiver smooths the level [s].
-The beam starts from rest in SPEED_RISE_TIME_S, and rests for an instant in each corner: offset and rate have no jump.
+The beam starts from rest in SPEED_RISE_TIME_S, and rests for an instant in each corner: offset and rate have no jump
+there. The spiral has no corner and ends at full speed, so its rate jumps to zero at its end.
 """
 import math
 from collections import namedtuple
@@ -51,7 +53,10 @@ def rotated(p, angle):
 
 @compiled
 def circle(radius, period, t):
-    """Return the Point at t [s] of a circle about the centre, entered along a radius that grows for one period [s]."""
+    """Return the Point at t [s] of a circle about the centre, entered along a radius that grows for one period [s].
+
+    The circle is no search pattern. `acquisition` uses it to check the slopes of the receiver errors.
+    """
     w = 2.0 * math.pi / period
     r, dr = (radius * t / period, radius / period) if t < period else (radius, 0.0)
     s, c = math.sin(w * t), math.cos(w * t)
@@ -119,13 +124,20 @@ def _on_spiral(area, t):
 
 @compiled
 def lines_aside(area):
-    """Return the number of lines of a raster or a sector on one side of the middle line."""
+    """Return the number of lines of a raster or a sector on one side of the middle line, at least 0.
+
+    The outermost line is at most half a pitch inside the edge, so that the edge is seen.
+    """
     return max(math.ceil(area.across / area.pitch - 0.5), 0)
 
 
 @compiled
 def vertices(area):
-    """Return the number of corners of a pattern of straight legs, with its begin and its end."""
+    """Return the number of corners of a pattern of straight legs, with its begin and its end.
+
+    A raster or a sector has the centre and two ends of each of its 2 lines_aside + 1 lines. A square has the centre
+    and two corners for each length of leg. Its outermost legs are at most half a pitch inside the edge.
+    """
     if area.pattern == PATTERN_SQUARE:
         return 4 * max(math.ceil(area.radius / area.pitch - 0.5), 1) + 3
     return 4 * lines_aside(area) + 3

@@ -2,8 +2,10 @@
 
 Symbols
     e, u, y         error of the axis, rate command, encoder angle                      [rad], [rad/s], [rad]
-    v, a, j         rate, acceleration, jerk of the shaped reference; in `beam_loop` v is the beam's rate
-    K_p, K_i, K_d   gains of the position loop; D, the filtered derivative of e         [1/s], [1/s2], [-]
+    v, a, j         rate, acceleration, jerk of the shaped reference; in `beam_loop` v is the beam's rate,
+                    in `ends` a is the braking
+    K_p, K_i, K_d   gains of the position loop                                          [1/s], [1/s2], [-]
+    D               filtered derivative of e                                            [rad/s]
     k_v, k_a        shares of v and of a fed forward into the rate command              [-], [s]
     J, Tc           inertia and Coulomb friction at the load                            [kg m2], [Nm]
     h0, r           filter step and acceleration of Han's fhan                          [s], [rad/s2]
@@ -11,9 +13,11 @@ Symbols
     z1, z2, z3      `adrc`: observed angle, rate, disturbance                           [rad, rad/s, rad/s2]
     w_c, w_o, w_s   `adrc`: poles of feedback, of observer, of the drive's rate loop    [rad/s]
     l1, l2, l3      `adrc`: gains of the observer over a step h                         [-], [1/s], [1/s2]
-    b0, u0          `adrc`: gain of the plant, w_s; the wanted acceleration             [1/s], [rad/s2]
+    b0              `adrc`: gain from u to the acceleration, equal to w_s               [1/s]
+    u0              `adrc`: wanted acceleration                                         [rad/s2]
     R, alpha, beta  `beam_loop`: angle of the beam, gains on angle and rate             [rad], [-], [-]
-    delta, V        `beam_loop`: share compensated of V, the apparent rate of a fixed target [-], [rad/s]
+    V               `beam_loop`: rate at which the carrier's motion moves a fixed target [rad/s]
+    delta           `beam_loop`: share of V that is compensated                         [-]
     d, a, t         `ends`: distance to the end of travel, braking, reaction time       [rad], [rad/s2], [s]
     w, width, depth `notch`: centre, damping of its poles, gain at the centre           [rad/s], [-], [-]
 """

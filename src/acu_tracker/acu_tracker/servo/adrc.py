@@ -1,5 +1,7 @@
 """Active disturbance rejection: TD, ESO and NLC of paper 001, equations (7) to (11), for a drive with a rate loop.
 
+docs/papers.md names the paper.
+
     TD, ESO, NLC   tracking differentiator, extended state observer, nonlinear control law
     y, u           encoder angle [rad], rate command [rad/s]
     v1, v2, v3     angle, rate, acceleration of the shaped reference
@@ -13,13 +15,15 @@ forward gives it the acceleration v3 of the reference:
 
     y'' = w_s (u - y') + v3 + z3
 
-The known part of y'' is in the observer's model, so that z3 holds the disturbance only. The paper's y'' = z3 + b0 u
-leaves -w_s y' and v3 to z3 as well; these change as the target moves, and the observer follows them with a lag.
+The observer's model contains the known part w_s (u - y') + v3, so that z3 holds the disturbance only. The paper's
+y'' = z3 + b0 u leaves -w_s y' and v3 to z3 as well; these change as the target moves, and the observer follows them
+with a lag.
 
 TD (7)(8)   the shaper: fhan with the target's own rate and acceleration fed forward; v1, v2, v3 are its result
 ESO (9)     linear instead of fal, all poles at exp(-w_o h); its input is the limited command
-NLC (11)    u0 = v3 + w_c^2 (v1 - z1) + 2 w_c (v2 - z2): fhan (h1 = 1/w_c) in its linear zone, which the paper's never
-            leaves; u = (u0 - known part - z3) / b0, where the paper prints u0 - z3 / b0
+NLC (11)    u0 = v3 + w_c^2 (v1 - z1) + 2 w_c (v2 - z2). This is fhan with h1 = 1/w_c in its linear zone. With the
+            gains of the paper, its fhan never leaves this zone. u = (u0 - v3 + w_s z2 - z3) / b0, so that y'' = u0;
+            the paper prints u0 - z3 / b0
 """
 import math
 
@@ -67,5 +71,7 @@ def rate(z, v1, v2, v2_m, w_c, w_s):
 
     t_k: stamp of the step; t_m: middle of the interval in which the command is in force.
     """
-    u0 = w_c * w_c * (v1 - z[0]) + 2.0 * w_c * (v2 - z[1])
-    return v2_m + (z[1] - v2) + (u0 - z[2]) / w_s
+    # u0 - v3 = feedback, so v3 cancels: u = (feedback + w_s z2 - z3) / w_s = z2 + (feedback - z3) / w_s. Because the
+    # command acts at t_m, z2 is taken there: the rate error z2 - v2 at t_k is added to the reference's rate at t_m.
+    feedback = w_c * w_c * (v1 - z[0]) + 2.0 * w_c * (v2 - z[1])
+    return v2_m + (z[1] - v2) + (feedback - z[2]) / w_s

@@ -22,8 +22,10 @@ def mesh_torque(delta, rate, k, c, half_lash):
 def transmission_error(pinion, c):
     """Return the transmission error [rad on the load axis] of a pinion at an angle [rad].
 
-    The runout acts once per turn, the tooth error once per tooth: total and tooth-to-tooth tangential composite
-    deviation, ISO 1328-1.
+    c: constants of the axis. c.runout, c.tooth_error: amplitudes [rad on the load axis] of an error once per turn and
+    once per tooth; c.teeth: number of teeth. ISO 1328-1 limits the corresponding deviations, the total and the
+    tooth-to-tooth tangential composite deviation. A deviation is peak to peak and along the pitch circle. An amplitude
+    is half of it, divided by the radius of the bull gear.
     """
     return c.runout * math.sin(pinion) + c.tooth_error * math.sin(c.teeth * pinion)
 
@@ -33,8 +35,9 @@ def gap(pinion, teeth, ratio):
     """Return the additional half lash [rad on the load axis] of a pinion at an angle [rad] without its tooth at 0.
 
     teeth: number of teeth, 0 for a whole pinion; ratio: bull gear to pinion. At the lost tooth, the flanks of its
-    neighbours stop the pinion after half a pitch. They come closer as the pinion turns, so the gap is a cam:
-    (cos phi - cos phi_0) / (1 - cos phi_0) within phi_0 = pi / teeth.
+    neighbours stop the pinion after half a pitch. They come closer as the pinion turns, so the gap is half a pitch
+    times (cos phi - cos phi_0) / (1 - cos phi_0). Here phi is the angle of the pinion from the lost tooth. The gap is
+    0 from phi_0 = pi / teeth on, half a pitch of the pinion.
     """
     if teeth == 0.0:
         return 0.0

@@ -39,7 +39,10 @@ WHY = 'why'
 
 
 class Question(typing.NamedTuple):
-    """A yes or no about a trial: name; the result that decides; holds(values (n,)) -> (n,) bool; a sentence."""
+    """A yes or no about a trial: name; the result that decides; holds(values (n,)) -> (n,) bool; a sentence.
+
+    A trial without the result has the value NaN, for which `holds` is False: it counts as no.
+    """
     name: str
     result: str
     holds: typing.Callable
@@ -231,7 +234,7 @@ def of_results(case, table):
 
 
 def of_questions(case, table):
-    """Return the rows of the rates of TRIAL_QUESTIONS over a table.Table."""
+    """Return the rows of the rates of TRIAL_QUESTIONS over a table.Table; a trial without the result counts as no."""
     found = []
     for name in table.measured_results:
         own, metric = case_of(case, name)
@@ -278,6 +281,7 @@ def ranking(name, values):
 def ranked_by(table, result=None):
     """Return the result that ranks the trials of a table.Table: result, else pointing, else following error.
 
+    A named result is taken even if it is missing in every trial; pointing only if a trial has measured it.
     Raises ValueError if no trial has the result.
     """
     for name in (result,) if result else ('pointing_rms_deg', 'azimuth_following_rms_deg'):

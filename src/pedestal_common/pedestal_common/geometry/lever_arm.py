@@ -1,8 +1,8 @@
 """Place of the antenna on the deck.
 
 The simulated receiver and the control unit each have a copy of this parameter. The copies must agree: the receiver
-computes the direction from the antenna, and the control unit corrects this direction. A scenario gives the control
-unit the copy of the receiver.
+computes the direction from the antenna, and the control unit corrects this direction. `pedestal run` gives the control
+unit the value of the receiver, where the scenario does not set that of the control unit.
 """
 import dataclasses
 
@@ -11,10 +11,10 @@ from pedestal_common.parameters import Parameters, parameter
 
 @dataclasses.dataclass(frozen=True)
 class LeverArm(Parameters):
-    """Vector from the INS to the antenna, FLU.
+    """Vector from the INS to the antenna: x forward, y to the left, z up (FLU).
 
-    The control unit uses it only where the range is measured, because the parallax of the lever arm is its length
-    divided by the range.
+    The lever arm causes a parallax, at most its length divided by the range. The control unit therefore uses it only
+    where the range is measured.
     """
 
     x: float = parameter(0.0, -500.0, 500.0, 'm', 'antenna forward of the INS')

@@ -1,4 +1,9 @@
-"""Faults of the numbers of a message, of any kind: frozen, NaN, noisy."""
+"""Faults of a message of any kind: dropped, or its numbers frozen, NaN, noisy.
+
+In each step a node first calls `clear`, then `apply` for each fault in force. It adds `noise` to the numbers of its
+message, and then calls `numbers`, so that frozen numbers contain the noise of the first frozen step. The node itself
+carries out the fault drop.
+"""
 import math
 
 import numpy as np
@@ -7,18 +12,25 @@ from pedestal_common.compiled import compiled
 from pedestal_common.injection import table
 
 MAX_HELD_NUMBERS = 32
-"""Largest number of values that a node freezes."""
+"""Largest number of values that a node freezes: the size of `held`."""
 
 MESSAGE_FAULT_DTYPE = np.dtype([('drop', 'i8'), ('freeze', 'i8'), ('nan', 'i8'), ('holds', 'i8'),
                                 ('held', 'f8', (MAX_HELD_NUMBERS,)),
                                 ('sigma', 'f8'), ('seed', 'i8')], align=True)
-"""Faults in force. drop, freeze, nan: 1 while in force; held: the numbers of the first frozen step, holds: 1 once they
-are stored; sigma and seed of white noise, sigma 0: none."""
+"""Faults in force.
+
+    drop, freeze, nan    1 while in force
+    held                 numbers of the first frozen step; holds: 1 once they are stored
+    sigma, seed          1 sigma of white noise, in the unit of the numbers, 0 for none; its seed
+"""
 
 
 @compiled
 def clear(e):
-    """End every fault of the message; the held numbers stay, for a freeze that goes on."""
+    """End every fault of the message. `apply` sets the faults that are still in force again.
+
+    holds is 1 if there was a freeze in the step before: a freeze that continues then uses the same held numbers.
+    """
     e.holds = e.freeze
     e.drop, e.freeze, e.nan, e.sigma = 0, 0, 0, 0.0
 
@@ -44,7 +56,10 @@ def apply(e, codes, fault, values):
 
 @compiled
 def numbers(e, values, first):
-    """Freeze values (n,) or make them NaN; e.held stores them from number `first` on."""
+    """Freeze values (n,) or make them NaN, in place; e.held stores them from number `first` on.
+
+    first + n must be at most MAX_HELD_NUMBERS.
+    """
     for i in range(len(values)):
         if e.freeze != 0:
             if e.holds != 0:
@@ -65,8 +80,10 @@ def _mixed(x):
 
 @compiled
 def _uniform(seed, stamp, i):
-    """Return a number in (0, 1) of a key. It is counter-based, so it depends on no earlier number (Salmon et al., SC
-    2011)."""
+    """Return a random number in (0, 1) that depends only on (seed, stamp, i), not on earlier numbers.
+
+    Such a generator is counter-based (Salmon et al., SC 2011).
+    """
     x = _mixed(_mixed(_mixed(np.uint64(seed) + np.uint64(0x9E3779B97F4A7C15)) ^ np.uint64(stamp)) ^ np.uint64(i))
     return (float(x >> np.uint64(11)) + 0.5) * 2.0**-53
 

@@ -46,7 +46,7 @@ Vector3Stamped = _TYPES['geometry_msgs/msg/Vector3Stamped']
 
 
 def serialize(message) -> bytes:
-    """Return the CDR bytes of a message, padding zeroed."""
+    """Return the CDR bytes of a message, padding zeroed, because equal runs must give equal bytes."""
     return bytes(ROS_TYPESTORE.serialize_cdr(message, message.__msgtype__))
 
 
@@ -88,7 +88,7 @@ def put_stamp(stamp, ns):
 
 
 def since(message, epoch):
-    """Return the message with its header's stamp counted from an epoch [ns]; a stamp 0 is the epoch itself."""
+    """Return the message with its header's stamp, changed in place, counted from an epoch [ns]; a stamp 0 stays 0."""
     stamp = nanoseconds(message.header.stamp)
     put_stamp(message.header.stamp, stamp - epoch if stamp else 0)
     return message
@@ -126,7 +126,10 @@ def _vector3_stamped(row):
 
 
 def _range(row):
-    """Return a Range of radio, any distance. The type has no code for radio; its 0 is the code that is not light."""
+    """Return a Range measured by radio, at any distance.
+
+    The type has codes for ultrasound (0) and infrared (1) and none for radio. 0 is taken, because radio is no light.
+    """
     return Range(header=header(row.frame), radiation_type=0, field_of_view=0.0, min_range=0.0, max_range=float('inf'),
                  range=0.0, variance=0.0)
 
@@ -153,7 +156,7 @@ _TEMPLATES = {'sensor_msgs/msg/JointState': _joint_state, 'trajectory_msgs/msg/J
 
 
 def template(topic):
-    """Return a message of a stamped topic of the table, with its names and frames set and its numbers zero."""
+    """Return a message of a topic of topics.TOPIC_BY_NAME with a stamp: names and frames set, numbers zero."""
     row = topics.TOPIC_BY_NAME[topic]
     return _TEMPLATES[row.type](row)
 

@@ -15,13 +15,20 @@ from pedestal_operator.rotator.rotctld import Limits, turn
 from pedestal_operator.rotator.set_point_filter import SetPointFilter
 
 SLAVE_DURATION_S = 3600.0
-"""Time for which a `slave` direction on a ship is valid [s]."""
+"""Time for which a `slave` direction on a ship is valid [s].
+
+A program may send one set-point and then none for a long time. The antenna keeps this direction meanwhile, longer than
+a pass lasts.
+"""
 
 MAX_ANGLE_AGE_S = 0.5
 """Age after which angles and attitude are stale [s]; they are published at each step of the drive."""
 
 MAX_AZIMUTH_DEG, MAX_SHIP_ELEVATION_DEG = 720.0, 180.0
-"""Largest azimuth of a set-point; largest elevation of a set-point on a ship [deg], in both directions."""
+"""Largest azimuth of a set-point; largest elevation of a set-point on a ship [deg], in both directions.
+
+On a ship a set-point is an earth direction, to which the limits of the axes, which are deck angles, do not apply.
+"""
 
 ATTITUDE_TOPIC = 'ship/imu/data'
 """Topic of the attitude, which exists on a ship only."""
@@ -97,7 +104,9 @@ class Pointing:
         low, high = (-MAX_SHIP_ELEVATION_DEG, MAX_SHIP_ELEVATION_DEG) if self.on_ship else limits.elevation
         self._check('azimuth', azimuth, -MAX_AZIMUTH_DEG, MAX_AZIMUTH_DEG)
         self._check('elevation', elevation, low, high)
-        self.earth_angles()
+        self.earth_angles()     # Only for its check: it raises Refused without a fresh position.
+        # On a ship the first `near` is a deck angle and not an earth angle. This is sufficient, because the whole
+        # turns of an earth azimuth matter only from one set-point to the next.
         near = (self._filter.set_point if self.continues(now) else self._remote.angles('joint_states'))[0]
         if self.on_ship:
             return near + (azimuth - near + 180.0) % 360.0 - 180.0, elevation
@@ -127,6 +136,7 @@ class Pointing:
         self._filter = SetPointFilter()
 
     def _request(self, angles, rates=(0.0, 0.0), moves=0.0):
+        """Request angles [deg] that move at rates [deg/s] for `moves` [s]; on a ship valid for `holds` [s]."""
         names = (*topics.AXES, *(f'{axis}_rate' for axis in topics.AXES))
         arguments = {**dict(zip(names, np.radians((*angles, *rates)))), 'moves': moves}
         if self.on_ship:

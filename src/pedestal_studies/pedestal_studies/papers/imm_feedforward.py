@@ -1,5 +1,6 @@
 """Feed-forward of estimated rate and acceleration (paper 003): a conventional Kalman filter beside the IMM.
 
+An IMM (interacting multiple model) filter mixes several Kalman filters by the probabilities of their models.
 The miss is the angle from the axis of the antenna to the target (the pointing error), as the paper's miss distance.
 The loop is `feedforward_loop`: 20 deg to and fro at 3.5 deg/s. Every 10 ms it gets a measured miss, which is 40 ms
 old. Cases AXIS/SOURCE, by the source of the rate and acceleration that are fed forward:
@@ -98,7 +99,10 @@ CASES = {
 
 
 def drive_case(axis, tuned):
-    """Return a Case of reversals without a pause on an axis, tracked with a filter (FilterParameters)."""
+    """Return a Case of reversals without a pause on an axis, tracked with a filter (FilterParameters).
+
+    The target's range of 510 m is that of uav_flyby's reference_range, at which the receiver has its nominal C/N0.
+    """
     w = math.pi / REVERSAL_S_BY_AXIS[axis]
     amplitudes = {f'tracking_receiver.target.angle.{name}_amplitude':
                   profiles.S_MOTION_RATE_RAD_S / w if name == axis else 0.0 for name in REVERSAL_S_BY_AXIS}

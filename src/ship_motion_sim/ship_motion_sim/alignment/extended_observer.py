@@ -21,7 +21,7 @@ INNOVATION_TIME_CONSTANT_S = 30.0
 EXPECTED_INNOVATION_RATIO = 1.2
 """Innovation ratio on a sea as expected, with the noise of the running mean [-]."""
 MIN_SWELL_FREQUENCY_RAD_S = 2.0 * math.pi / 16.0
-"""Frequency of the slowest swell on which a stated 1 sigma is valid [rad/s]."""
+"""Frequency of the slowest swell on which a stated 1 sigma is valid [rad/s]: 16 s, the longest expected period."""
 
 
 @compiled

@@ -49,7 +49,7 @@ def step(s, k, a, v, h):
     """
     s.t += h
     o = s.observer
-    l1, l2, l3, variance = riccati_eso.limit(o, k, h)
+    l1, l2, l3, variance = riccati_eso.advance_covariance(o, k, h)
     if v[0] == 0.0 and v[1] == 0.0:
         # The innovations measure the difference to the expected sea. With a GNSS, b contains the motion of the ship.
         extended_observer.predict(o, h)

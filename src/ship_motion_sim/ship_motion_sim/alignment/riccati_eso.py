@@ -1,6 +1,14 @@
 """The extended observer with Kalman gains: the best linear estimate of azimuth if the sea is as assumed.
 
-The covariance is the information limit: x3 from velocities with white noise r per step, x2 a random walk of q.
+    x1, x2, x3   of the north and of the east channel: velocity error [m/s], its rate [m/s2], the rate of x2 without
+                 command [m/s3]. Tilt is x2 / g, and x3 depends on the azimuth (see the package)
+    z1, z2, z3   their estimates
+    r, q         variance of the measured velocity per step [m2/s2]; growth of the variance of x2, the random walk of
+                 the gyros times g [(m/s2)2/s]
+    n'           frame that the INS computes for east, north, up
+
+The covariance is the information limit. It is the least covariance of z if x1 is measured with white noise r and x2
+walks at random by q.
 """
 import math
 
@@ -17,11 +25,13 @@ STATE_DTYPE = np.dtype([
     ('v1', 'f8', (2,)), ('v2', 'f8', (2,)),
     ('command', 'f8', (3,)), ('azimuth', 'f8'), ('azimuth_sigma', 'f8'), ('level_sigma', 'f8'),
 ], align=True)
+"""State. v1, v2: references of x1 [m/s] and x2 [m/s2] of both channels; command: rate of n' about east, north and up
+[rad/s]; azimuth: estimated misalignment [rad]; azimuth_sigma, level_sigma: stated 1 sigma [rad]."""
 
 
 @compiled
-def limit(o, k, h):
-    """Update the covariance of o for one step h [s] and its measurement; return (l1, l2, l3, expected variance of the
+def advance_covariance(o, k, h):
+    """Advance the covariance of o by one step h [s] and its measurement; return (l1, l2, l3, expected variance of the
     innovation [m2/s2])."""
     r = k.velocity_density / h
     extended_observer.predict_covariance(o, k, h)
@@ -39,14 +49,17 @@ def step(s, k, v_east, v_north, h, w_c):
     not affect the estimate, because the observer receives its exact commands.
     """
     o = s.observer
+    # The wanted velocity error is zero, so v1 and v2 start at zero and stay there. The differentiator is that of the
+    # paper.
     for i in range(2):
         s.v1[i], s.v2[i] = levelling.differentiated(s.v1[i], s.v2[i], 0.0, h)
     extended_observer.predict(o, h)
-    l1, l2, l3, variance = limit(o, k, h)
+    l1, l2, l3, variance = advance_covariance(o, k, h)
     extended_observer.correct(o, v_east, v_north, l1, l2, l3, variance, h)
     levelling.level(o, k, s.v1, s.v2, w_c, s.command)
     s.azimuth = extended_observer.azimuth(o, k)
-    # z3 is the integral of l3 / h times the innovations, so it oscillates with their swell.
+    # z3 is the integral of l3 / h times the innovations. Swell is the part of the innovations above the expected sea.
+    # The slowest swell, of 16 s, gives z3 its largest oscillation, because an integral divides by the frequency.
     swing = l3 / (h * extended_observer.MIN_SWELL_FREQUENCY_RAD_S)
     swell = swing * swing * extended_observer.swell_variance(o, variance)
     s.azimuth_sigma, level_sigma = extended_observer.sigmas(o, k, swell)

@@ -1,4 +1,6 @@
-"""Covariance of a stable linear loop under white noise: x+ = A x + noise of covariance Q.
+"""Covariance of a stable linear loop under white noise: x(k+1) = A x(k) + noise of covariance Q.
+
+The alignment method `adrc` computes with it the noise of its loop.
 
 The covariance becomes a constant of a law. `reproducible.solution` therefore takes the place of numpy.linalg.solve,
 whose last bits differ between processors.

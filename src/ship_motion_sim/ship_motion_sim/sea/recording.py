@@ -1,8 +1,11 @@
 """A recorded motion of a ship as piecewise polynomials with a continuous second derivative, made once at the start.
 
+Columns of the file:
+
     time_s      [s], growing; stamp 0 of the run is `start` after the first row
-    roll_deg    positive with the port side up
-    pitch_deg   positive with the bow up: the signs of a ship's instruments (PASHR), where FLU has the bow down
+    roll_deg    positive with the port side up, as in FLU
+    pitch_deg   positive with the bow up, as ship's instruments state it (NMEA sentence PASHR); in FLU it is positive
+                with the bow down
     heading_deg clockwise from north, 0 to 360 or -180 to 180
     surge_m     forward along the mean heading; surge, sway and heave are optional, 0 if missing
     sway_m      to port
@@ -22,7 +25,10 @@ from pedestal_common.geometry.interval import interval
 from pedestal_common.text_files import csv_table
 
 MIN_ROWS, MAX_ROWS = 4, 16384
-"""Least number of rows of a recording, which a not-a-knot spline needs, and largest number."""
+"""Least number of rows of a recording, which a not-a-knot spline needs, and largest number.
+
+The largest number bounds the size of the law's constants, whose arrays have a fixed length (sea.motion).
+"""
 MAX_PIECES = MAX_ROWS + 1
 """Largest number of pieces, those before and after the record included."""
 COEFFICIENTS_PER_PIECE = 6
@@ -86,8 +92,10 @@ def spline_with_ends(times, freedoms):
 
 @compiled
 def evaluate(breaks, coefficients, count, t, freedoms):
-    """Fill freedoms (3, 6) with the first `count` pieces at t and their first and second derivative; outside the
-    pieces, with the values at the nearest end."""
+    """Fill freedoms (3, 6) from the first `count` pieces at t [s]: value, first and second derivative of the six.
+
+    Outside the pieces, the values are those at the nearest end, where the ship is at rest.
+    """
     t = min(max(t, breaks[0]), breaks[count])
     piece = interval(breaks[:count + 1], t)
     s = t - breaks[piece]

@@ -19,13 +19,19 @@ TIME_OF_DAY = columns.Quantity('time of day', dict.fromkeys(('time', 'utc', 'utc
 MODIFIED_JULIAN_DATE_ZERO = 2_400_000.5
 """Julian date of the modified Julian date 0."""
 JULIAN_DATE_LIMITS = 2_400_000.5, 2_536_000.0
-"""Range of Julian dates: until 2231."""
+"""Range of Julian dates: 1858, the modified Julian date 0, until 2231."""
 FIRST_EXPECTED_JULIAN_DATE = 2_440_000.5
-"""Julian date of 1968, before which no time in seconds looks like a Julian date."""
+"""Julian date of 1968. `check` takes no number below it for a date.
+
+Because this date is the modified Julian date 40,000, a short file of seconds from 0 on is not refused.
+"""
 MIN_UNIX_TIME_S = 1e8
 """Least number of seconds since 1970 in a column of UTC [s]; a smaller number has another origin."""
 MIN_SPAN_S = 3.0
-"""Least time from the first row to the last if the times may also be days of a Julian date [s]."""
+"""Least time from the first row to the last if the times may also be days of a Julian date [s].
+
+A pass lasts less than 3 days. A column of days therefore spans less than 3.
+"""
 
 
 class Times:
@@ -50,7 +56,10 @@ class Times:
         return f'{self.date} and {self.column.name}' if self.date else self.column.name
 
     def seconds(self, row):
-        """Return the time of a row [s]. Raises TableError."""
+        """Return the time of a row [s]: an instant if the times are dated, otherwise seconds from any origin.
+
+        Raises TableError.
+        """
         cell = row[self.column.name] or ''
         value = self._seconds(f'{row[self.date] or ""} {cell}' if self.date else cell)
         self.first, self.last = value if self.first is None else self.first, value
@@ -69,6 +78,8 @@ class Times:
                                        f'{"UTC as ISO 8601" if self.dated else "a number"} as in the lines above')
         self.dated = dated
         if not dated:
+            # Such a cell, for example hh:mm:ss, is neither a date nor a number. The call only raises the error that
+            # names the valid forms of a date.
             if column.unit == 's' and ':' in cell:
                 return instant.seconds(*place, cell)
             return table.number(column, cell, -1e12, 1e12)

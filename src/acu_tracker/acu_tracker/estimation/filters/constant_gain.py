@@ -1,6 +1,10 @@
 """Filters of constant gain: X += (alpha, beta / T, gamma / (2 T^2)) nu, predicted at constant rate or acceleration.
 
-alpha determines beta and gamma by a relation. nu: innovation of the angle [rad]; T: time between measurements [s].
+    X    estimate of angle, rate and acceleration; its gains in parentheses are k1, k2, k3 of `gain`
+    nu   innovation of the angle [rad]
+    T    time between measurements [s]
+
+The gain alpha determines beta and gamma, by the relation of Benedict and Bordner or by that of Kalata.
 """
 import math
 

@@ -15,9 +15,14 @@ Measurement = namedtuple('Measurement', 'stamp axis range range_variance')
 """stamp [s]; axis: the AxisMeasurement of both; range [m] and its variance, NaN if it was not measured."""
 
 AxisInnovation = namedtuple('AxisInnovation', 'nu S chi_square rate rate_chi_square')
-"""nu: innovation of the angle [rad]; S: its variance; chi_square = nu^2 / S; rate: innovation of the rate [rad/s], NaN
-where none was used. rate_chi_square: contribution of the rate, given the angle, to nu' S^-1 nu of both. Each of the
-two is chi-square of one degree of freedom."""
+"""Innovation of an axis.
+
+    nu                 innovation of the angle [rad]; S: its variance; chi_square = nu^2 / S
+    rate               innovation of the rate [rad/s], NaN where none was used
+    rate_chi_square    NIS of angle and rate together, minus chi_square
+
+Both chi_square and rate_chi_square follow a chi-square distribution of one degree of freedom.
+"""
 
 Innovation = namedtuple('Innovation', 'axis range_nu range_S')
 """axis: the AxisInnovation of both; range_nu [m] and its variance range_S; NaN where nothing was compared."""
@@ -38,9 +43,11 @@ def error_variance(cross_elevation, elevation, cn0_dbhz, receiver):
     """Return the variance [rad2] of a receiver error (cross_elevation, elevation) [rad] at a C/N0 [dB-Hz].
 
     It is the sum of a floor and of thermal noise, which grows with the distance from the beam's axis. receiver: record
-    of ReceiverModelParameters.
+    of ReceiverModelParameters, with its integration [s] and its sigma_floor [rad].
     """
-    # slope [1/rad]: monopulse slope; offset [-]: difference over sum of the receiver at this error.
+    # slope [1/rad]: monopulse slope; offset [-]: difference over sum of the receiver at this error. With equal and
+    # independent noise in both channels, this ratio has the variance (1 + offset^2) / (2 C/N0 integration) to first
+    # order. Its square root over the slope is the sigma of ReceiverModelParameters on the axis.
     slope = receiver.slope / receiver.beamwidth
     offset = slope * math.hypot(cross_elevation, elevation)
     thermal = (1.0 + offset * offset) / (slope * slope * 2.0 * 10.0**(0.1 * cn0_dbhz) * receiver.integration)
@@ -52,8 +59,11 @@ def attitude_variances(verticals, tilt, heading):
     """Return the variances (across, along) of a direction that follow from the variances of the
     attitude, in their unit.
 
-    tilt: about every horizontal axis; heading: about the vertical. A turn about one axis of the direction moves it
-    along the other. verticals: (across, along) of estimate_frame.verticals.
+        across, along    unit vectors at a right angle to the direction: that of growing azimuth, of growing elevation
+        verticals        their components along the earth's vertical, see estimate_frame.verticals
+        tilt, heading    variance of the attitude about every horizontal axis, and about the vertical
+
+    A turn about `along` moves the direction across, and a turn about `across` moves it along.
     """
     across, along = verticals
     return tilt + along * along * (heading - tilt), tilt + across * across * (heading - tilt)

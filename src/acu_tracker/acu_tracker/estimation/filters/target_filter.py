@@ -1,9 +1,11 @@
 """The target filter in use: the filters of the axes, or the Cartesian filter if the kind has it
 and a range is measured.
 
-The Cartesian filter starts with the first range from the estimate of the axes' filters. It is used once its standard
-deviation of the rate is half of theirs. The axes' filters keep running beside it, and take over from its estimate when
-it has lost the range. Measured rates go to the axes' filters only.
+The Cartesian filter starts from the estimate of the axes' filters, at a measured range whose standard deviation is at
+most ukf.range_share of it. An axis uses the Cartesian filter once its standard deviation of the rate is at most half
+of that of the axis's own filter. This margin avoids a hand-over that gains little. The axes' filters keep running
+beside the Cartesian filter. The Cartesian filter stops when the standard deviation of its own range exceeds the same
+share. The axes' filters then continue from its estimate. Measured rates go to the axes' filters only.
 
 f, c: records of FILTER_DTYPE and of CONSTANTS_DTYPE; m: a Measurement.
 """
@@ -48,8 +50,10 @@ def start(f, c, m, rate_sigma):
 
 @compiled
 def walk(f, azimuth, elevation):
-    """Set the variances per second [rad2/s] by which the measured angles walk from now on, for an INS whose error
-    changes slowly. The Cartesian filter neglects them."""
+    """Set the variances per second [rad2/s] by which the error of the measured angles walks at random from now on.
+
+    This is the slowly changing error of an INS. The Cartesian filter neglects it.
+    """
     f.axis[0].drift_variance_rate, f.axis[1].drift_variance_rate = azimuth, elevation
 
 
@@ -88,6 +92,7 @@ def _chosen_innovation(used, own, cartesian):
     """Return the AxisInnovation of the Cartesian filter if it is used, otherwise that of the axis's own filter."""
     if not used:
         return own
+    # The NaN is the innovation of the rate, because the Cartesian filter uses no measured rate.
     return AxisInnovation(cartesian.nu, cartesian.S, cartesian.chi_square, math.nan, own.rate_chi_square)
 
 

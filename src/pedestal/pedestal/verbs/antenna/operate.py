@@ -15,11 +15,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def main(options: argparse.Namespace) -> int:
-    """Run the console. Return exit code 0."""
+    """Run the console. Return exit code 0. Raises ValueError without a terminal."""
     if not (sys.stdin.isatty() and sys.stdout.isatty()):
         raise ValueError('operate needs a terminal; `pedestal mode` and `pedestal status` need none')
     from pedestal_operator import console
-    with arguments.remote(options) as spun:
-        spun.wait_for_node(options.timeout)
-        console.operate(spun)
+    with arguments.remote(options) as connection:
+        connection.wait_for_node(options.timeout)
+        console.operate(connection)
     return 0

@@ -1,4 +1,4 @@
-"""list the scenarios that come with the product"""
+"""list the scenarios that come with this package"""
 import argparse
 
 from pedestal_analysis import console
