@@ -4,6 +4,10 @@ Both are squared errors in units of the covariance that the filter states (Bar-S
 5.4). NIS compares with the measurements: chi-square with one degree of freedom for each measured number. NEES compares
 angle and rate with the truth: two degrees of freedom. Larger values mean that the stated covariance is too small (the
 filter is too sure), smaller values that it is too large (the filter is too careful).
+
+The filter estimates the target in the frame of its sensors. The slow errors of INS and encoders turn this frame, and the
+measurements cannot show them. Because they cancel where the antenna points at the estimate, they are no error of the
+filter. The truth is therefore the direction that sensors with these slow errors, and without noise, would measure.
 """
 import dataclasses
 import functools
@@ -30,6 +34,10 @@ NOTABLE_DEVIATION = 0.1
 Because over minutes the band becomes narrower than the accuracy of any model, the band alone would mark every filter.
 """
 
+SLOW_ERROR_TIME_S = 1.0
+"""Time over which the errors of INS and encoders are averaged [s]. The filter follows the slower errors. The faster
+errors are noise, which the filter must expect."""
+
 FILTER_NUMBERS = ('innovation', 'rate_innovation', 'nis', 'sigma', 'rate_sigma', 'correlation')
 
 
@@ -39,8 +47,8 @@ class Consistency:
 
     innovation [rad], rate_innovation [rad/s], nis       of the measurements
     sigma [rad], rate_sigma [rad/s], correlation         stated covariance of the estimate
-    probability                                          (n, 2, 4) of topics.MOTION_MODELS
-    error [rad], rate_error [rad/s], nees                estimate minus truth
+    probability                                          (n, 2, m) of the m topics.MOTION_MODELS
+    error [rad], rate_error [rad/s], nees                estimate minus truth in the frame of the sensors
     tracking                                             (n,) bool: the evaluated part
     """
     t: np.ndarray
@@ -80,6 +88,46 @@ def _rates(relative, velocity, attitude, ship_velocity, rates):
         rates[k, 0], rates[k, 1] = motion.azimuth.rate, motion.elevation.rate
 
 
+@compiled
+def _offsets_of_sensors(deck, error, known_attitude, target, offsets):
+    """Fill offsets (n, 2) (cross-elevation, elevation) [rad]: the direction that the sensors measure without noise,
+    seen from the true direction.
+
+    deck (n, 2): angles of the encoders; error (n, 2): true pointing error (cross-elevation, elevation), both [rad];
+    known_attitude (n, 4): that of the INS; target (n, 2): true earth angles [rad].
+    """
+    mat = np.empty((3, 3))
+    for k in range(len(deck)):
+        azimuth, elevation = line_of_sight.displaced(deck[k, 0], deck[k, 1], error[k, 0], error[k, 1])
+        x, y, z = line_of_sight.direction(azimuth, elevation)
+        q = known_attitude[k]
+        line_of_sight.rotation(q[0], q[1], q[2], q[3], mat)
+        east, north, up = line_of_sight.to_earth(mat, x, y, z)
+        # Earth angles are clockwise, as deck angles are: north, west, up take the place of FLU.
+        offsets[k, 0], offsets[k, 1] = line_of_sight.offsets(target[k, 0], target[k, 1], north, -east, up)
+
+
+@compiled
+def _displaced_rows(angles, offsets, out):
+    """Fill out (n, 2): angles (n, 2) displaced by offsets (n, 2) (cross-elevation, elevation), all [rad]."""
+    for k in range(len(angles)):
+        out[k, 0], out[k, 1] = line_of_sight.displaced(angles[k, 0], angles[k, 1], offsets[k, 0], offsets[k, 1])
+
+
+def _slow(values, period):
+    """Return values (n, 2) averaged over SLOW_ERROR_TIME_S about each row, NaN excepted; period [s] of the rows."""
+    window = np.ones(2 * round(0.5 * SLOW_ERROR_TIME_S / period) + 1)
+    known = np.isfinite(values)
+    with np.errstate(invalid='ignore'):
+        return np.column_stack([
+            np.convolve(np.where(there, column, 0.0), window, 'same') / np.convolve(there, window, 'same')
+            for column, there in zip(values.T, known.T)])
+
+
+def _wrapped(angle):
+    return (angle + math.pi) % (2.0 * math.pi) - math.pi
+
+
 def read(bag, run):
     """Return the Consistency of a bag.Bag whose tracking.Tracking is `run`; None if the bag has no acu/filter."""
     if 'acu/filter' not in bag.topics or not bag.rows('acu/filter').size:
@@ -94,15 +142,23 @@ def read(bag, run):
                                         for axis in topics.AXES])
     place, twist = ('position.x', 'position.y', 'position.z'), ('twist.linear.x', 'twist.linear.y', 'twist.linear.z')
     relative, velocity = at_steps('target/truth', place), at_steps('target/truth', twist)
-    attitude, ship_velocity = np.tile(line_of_sight.ASHORE_ATTITUDE, (t.size, 1)), np.zeros((t.size, 3))
+    attitude = known_attitude = np.tile(line_of_sight.ASHORE_ATTITUDE, (t.size, 1))
+    ship_velocity = np.zeros((t.size, 3))
     if 'ship/truth' in bag.topics:
         relative = relative - at_steps('ship/truth', place)
-        attitude = at_steps('ship/truth', [f'orientation.{letter}' for letter in 'xyzw'])
+        quaternion = [f'orientation.{letter}' for letter in 'xyzw']
+        attitude, known_attitude = at_steps('ship/truth', quaternion), at_steps('ship/imu/data', quaternion)
         ship_velocity = at_steps('ship/truth', twist)
     true_rate = np.empty((t.size, 2))
     _rates(relative, velocity, attitude, ship_velocity, true_rate)
-    error = (estimate[:, :2] - run.target_earth + math.pi) % (2.0 * math.pi) - math.pi
-    rate_error = estimate[:, 2:] - true_rate
+    offsets, seen = np.empty((t.size, 2)), np.empty((t.size, 2))
+    _offsets_of_sensors(np.column_stack((run.azimuth, run.elevation)),
+                        np.column_stack((run.cross_elevation, run.elevation_error)), known_attitude, run.target_earth,
+                        offsets)
+    _displaced_rows(run.target_earth, _slow(offsets, run.period), seen)
+    slow_rate = np.gradient(_wrapped(seen - run.target_earth), t, axis=0) if t.size > 1 else np.zeros_like(seen)
+    error = _wrapped(estimate[:, :2] - seen)
+    rate_error = estimate[:, 2:] - true_rate - slow_rate
     with np.errstate(all='ignore'):  # a filter without a stated covariance has no NEES
         a, b, correlation = error / numbers['sigma'], rate_error / numbers['rate_sigma'], numbers['correlation']
         nees = (a * a - 2.0 * correlation * a * b + b * b) / (1.0 - correlation * correlation)
