@@ -5,8 +5,8 @@ Both are squared errors in units of the covariance that the filter states (Bar-S
 angle and rate with the truth: two degrees of freedom. Larger values mean that the stated covariance is too small (the
 filter is too sure), smaller values that it is too large (the filter is too careful).
 
-The filter estimates the target in the frame of its sensors. The slow errors of INS and encoders turn this frame, and the
-measurements cannot show them. Because they cancel where the antenna points at the estimate, they are no error of the
+The filter estimates the target in the frame of its sensors. The slow errors of INS, encoders and boresight turn this
+frame, and the measurements cannot show them. Because the antenna points in the same frame, they are no error of the
 filter. The truth is therefore the direction that sensors with these slow errors, and without noise, would measure.
 """
 import dataclasses
@@ -124,6 +124,13 @@ def _slow(values, period):
             for column, there in zip(values.T, known.T)])
 
 
+def _boresight(bag):
+    """Return the offset (cross-elevation, elevation) [rad] of the receiver's null from the beam, of the parameters in a
+    bag."""
+    of_receiver = bag.configuration['parameters'].get('tracking_receiver', {})
+    return np.array([of_receiver.get(f'antenna.boresight_{axis}', 0.0) for axis in ('cross_elevation', 'elevation')])
+
+
 def _wrapped(angle):
     return (angle + math.pi) % (2.0 * math.pi) - math.pi
 
@@ -153,8 +160,8 @@ def read(bag, run):
     _rates(relative, velocity, attitude, ship_velocity, true_rate)
     offsets, seen = np.empty((t.size, 2)), np.empty((t.size, 2))
     _offsets_of_sensors(np.column_stack((run.azimuth, run.elevation)),
-                        np.column_stack((run.cross_elevation, run.elevation_error)), known_attitude, run.target_earth,
-                        offsets)
+                        np.column_stack((run.cross_elevation, run.elevation_error)) - _boresight(bag), known_attitude,
+                        run.target_earth, offsets)
     _displaced_rows(run.target_earth, _slow(offsets, run.period), seen)
     slow_rate = np.gradient(_wrapped(seen - run.target_earth), t, axis=0) if t.size > 1 else np.zeros_like(seen)
     error = _wrapped(estimate[:, :2] - seen)
