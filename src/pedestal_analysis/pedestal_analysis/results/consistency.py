@@ -16,8 +16,9 @@ import math
 import numpy as np
 from scipy import special
 
-from acu_tracker.geometry.motion import motion_of_position
-from acu_tracker.geometry.vector import Vector, minus, rotated, turn, vector
+from acu_tracker.geometry.motion import AxisMotion, LineOfSight, Motion, earth_angles, motion_of_position
+from acu_tracker.geometry.motion import line_of_sight as line_of_sight_of
+from acu_tracker.geometry.vector import Vector, cross, minus, rotated, turn, vector
 from pedestal_analysis.results import tracking
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry import line_of_sight
@@ -108,10 +109,23 @@ def _offsets_of_sensors(deck, error, known_attitude, target, offsets):
 
 
 @compiled
-def _displaced_rows(angles, offsets, out):
-    """Fill out (n, 2): angles (n, 2) displaced by offsets (n, 2) (cross-elevation, elevation), all [rad]."""
+def _turn_rows(angles, rates, offsets):
+    """Turn angles (n, 2) [rad] and rates (n, 2) [rad/s] in place by offsets (n, 2) (cross-elevation, elevation) [rad].
+
+    Each row is turned as if its offset stood still, because the filter takes the changes of a slow error for a walk of
+    the angle, not for a rate.
+    """
     for k in range(len(angles)):
-        out[k, 0], out[k, 1] = line_of_sight.displaced(angles[k, 0], angles[k, 1], offsets[k, 0], offsets[k, 1])
+        azimuth, elevation = line_of_sight.displaced(angles[k, 0], angles[k, 1], offsets[k, 0], offsets[k, 1])
+        sight = line_of_sight_of(Motion(AxisMotion(angles[k, 0], rates[k, 0], 0.0),
+                                        AxisMotion(angles[k, 1], rates[k, 1], 0.0)))
+        u = Vector(*line_of_sight.earth_direction(azimuth, elevation))
+        # The rotation vector r of this small turn moves the rate by r x du.
+        more = cross(cross(sight.u, u), sight.du)
+        du = Vector(sight.du.x + more.x, sight.du.y + more.y, sight.du.z + more.z)
+        motion = earth_angles(LineOfSight(u, du, Vector(0.0, 0.0, 0.0)))
+        angles[k, 0], angles[k, 1] = azimuth, elevation
+        rates[k, 0], rates[k, 1] = motion.azimuth.rate, motion.elevation.rate
 
 
 def _slow(values, period):
@@ -129,10 +143,6 @@ def _boresight(bag):
     bag."""
     of_receiver = bag.configuration['parameters'].get('tracking_receiver', {})
     return np.array([of_receiver.get(f'antenna.boresight_{axis}', 0.0) for axis in ('cross_elevation', 'elevation')])
-
-
-def _wrapped(angle):
-    return (angle + math.pi) % (2.0 * math.pi) - math.pi
 
 
 def read(bag, run):
@@ -158,14 +168,13 @@ def read(bag, run):
         ship_velocity = at_steps('ship/truth', twist)
     true_rate = np.empty((t.size, 2))
     _rates(relative, velocity, attitude, ship_velocity, true_rate)
-    offsets, seen = np.empty((t.size, 2)), np.empty((t.size, 2))
+    offsets, seen = np.empty((t.size, 2)), run.target_earth.copy()
     _offsets_of_sensors(np.column_stack((run.azimuth, run.elevation)),
                         np.column_stack((run.cross_elevation, run.elevation_error)) - _boresight(bag), known_attitude,
                         run.target_earth, offsets)
-    _displaced_rows(run.target_earth, _slow(offsets, run.period), seen)
-    slow_rate = np.gradient(_wrapped(seen - run.target_earth), t, axis=0) if t.size > 1 else np.zeros_like(seen)
-    error = _wrapped(estimate[:, :2] - seen)
-    rate_error = estimate[:, 2:] - true_rate - slow_rate
+    _turn_rows(seen, true_rate, _slow(offsets, run.period))
+    error = (estimate[:, :2] - seen + math.pi) % (2.0 * math.pi) - math.pi
+    rate_error = estimate[:, 2:] - true_rate
     with np.errstate(all='ignore'):  # a filter without a stated covariance has no NEES
         a, b, correlation = error / numbers['sigma'], rate_error / numbers['rate_sigma'], numbers['correlation']
         nees = (a * a - 2.0 * correlation * a * b + b * b) / (1.0 - correlation * correlation)
