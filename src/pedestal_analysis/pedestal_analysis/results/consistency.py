@@ -139,8 +139,7 @@ def _slow(values, period):
 
 
 def _boresight(bag):
-    """Return the offset (cross-elevation, elevation) [rad] of the receiver's null from the beam, of the parameters in a
-    bag."""
+    """Return the offset (cross-elevation, elevation) [rad] of the receiver's null from the beam, stated by a bag."""
     of_receiver = bag.configuration['parameters'].get('tracking_receiver', {})
     return np.array([of_receiver.get(f'antenna.boresight_{axis}', 0.0) for axis in ('cross_elevation', 'elevation')])
 
