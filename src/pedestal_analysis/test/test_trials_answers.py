@@ -75,7 +75,7 @@ class Rig(solve.Search):
 def test_the_value_at_which_a_law_reaches_the_limit_is_found():
     for low, high in ((0.0, 8.0), (0.01, 80.0)):
         found = Rig(lambda x: 0.5 * x * x, low, high).run()
-        assert found.value == pytest.approx(2.0, rel=2.0 * solve.TOLERANCE)
+        assert found.value == pytest.approx(2.0, rel=2.0 * solve.BRACKET_TOLERANCE)
         assert found.sentence.startswith('adu.wind.field.speed = 2')
         assert 'pointing_rms_deg = 2 is reached between ' in found.sentence
     assert Rig(lambda x: 10.0 - x, limit=4.4, whole=True).run().value in (5, 6)
@@ -86,13 +86,13 @@ def test_a_limit_that_is_not_reached_or_not_steadily_is_told_with_the_values():
     assert math.isnan(never.value) and len(never.tried) > solve.GRID_COUNT
     assert 'is not reached for adu.wind.field.speed from 0 to 8 m/s: the mean is 0 at 0 to 0.5' in never.sentence
     *_, (last, first) = [pair for pair in zip(never.tried, never.tried[1:]) if pair[0].measured != pair[1].measured]
-    assert last.value < 5.5 <= first.value <= last.value * (1.0 + 1.5 * solve.TOLERANCE)
+    assert last.value < 5.5 <= first.value <= last.value * (1.0 + 1.5 * solve.BRACKET_TOLERANCE)
     assert never.sentence.endswith(f'most trials have no pointing_rms_deg from {first.value:.4g} to 8')
     unsteady = Rig(lambda x: 2.0 + math.sin(x)).run()
     assert math.isnan(unsteady.value)
     assert 'is not reached steadily: between 3 and 4, between 6 and 7' in unsteady.sentence
     hidden = Rig(lambda x: x if x < 5.5 else math.nan, limit=5.2).run()     # between the last grid value and the edge
-    assert hidden.value == pytest.approx(5.2, rel=solve.TOLERANCE)
+    assert hidden.value == pytest.approx(5.2, rel=solve.BRACKET_TOLERANCE)
     gap = Rig(lambda x: x if abs(x - 2.5) > 0.1 else math.nan, limit=2.5).run()
     assert math.isnan(gap.value) and 'is not reached steadily: between 2 and 3' in gap.sentence
 

@@ -109,7 +109,7 @@ class RotctldNode(ServerNode):
     def _lines(self, request):
         """Return [(name, text)], the values in the answer to a request without motion. Raises Refused."""
         if request.name == 'help':
-            return rotctld.HELP
+            return rotctld.COMMAND_LIST_LINES
         pointing = self.controller.pointing
         if request.name == 'get_pos':
             return rotctld.position(*pointing.earth_angles(), self.parameters.raw_azimuth)

@@ -52,8 +52,9 @@ def test_nothing_is_answered_to_what_asks_nothing():
 
 
 def test_a_question_mark_is_answered_by_the_commands():
-    told = answer(read('?'), RESULT_OK, rotctld.HELP).decode().splitlines()
-    assert told[:2] == ['p: get_pos', 'P: set_pos'] and '\\dump_state' in told and len(told) == len(rotctld.COMMANDS)
+    listed = answer(read('?'), RESULT_OK, rotctld.COMMAND_LIST_LINES).decode().splitlines()
+    assert listed[:2] == ['p: get_pos', 'P: set_pos'] and '\\dump_state' in listed
+    assert len(listed) == len(rotctld.COMMANDS)
     assert read('?p').separator == '?'
 
 

@@ -265,7 +265,7 @@ def test_loops_of_a_flexible_dish_hold_their_margins_with_another_inertia_and_fr
     tuned = loops.Loops(file)
     loops.design(tuned, ('azimuth',), loops.LoopRequirements(), lambda share, text: None)
     changes = [scenario.override(*gain) for gain in tuned.gains.items()]
-    for inertia, mode in ((1.0, 1.0), *loops.CORNERS):
+    for inertia, mode in ((1.0, 1.0), *loops.PLANT_CORNERS):
         changed = scenario.load(file, [*changes, f'adu.azimuth.load.inertia={350.0 * inertia}',
                                        f'adu.azimuth.structure.frequency={4.0 * mode}'])
         p, c = changed.node_parameters('adu').azimuth, changed.node_parameters('acu').azimuth.feedforward

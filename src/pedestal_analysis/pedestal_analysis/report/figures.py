@@ -11,6 +11,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, LogLocator, NullFormatter
 
+from pedestal_analysis.results.tracking import stretches
+
 INK_COLOUR = '#20242a'
 RAW_COLOUR, FILTERED_COLOUR, TRUTH_COLOUR = '#8d949e', '#1f6fd1', '#e57a00'
 MOTOR_1_COLOUR, MOTOR_2_COLOUR = '#0b8f8c', '#a04fc4'
@@ -62,8 +64,7 @@ def thin(t, y, bins=1000):
 
 def spans(flags):
     """Return [(first, last index)] of the intervals in which flags (n,) bool are true."""
-    edges = np.flatnonzero(np.diff(np.concatenate(([0], flags.astype(int), [0]))))
-    return list(zip(edges[::2].tolist(), (edges[1::2] - 1).tolist()))
+    return [(first, end - 1) for first, end in stretches(flags)]
 
 
 def new_panels(rows, columns=1, height=None, width=FIGURE_WIDTH_INCH, x='time [s]', y='', **options):

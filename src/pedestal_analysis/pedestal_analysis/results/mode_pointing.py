@@ -37,12 +37,6 @@ def read(bag, run) -> dict:
     return found
 
 
-def stretches(inside):
-    """Return the (first, last + 1) of each stretch of True in a mask (n,)."""
-    ends = np.flatnonzero(np.diff(np.concatenate(([False], inside, [False])).astype(np.int8)))
-    return list(zip(ends[::2].tolist(), ends[1::2].tolist()))
-
-
 def _window(run):
     """Return SETTLING_TIME_S as a number of steps."""
     return max(1, round(SETTLING_TIME_S / run.period))
@@ -63,7 +57,7 @@ def _of_table(_, run, inside):
     """Return (error (n, 2) [rad], mask (n,) of its settled steps) of a mode that follows a table."""
     error, window = _to_target(run), _window(run)
     on = np.zeros(run.t.size, bool)
-    for first, last in stretches(inside):
+    for first, last in tracking.stretches(inside):
         still = _moved(error[first:last], window) < MAX_DRIFT * SETTLING_TIME_S * run.beamwidth
         long = np.flatnonzero(np.convolve(still, np.ones(window, int))[:last - first] == window)
         if long.size:
@@ -74,7 +68,7 @@ def _of_table(_, run, inside):
 def _of_steps(_, run, inside):
     """Return (error (n, 2) [rad], mask (n,) of its settled steps) of step track."""
     on = np.zeros(run.t.size, bool)
-    for first, last in stretches(inside):
+    for first, last in tracking.stretches(inside):
         on[first:last] = run.t[first:last] >= run.t[first] + tracking.HANDOVER_SETTLING_S
     return _to_target(run), on
 
@@ -85,7 +79,7 @@ def _of_preset(bag, run, inside):
     beam = tracking.on_grid(bag, run.t, 'adu/truth' if 'adu/truth' in bag.topics else 'joint_states', columns)
     error, on = run.reference - beam, np.zeros(run.t.size, bool)
     error[:, 0] *= np.cos(beam[:, 1])
-    for first, last in stretches(inside):
+    for first, last in tracking.stretches(inside):
         part = slice(first, last)
         on[part] = ((_moved(run.reference[part], window) < MAX_REFERENCE_STEP_RAD)
                     & (_moved(error[part], window) < MAX_DRIFT * SETTLING_TIME_S * run.beamwidth))

@@ -338,6 +338,12 @@ def keyholes(bag):
     return list(slews.values())
 
 
+def stretches(flags):
+    """Return the (first, last + 1) of each stretch in which flags (n,) bool are true."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], flags.astype(int), [0]))))
+    return list(zip(edges[::2].tolist(), edges[1::2].tolist()))
+
+
 def rms(values, axis=None):
     """Return the root mean square of all values, or along an axis; NaN where a value is NaN."""
     return np.sqrt(np.mean(np.square(values), axis=axis))

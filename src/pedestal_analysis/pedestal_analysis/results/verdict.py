@@ -11,6 +11,7 @@ import typing
 import numpy as np
 
 from acu_tracker.modes import REASON_TEXTS
+from acu_tracker.operating.command_table import ACU_COMMANDS
 from pedestal_analysis.results.tracking import DEG_PER_RAD
 from pedestal_common.graph import modes, nodes
 from pedestal_common.graph.steps import NS_PER_SECOND
@@ -18,7 +19,7 @@ from pedestal_common.wire import commands
 
 TRIPPED, REFUSED, NOT_LOCKED, NOT_TRACKED = 'tripped', 'refused', 'never locked', 'never tracked'
 TRACKED, ON_THE_WAY, NO_TARGET = 'tracked', 'ended on the way', 'no target'
-FAILURES = TRIPPED, REFUSED, NOT_LOCKED, NOT_TRACKED
+FAILURE_WORDS = TRIPPED, REFUSED, NOT_LOCKED, NOT_TRACKED
 """Words of the verdicts on a failed run; the other words are of runs that did what was commanded."""
 
 TRACKING_MODES = 'autotrack', 'steptrack'
@@ -46,7 +47,7 @@ class Verdict(typing.NamedTuple):
     @property
     def failed(self) -> bool:
         """True if the run failed."""
-        return self.word in FAILURES
+        return self.word in FAILURE_WORDS
 
     @property
     def why(self) -> str:
@@ -111,7 +112,8 @@ def _tracking(bag, run) -> tuple[str, str]:
     wanted = {acu.get('initial_mode', 'standby'), *(command.verb for _, command, _ in _replies(bag)),
               *np.unique(run.mode[run.known_mode]).tolist()}
     shares = {mode: 100.0 * float(np.mean(run.mode == mode)) for mode in modes.MODES if (run.mode == mode).any()}
-    near = np.hypot(run.cross_elevation, run.elevation_error) < 0.5 * run.beamwidth
+    distance = np.hypot(run.cross_elevation, run.elevation_error)
+    near = distance < 0.5 * run.beamwidth
     by_level = run.mode == 'steptrack'
     if 'autotrack' in shares:
         since = '' if math.isnan(run.lock_time) else f', first lock at {run.lock_time:.4g} s'
@@ -122,7 +124,7 @@ def _tracking(bag, run) -> tuple[str, str]:
         return NO_TARGET, _without_target(shares, acu)
     if not any(modes.MODE_ROWS[modes.MODES.index(mode)].follows for mode in shares):
         return _never_began(bag, acu.get('initial_mode', 'standby'))
-    return _never_tracked(bag, run, near, acu)
+    return _never_tracked(bag, run, distance, near, acu)
 
 
 def _without_target(shares, acu):
@@ -143,8 +145,11 @@ def _never_began(bag, mode):
     return NOT_TRACKED, f'tracked 0 %: mode {mode} was never entered: {reason}'
 
 
-def _never_tracked(bag, run, near, acu):
-    """Return (word, sentence) on a run that followed a direction and never tracked; near (n,): target in the beam."""
+def _never_tracked(bag, run, distance, near, acu):
+    """Return (word, sentence) on a run that followed a direction and never tracked.
+
+    distance (n,): from beam to target [rad]; near (n,): target in the beam.
+    """
     receiver = bag.configuration['parameters'].get('tracking_receiver', {})
     count = acu.get('tracker.lock_count', 0) * run.period
     follows = np.isin(run.mode, [row.name for row in modes.MODE_ROWS if row.follows])
@@ -165,7 +170,6 @@ def _never_tracked(bag, run, near, acu):
         return NOT_LOCKED, f'{best}: the target was below the horizon'
     if np.sum(near) * run.period >= allowance:
         return NOT_LOCKED, best
-    distance = np.hypot(run.cross_elevation, run.elevation_error)
     away = f'{distance[-1] * DEG_PER_RAD:.3g} deg away'
     if left < allowance or near[-1] or _approaches(run, distance):
         return ON_THE_WAY, f'ended on the way to the target, {away}, before the receiver could lock'
@@ -177,10 +181,10 @@ def _never_tracked(bag, run, near, acu):
 
 def _next_command(acu, end):
     """Return the next scheduled command after the end [s] of a run that leads to tracking, with its time, or ''."""
-    for entry in filter(None, map(str.split, acu.get('commands', '').split(';'))):
-        at, verb = float(entry[0]), entry[1]
-        if at > end and _leads_to_tracking(verb, acu.get('tracker.handover', True)):
-            return f'{verb} at {at:g} s'
+    for due, command in commands.schedule('acu.commands', acu.get('commands', ''), ACU_COMMANDS):
+        at = due / NS_PER_SECOND
+        if at > end and _leads_to_tracking(command.verb, acu.get('tracker.handover', True)):
+            return f'{command.verb} at {at:g} s'
     return ''
 
 

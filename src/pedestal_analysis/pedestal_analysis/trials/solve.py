@@ -17,13 +17,12 @@ from pedestal_analysis.trials import ensemble, statistics
 from pedestal_analysis.trials import plan as plans
 from pedestal_bringup.scenario import scenario
 from pedestal_common.graph import nodes
-from pedestal_common.parameters import did_you_mean
 
 DEFAULT_RUNS = 12
 """Number of trials at each value, unless the user gives another."""
 GRID_COUNT, MAX_BISECTIONS = 9, 12
 """Number of values that fill the range, and largest number of bisections."""
-TOLERANCE = 0.01
+BRACKET_TOLERANCE = 0.01
 """Width of the last bracket over its upper end at which the search ends [-]."""
 MAX_LINEAR_RATIO = 20.0
 """Largest ratio of the ends of a positive range that is filled evenly; a wider range is filled in equal ratios."""
@@ -73,9 +72,7 @@ def goal(text, known) -> Goal:
     limit = statistics.number(rest)
     if not (name and math.isfinite(limit)):
         raise ValueError(f"--until {text!r}: must be RESULT = LIMIT, such as 'pointing_rms_deg = 0.02'")
-    if name not in known and name not in map(nodes.plain, known):
-        raise ValueError(f'--until {text!r}: no trial has a result {name!r};{did_you_mean(name, known)} '
-                         '`pedestal run --all --explain` explains the results')
+    statistics.check_result(f'--until {text!r}', name, known)
     return Goal(name, limit)
 
 
@@ -94,6 +91,11 @@ def search_range(text, chosen) -> Range:
     if not (math.isfinite(low) and math.isfinite(high) and low < high):
         raise plans.VaryError(f'--solve {text}: must be NODE.KEY=LOW:HIGH, LOW below HIGH')
     return Range(key, float(low), float(high), field.type is int, field.metadata.get('unit', ''))
+
+
+def table_prefix(key):
+    """Return the beginning of the names of the tables of a search over the parameter `key`."""
+    return f'solve_{key.replace("/", "_")}_'
 
 
 def _between(low, high, ratio):
@@ -143,7 +145,7 @@ class Search:
         return sorted(found, key=lambda one: one.value)
 
     def _name(self, value):
-        return f'solve_{self._wanted.key.replace("/", "_")}_{value!r}'
+        return f'{table_prefix(self._wanted.key)}{value!r}'
 
     def _tried(self, value, table):
         name = next(name for name in table.results if self._aim.result in (name, nodes.plain(name)))
@@ -152,7 +154,7 @@ class Search:
         estimate = intervals.interval(values[known]) if known.any() else (math.nan,) * 3
         row = {**intervals.estimated(f'{self._wanted.key}={value:.6g}', f'{nodes.plain(name)}/mean', estimate,
                                      statistics.unit(name), int(known.sum())),
-               'of': known.size, 'left_out': statistics.words_of(table, name, ~known)}
+               **statistics.coverage_fields(table, name, known)}
         return Tried(value, row, '', bool(known.mean() >= MIN_MEASURED_SHARE))
 
     def run(self) -> Solution:
@@ -192,10 +194,10 @@ class Search:
         return []
 
     def _middle(self, low, high):
-        """Return the value between two Tried, None if they are as near as TOLERANCE."""
+        """Return the value between two Tried, None if they are as near as BRACKET_TOLERANCE."""
         middle = _between(low.value, high.value, _in_ratios(self._wanted))
         middle = round(middle) if self._wanted.whole else float(f'{middle:.6g}')
-        near = high.value - low.value <= TOLERANCE * max(abs(low.value), abs(high.value))
+        near = high.value - low.value <= BRACKET_TOLERANCE * max(abs(low.value), abs(high.value))
         return None if near or not low.value < middle < high.value else middle
 
     def _bisected(self, low, high):

@@ -72,6 +72,13 @@ class Requirement(typing.NamedTuple):
 _REQUIRED = re.compile(r'\s*(\S+)\s*(<=|>=|<|>)\s*(\S+)\s*')
 
 
+def check_result(option, name, known):
+    """Raise ValueError unless `known`, names of results, contains a name, of a beam or of any; option: as given."""
+    if name not in known and name not in map(nodes.plain, known):
+        raise ValueError(f'{option}: no trial has a result {name!r};{did_you_mean(name, known)} '
+                         '`pedestal run --all --explain` explains the results')
+
+
 def requirement(text, known) -> Requirement:
     """Return the Requirement of a text such as 'pointing_max_deg < 0.1'; known: results. Raises ValueError."""
     match = _REQUIRED.fullmatch(text)
@@ -79,9 +86,7 @@ def requirement(text, known) -> Requirement:
     if not match:
         raise ValueError(usage)
     name, sign, limit = match.groups()
-    if name not in known and name not in map(nodes.plain, known):
-        raise ValueError(f'--require {text!r}: no trial has a result {name!r};{did_you_mean(name, known)} '
-                         '`pedestal run --all --explain` explains the results')
+    check_result(f'--require {text!r}', name, known)
     if math.isnan(number(limit)):
         raise ValueError(usage)
     return Requirement(f'{name} {sign} {limit}', name, f'{sign} {limit}')
@@ -182,11 +187,15 @@ def case_of(case, name):
     return f'{case}/{beam}'.rstrip('/'), plain
 
 
-def words_of(table, name, chosen):
-    """Return {first word of `why`: count} of some trials (n,), a mask, of the beam of a column of a table.Table."""
-    return dict(collections.Counter(
-        why.partition(':')[0] or 'not measured'
-        for why, is_chosen in zip(table.text(why_column(name)), chosen) if is_chosen).most_common())
+def coverage_fields(table, name, known):
+    """Return the fields of a row that `coverage` reads, of a column of a table.Table.
+
+    known: mask (n,) of the trials with the result. of: number of trials; left_out: {first word of `why`: count} of the
+    trials without the result.
+    """
+    words = collections.Counter(why.partition(':')[0] or 'not measured'
+                                for why, is_known in zip(table.text(why_column(name)), known) if not is_known)
+    return {'of': known.size, 'left_out': dict(words.most_common())}
 
 
 def why_column(name):
@@ -205,9 +214,9 @@ def coverage(row):
 def failures(table):
     """Return one line on the trials of a table.Table that failed, '' for none."""
     words = [text.partition(':')[0] for name in table.texts for text in table.text(name)]
-    count = collections.Counter(word for word in words if word in verdict.FAILURES)
-    told = ', '.join(f'{number} {word}' for word, number in count.most_common())
-    return f'{sum(count.values())} of {len(words)} runs failed: {told}; column `{WHY}` of the table' if count else ''
+    count = collections.Counter(word for word in words if word in verdict.FAILURE_WORDS)
+    listed = ', '.join(f'{number} {word}' for word, number in count.most_common())
+    return f'{sum(count.values())} of {len(words)} runs failed: {listed}; column `{WHY}` of the table' if count else ''
 
 
 def of_results(case, table):
@@ -220,7 +229,7 @@ def of_results(case, table):
     for name in table.measured_results:
         values = table.column(name)
         known = np.isfinite(values)
-        left_out = {'of': known.size, 'left_out': words_of(table, name, ~known)}
+        fields = coverage_fields(table, name, known)
         values = values[known]
         own, metric = case_of(case, name)
         if not values.size:
@@ -228,7 +237,7 @@ def of_results(case, table):
         estimates = {'mean': intervals.interval(values), 'min': (values.min(), math.nan, math.nan),
                      **{f'p{share:02d}': percentile(values, share) for share in PERCENTILES},
                      'max': (values.max(), math.nan, math.nan)}
-        found += [{**intervals.estimated(own, f'{metric}/{key}', estimate, unit(name), values.size), **left_out}
+        found += [{**intervals.estimated(own, f'{metric}/{key}', estimate, unit(name), values.size), **fields}
                   for key, estimate in estimates.items()]
     return found
 

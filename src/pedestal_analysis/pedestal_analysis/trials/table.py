@@ -107,9 +107,11 @@ class Table:
         """
         i = self.head.index(name)
         cells = [row[i] for row in self.rows]
-        if categories := self.categories(name):
+        try:
+            return np.array([float(cell) if cell else math.nan for cell in cells])
+        except ValueError:
+            categories = self.categories(name)
             return np.array([float(categories.index(cell)) for cell in cells])
-        return np.array([float(cell) if cell else math.nan for cell in cells])
 
     def categories(self, name):
         """Return the different texts of a column in the order of first appearance; [] for a column of numbers."""

@@ -55,11 +55,11 @@ MODE_H0, MODE_RATIO = 0.8, 3.0
 """Filter step of the shaper times the frequency of the structure, and least ratio of that frequency to the crossover
 of the position loop [-]."""
 
-CORNERS = tuple((inertia, mode) for inertia in (0.7, 1.3) for mode in (0.8, 1.2))
+PLANT_CORNERS = tuple((inertia, mode) for inertia in (0.7, 1.3) for mode in (0.8, 1.2))
 """Factors of load inertia and frequency of the structure with which the loops must hold their margins, too [-]."""
 
 WORST_SUFFIX = ', worst'
-"""Suffix of the name of a loop in the row with its smallest margins in all CORNERS."""
+"""Suffix of the name of a loop in the row with its smallest margins in all PLANT_CORNERS."""
 
 SLOWDOWN_FACTOR, MAX_SLOWDOWNS = 0.85, 12
 """Factor by which a loop without its margins is made slower, and number of tried crossovers."""
@@ -255,7 +255,7 @@ class Loops:
     def response(self, loop, name, corner=(1.0, 1.0)):
         """Return the frequency.Response of a loop of an axis with the present gains, None if the drive trips.
 
-        loop: 'current' (of the motor with the smaller phase margin), 'speed' or 'position'; corner: see CORNERS.
+        loop: 'current' (of the motor with the smaller phase margin), 'speed' or 'position'; corner: see PLANT_CORNERS.
         """
         case = self._case(corner)
         drive = case.loaded().node_parameters('adu')
@@ -284,13 +284,13 @@ class Loops:
     def close(self, loop, name, required, set_to, fastest):
         """Return (w, rows) of the first loop, from crossover `fastest` [rad/s] down, that meets LoopRequirements.
 
-        rows: [(name of the loop, margins)], with the smallest values in all CORNERS if a structure is declared.
+        rows: [(name of the loop, margins)], with the smallest values in all PLANT_CORNERS if a structure is declared.
         set_to(w) sets the gains for w. Raises LoopError if no loop meets the requirements.
         """
         for w in fastest * SLOWDOWN_FACTOR**np.arange(MAX_SLOWDOWNS):
             set_to(w)
             every = []
-            for corner in ((1.0, 1.0), *(CORNERS if self.plants[name].mode else ())):
+            for corner in ((1.0, 1.0), *(PLANT_CORNERS if self.plants[name].mode else ())):
                 margins = self.measured(loop, name, corner)
                 every.append(margins)
                 if not (margins and meets_margins(margins, required)):

@@ -32,7 +32,7 @@ COMMANDS = (Row('p', 'get_pos'), Row('P', 'set_pos', 2, True), Row('S', 'stop', 
             Row('R', 'reset', 1, True), Row('M', 'move', 2, True), Row('_', 'get_info'), Row('s', 'get_status'),
             Row('1', 'dump_caps'), Row('', 'dump_state'), Row('q', 'quit'), Row('Q', 'quit'))
 
-HELP = tuple(('', f'{row.letter}: {row.name}' if row.letter else f'\\{row.name}') for row in COMMANDS)
+COMMAND_LIST_LINES = tuple(('', f'{row.letter}: {row.name}' if row.letter else f'\\{row.name}') for row in COMMANDS)
 """Lines of the answer to `?`: the commands."""
 
 SET_COMMANDS = tuple(row.name for row in COMMANDS if row.sets)

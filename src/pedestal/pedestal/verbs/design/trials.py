@@ -176,7 +176,7 @@ def _solve(options: argparse.Namespace) -> int:
         found = solve.Search(make_plan, wanted, aim, folder, pool, progress).run()
     print(found.sentence)
     console.show_tried(wanted.key, wanted.unit, found.tried)
-    print(f'tables {folder}/solve_{wanted.key.replace("/", "_")}_*.csv')
+    print(f'tables {folder}/{solve.table_prefix(wanted.key)}*.csv')
     console.write_json(options.json, {
         'name': nominal.name, 'rows': [one.row for one in found.tried if one.row], 'parameter': wanted.key,
         'value': found.value if math.isfinite(found.value) else None, 'unit': wanted.unit, 'sentence': found.sentence})
