@@ -25,7 +25,7 @@ def wait_until(condition, seconds):
 def begun(start_run, patient):
     """begun(prefix of its command) -> a realtime Run that records."""
     def begin(prefix=()):
-        run = start_run('leo_pass', '--pacing', 'realtime', *patient, prefix=prefix)
+        run = start_run('leo_pass', '--pacing', 'realtime', '--all', *patient, prefix=prefix)
         wait_until(lambda: run.bag.exists() and run.recorded(1), 180.0)
         return run
     return begin
