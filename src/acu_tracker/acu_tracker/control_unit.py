@@ -1,7 +1,7 @@
 """Antenna control unit: one `step` per drive step, from encoders, receiver error and attitude to the rate command.
 
-The estimate lives in earth angles, near the zenith in those of a tilted `estimate_frame`. docs/architecture.md shows
-the order of a step. Each part of the state is written by its own module; this module connects the parts.
+The estimate lives in the angles of `estimate_frame`, whose equator passes through the target. docs/architecture.md
+shows the order of a step. Each part of the state is written by its own module; this module connects the parts.
 
 One-letter names in all functions:
 s, c, u, o   records of STATE_DTYPE, CONSTANTS_DTYPE, signals.INPUTS_DTYPE and OUTPUTS_DTYPE
@@ -188,7 +188,7 @@ def _observe(s, c, u, o, program, silence):
     """
     g, k, mode = s.guidance, s.tracking, s.mode.now
     way = bridge.way(g.bridge, program)
-    tracker.transfer(k.target.tracker, c.p.tracker, c.tracker)
+    tracker.transfer(k.target.tracker, c.tracker)
     flags = signals.Flag.STEP_GAP if silence else 0
     flags |= measurements.take_encoders(k.encoders, u) | _take_attitude(s, c, u) | _take_receiver(s, c, u, o, way)
     flags |= measurements.take_preset(g.preset, u)

@@ -3,7 +3,7 @@ import math
 
 import numpy as np
 
-from acu_tracker.estimation.filters.motion_models import MODEL_NAMES
+from acu_tracker.estimation.filters.motion_models import COLUMN_NAMES
 from pedestal_common.codes import bits
 from pedestal_common.compiled import compiled
 from pedestal_common.graph import nodes, topics
@@ -47,7 +47,7 @@ OUTPUTS_DTYPE = np.dtype([
     ('reference', 'f8', (2, 3)),                        # deck angle, rate, acceleration at t_k; of a beam: the
                                                         # command at t_m
     ('covariance', 'f8', (2, 3)),                                               # p11, p12, p22 at t_k
-    ('probability', 'f8', (2, len(MODEL_NAMES))),                               # of the motion models MODEL_NAMES
+    ('probability', 'f8', (2, len(COLUMN_NAMES))),                               # of the motion models COLUMN_NAMES
     ('innovation', 'f8', (2,)), ('rate_innovation', 'f8', (2,)),                # nu of angle, rate; NaN: no error
     ('innovation_sigma', 'f8', (2,)),                                           # of the angle's, as predicted
     ('nis', 'f8', (2,)), ('gated', 'i8'),                                       # nu' S^-1 nu; errors gated so far

@@ -12,8 +12,8 @@ from acu_tracker.estimation.params import FilterParameters
 from pedestal_common.parameters import build
 
 T, SIGMA, RATE_SIGMA = 0.01, 5e-4, 2e-3
-MODELS = {'imm.models': 'cv ca singer', 'imm.cv.noise': 1e-3, 'imm.ca.noise': 0.3, 'imm.singer.sigma': 0.1,
-          'imm.singer.alpha': 2.0, 'imm.dwell': 0.5}
+MODELS = {'imm.models': 'cv ca singer', 'imm.rungs': 1, 'imm.cv.noise': 1e-3, 'imm.ca.noise': 0.3,
+          'imm.singer.sigma': 0.1, 'imm.singer.alpha': 2.0, 'imm.dwell': 0.5}
 
 
 def filterpys(y, with_rate):

@@ -67,15 +67,15 @@ def reset_accepted_count(t):
 
 
 @compiled
-def transfer(t, p, c):
+def transfer(t, c):
     """Adopt constants that may have changed: a filter of another kind continues from the estimate of the old one."""
-    target_filter.transfer(t.filter, c.filter, p.initial_rate, t.running)
+    target_filter.transfer(t.filter, c.filter, t.running)
 
 
 @compiled
-def move(t, c, motion):
-    """Move the filter to a frame in which the target has this Motion now."""
-    target_filter.move(t.filter, c.filter, motion)
+def turn(t, c, rotation):
+    """Turn the filter into another frame; rotation: Rotation from the old frame into the new one."""
+    target_filter.turn(t.filter, c.filter, rotation)
 
 
 @compiled

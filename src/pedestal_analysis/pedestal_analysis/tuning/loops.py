@@ -21,6 +21,8 @@ receiver sees this swing as a motion of the target, and the shaper must not pass
     shaper: a that bends the structure by a / (2 pi f)^2 of at most 0.8 mrad and a tenth of the beamwidth, and needs
             half of the torque, up to which the bias torque keeps the teeth closed; jerk a f, so that the acceleration
             rises within one period of the swing and leaves no swing behind; h0 = 0.8 / f
+    filter: of the default bank only the models ca whose bandwidth (q / r)^(1/3) is at most 2 pi f / 7, with the white
+            jerk q of the model and the root density r of the receiver's noise. A faster model would follow the swing.
 
 Each of these values is the smaller one of the two designs (of h0 the larger one). The margins are then measured with
 the structure in the plant, also with the load inertia changed by 30 % and f by 20 %, and the smallest margins count.
@@ -31,6 +33,7 @@ import pathlib
 
 import numpy as np
 
+from acu_tracker.estimation.params import FilterParameters
 from adu_drive.params import SPEED_LOOP_PERIOD_S
 from pedestal_analysis.tuning import frequency_response as frequency
 from pedestal_bringup.scenario import scenario
@@ -51,9 +54,9 @@ CLOSED_TEETH_SHARE = 0.5
 """Share of the torque limit that the shaper uses on a flexible structure: `bias.out`, above which no bias torque keeps
 the teeth closed [-]."""
 
-MODE_H0, MODE_RATIO = 0.8, 3.0
-"""Filter step of the shaper times the frequency of the structure, and least ratio of that frequency to the crossover
-of the position loop [-]."""
+MODE_H0, MODE_RATIO, FILTER_RATIO = 0.8, 3.0, 7.0
+"""Filter step of the shaper times the frequency of the structure, and least ratios of that frequency to the crossover
+of the position loop and to the bandwidth of the target filter [-]."""
 
 PLANT_CORNERS = tuple((inertia, mode) for inertia in (0.7, 1.3) for mode in (0.8, 1.2))
 """Factors of load inertia and frequency of the structure with which the loops must hold their margins, too [-]."""
@@ -99,12 +102,14 @@ class LoopRequirements:
 class Plant:
     """Model of one axis, from its adu_drive.params.AxisParameters, the mean wind torque [Nm] and the beamwidth [rad].
 
-    Raises LoopError if the motors cannot move the axis.
+    noise: root density of the receiver's noise on the beam axis [rad/sqrt(Hz)], see receiver_noise. Raises LoopError
+    if the motors cannot move the axis.
     """
     name: str
     axis: object
     wind: float = 0.0
     beamwidth: float = math.inf
+    noise: float = math.inf
 
     def __post_init__(self):
         if self.acceleration <= 0.0:
@@ -156,6 +161,23 @@ class Plant:
                 ) / self.whole_inertia
 
 
+def receiver_noise(receiver):
+    """Return the root density [rad/sqrt(Hz)] of the error noise at the reference range, from
+    TrackingReceiverParameters: beamwidth / (slope sqrt(2 C/N0))."""
+    density = 2.0 * 10.0**(0.1 * receiver.receiver.cn0_dbhz)
+    return receiver.antenna.beamwidth / (receiver.antenna.slope * math.sqrt(density))
+
+
+def filter_gains(plant):
+    """Return {key of acu.AXIS: value} of the target filter: the number of models that do not follow the structure."""
+    if not plant.mode:
+        return {}
+    bank = FilterParameters().imm
+    fastest = plant.noise * (2.0 * math.pi * plant.mode / FILTER_RATIO)**3
+    noises = bank.ca.noise * bank.rung_ratio**np.arange(bank.rungs)
+    return {'filter.imm.rungs': max(1, int(np.sum(noises <= fastest)))}
+
+
 def rate_slope(plant):
     """Return the largest change of the rate command [rad/s2], a quarter of the torque below the limits."""
     return 1.3 * TORQUE_SHARE * plant.acceleration
@@ -190,12 +212,12 @@ def control_gains(plant, w_s, w_p):
     shaper = {f'shaper.{key}': value for key, value in shaper_gains(plant, w_s).items()}
     return {'controller': 'feedforward', 'feedforward.bandwidth': w_p, 'feedforward.inertia': plant.whole_inertia,
             'feedforward.friction': plant.axis.friction.coulomb,
-            'shaper.rate': SHAPER_RATE_SHARE * plant.axis.limits.rate, **shaper,
+            'shaper.rate': SHAPER_RATE_SHARE * plant.axis.limits.rate, **shaper, **filter_gains(plant),
             'limits.rate': plant.axis.limits.rate, 'limits.acceleration': rate_slope(plant)}
 
 
 def _rounded(gains):
-    return {key: value if isinstance(value, str) else float(f'{value:.4g}') for key, value in gains.items()}
+    return {key: float(f'{value:.4g}') if isinstance(value, float) else value for key, value in gains.items()}
 
 
 def smallest(every):
@@ -224,8 +246,9 @@ class Loops:
             raise LoopError(f'scenario {chosen.name}: an electronic beam has no loops to tune')
         self.source, self.overrides, self.name = source, tuple(overrides), chosen.name
         drive = chosen.node_parameters('adu')
-        beamwidth = chosen.node_parameters('tracking_receiver').antenna.beamwidth
-        self.plants = {name: Plant(name, getattr(drive, name), getattr(drive.wind, name), beamwidth) for name in AXES}
+        receiver = chosen.node_parameters('tracking_receiver')
+        self.plants = {name: Plant(name, getattr(drive, name), getattr(drive.wind, name), receiver.antenna.beamwidth,
+                                   receiver_noise(receiver)) for name in AXES}
         self.gains = {}
 
     def set(self, node, name, gains):

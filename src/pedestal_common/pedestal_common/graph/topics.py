@@ -14,7 +14,7 @@ import typing
 
 AXES = ('azimuth', 'elevation')
 MOTOR_NAMES = tuple(f'{axis}_motor_{i}' for axis in AXES for i in (1, 2))
-MOTION_MODELS = ('cv', 'ca', 'singer', 'current_statistical')
+MOTION_MODELS = ('cv', 'ca', 'singer', 'current_statistical', *(f'ca_{rung}' for rung in range(2, 9)))
 """Motion models of the target in the ACU's filters."""
 
 FILTER_UNITS = {'innovation': 'rad', 'rate_innovation': 'rad/s', 'nis': '', 'sigma': 'rad', 'rate_sigma': 'rad/s',

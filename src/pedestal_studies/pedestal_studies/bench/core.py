@@ -144,7 +144,8 @@ def filterpy_steps():
 def filter_rows():
     """Return the rows of a step of one filter, of an IMM of three and of two unscented filters, beside filterpy."""
     steps = (filter_step(kind='current_statistical'),
-             filter_step(**{'kind': 'imm', 'imm.models': 'cv ca current_statistical'}), unscented_step())
+             filter_step(**{'kind': 'imm', 'imm.models': 'cv ca current_statistical',
+                                                      'imm.rungs': 1}), unscented_step())
     rows = []
     for metric, ours, target, theirs in zip(('kalman', 'imm3', 'imm_ukf'), steps, ('<= 2', '<= 10', None),
                                             filterpy_steps()):

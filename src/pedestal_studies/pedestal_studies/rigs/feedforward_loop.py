@@ -143,7 +143,7 @@ def imm(q_ca, predicted):
     """
     default = FilterParameters().imm
     bank = {
-        'models': 'cv ca current_statistical', 'dwell': 5.0,
+        'models': 'cv ca current_statistical', 'rungs': 1, 'dwell': 5.0,
         'cv': dataclasses.replace(default.cv, noise=math.radians(0.003)),
         'ca': dataclasses.replace(default.ca, noise=math.radians(q_ca)),
         'current_statistical': dataclasses.replace(default.current_statistical, alpha=4.0, a_max=math.radians(40.0),

@@ -51,7 +51,7 @@ same rms."""
 RATE_SIGMAS_RAD_S = {f'current_statistical-rate-{sigma}': math.radians(sigma) for sigma in (0.5, 0.1, 0.02)}
 """{filter with a rate measurement: standard deviation of the measured rate [rad/s]}."""
 
-MANOEUVRE_PARAMETERS = {'imm.models': 'cv ca current_statistical', 'imm.dwell': 5.0,
+MANOEUVRE_PARAMETERS = {'imm.models': 'cv ca current_statistical', 'imm.rungs': 1, 'imm.dwell': 5.0,
                         'imm.cv.noise': math.radians(0.003), 'imm.ca.noise': math.radians(0.1)}
 """Parameters of the filter imm-manoeuvre."""
 

@@ -18,11 +18,11 @@ from acu_tracker.estimation.filters import constant_gain, imm, kalman, motion_mo
 from acu_tracker.estimation.filters.kalman import Gaussian, PreviousAngle, Symmetric
 from acu_tracker.estimation.filters.kinds import FILTER_KINDS
 from acu_tracker.estimation.filters.measurement import AxisInnovation, AxisMeasurement, AxisVariances
-from acu_tracker.estimation.filters.motion_models import MODEL_NAMES
+from acu_tracker.estimation.filters.motion_models import COLUMN_NAMES
 from acu_tracker.geometry.motion import AxisMotion
 from pedestal_common.compiled import compiled
 
-BANK_SIZE = len(MODEL_NAMES)
+BANK_SIZE = len(COLUMN_NAMES)
 """Largest number of models in a bank."""
 
 P11_COLUMN, P33_COLUMN = Symmetric._fields.index('p11'), Symmetric._fields.index('p33')
@@ -61,7 +61,7 @@ ESTIMATE_DTYPE = np.dtype([('angle', 'f8'), ('rate', 'f8'), ('acceleration', 'f8
 
 variance, covariance, rate_variance: variances of angle and rate, and their covariance. `innovation` [rad],
 `rate_innovation` [rad/s], `nis` (nu' S^-1 nu): NaN where nothing was measured. `mu`: probability of each of
-MODEL_NAMES, NaN if it is not in the bank.
+COLUMN_NAMES, NaN if it is not in the bank.
 """
 
 
@@ -71,7 +71,7 @@ def constants(params, noise_bandwidth=0.0) -> np.ndarray:
     c, bank = np.zeros(1, CONSTANTS_DTYPE), FILTER_KINDS[params.kind].bank(params)
     c['count'] = len(bank.models)
     c['models'][0, :len(bank.models)] = bank.models
-    c['bank'], c['states'] = np.sum(1 << bank.models['kind']), bank.models['states'].max()
+    c['bank'], c['states'] = np.sum(1 << bank.models['column']), bank.models['states'].max()
     c['dwell'], (c['alpha'], c['beta'], c['gamma']) = bank.dwell, bank.gains
     c['rate_measurement'], c['noise_bandwidth'] = params.rate_measurement, 2.0 * math.pi * noise_bandwidth
     return c
@@ -107,31 +107,31 @@ def _fill(f, c, g):
 
 
 @compiled
-def _reset_acceleration_variance(f, c, rate_sigma):
-    """Set the variance of the acceleration to that at the start."""
+def _reset_acceleration_variance(f, c):
+    """Set the variance of the acceleration of every model to that at its start."""
     for j in range(c.count):
-        f.p[j, P33_COLUMN] = motion_models.initial_variance(c.models[j], rate_sigma)
+        f.p[j, P33_COLUMN] = c.models[j].initial_sigma * c.models[j].initial_sigma
 
 
 @compiled
 def start(f, c, y, R, rate_sigma):
     """Start at a measured angle y [rad] of variance R; rate_sigma: standard deviation of the unknown rate [rad/s]."""
     _fill(f, c, Gaussian(AxisMotion(y, 0.0, 0.0), Symmetric(R, 0.0, 0.0, rate_sigma * rate_sigma, 0.0, 0.0)))
-    _reset_acceleration_variance(f, c, rate_sigma)
+    _reset_acceleration_variance(f, c)
     f.last_angle, f.correlated = y, 1
 
 
 @compiled
-def transfer(f, c, rate_sigma):
+def transfer(f, c):
     """If the bank has changed, start its models from the combined estimate and covariance of the old bank.
 
-    An acceleration that the old bank did not estimate gets the variance of a `start` with rate_sigma [rad/s].
+    An acceleration that the old bank did not estimate gets the variance of a `start`.
     """
     if f.bank != c.bank:
         unknown = f.states == 2
-        _fill(f, c, imm.combine(f.mu, f.x, f.p, f.count))
+        _fill(f, c, corrected(f))
         if unknown:
-            _reset_acceleration_variance(f, c, rate_sigma)
+            _reset_acceleration_variance(f, c)
 
 
 @compiled
@@ -147,6 +147,29 @@ def move(f, c, motion):
         f.x[j, 1] += motion.rate - x.rate
         if c.models[j].states > 2:
             f.x[j, 2] += motion.acceleration - x.acceleration
+
+
+@compiled
+def blend(f, c, own, share, other):
+    """Set the covariance of every model to `own` of itself plus `share` of `other`, a Symmetric.
+
+    Of a model without an acceleration state only angle and rate have a covariance.
+    """
+    for j in range(c.count):
+        P = f.p[j]
+        P[0] = own * P[0] + share * other.p11
+        P[1] = own * P[1] + share * other.p12
+        P[3] = own * P[3] + share * other.p22
+        if c.models[j].states > 2:
+            P[2] = own * P[2] + share * other.p13
+            P[4] = own * P[4] + share * other.p23
+            P[5] = own * P[5] + share * other.p33
+
+
+@compiled
+def corrected(f):
+    """Return the Gaussian of the bank at the last measurement."""
+    return imm.combine(f.mu, f.x, f.p, f.count)
 
 
 @compiled
@@ -258,10 +281,10 @@ def outlook(f, c, T):
 
 @compiled
 def probabilities(f, c, mu):
-    """Set mu (BANK_SIZE,) to the probability of each of MODEL_NAMES, NaN if it is not in the bank."""
+    """Set mu (BANK_SIZE,) to the probability of each of COLUMN_NAMES, NaN if it is not in the bank."""
     mu[:] = math.nan
     for j in range(c.count):
-        mu[c.models[j].kind] = f.mu[j]
+        mu[c.models[j].column] = f.mu[j]
 
 
 @compiled

@@ -8,6 +8,10 @@ from acu_tracker.estimation.filters import constant_gain, motion_models
 from acu_tracker.estimation.filters.motion_models import MODEL_NAMES, MODEL_ROWS
 from pedestal_common.parameters import ParameterError
 
+UNKNOWN_ACCELERATION_RAD_S2 = 1e3
+"""Standard deviation of the acceleration at the start of a filter of constant gains: none is assumed, and the filter
+starts as a least-squares fit."""
+
 
 class Bank(typing.NamedTuple):
     """The motion models of an axis.
@@ -36,7 +40,8 @@ def _bank_of_alpha_beta(params):
 
 def _bank_of_alpha_beta_gamma(params):
     alpha = params.alpha_beta_gamma.alpha
-    return Bank(motion_models.constants('ca', params.ca, noise=0.0), gains=(alpha, *constant_gain.kalata(alpha)))
+    return Bank(motion_models.constants('ca', params.ca, noise=0.0, initial_sigma=UNKNOWN_ACCELERATION_RAD_S2),
+                gains=(alpha, *constant_gain.kalata(alpha)))
 
 
 def _bank_of_one(name, params):
@@ -44,8 +49,10 @@ def _bank_of_one(name, params):
 
 
 def _bank_of_several(params):
-    models = [motion_models.constants(name, getattr(params.imm, name)) for name in named_models(params.imm.models)]
-    return Bank(np.concatenate(models), params.imm.dwell)
+    imm = params.imm
+    models = [motion_models.ladder(imm.ca, imm.rungs, imm.rung_ratio) if name == 'ca'
+              else motion_models.constants(name, getattr(imm, name)) for name in named_models(imm.models)]
+    return Bank(np.concatenate(models), imm.dwell)
 
 
 FILTER_KINDS = {

@@ -7,7 +7,7 @@
 
 In cv the third state stays 0; current_statistical is paper 000, eq. 2, 4, 5. A further model needs a row of
 MODEL_ROWS, a law that `discretised` selects, its group in params.py, and its name in topics.MOTION_MODELS,
-a column of acu/filter.
+a column of acu/filter. Several models ca with growing noise form a `ladder`.
 
 The print of paper 000 has two errors, which are corrected here. Its factor of q22 is 1/(2 alpha^2); correct is
 1/(2 alpha^3). Its sigma_a^2 (eq. 5) contains a_max - abar; correct is the square (a_max - abar)^2.
@@ -16,6 +16,7 @@ For small x the closed forms of Q = 2 alpha sigma_a^2 q lose all digits, because
 terms of about 1. Below MAX_SERIES_ARGUMENT the power series is used:
     q = int_0^T g(s) g(s)' ds,  g = (s^2/2 - alpha s^3/6 + ..., s - alpha s^2/2 + ..., e^(-alpha s)).
 """
+import dataclasses
 import math
 import typing
 from collections import namedtuple
@@ -29,17 +30,24 @@ from pedestal_common.compiled import compiled, inlined
 class MotionModel(typing.NamedTuple):
     """A row of MODEL_ROWS. doc: motion of the target; states: 2 for a model without an acceleration, else 3.
     `initial_sigma`: function of its parameters that returns the standard deviation of the acceleration [rad/s2] at the
-    start. NaN stands for the number of the initial standard deviation of the rate: in one second the rate may change
-    by as much as it is uncertain."""
+    start."""
     name: str
     doc: str
     states: int
     initial_sigma: typing.Callable
 
 
+WHITE_JERK_TIME_S = 10.0
+"""Time in which white jerk changes the acceleration by as much as it is uncertain at the start of the model ca.
+
+Each model starts with the acceleration that it expects itself. A larger one would make a quiet model as wrong about a
+target that moves steadily as a noisy model, and the bank would believe that the target stands still (Lindley's
+paradox)."""
+
 MODEL_ROWS = (
     MotionModel('cv', 'constant rate, disturbed by white acceleration', 2, lambda params: 0.0),
-    MotionModel('ca', 'constant acceleration, disturbed by white jerk', 3, lambda params: math.nan),
+    MotionModel('ca', 'constant acceleration, disturbed by white jerk', 3,
+                lambda params: params.noise * math.sqrt(WHITE_JERK_TIME_S)),
     MotionModel('singer', 'an acceleration of mean 0 that lasts 1 / alpha (Singer 1970)', 3,
                 lambda params: params.sigma),
     MotionModel('current_statistical', 'an acceleration that lasts 1 / alpha about its estimated mean (paper 000)', 3,
@@ -47,10 +55,16 @@ MODEL_ROWS = (
 MODEL_NAMES = tuple(row.name for row in MODEL_ROWS)
 MODEL_CV, MODEL_CA, MODEL_SINGER, MODEL_CURRENT_STATISTICAL = range(len(MODEL_NAMES))
 
-MOTION_MODEL_DTYPE = np.dtype([('kind', 'i8'), ('states', 'i8'), ('initial_sigma', 'f8'), ('alpha', 'f8'),
-                               ('noise', 'f8'), ('sigma', 'f8'), ('a_max', 'f8'), ('floor', 'f8')], align=True)
-"""kind: of MODEL_NAMES; states and initial_sigma: of its row; then the values of its group of parameters. A model
-reads only its own.
+MAX_RUNG_COUNT = 8
+"""Largest number of models ca in a bank."""
+COLUMN_NAMES = (*MODEL_NAMES, *(f'ca_{rung}' for rung in range(2, MAX_RUNG_COUNT + 1)))
+"""Names of the models of the largest bank. ca is the first rung of a `ladder`, ca_2 its second rung."""
+
+MOTION_MODEL_DTYPE = np.dtype([('kind', 'i8'), ('column', 'i8'), ('states', 'i8'), ('initial_sigma', 'f8'),
+                               ('alpha', 'f8'), ('noise', 'f8'), ('sigma', 'f8'), ('a_max', 'f8'), ('floor', 'f8')],
+                              align=True)
+"""kind: of MODEL_NAMES; column: of COLUMN_NAMES; states and initial_sigma: of its row; then the values of its group of
+parameters. A model reads only its own.
 
 noise: cv [rad/s2/sqrt(Hz)] of the white acceleration, ca [rad/s3/sqrt(Hz)] of the white jerk: the square root of a
 two-sided density, int of E[w(t) w(s)] ds = noise^2.
@@ -58,11 +72,22 @@ two-sided density, int of E[w(t) w(s)] ds = noise^2.
 
 
 def constants(name, params, **changes) -> np.ndarray:
-    """Return the constants (1,) of the named model with its group of parameters; changes: fields with other values."""
+    """Return the constants (1,) of the named model with its group of parameters; changes: fields of
+    MOTION_MODEL_DTYPE with other values."""
     m, kind = np.zeros(1, MOTION_MODEL_DTYPE), MODEL_NAMES.index(name)
-    m['kind'], m['states'], m['initial_sigma'] = kind, MODEL_ROWS[kind].states, MODEL_ROWS[kind].initial_sigma(params)
+    m['kind'] = m['column'] = kind
+    m['states'], m['initial_sigma'] = MODEL_ROWS[kind].states, MODEL_ROWS[kind].initial_sigma(params)
     for field, value in {**vars(params), **changes}.items():
         m[field] = value
+    return m
+
+
+def ladder(params, rungs, ratio) -> np.ndarray:
+    """Return the constants (rungs,) of models ca: the first with CaParameters, each further one with `ratio` times the
+    noise of the one before."""
+    m = np.concatenate([constants('ca', dataclasses.replace(params, noise=params.noise * ratio**rung))
+                        for rung in range(rungs)])
+    m['column'] = [COLUMN_NAMES.index('ca' if rung == 0 else f'ca_{rung + 1}') for rung in range(rungs)]
     return m
 
 
@@ -209,11 +234,3 @@ def discretised(m, abar, T):
     if m.kind == MODEL_SINGER:
         return singer(m, T)
     return current_statistical(m, abar, T)
-
-
-@compiled
-def initial_variance(m, rate_sigma):
-    """Return the variance of the acceleration [rad2/s4] at the start;
-    rate_sigma: standard deviation of the rate [rad/s]."""
-    sigma = rate_sigma if math.isnan(m.initial_sigma) else m.initial_sigma
-    return sigma * sigma

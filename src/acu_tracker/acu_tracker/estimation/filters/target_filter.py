@@ -140,7 +140,7 @@ def read(f):
 
 @compiled
 def probabilities(f, c, mu):
-    """Set mu (2, BANK_SIZE) to the probability of each of MODEL_NAMES on both axes, NaN if it is not in the filter."""
+    """Set mu (2, BANK_SIZE) to the probability of each of COLUMN_NAMES on both axes, NaN if not in the filter."""
     for i in range(2):
         axis_filter.probabilities(f.axis[i], c.axis[i], mu[i])
         if f.used[i]:
@@ -201,25 +201,25 @@ def _leave_cartesian(f, c, azimuth, elevation):
 
 
 @compiled
-def transfer(f, c, rate_sigma, running):
+def transfer(f, c, running):
     """Adopt constants that may have changed: a filter of another kind continues from the estimate of the old one.
 
-    running: whether there is an estimate; rate_sigma: as in `start`.
+    running: whether there is an estimate.
     """
     f.predicted = math.nan
     if running:
         for i in range(2):
-            axis_filter.transfer(f.axis[i], c.axis[i], rate_sigma)
+            axis_filter.transfer(f.axis[i], c.axis[i])
     _leave_cartesian(f, c, f.used[0] and not c.wanted[0], f.used[1] and not c.wanted[1])
     if not (c.wanted[0] or c.wanted[1]):
         f.running = 0
 
 
 @compiled
-def move(f, c, motion):
-    """Change to a frame in which the target has this Motion now; the covariances stay. The Cartesian filter stops,
-    because it works in the old frame."""
-    f.running = f.used[0] = f.used[1] = 0
-    for i in range(2):
-        axis_filter.move(f.axis[i], c.axis[i], motion[i])
+def turn(f, c, rotation):
+    """Turn the estimate and its covariances into another frame; rotation: Rotation from the old frame into the new
+    one."""
+    axes_filter.turn(f.axis, c.axis, rotation)
+    if f.running:
+        unscented.turn(f.cartesian, rotation)
     f.predicted = math.nan

@@ -1,6 +1,7 @@
 """The Cartesian target filter: an IMM of two unscented filters, CV and CA; azimuth, elevation and range measured.
 
-X = (east north up, velocity, acceleration) [m, m/s, m/s2] of each mode, relative to the antenna; CV keeps its
+X = (position, velocity, acceleration) [m, m/s, m/s2] of each mode, relative to the antenna, in the axes of the
+filter's frame (`estimate_frame`). The axes x, y, z of this frame stand for east, north and up. CV keeps its
 acceleration at zero. Without a range only the two angles are used, and the variance of the range grows.
 
 The unscented filter (Merwe's points; Wan and Van der Merwe 2000) has two simplifications here. Because the motion is
@@ -17,7 +18,7 @@ import numpy as np
 from acu_tracker.estimation.filters import imm, motion_models
 from acu_tracker.estimation.filters.measurement import AxisInnovation, AxisVariances, Innovation
 from acu_tracker.geometry.motion import line_of_sight, motion_of_position
-from acu_tracker.geometry.vector import Vector, dot, times
+from acu_tracker.geometry.vector import Vector, dot, rotated, times
 from pedestal_common.compiled import assign, compiled
 from pedestal_common.geometry.line_of_sight import earth_angles, wrap
 
@@ -165,6 +166,21 @@ def predict(s, c, T):
 
 
 @compiled
+def turn(s, rotation):
+    """Turn the estimate and covariance of both modes into another frame; rotation: Rotation from the old frame into
+    the new one."""
+    for j in range(2):
+        x, p = s.x[j], s.p[j]
+        for k in range(0, N, 3):
+            x[k], x[k + 1], x[k + 2] = rotated(rotation, Vector(x[k], x[k + 1], x[k + 2]))
+            for i in range(N):
+                p[i, k], p[i, k + 1], p[i, k + 2] = rotated(rotation, Vector(p[i, k], p[i, k + 1], p[i, k + 2]))
+        for k in range(0, N, 3):
+            for i in range(N):
+                p[k, i], p[k + 1, i], p[k + 2, i] = rotated(rotation, Vector(p[k, i], p[k + 1, i], p[k + 2, i]))
+
+
+@compiled
 def _measured(east, north, up):
     """Return (azimuth, elevation, range) of a position."""
     azimuth, elevation = earth_angles(east, north, up)
@@ -307,7 +323,7 @@ def range_known(s, share_2):
 
 @compiled
 def probabilities(s, mu):
-    """Set mu (BANK_SIZE,) to the probability of each of motion_models.MODEL_NAMES, NaN if it is not in the filter."""
+    """Set mu (BANK_SIZE,) to the probability of each of motion_models.COLUMN_NAMES, NaN if it is not in the filter."""
     mu[:] = math.nan
     for j in range(len(MODE_MODELS)):
         mu[MODE_MODELS[j]] = s.mu[j]
