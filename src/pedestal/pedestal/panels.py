@@ -15,8 +15,8 @@ if typing.TYPE_CHECKING:
 class Panel(typing.NamedTuple):
     """A figure.
 
-    draw: function(axes, RunData). needs: names of the parts of RunData that the figure needs. polar: True if the figure
-    needs polar axes.
+    draw: function(axes, RunData). needs: names of the required parts of RunData. polar: True if the figure needs polar
+    axes.
     """
     draw: Callable[[Axes, run_data.RunData], None]
     needs: tuple[str, ...]
