@@ -1,10 +1,14 @@
-"""Studies of your own plant, `pedestal study servo|backlash|bode --scenario FILE`: both axes of a scenario, ashore.
+"""Studies of your own plant: `pedestal study servo|backlash|bode --scenario FILE` measures both axes of a scenario.
 
-  bode      the loops by pedestal_analysis/tuning/frequency_response.py, each axis by itself
-  servo     a step of STEP_SIZE_RAD, a sine of SINE_AMPLITUDE_RAD at SINE_FREQUENCY_HZ, and a step of wind torque of
-            GUST_TORQUE_SHARE of the torque limit of both motors; measured on the true angle of the dish, in still air
-  backlash  the standstill after that step, and the error of that sine at its reversals, with the bias of the
-            scenario and without bias
+The antenna stands ashore and in still air. The plant is the drive with motors, gears and load.
+
+  bode      frequency response of the current, speed and position loops, each axis by itself; measured by
+            pedestal_analysis/tuning/frequency_response.py
+  servo     response to a step of STEP_SIZE_RAD, to a sine of SINE_AMPLITUDE_RAD at SINE_FREQUENCY_HZ, and to a gust.
+            The gust is a step of wind torque: GUST_TORQUE_SHARE times the largest torque of both motors on the load.
+            The response is the true angle of the dish
+  backlash  motion of the dish at rest after the step, and its error at the reversals of the sine; both with the bias
+            torque of the scenario and without bias torque
 """
 import math
 
@@ -21,26 +25,27 @@ from pedestal_studies.rigs.rows import Result
 from pedestal_studies.system import bode
 
 STEP_SIZE_RAD, SINE_AMPLITUDE_RAD, SINE_FREQUENCY_HZ, GUST_TORQUE_SHARE = 0.02, 0.02, 0.1, 0.2
-"""Size of the step [rad]; amplitude [rad] and frequency [Hz] of the sine; wind torque over both torque limits [-]."""
+"""Size of the step [rad]; amplitude [rad] and frequency [Hz] of the sine; torque of the gust over the largest torque
+of both motors [-]."""
 
 RUN_DURATION_S, START_ANGLES_RAD, SETTLING_BAND, SINE_PERIODS = 10.0, (0.0, 0.6), 0.02, 3
-"""Duration of the step and gust runs [s]; initial angles of the axes [rad]; band of the settling time [-]; periods
-of the sine, of which the first is not evaluated."""
+"""Duration of the step and gust runs [s]; initial angles of azimuth and elevation [rad]; half-width of the band of the
+settling time over the size of the step [-]; periods of the sine, of which the first is not evaluated."""
 
 GUST_START_S, STANDSTILL_START_S = 4.0, 5.0
 """Start of the gust; start of the evaluated standstill after the step [s]."""
 
 BIAS_PARAMETERS = {'': {}, '/bias-off': {f'adu.{name}.bias.schedule': 'off' for name in AXES}}
-"""{suffix of a case: parameters}: with the bias of the scenario, and without bias."""
+"""{suffix of a case: parameters}: with the bias torque of the scenario, and without bias torque."""
 
 REST_PARAMETERS = {**loops.STILL_AIR_PARAMETERS, 'scenario.program.source': 'none', 'acu.initial_mode': 'preset',
                    **{f'adu.initial_{name}': start for name, start in zip(AXES, START_ANGLES_RAD)},
                    **{f'acu.{name}.preset': start for name, start in zip(AXES, START_ANGLES_RAD)}}
-"""Parameters of axes at rest."""
+"""Parameters with which both axes hold START_ANGLES_RAD."""
 
 STEP_PARAMETERS = {**REST_PARAMETERS, **{f'acu.{name}.preset': start + STEP_SIZE_RAD
                                          for name, start in zip(AXES, START_ANGLES_RAD)}}
-"""Parameters of a step of both axes."""
+"""Parameters with which both axes make the step at the start of the run."""
 
 SINE_PARAMETERS = {**loops.STILL_AIR_PARAMETERS, 'acu.tracker.handover': False, 'scenario.program.time_offset': 0.0,
                    'scenario.program.interval': 0.02, 'tracking_receiver.target.kind': 'sine',
@@ -48,7 +53,7 @@ SINE_PARAMETERS = {**loops.STILL_AIR_PARAMETERS, 'acu.tracker.handover': False, 
                    **{f'adu.initial_{name}': start for name, start in zip(AXES, START_ANGLES_RAD)},
                    **{f'tracking_receiver.target.angle.{name}': start for name, start in zip(AXES, START_ANGLES_RAD)},
                    **{f'tracking_receiver.target.angle.{name}_amplitude': SINE_AMPLITUDE_RAD for name in AXES}}
-"""Parameters of a sine of both axes."""
+"""Parameters with which both axes follow the sine, a program track."""
 
 
 def bode_study(source, progress):
@@ -116,21 +121,23 @@ def backlash_study(source, progress):
 
 
 def _standstill(run, i):
-    """Return (times [s], angle without its mean [rad]) of an axis at rest."""
+    """Return (times [s], angle minus its mean [rad]) of axis i at rest; i: index in AXES, here and below."""
     stands = run.t >= STANDSTILL_START_S
     angle = _angle(run, i)[stands]
     return run.t[stands], angle - np.mean(angle)
 
 
 def _reversals(run, i):
-    """Return (times [s], error without its fundamental [rad]) of an axis over the whole periods after the first."""
+    """Return (times [s], error [rad] without the part at the sine frequency) over whole periods after the first."""
     steady = metrics.whole_periods(run.t, 1.0 / SINE_FREQUENCY_HZ, 1.0 / SINE_FREQUENCY_HZ)
     return run.t[steady], metrics.residual(run.t[steady], _sine_error(run, i)[steady], 1.0 / SINE_FREQUENCY_HZ)
 
 
 def _bias_figure(kind, motion_of, flown):
-    """Draw the remaining motion of both axes, with the bias of the scenario and without bias; motion_of: `_standstill`
-    or `_reversals`."""
+    """Draw the remaining motion of both axes, with the bias torque of the scenario and without bias torque.
+
+    kind: title of the panels. motion_of: `_standstill` or `_reversals`.
+    """
     figure, axes = new_panels(2, height=4.6, sharex=True,
                               y=f'{"error" if kind == "sine" else "angle"} [\N{MICRO SIGN}rad]')
     for i, (panel, name) in enumerate(zip(axes[:, 0], AXES)):
@@ -153,7 +160,7 @@ def _sine_error(run, i):
 
 
 def _metrics(flown, i, torque):
-    """Return [(metric, value, unit)] of an axis."""
+    """Return [(metric, value, unit)] of axis i; flown: {name: Run}; torque: of the gust [Nm]."""
     step, gust, sine = (flown[name] for name in ('step', 'gust', 'sine'))
     after, settled = _angle(gust, i)[gust.t >= GUST_START_S], sine.t >= 1.0 / SINE_FREQUENCY_HZ
     return [('step_overshoot_percent', metrics.overshoot_percent(_angle(step, i), STEP_SIZE_RAD), '%'),
