@@ -13,8 +13,8 @@ The square law with a torque coefficient for A D is that of wind tunnels: Gawron
 and Telescopes (2008), section on wind disturbances. C is a measured curve there (JPL memo CP-6, 1964), of which c_1
 and c_2 are the first harmonics. The defaults have its size and shape: the largest value is 0.12, with the wind from
 behind at 130 deg. The components v and w have 0.78 and 0.55 of the intensity of u (ESDU 85020) and, for simplicity,
-the von Karman spectrum of u. Gusts smaller than the dish cancel over it: aerodynamic admittance
-1 / (1 + (2 f sqrt(A) / V)^(4/3)) (Vickery 1965).
+the von Karman spectrum of u. Gusts smaller than the dish cancel over its area. The aerodynamic admittance
+1 / (1 + (2 f sqrt(A) / V)^(4/3)) reduces their amplitude (Vickery 1965).
 """
 import math
 import types
