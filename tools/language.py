@@ -102,7 +102,7 @@ def _indent(text):
 
 
 def sentences(text):
-    """Return the sentences of a paragraph. Each piece of inline code becomes one word, and links lose their address."""
+    """Return the sentences of a paragraph. Inline code becomes one word each, and links lose their address."""
     text = re.sub(r'\]\([^)]*\)', ']', re.sub(r'`[^`]*`', '`x`', text))
     return _SENTENCE_END.split(_ABBREVIATION.sub(r'\1 ', text))
 
