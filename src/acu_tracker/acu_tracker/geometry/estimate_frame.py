@@ -1,8 +1,10 @@
-"""The frame of the target filter: the earth's, or near the zenith a frame with its equator along the target's motion.
+"""The frame of the target filter: the earth frame, or near the zenith a tilted frame.
 
-Azimuth and elevation are singular at the zenith. Above TILT_ELEVATION_RAD the filter changes to a frame in which the
-target moves along the equator, and back below LEVEL_ELEVATION_RAD. In this frame a great circle is an azimuth of
-constant rate.
+Azimuth and elevation are singular at the zenith. Above TILT_ELEVATION_RAD the filter therefore changes to a tilted
+frame, whose equator is laid along the motion of the target. There the elevation of the target stays near 0, and a
+target that moves along a great circle has a constant azimuth rate. Below LEVEL_ELEVATION_RAD the filter changes back.
+
+f: record of FRAME_DTYPE. A frame is level while it is the earth frame.
 """
 import math
 
@@ -15,15 +17,15 @@ from pedestal_common.compiled import compiled
 from pedestal_common.geometry.line_of_sight import earth_direction
 
 TILT_ELEVATION_RAD, LEVEL_ELEVATION_RAD = math.radians(75.0), math.radians(70.0)
-"""Elevations in the earth's frame [rad]: above the first the frame is tilted, below the second it is level again."""
+"""Earth elevations [rad]: above the first the frame is tilted, below the second it is level again."""
 
 FRAME_DTYPE = np.dtype([('mat', 'f8', (3, 3)), ('tilted', 'i8')], align=True)
-"""mat: rotation frame -> earth; tilted: 0 while the frame is the earth's."""
+"""mat: rotation matrix frame -> earth; tilted: 1 while the frame is tilted, 0 while it is the earth frame."""
 
 
 @compiled
 def level(f):
-    """Set the frame to the earth's."""
+    """Set the frame to the earth frame."""
     f.tilted = 0
     for i in range(3):
         for j in range(3):
@@ -32,7 +34,10 @@ def level(f):
 
 @compiled
 def tilt(f, u, du):
-    """Lay the equator from the ENU unit vector u along its rate du [1/s], with azimuth 0 at u."""
+    """Tilt the frame: azimuth and elevation 0 are at the target, and the equator leads along its motion.
+
+    u, du: ENU unit vector towards the target and its rate [1/s].
+    """
     W = math.sqrt(dot(du, du))
     if W > 0.0:
         along = Vector(du.x / W, du.y / W, du.z / W)
@@ -49,7 +54,7 @@ def tilt(f, u, du):
 
 @compiled
 def to_earth(f, motion):
-    """Return the LineOfSight in ENU of a Motion in the frame."""
+    """Return the LineOfSight in ENU; motion: the Motion in the frame."""
     sight = line_of_sight(motion)
     if not f.tilted:
         return sight
@@ -59,7 +64,7 @@ def to_earth(f, motion):
 
 @compiled
 def to_frame(f, sight):
-    """Return the Motion in the frame of a LineOfSight in ENU; the inverse of to_earth."""
+    """Return the Motion in the frame; sight: the LineOfSight in ENU. This is the inverse of to_earth."""
     if f.tilted:
         mat = rotation(f.mat)
         sight = LineOfSight(rotated_back(mat, sight.u), rotated_back(mat, sight.du), rotated_back(mat, sight.ddu))
@@ -68,7 +73,7 @@ def to_frame(f, sight):
 
 @compiled
 def direction_to_frame(f, azimuth, elevation):
-    """Return (azimuth, elevation) [rad] in the frame of a direction's earth angles."""
+    """Return (azimuth, elevation) [rad] of a direction in the frame; azimuth, elevation: its earth angles [rad]."""
     e, n, u = earth_direction(azimuth, elevation)
     v = rotated_back(rotation(f.mat), Vector(e, n, u))
     return math.atan2(v.x, v.y), math.atan2(v.z, math.hypot(v.x, v.y))
@@ -76,17 +81,20 @@ def direction_to_frame(f, azimuth, elevation):
 
 @compiled
 def verticals(f, azimuth, elevation):
-    """Return (across, along): components along the earth's vertical of the unit vectors in which azimuth and elevation
-    of a direction in the frame grow; both angles [rad]. In a level frame they are 0 and the cosine of the elevation.
+    """Return (across, along), the vertical components of two unit vectors at a right angle to a direction.
+
+    The first vector points to growing azimuth, the second to growing elevation. Their components along the earth's
+    vertical are 0 and cos(elevation) in a level frame. `measurement.attitude_variances` needs them to separate the
+    errors of heading and tilt. azimuth, elevation: angles of the direction in the frame [rad].
     """
-    # z: the earth's vertical in the frame.
+    # z: the earth's vertical, as components in the frame.
     s, c, z = math.sin(azimuth), math.cos(azimuth), f.mat[2]
     return z[0] * c - z[1] * s, z[2] * math.cos(elevation) - (z[0] * s + z[1] * c) * math.sin(elevation)
 
 
 @compiled
 def of_deck(f, attitude):
-    """Return the Attitude, deck -> frame, of an Attitude deck -> earth."""
+    """Return the Attitude deck -> frame; attitude: the Attitude deck -> earth."""
     mat, (x, y, z) = rotation(f.mat), transposed(attitude.mat)
     columns = Rotation(rotated_back(mat, x), rotated_back(mat, y), rotated_back(mat, z))
     return Attitude(transposed(columns), attitude.w, attitude.dw)
@@ -94,9 +102,13 @@ def of_deck(f, attitude):
 
 @compiled
 def earth_variances(f, framed, earth, p_A, p_E):
-    """Return the variances [rad2] of azimuth and elevation in the earth's frame from those in the frame, p_A and p_E.
+    """Return the variances of azimuth and elevation in the earth frame, in the unit of p_A and p_E.
 
-    framed, earth: the Motion of the target in each frame. The correlation in the frame is unknown and taken as zero.
+    p_A, p_E       variances of azimuth and elevation in the frame of the filter, of angles [rad2] or of rates; or the
+                   covariances of angle and rate
+    framed, earth  Motion of the target in the frame of the filter and in the earth frame
+
+    The correlation of azimuth and elevation is taken as zero, because the filter does not estimate it.
     """
     A, E = framed.azimuth.angle, framed.elevation.angle
     azimuth, elevation = earth.azimuth.angle, earth.elevation.angle
