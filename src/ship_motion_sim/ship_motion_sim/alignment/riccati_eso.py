@@ -1,4 +1,4 @@
-"""The extended observer with Kalman gains: the best linear estimate of azimuth if the sea is as assumed.
+"""Alignment method: the extended observer with Kalman gains, the best linear estimate of azimuth on the assumed sea.
 
     x1, x2, x3   of the north and of the east channel: velocity error [m/s], its rate [m/s2], the rate of x2 without
                  command [m/s3]. Tilt is x2 / g, and x3 depends on the azimuth (see the package)
@@ -49,8 +49,8 @@ def step(s, k, v_east, v_north, h, w_c):
     not affect the estimate, because the observer receives its exact commands.
     """
     o = s.observer
-    # The wanted velocity error is zero, so v1 and v2 start at zero and stay there. The differentiator is that of the
-    # paper.
+    # The wanted velocity error is zero, so v1 and v2 start at zero and stay there. The differentiator is part of the
+    # ADRC of paper 001.
     for i in range(2):
         s.v1[i], s.v2[i] = levelling.differentiated(s.v1[i], s.v2[i], 0.0, h)
     extended_observer.predict(o, h)
