@@ -1,7 +1,7 @@
 """A seaway as a sum of sine waves, and the response of the hull to each wave. Plain numpy, run once at the start.
 
 The elevation of the surface at the ship is zeta = sum Re(a e^{j(w_e t + phase)}) with the amplitudes a [m] of the
-waves. k and w_e are the wave number and the encounter frequency, see the package. A wave that travels along the unit
+waves. The package defines the wave number k and the encounter frequency w_e. A wave that travels along the unit
 vector (d_x, d_y) of the deck (FLU) has zeta ~ e^{-j k (d_x x + d_y y)}. Its slope along x is -j k d_x a.
 """
 import math
