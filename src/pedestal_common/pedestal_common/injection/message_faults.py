@@ -1,4 +1,4 @@
-"""Faults of a message of any kind: dropped, or its numbers frozen, NaN, noisy.
+"""Injected faults that every simulated node can have: its message is dropped, or the numbers are frozen, NaN or noisy.
 
 In each step a node first calls `clear`, then `apply` for each fault in force. It adds `noise` to the numbers of its
 message, and then calls `numbers`, so that frozen numbers contain the noise of the first frozen step. The node itself
@@ -27,9 +27,10 @@ MESSAGE_FAULT_DTYPE = np.dtype([('drop', 'i8'), ('freeze', 'i8'), ('nan', 'i8'),
 
 @compiled
 def clear(e):
-    """End every fault of the message. `apply` sets the faults that are still in force again.
+    """End every fault of the message. Afterwards `apply` sets the faults that are still in force.
 
-    holds is 1 if there was a freeze in the step before: a freeze that continues then uses the same held numbers.
+    e: MESSAGE_FAULT_DTYPE of the node. e.holds becomes 1 if the step before had a freeze: a freeze that continues then
+    uses the same held numbers.
     """
     e.holds = e.freeze
     e.drop, e.freeze, e.nan, e.sigma = 0, 0, 0, 0.0
@@ -56,9 +57,9 @@ def apply(e, codes, fault, values):
 
 @compiled
 def numbers(e, values, first):
-    """Freeze values (n,) or make them NaN, in place; e.held stores them from number `first` on.
+    """Freeze values (n,) or make them NaN, in place, as the faults in force require.
 
-    first + n must be at most MAX_HELD_NUMBERS.
+    e.held stores the values from its element `first` on; first + n must be at most MAX_HELD_NUMBERS.
     """
     for i in range(len(values)):
         if e.freeze != 0:

@@ -82,8 +82,10 @@ class CommandDefinition(typing.NamedTuple):
 
 
 def values(definitions, command) -> dict:
-    """Return {argument: number or text} of a command by its CommandDefinition, defaults included. Raises
-    ValueError."""
+    """Return {argument: number or text} of a Command, with the defaults of left-out arguments. Raises ValueError.
+
+    definitions: CommandDefinitions of the node, one of which must have the name of the command.
+    """
     definition = next((row for row in definitions if row.name == command.verb), None)
     if definition is None:
         names = [row.name for row in definitions]
