@@ -125,9 +125,9 @@ def take(s, p, t_k, stamp, q, w, aligning):
     """Take a measured quaternion q (4,) and rate w (3,) [rad/s] into the history; return SAMPLE_INVALID,
     SAMPLE_REPEATED or SAMPLE_NEW.
 
-    A sample is invalid if it is not finite, or its quaternion has not the length 1. A sample is also invalid if it is
-    older than the last one, later than the step, or equal to the last one while the deck turns. A sample with the
-    stamp of the last one is a repeated sample.
+    A sample is invalid if it is not finite, or its quaternion has not the length 1. A sample older than the last one
+    or later than the step is invalid as well. So is a sample that equals the last one while the deck turns. A sample
+    with the stamp of the last one is a repeated sample.
 
     t_k       stamp of the step [s]
     stamp     stamp of the sample [s]

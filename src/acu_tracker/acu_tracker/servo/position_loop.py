@@ -38,8 +38,12 @@ AXIS_LOOP_DTYPE = np.dtype([
 """State of the position loop of one axis."""
 
 Instants = namedtuple('Instants', 't_k t_m dt')
-"""t_k: stamp of the drive step [s]; t_m: middle of the interval in which the command of this step is in force [s]; dt:
-time since the step before [s]."""
+"""Times of a step [s].
+
+t_k  stamp of the step
+t_m  middle of the interval in which the command of the step is in force
+dt   time since the step before
+"""
 
 Feedback = namedtuple('Feedback', 'y dy error V closed ends')
 """Feedback of one axis at t_k.

@@ -1,1 +1,5 @@
-"""The target filters: their laws, the filter of one axis, of both axes, and the table of filter kinds."""
+"""The target filters: Kalman laws and motion models, filters of one axis and of both, Cartesian filter, table of
+kinds.
+
+`target_filter` is the interface for `estimation.tracker`.
+"""
