@@ -1,5 +1,4 @@
-"""Parameters of the target filter: kinds of the axis filter, Cartesian filter, models of receiver and INS, gate,
-lock."""
+"""Parameters of the target filter: axis filters, Cartesian filter, models of receiver and INS, gate and lock."""
 import dataclasses
 import math
 

@@ -8,8 +8,11 @@ import numpy as np
 from pedestal_common.compiled import compiled
 
 REPETITION_DTYPE = np.dtype([('message', 'f8', (3,)), ('at', 'f8', (2,))], align=True)
-"""message: cross-elevation error, elevation error [rad] and C/N0 [dB-Hz] of the last message; at: deck angles
-(azimuth, elevation) [rad] of the beam when these numbers came for the first time."""
+"""Last message of the receiver.
+
+message  cross-elevation error, elevation error [rad] and C/N0 [dB-Hz]
+at       deck angles (azimuth, elevation) of the beam when these numbers came for the first time [rad]
+"""
 
 REPETITION_TRAVEL_RAD = 3e-3
 """Travel of the beam within which the message must change [rad]."""

@@ -91,8 +91,10 @@ def beam(mat_ed, A, E):
 
 @compiled
 def near(u, beamwidth):
-    """Return True if the error in u (signals.INPUTS_DTYPE) is on the straight part of the error curve; beamwidth
-    [rad]."""
+    """Return True if an error of the receiver is on the straight part of the error curve.
+
+    u: record of signals.INPUTS_DTYPE; beamwidth [rad].
+    """
     return math.hypot(u.cross_elevation, u.elevation) < MAX_ERROR_BEAMWIDTHS * beamwidth
 
 

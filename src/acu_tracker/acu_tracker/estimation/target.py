@@ -1,5 +1,4 @@
-"""The estimate of the target: conversion of measurements from the deck to the frame of the filter, and back to
-pointing.
+"""The estimate of the target: conversion of measurements from the deck to the frame of the filter, and back.
 
 The frame of the filter is the earth frame, or near the zenith a tilted frame (`estimate_frame`). With a measured range
 the filter estimates the line of sight from the INS, otherwise the one from the antenna (`lever_arm`). The module
@@ -42,8 +41,11 @@ OUTCOME_NO_ATTITUDE = OUTCOME_NOISY + 1
 """Outcome of `take` without an attitude; the other outcomes are those of the tracker."""
 
 Source = namedtuple('Source', 'framed motion')
-"""Target to which the antenna points: its Motion, in the frame of the filter (framed 1) or in earth angles (framed
-0)."""
+"""Target to which the antenna points.
+
+framed  1 if the Motion is in the frame of the filter, 0 if it is in earth angles
+motion  its Motion
+"""
 
 
 def initialise(g):

@@ -16,10 +16,11 @@ from acu_tracker.estimation.filters.measurement import NO_INNOVATION, Measuremen
 from pedestal_common.compiled import compiled
 
 CONSTANTS_DTYPE = np.dtype([('filter', target_filter.CONSTANTS_DTYPE), ('gates', 'f8', (2,))], align=True)
-"""filter: constants of the filter; gates: largest accepted nu' S^-1 nu [-] of the two angles, and of one rate or
-range.
+"""Constants of the tracker.
 
-nu: innovation; S: its covariance.
+filter  constants of the filter
+gates   largest accepted nu' S^-1 nu (nu: innovation, S: its covariance) of the two angles, and of one rate or range
+        [-]
 """
 
 TRACKER_DTYPE = np.dtype([('filter', target_filter.FILTER_DTYPE), ('stamp', 'f8'), ('running', 'i8'),
@@ -38,8 +39,14 @@ gated, rates_gated, ranges_gated  numbers of rejected directions, rates and rang
 """
 
 OUTCOME_STARTED, OUTCOME_ACCEPTED, OUTCOME_GATED, OUTCOME_STALE, OUTCOME_NOISY = range(5)
-"""Outcomes of `observe`: the measurement starts the filter, is accepted, is rejected by the gate, is not newer than
-the last one, or is only noise."""
+"""Outcomes of `observe` for a measurement.
+
+STARTED   it starts the filter
+ACCEPTED  the filter uses it
+GATED     the gate rejects it
+STALE     it is not newer than the last one
+NOISY     it is only noise
+"""
 
 
 def gate_of_one(gate):
@@ -188,8 +195,9 @@ def _converged(f, k, m, initial_rate):
 def locked(t, p, since_accepted):
     """Return True if the tracker has lock: autotrack can begin.
 
-    It has lock if lock_count consecutive measurements were accepted, the filter has converged, and the last accepted
-    measurement is at most coast_after old. since_accepted: age of this measurement, less the receiver's latency [s].
+    It has lock under three conditions: lock_count consecutive measurements were accepted, the last of them is at most
+    coast_after old, and the filter has converged. since_accepted: age of the last one, less the receiver's latency
+    [s].
     """
     return t.running and t.accepted_in_a_row >= p.lock_count and t.converged and since_accepted <= p.coast_after
 

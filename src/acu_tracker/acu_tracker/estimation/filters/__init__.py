@@ -1,5 +1,4 @@
-"""The target filters: Kalman laws and motion models, filters of one axis and of both, Cartesian filter, table of
-kinds.
+"""The target filters: Kalman laws, motion models, filters of the axes, Cartesian filter, table of filter kinds.
 
 `target_filter` is the interface for `estimation.tracker`.
 """

@@ -7,8 +7,8 @@ The state stays at the last accepted measurement; `predict` and `outlook` extrap
 result into the prior fields; `expected`, `innovation` and `correct` use these fields.
 
 The noise of the angle may be coloured by a first-order lag. The filter then uses the differences y_k - rho y_k-1,
-whose noise is white (Bryson, Henrikson 1968; kalman.update_correlated). y_k: angle of measurement k; rho: correlation
-of the noise of two successive angles.
+whose noise is white (Bryson, Henrikson 1968; kalman.update_correlated). Here y_k is the angle of measurement k, and
+rho is the correlation of the noise of two successive angles.
 
 f, c: records of FILTER_DTYPE and of CONSTANTS_DTYPE; j: number of a model in the bank.
 """

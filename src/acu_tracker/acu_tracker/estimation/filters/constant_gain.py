@@ -6,8 +6,8 @@
     nu   innovation of the angle [rad]
     T    time between measurements [s]
 
-The gain alpha [-] determines beta and gamma [-]: by the relation of Benedict and Bordner in the alpha-beta filter, by
-that of Kalata in the alpha-beta-gamma filter.
+The gain alpha [-] determines beta and gamma [-]. The alpha-beta filter uses the relation of Benedict and Bordner, the
+alpha-beta-gamma filter that of Kalata.
 """
 import math
 

@@ -5,8 +5,8 @@ measurement the likelihood of the measurement changes the probability of each mo
 mean of all filters, weighted with these probabilities. `axis_filter` and `unscented` use this module.
 
 The equations are those of paper 003, eq. 5 to 11, with two corrections. The paper omits the mixing before the
-prediction. In its eq. 11 the second factor has a reversed sign, which would subtract the spread of the models; here
-the weights are the probabilities, and the spread is added.
+prediction. In its eq. 11 the second factor has a reversed sign, which would subtract the spread of the models. Here
+the weights in eq. 11 are the probabilities, and the spread is added.
 
 The likelihoods are kept as logarithms. Therefore even a measurement far from all models ranks the models.
 
@@ -30,8 +30,8 @@ def switching(T, dwell, count):
     switch  probability that a given other model holds after T
     dwell   mean time for which one model holds [s]
 
-    The models form a Markov chain in continuous time, in which all other models follow with equal probability. stay is
-    near exp(-T / dwell) for short T, and 1 / count for long T.
+    The models form a Markov chain in continuous time. After one model each other model follows with equal probability.
+    The probability `stay` is near exp(-T / dwell) for short T, and near 1 / count for long T.
     """
     if count == 1:
         return 1.0, 0.0

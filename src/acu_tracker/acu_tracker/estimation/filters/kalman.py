@@ -89,7 +89,7 @@ def update_correlated(g, o, rho, nu, S):
     """Return the Gaussian after a measured angle whose noise is correlated with that of the last angle.
 
     The noise is rho times the noise of the last angle, plus independent noise. The difference y_k - rho y_k-1 of the
-    measured angles is then H X_k - rho H X_k-1 plus the independent noise alone (Bryson, Henrikson 1968).
+    measured angles is therefore H X_k - rho H X_k-1 plus the independent noise (Bryson, Henrikson 1968).
 
     o      PreviousAngle; c is its (c1, c2, c3)
     nu, S  innovation of the difference [rad] and its variance [rad2]
@@ -134,6 +134,5 @@ def update_with_gain(g, nu, R, K):
 
 @compiled
 def log_likelihood(nu, S):
-    """Return the logarithm of the normal density of an innovation nu of variance S, without its constant -log(2
-    pi)/2."""
+    """Return the logarithm of the normal density of an innovation nu of variance S, without the constant term."""
     return -0.5 * (nu * nu / S + math.log(S))

@@ -13,8 +13,12 @@ AxisMeasurement = namedtuple('AxisMeasurement', 'angle variance rate rate_varian
 """Measured angle [rad] and rate [rad/s] of the target on one axis, and their variances; rate NaN: not measured."""
 
 Measurement = namedtuple('Measurement', 'stamp axis range range_variance')
-"""stamp: time of the measurement [s]; axis: AxisMeasurement of both axes; range, range_variance: range of the target
-[m] and its variance [m2]; range NaN: not measured."""
+"""Measurement of the target at one instant.
+
+stamp                  time of the measurement [s]
+axis                   AxisMeasurement of both axes
+range, range_variance  range [m], NaN if it was not measured, and its variance [m2]
+"""
 
 AxisInnovation = namedtuple('AxisInnovation', 'nu S chi_square rate rate_chi_square')
 """Innovation of an axis.
@@ -46,8 +50,8 @@ NO_INNOVATION = Innovation((_NONE, _NONE), math.nan, math.nan)
 def error_variance(cross_elevation, elevation, cn0_dbhz, receiver):
     """Return the variance [rad2] of a receiver error (cross_elevation, elevation) [rad] at a C/N0 [dB-Hz].
 
-    It is the sum of a floor and of thermal noise, which grows with the distance from the beam's axis. receiver: record
-    of ReceiverModelParameters, with its integration [s] and its sigma_floor [rad].
+    The variance is the sum of a floor and of thermal noise, which grows with the distance from the axis of the beam.
+    receiver: record of ReceiverModelParameters; integration in s, sigma_floor in rad.
     """
     # slope [1/rad]: monopulse slope; offset [-]: difference over sum of the receiver at this error. With equal and
     # independent noise in both channels, this ratio has the variance (1 + offset^2) / (2 C/N0 integration) to first

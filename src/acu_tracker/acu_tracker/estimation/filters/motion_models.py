@@ -9,8 +9,8 @@ Each model gives the matrices F and Q of the Kalman filter for the state X = (an
 
 In the model cv the acceleration stays 0. The model current_statistical is that of paper 000, eq. 2, 4, 5.
 
-Another model needs a row of MODEL_ROWS, a law that `discretised` selects, its group in params.py, and its name in
-topics.MOTION_MODELS, which makes its probability a column of acu/filter.
+Another model needs a row of MODEL_ROWS, a law that `discretised` selects, and its group in params.py. Its name in
+topics.MOTION_MODELS makes its probability a column of acu/filter.
 
 The print of paper 000 has two errors, which are corrected here. Its factor of q22 is 1/(2 alpha^2); correct is
 1/(2 alpha^3). Its sigma_a^2 (eq. 5) contains a_max - abar; correct is the square (a_max - abar)^2.
@@ -168,9 +168,9 @@ def fading_noise(alpha, T):
 def acceleration_variance(abar, a_max, floor):
     """Return sigma_a^2 [rad2/s4] for a mean acceleration abar [rad/s2] (paper 000, eq. 5, with the square).
 
-    It is the variance of the modified Rayleigh density. At abar = a_max this variance is zero, and the filter would
-    ignore its measurements. Therefore sigma_a is at least floor a_max. a_max: largest acceleration [rad/s2]; floor:
-    [-].
+    a_max: largest acceleration [rad/s2]; floor: least sigma_a over a_max [-]. The result is the variance of the
+    modified Rayleigh density. At abar = a_max this variance is zero, and the filter would ignore its measurements.
+    Therefore sigma_a is at least floor a_max.
     """
     return max((4.0 - math.pi) / math.pi * max(a_max - abs(abar), 0.0)**2, (floor * a_max)**2)
 

@@ -1,19 +1,18 @@
 """The target filter: it holds the filters of both axes and the Cartesian filter, and selects which of them is used.
 
 The filters of the axes (`axes_filter`) always run. The Cartesian filter (`unscented`) runs if the kind of the filter
-is imm_ukf and the receiver measures the range. Its life has four parts:
+is imm_ukf and the receiver measures the range:
 
-start   from the estimate of the axis filters, at a measured range with a standard deviation of at most ukf.range_share
-        of the range
-use     on each axis, once the Cartesian filter knows the rate with at most half the standard deviation of the axis
-        filter. This margin avoids a hand-over that gains little
-stop    when the standard deviation of the range that it estimates exceeds ukf.range_share of the range
-after   the axis filters continue from the estimate of the Cartesian filter
+1. It starts from the estimate of the axis filters, when the standard deviation of a measured range is at most
+   ukf.range_share of the range.
+2. An axis uses it once its standard deviation of the rate is at most half of that of the axis filter. This margin
+   avoids a hand-over that gains little.
+3. It stops when the standard deviation of its own range exceeds ukf.range_share of the range. The axis filters then
+   continue from its estimate.
 
-Measured rates go to the axis filters only.
+Measured rates go to the axis filters only. The prior fields of a filter hold its prediction.
 
-f, c: records of FILTER_DTYPE and of CONSTANTS_DTYPE; m: a Measurement. The prior fields of a filter hold its
-prediction.
+f, c: records of FILTER_DTYPE and of CONSTANTS_DTYPE; m: a Measurement.
 """
 import math
 
@@ -72,8 +71,7 @@ def start(f, c, m, rate_sigma):
 
 @compiled
 def walk(f, azimuth, elevation):
-    """Set the random walk of the error of the measured azimuth and elevation: variance per second [rad2/s] from now
-    on.
+    """Set the random walk of the error of the measured azimuth and elevation: variances per second [rad2/s].
 
     An INS with a slowly changing error causes this walk. The Cartesian filter neglects it.
     """

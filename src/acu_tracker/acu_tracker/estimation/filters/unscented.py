@@ -1,9 +1,8 @@
 """The Cartesian target filter: it estimates the position of the target from measured azimuth, elevation and range.
 
 It is an IMM of two unscented Kalman filters, called modes: CV (constant velocity) and CA (constant acceleration). The
-state of each mode is X = (east north up, velocity, acceleration) [m, m/s, m/s2], relative to the origin of the
-measured range. CV keeps its acceleration at zero. Without a range only the two angles are used, and the variance of
-the range grows.
+state of each mode is X = (east north up, velocity, acceleration) [m, m/s, m/s2], relative to the antenna. CV keeps its
+acceleration at zero. Without a range only the two angles are used, and the variance of the range grows.
 
 An unscented filter evaluates the measurement at sigma points, states that represent mean and covariance of X (points
 of Merwe; Wan and Van der Merwe 2000). Here it has two simplifications:
@@ -272,8 +271,9 @@ def _axis_innovation(s, i, m):
 def _corrected(s, j, azimuth, elevation, range_):
     """Correct mode j with a measurement; return the logarithm of its likelihood, without terms equal in both modes.
 
-    The covariance S of the innovation nu is factored: S = G G', G lower triangular. With the standardised innovation n
-    = G^-1 nu and w = gain times G the correction is X += w n, P -= w w'. per_G22: 1 / G22, 0 without a range.
+    The covariance S of the innovation nu is factored: S = G G', G lower triangular. The correction is X += w n, P -= w
+    w'. Here n = G^-1 nu is the standardised innovation, and w is the gain times G. per_G22 is 1 / G22, or 0 without a
+    range.
     """
     S, g = s.s[j], s.g[j]
     G00 = math.sqrt(S[0, 0])
