@@ -93,8 +93,10 @@ class Consistency:
 def _rates(relative, velocity, attitude, ship_velocity, rates):
     """Fill the rates (n, 2) [rad/s] of earth azimuth and elevation of a target seen from a ship.
 
-    relative (n, 3): vector from ship to target, ENU [m]; velocity (n, 3): of the target, ENU [m/s]; attitude (n, 4):
-    quaternion x, y, z, w deck -> earth; ship_velocity (n, 3): in the frame of the ship [m/s].
+    relative (n, 3)        vector from ship to target, ENU [m]
+    velocity (n, 3)        velocity of the target, ENU [m/s]
+    attitude (n, 4)        quaternion x, y, z, w of the rotation deck -> earth
+    ship_velocity (n, 3)   velocity of the ship in its own frame, FLU [m/s]
     """
     for k in range(len(relative)):
         q = attitude[k]

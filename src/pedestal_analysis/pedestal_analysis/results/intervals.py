@@ -32,9 +32,12 @@ def interval(values):
 def pseudo_values(parts, statistic):
     """Return values (n,) for `interval` of a statistic that is taken over all runs together, such as an rms.
 
-    parts: n about equal parts of the runs; statistic(parts) -> number. The values are those of Tukey's jackknife
-    (Efron and Stein, Annals of Statistics 9 (1981) 586): value i is n theta - (n - 1) theta_-i. theta is the statistic
-    of all parts, and theta_-i that of all parts except i.
+    parts: n about equal parts of the runs; statistic(parts) -> number. The method is Tukey's jackknife (Efron and
+    Stein, Annals of Statistics 9 (1981) 586):
+
+        value i = n theta - (n - 1) theta_-i
+
+        theta, theta_-i   statistic of all parts; statistic of all parts except i
     """
     n, whole = len(parts), statistic(parts)
     return np.array([n * whole - (n - 1) * statistic(parts[:i] + parts[i + 1:]) if n > 1 else whole

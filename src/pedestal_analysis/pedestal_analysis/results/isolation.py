@@ -74,9 +74,10 @@ def _beam_axes(direction):
 def measure(dt, error, target, attitude, deck_rate) -> Isolation:
     """Return the Isolation of n samples at intervals of dt [s].
 
-    error (n, 2): true pointing error in cross-elevation and elevation [rad]; target (n, 3): vector from ship to
-    target, ENU, of any length; attitude (n, 4): true quaternions x, y, z, w of the rotation deck -> earth; deck_rate
-    (n, 3): true angular velocity of the deck, FLU [rad/s].
+    error (n, 2)       true pointing error in cross-elevation and elevation [rad]
+    target (n, 3)      vector from ship to target, ENU, of any length
+    attitude (n, 4)    true quaternions x, y, z, w of the rotation deck -> earth
+    deck_rate (n, 3)   true angular velocity of the deck, FLU [rad/s]
     """
     # Because the import is slow and most runs are ashore, it is made here.
     from scipy import ndimage

@@ -26,9 +26,11 @@ def _displaced(azimuth, elevation, errors, quaternions, earth):
 def earth_angles(beam, errors, quaternions=None):
     """Return the earth angles (n, 2) [rad] of the target: azimuth in (-pi, pi] and elevation.
 
-    beam (n, 2): azimuth and elevation of the beam on the deck [rad]; errors (n, 2): receiver errors in cross-elevation
-    and elevation [rad]; quaternions (n, 4): attitude x, y, z, w of the rotation deck -> earth, None ashore. The result
-    is NaN where an input is NaN.
+    beam (n, 2)          azimuth and elevation of the beam on the deck [rad]
+    errors (n, 2)        receiver errors in cross-elevation and elevation [rad]
+    quaternions (n, 4)   attitude x, y, z, w of the rotation deck -> earth, None ashore
+
+    The result is NaN where an input is NaN.
     """
     if quaternions is None:
         quaternions = np.tile(np.array(line_of_sight.ASHORE_ATTITUDE), (len(beam), 1))

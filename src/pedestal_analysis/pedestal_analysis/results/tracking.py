@@ -44,9 +44,11 @@ def _true_error(direction, relative, attitude, error):
 def _view_from_beam(beam, attitude, known_attitude, estimate, filtered, beam_earth):
     """Fill filtered (n, 2): direction of the estimate minus the beam; and beam_earth (n, 2): earth angles of the beam.
 
-    filtered is (cross-elevation, elevation) [rad]. beam (n, 2): deck angles [rad]; attitude (n, 4): true attitude;
-    known_attitude (n, 4): attitude of the INS; estimate (n, 2): earth angles [rad], computed with the attitude of the
-    INS.
+    filtered              (cross-elevation, elevation) [rad]
+    beam (n, 2)           deck angles [rad]
+    attitude (n, 4)       true attitude
+    known_attitude (n, 4) attitude that the INS reports
+    estimate (n, 2)       earth angles [rad], computed with the attitude that the INS reports
     """
     mat_ed, known = np.empty((3, 3)), np.empty((3, 3))
     for k in range(len(beam)):
@@ -74,9 +76,13 @@ def _interval_start_error(beam, error, out):
 def interval_start_error(beam, error):
     """Return the pointing error (n, 2) [rad] of an electronic beam at the beginning of the interval before each stamp.
 
-    The beam of an array jumps at each step, and stands during the interval until the next step. beam (n, 2): its deck
-    angles [rad] in the interval that ends at stamp k; error (n, 2): pointing error [rad] at stamp k. At the beginning
-    of this interval the beam is already beam k, but the target is still that of stamp k - 1. The first row is NaN.
+    The beam of an array jumps at each step, and stands during the interval until the next step.
+
+    beam (n, 2)    its deck angles in the interval that ends at stamp k [rad]
+    error (n, 2)   pointing error at stamp k [rad]
+
+    At the beginning of this interval the beam is already beam k, but the target is still that of stamp k - 1. The
+    first row is NaN.
     """
     out = np.full(beam.shape, np.nan)
     _interval_start_error(np.ascontiguousarray(beam), np.ascontiguousarray(error), out)
