@@ -1,9 +1,14 @@
 """The default target filter beside filters tuned for one target each: pointing in the closed loop.
 
-Cases are <target>/<filter>. The filter `default` has its default parameters. `tuned` is a filter of one model with the
-noise that points best at this target. `manoeuvre` is an IMM that expects a manoeuvre at any time.
-`current-statistical` is the filter of paper 000 with the default a_max. A ratio is the ratio to `tuned` under the same
-seed. A satellite seen from a ship is the satellite of leo or geo, seen from the deck of ship_pass.
+Cases are <target>/<filter>:
+
+default               target filter with its default parameters
+tuned                 filter of one motion model, whose process noise gives the smallest pointing error at this target
+manoeuvre             IMM that expects a manoeuvre at any time
+current-statistical   filter of paper 000 with its default a_max, the largest acceleration of its model
+
+A ratio divides the pointing error of a case by that of `tuned` under the same seed. The targets leo-ship and geo-ship
+are the satellites leo and geo, seen from the deck of the scenario ship_pass.
 """
 import math
 
@@ -35,20 +40,21 @@ TARGET_SCENARIOS: dict[str, tuple[str, dict]] = {
     'uav-500m': ('uav_flyby', {}), 'leo': ('leo_pass', {}), 'geo': ('leo_pass', FIXED_TARGET_PARAMETERS),
     'leo-ship': ('ship_pass', {}), 'leo-ship-ss6': ('ship_pass_ss6', {}),
     'geo-ship': ('ship_pass', FIXED_TARGET_PARAMETERS)}
-"""{target: (scenario, its parameters)}."""
+"""{target: (scenario, parameters that it changes)}."""
 
 TUNED_FILTERS = {'uav-60m': ('ca', 6.3e-3, 2.3e-3), 'uav-150m': ('ca', 1.1e-3, 3.5e-4), 'uav-500m': ('ca', 6e-5, 2e-5),
                  'leo': ('ca', 1.15e-4, 3.7e-5), 'geo': ('cv', 1e-9, 1e-9), 'leo-ship': ('ca', 1.15e-4, 3.7e-5),
                  'leo-ship-ss6': ('ca', 1.15e-4, 3.7e-5), 'geo-ship': ('cv', 1e-9, 1e-9)}
-"""{target: (kind, its noise in azimuth and in elevation)}.
+"""{target: (kind of the filter, its process noise in azimuth and in elevation)}; cv [rad/s2/sqrt(Hz)], ca
+[rad/s3/sqrt(Hz)].
 
 The filter is the better of cv and ca on the seeds 101 to 103. The noise is the best of a grid; for uav-60m and leo
-parameter_search found it. A target seen from a ship has the filter of leo.
+parameter_search found the noise. A target seen from a ship has the filter of the same target seen from ashore.
 """
 
 
 def _both(**changes):
-    """Return parameters of the filters of both axes."""
+    """Return parameters of the control unit with the same changes for the filters of both axes."""
     return {f'{axis}.filter.{name}': value for axis in ('azimuth', 'elevation') for name, value in changes.items()}
 
 
@@ -72,7 +78,7 @@ MAX_POINTING_RATIO = 1.15
 
 
 def pointing(case):
-    """Return the rms of the true pointing error [deg] of one run of a Case, both axes; NaN if it left autotrack."""
+    """Return the rms of the true pointing error [deg], both axes, of one run of a Case; NaN if it left autotrack."""
     flown = tracking.read(memory_recording.record(case.loaded()))
     begun = np.flatnonzero(flown.mode == 'autotrack')
     if not begun.size or np.any(flown.mode[begun[0]:] != 'autotrack'):
@@ -87,7 +93,7 @@ def batch(item):
 
 
 def rows(values):
-    """Return the rows of values {case: (runs,)}."""
+    """Return the rows of the study; values: {case: pointing error (runs,) [deg]}."""
     table = []
     for name, of_runs in values.items():
         target, _, filter_name = name.partition('/')
@@ -106,7 +112,7 @@ def run(progress, runs=DEFAULT_RUNS, pool=None) -> Result:
 
 
 def figure(values):
-    """Draw the pointing error of every seed over the mean of the tuned filter; values as of `rows`."""
+    """Draw the pointing error of every seed, divided by the mean of the tuned filter; values as of `rows`."""
     drawn, axes = new_panels(1, height=5.4, x='pointing error over that of the tuned filter')
     for name, of_runs in values.items():
         relative = of_runs / values[f'{name.partition("/")[0]}/tuned'].mean()
