@@ -1,8 +1,9 @@
-"""Commands of pages to the control unit, and the replies: roles, jog timeouts. No ROS here.
+"""Commands from the open pages to the control unit, and the replies; roles and timeouts are checked. No ROS here.
 
-A jog has three timeouts. The page repeats it while its button is held. Each repetition is forwarded once, if the last
-state that the page received is at most MAX_STATE_AGE_S old. If a page that jogs is silent for JOG_TIMEOUT_S or has
-left, this module stops the axes. The control unit itself stops them 0.5 s after the last jog.
+A jog is a command of axis rates while a button of the page is held. The page repeats the jog, and three timeouts end
+it. Each repetition is forwarded once, if the last state that the page received is at most MAX_STATE_AGE_S old. If a
+page that jogs is silent for JOG_TIMEOUT_S or has left, this module stops the axes. The control unit itself stops the
+axes 0.5 s after the last jog.
 """
 import math
 
@@ -28,10 +29,10 @@ MAX_ARGUMENTS = 20
 
 
 class PageRequests:
-    """Commands of all pages.
+    """Commands of all pages. The arguments are functions:
 
-    request(who, verb, {argument: value})   send a command, return the number of the request
-    replied(number)                         return its Reply, or None
+    request(who, verb, {argument: value})   send a command to the control unit, return the number of the request
+    replied(number)                         return the Reply to a request, or None
     send(client, message)                   send a message to a page
     is_jogging()                            return True while the antenna follows a jog
     """
@@ -93,7 +94,7 @@ class PageRequests:
             self._rate(client, (0.0, 0.0), now)
 
     def look(self, now):
-        """Forward replies, end the jogs of silent pages, and report missing replies."""
+        """Forward replies, end the jogs of silent pages, and report missing replies, at the time now [s]."""
         for client in [client for client, at in self._jogs.items() if now - at > JOG_TIMEOUT_S]:
             self._end_jog(client, now)
         for number, (client, page_number, verb, at) in list(self._waiting.items()):
