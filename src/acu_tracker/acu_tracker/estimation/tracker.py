@@ -19,8 +19,7 @@ CONSTANTS_DTYPE = np.dtype([('filter', target_filter.CONSTANTS_DTYPE), ('gates',
 """Constants of the tracker.
 
 filter  constants of the filter
-gates   largest accepted nu' S^-1 nu (nu: innovation, S: its covariance) of the two angles, and of one rate or range
-        [-]
+gates   largest accepted nu' S^-1 nu [-] of the two angles, and of one rate or range; nu: innovation, S: its covariance
 """
 
 TRACKER_DTYPE = np.dtype([('filter', target_filter.FILTER_DTYPE), ('stamp', 'f8'), ('running', 'i8'),
@@ -195,9 +194,10 @@ def _converged(f, k, m, initial_rate):
 def locked(t, p, since_accepted):
     """Return True if the tracker has lock: autotrack can begin.
 
-    It has lock under three conditions: lock_count consecutive measurements were accepted, the last of them is at most
-    coast_after old, and the filter has converged. since_accepted: age of the last one, less the receiver's latency
-    [s].
+    It has lock if lock_count consecutive measurements were accepted, the last of them is at most coast_after old, and
+    the filter has converged.
+
+    since_accepted: age of the last accepted measurement, less the receiver's latency [s].
     """
     return t.running and t.accepted_in_a_row >= p.lock_count and t.converged and since_accepted <= p.coast_after
 

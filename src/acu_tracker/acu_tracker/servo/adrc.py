@@ -56,8 +56,8 @@ def observer_gains(w_o, w_s, h):
 def observed(z, y, u, v3, w_o, w_s, h):
     """Return the new state (z1, z2, z3) of the observer [rad, rad/s, rad/s2], h [s] after its last state z (3,).
 
-    y: encoder angle now [rad]; u, v3: rate command [rad/s] and acceleration of the reference [rad/s2] in force during
-    h.
+    y      encoder angle now [rad]
+    u, v3  rate command [rad/s] and acceleration of the reference [rad/s2] that were in force during h
     """
     z1, z2, z3 = z[0], z[1], z[2]
     # settled: rate that the drive would reach at constant u, v3 and z3.

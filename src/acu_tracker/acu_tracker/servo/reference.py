@@ -41,8 +41,10 @@ def put(r, motion):
 
 @compiled
 def _plan(r, stamp, command):
-    """Put the reference into the history. stamp: instant for which it is planned [s]; command: rate command
-    [rad/s]."""
+    """Put the reference into the history.
+
+    stamp: instant for which the reference is planned [s]; command: rate command [rad/s].
+    """
     row = r.planned.sample[push(r.planned, stamp)]
     row[ANGLE_COLUMN], row[RATE_COLUMN], row[ACCELERATION_COLUMN] = r.angle, r.rate, r.acceleration
     row[COMMAND_COLUMN] = command

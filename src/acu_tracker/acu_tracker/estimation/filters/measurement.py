@@ -50,8 +50,9 @@ NO_INNOVATION = Innovation((_NONE, _NONE), math.nan, math.nan)
 def error_variance(cross_elevation, elevation, cn0_dbhz, receiver):
     """Return the variance [rad2] of a receiver error (cross_elevation, elevation) [rad] at a C/N0 [dB-Hz].
 
-    The variance is the sum of a floor and of thermal noise, which grows with the distance from the axis of the beam.
     receiver: record of ReceiverModelParameters; integration in s, sigma_floor in rad.
+
+    The variance is the sum of a floor and of thermal noise, which grows with the distance from the axis of the beam.
     """
     # slope [1/rad]: monopulse slope; offset [-]: difference over sum of the receiver at this error. With equal and
     # independent noise in both channels, this ratio has the variance (1 + offset^2) / (2 C/N0 integration) to first
