@@ -29,7 +29,7 @@ STEP_SIZE_RAD, SINE_AMPLITUDE_RAD, SINE_FREQUENCY_HZ, GUST_TORQUE_SHARE = 0.02, 
 of both motors [-]."""
 
 RUN_DURATION_S, START_ANGLES_RAD, SETTLING_BAND, SINE_PERIODS = 10.0, (0.0, 0.6), 0.02, 3
-"""Duration of the step and gust runs [s]; initial angles of azimuth and elevation [rad]; half-width of the band of the
+"""Duration of the step and gust runs [s]; initial angles of azimuth and elevation [rad]. Half-width of the band of the
 settling time over the size of the step [-]; periods of the sine, of which the first is not evaluated."""
 
 GUST_START_S, STANDSTILL_START_S = 4.0, 5.0

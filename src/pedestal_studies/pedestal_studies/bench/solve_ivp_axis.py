@@ -12,9 +12,11 @@ from scipy.integrate import solve_ivp
 def right_hand_side(t, x, p, v_q):
     """Return the time derivative (11,) of the state x of an axis.
 
-    x: (i_d, i_q, w_m, theta_m) of motor 1, the same of motor 2, and (w, theta, z) of the load. i_d, i_q: currents [A];
-    w_m, theta_m, w, theta: rates [rad/s] and angles [rad]; z: deflection of the bristles of the LuGre friction [rad].
-    t: time [s], without effect. p: adu_drive.params.AxisParameters. v_q: constant q voltages of both motors [V].
+    x      i_d, i_q, w_m, theta_m of motor 1; these four of motor 2; w, theta, z of the load. i_d, i_q: currents [A];
+           w_m, w: rates [rad/s]; theta_m, theta: angles [rad]; z: deflection of the friction bristles (LuGre) [rad]
+    t      time [s], without effect
+    p      adu_drive.params.AxisParameters
+    v_q    constant q voltages of both motors [V]
     """
     g, f, N = p.gear_train, p.friction, p.gear_train.ratio
     w, theta, z = x[8:]

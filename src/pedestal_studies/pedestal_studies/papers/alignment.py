@@ -9,9 +9,9 @@ Cases <method> have the conditions of the paper. Cases <method>/swell have an ad
 on every axis. Cases <method>/quadrant-N have any heading of the ship, an initial azimuth error in quadrant N, and
 random biases.
 
-The case `limit` is the information limit: the smallest 1 sigma that the gyros and the velocity permit. It is the root
-sum square of two errors: the 1 sigma of the Riccati filter, and the azimuth error bias / (earth rate * cos latitude)
-that the bias of an east gyro causes.
+The case `limit` is the information limit: the smallest 1 sigma that the gyros and the velocity permit. This limit is
+the root sum square of the 1 sigma of the Riccati filter and of the azimuth error due to the bias of an east gyro. The
+latter is bias / (earth rate * cos latitude).
 """
 import dataclasses
 import functools

@@ -1,8 +1,8 @@
 """Study of backlash. Two motors turn an axis and pull against each other with a bias torque.
 
 The bias torque closes the lash, which is the free play between pinion and bull gear. The study measures standstill,
-reversals and fast moves with each schedule of the bias torque. It also compares one speed loop for both motors with a
-speed loop for each motor.
+reversals and fast moves with each schedule of the bias torque. The study also compares one speed loop for both motors
+with a speed loop for each motor.
 
 Three cases have the controller of paper 000, as in the scenarios. The sine and the fast step run with the controller
 `best` of the study servo and with every schedule. `pedestal run servo_step|servo_sine --param ...` runs every case too

@@ -225,7 +225,8 @@ def remarks(misses):
         'ours. Its "largest miss (RMS)" is read as the rms over the whole motion. miss_worst_second_deg is the rms of '
         'the worst second.',
         f'A feed-forward that is {1e3 * late:g} ms late (d + T / 2) causes a miss of a (d + T / 2) / K_p in a long '
-        f'turn. It is {steepest * late / feedforward_loop.K_P:.3f} deg at the {steepest:.1f} deg/s2 of the azimuth. '
+        f'turn at the acceleration a. The miss is {steepest * late / feedforward_loop.K_P:.3f} deg at the '
+        f'{steepest:.1f} deg/s2 of the azimuth. '
         'imm-predicted has no such miss. The rate of kalman-cv is the same with and without prediction.',
         'perfect-state is the limit of this servo: its miss comes from the noise of the miss and the jerk in the rate '
         'loop.',

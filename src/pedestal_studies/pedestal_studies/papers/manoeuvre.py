@@ -4,7 +4,7 @@ A target moves to and fro through 20 deg at 3.5 deg/s. In a reversal its rate is
 2, 1, 0.5 and 0.35 s, one after the other. The angle is measured at 100 Hz with a noise of 0.02 deg. Cases are
 reversal-<seconds>/<filter>; their metrics are the rms errors of rate and acceleration inside the reversal. `cv` and
 `ca` are conventional filters of constant velocity and of constant acceleration. `imm-a` and `imm-b` are IMMs whose ca
-model has a process noise of 40 and of 5 deg/s3/sqrt(Hz). They are `imm` and `imm-b` of the study imm-feedforward.
+model has a process noise of 40 and of 5 deg/s3/sqrt(Hz), as in `imm` and `imm-b` of the study imm-feedforward.
 """
 import math
 

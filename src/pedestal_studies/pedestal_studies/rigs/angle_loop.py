@@ -178,8 +178,8 @@ def _beam(delay, hold):
 def receiver_reading(offset, receiver):
     """Return the error [rad] that a Receiver measures for an offset [rad] of the target from the beam.
 
-    The error is linear without a beamwidth, otherwise it follows the monopulse pattern within full scale. It is NaN if
-    the signal is lost.
+    With the beamwidth 0 the error is linear. With any other beamwidth the error follows the monopulse pattern within
+    full scale, and it is NaN if the signal is lost.
     """
     slope, beamwidth, lost_power_ratio = receiver
     if beamwidth == 0.0:

@@ -95,7 +95,7 @@ _STANDBY_OR_SAME_MODE = {mode: ('standby', mode) for mode in LEVEL_INDEPENDENT_M
 def _attitude_fault(report_steps, error, still_report_steps=None):
     """Return {mode: Expectation} of a wrong or missing attitude.
 
-    Without attitude no target can be followed, so a mode may end in standby. It may also remain and bridge the fault.
+    Without attitude no target can be followed, so a mode may end in standby. A mode that bridges the fault may remain.
     still_report_steps: as report_steps, for the modes that do not need the attitude.
     """
     return {**_in_every_mode(Expectation(still_report_steps, SAME_MODE, TENTH_BEAMWIDTH_DEG)),

@@ -59,8 +59,8 @@ def flyby(t, w):
 def s_turn(t):
     """Return (angle, rate, acceleration) (n,) of an S-turn at t (n,) [s].
 
-    The target turns to one side, twice as long to the other side, and a third time back to the old course. It flies
-    straight before and after.
+    The target turns to one side, twice as long to the other side, and a third time back to the old course. Before
+    and after these turns the target flies straight.
     """
     motion, before = [0.0, 0.0, 0.0], 0.0
     for at, side in TURN_SCHEDULE.items():

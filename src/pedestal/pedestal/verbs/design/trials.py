@@ -1,6 +1,6 @@
 """run a scenario many times with varied parameters, and print statistics and the worst trials
 
-Each trial has its own seed. It yields the same kinds of results as `pedestal run`. A trial runs all nodes in one
+Each trial has its own seed and gives the same kinds of results as `pedestal run`. A trial runs all nodes in one
 process, without ROS. For each of the worst trials a `pedestal run` command is printed, which runs separate nodes and
 gives the same numbers.
 
