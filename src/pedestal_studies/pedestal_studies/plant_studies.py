@@ -85,38 +85,38 @@ def servo_study(source, progress):
             'gust': ({**REST_PARAMETERS, 'adu.wind.gust.kind': 'step', 'adu.wind.gust.start': GUST_START_S,
                       **{f'adu.wind.gust.{name}': value for name, value in torque.items()}}, RUN_DURATION_S),
             'sine': (SINE_PARAMETERS, SINE_PERIODS / SINE_FREQUENCY_HZ)}
-    flown = {}
+    records = {}
     for i, (name, (changes, duration)) in enumerate(runs.items()):
         progress(i / len(runs), name)
-        flown[name] = Case(name, source, changes, duration).run()
+        records[name] = Case(name, source, changes, duration).run()
     return Result([row(f'{plant.name}/{name}', metric, value, unit) for i, name in enumerate(AXES)
-                   for metric, value, unit in _metrics(flown, i, torque[name])],
-                  {name: lambda name=name: _figure(name, flown[name]) for name in runs})
+                   for metric, value, unit in _metrics(records, i, torque[name])],
+                  {name: lambda name=name: _figure(name, records[name]) for name in runs})
 
 
 def backlash_study(source, progress):
     """Return the Result of the study backlash for a scenario, a name or a path. Raises LoopError, ScenarioError."""
-    plant, flown = loops.Loops(source), {}
+    plant, records = loops.Loops(source), {}
     runs = {(kind, end): Case(kind, source, {**changes, **bias}, duration) for end, bias in BIAS_PARAMETERS.items()
             for kind, changes, duration in (('standstill', STEP_PARAMETERS, RUN_DURATION_S),
                                             ('sine', SINE_PARAMETERS, SINE_PERIODS / SINE_FREQUENCY_HZ))}
     for done, (key, case) in enumerate(runs.items()):
         progress(done / len(runs), ''.join(key))
-        flown[key] = case.run()
+        records[key] = case.run()
     rows = []
     for i, name in enumerate(AXES):
         lash = plant.plants[name].axis.gear_train.lash
         rows.append(row(f'{plant.name}/{name}', 'lash_rad', lash, 'rad'))
         reversal_errors = {}
         for end in BIAS_PARAMETERS:
-            _, angle = _standstill(flown['standstill', end], i)
-            _, residual = _reversals(flown['sine', end], i)
+            _, angle = _standstill(records['standstill', end], i)
+            _, residual = _reversals(records['sine', end], i)
             reversal_errors[end] = metrics.peak(residual)
             rows += [row(f'{plant.name}/{name}{end}', 'standstill_peak_to_peak_rad', np.ptp(angle), 'rad'),
                      row(f'{plant.name}/{name}{end}', 'reversal_error_rad', reversal_errors[end], 'rad')]
         rows.append(row(f'{plant.name}/{name}', 'reversal_ratio_off_to_on',
                         reversal_errors['/bias-off'] / reversal_errors[''], '-'))
-    return Result(rows, {kind: lambda kind=kind, motion_of=motion_of: _bias_figure(kind, motion_of, flown)
+    return Result(rows, {kind: lambda kind=kind, motion_of=motion_of: _bias_figure(kind, motion_of, records)
                          for kind, motion_of in (('standstill', _standstill), ('sine', _reversals))})
 
 
@@ -133,7 +133,7 @@ def _reversals(run, i):
     return run.t[steady], metrics.residual(run.t[steady], _sine_error(run, i)[steady], 1.0 / SINE_FREQUENCY_HZ)
 
 
-def _bias_figure(kind, motion_of, flown):
+def _bias_figure(kind, motion_of, records):
     """Draw the remaining motion of both axes, with the bias torque of the scenario and without bias torque.
 
     kind: title of the panels. motion_of: `_standstill` or `_reversals`.
@@ -143,7 +143,7 @@ def _bias_figure(kind, motion_of, flown):
     for i, (panel, name) in enumerate(zip(axes[:, 0], AXES)):
         for end, colour, label in (('/bias-off', TRUTH_COLOUR, 'without bias'),
                                    ('', FILTERED_COLOUR, 'as the scenario is')):
-            t, remaining = motion_of(flown[kind, end], i)
+            t, remaining = motion_of(records[kind, end], i)
             panel.plot(t, 1e6 * remaining, color=colour, label=label)
         panel.set_title(f'{kind}, {name}')
     return drawing.legend(figure)
@@ -159,9 +159,9 @@ def _sine_error(run, i):
     return SINE_AMPLITUDE_RAD * np.sin(2.0 * math.pi * SINE_FREQUENCY_HZ * run.t) - _angle(run, i)
 
 
-def _metrics(flown, i, torque):
-    """Return [(metric, value, unit)] of axis i; flown: {name: Run}; torque: of the gust [Nm]."""
-    step, gust, sine = (flown[name] for name in ('step', 'gust', 'sine'))
+def _metrics(records, i, torque):
+    """Return [(metric, value, unit)] of axis i; records: {name: Run}; torque: of the gust [Nm]."""
+    step, gust, sine = (records[name] for name in ('step', 'gust', 'sine'))
     after, settled = _angle(gust, i)[gust.t >= GUST_START_S], sine.t >= 1.0 / SINE_FREQUENCY_HZ
     return [('step_overshoot_percent', metrics.overshoot_percent(_angle(step, i), STEP_SIZE_RAD), '%'),
             ('step_settling_2percent_s', metrics.settling_time(step.t, _angle(step, i), STEP_SIZE_RAD, SETTLING_BAND),

@@ -1,8 +1,8 @@
 """Paper 002's angle loop of a phased array: figures 3 to 7 and 9, limits of stability and of lock, a better loop.
 
 The array steers its beam electronically. The loop moves the beam after the target by the error that the receiver
-measures. alpha is its gain from the error to the angle [-], T the time between two updates. Cases run the loops of
-rigs/angle_loop.py; cases graph/... run the scenario phased_array_sway in the closed loop.
+measures. alpha is the gain of the loop from the error to the angle [-], T the time between two updates. Cases run the
+loops of rigs/angle_loop.py; cases graph/... run the scenario phased_array_sway in the closed loop.
 
 S0, S1 and S2 are the kinds of smoothing in the receiver: none, the paper's recursion, and a moving average, with n =
 20 samples at 1 kHz. A case without S0, S1 or S2 in its name has S1.

@@ -5,7 +5,8 @@ With constant sigma_a and noises, the 'current' statistical filter settles to co
     X, X+     estimate (angle, rate, acceleration) of one measurement and of the next
     y, y'     measured angle [rad] and measured rate [rad/s]
     sigma_a   standard deviation of the acceleration of the target that the filter assumes
-    T, w      time between two measurements [s]; angular frequency [rad/s]
+    T, w, t   time between two measurements [s]; angular frequency [rad/s]; time [s]
+    j, e^jwt  imaginary unit; sine of frequency w as a complex exponential
 
 A and B are identified on the compiled filter itself, with one unit state and one unit measurement at a time. A sine
 y = e^jwt, y' = jw y then gives the response G of the estimate:

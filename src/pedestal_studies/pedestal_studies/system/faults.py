@@ -11,10 +11,10 @@ largest_error_deg   largest error against truth while the mode is kept
 
 The error depends on the mode:
 
-TOWARDS_TARGET_MODES   pointing error, off the true target
+TOWARDS_TARGET_MODES   pointing error, the angle from the true beam to the true target
 slave, sun             angle from the true beam to the commanded direction, or to the sun
-rate                   angle from the place at the onset, moved on with the commanded rate, on the deck
-all other modes        angle from the place at the onset, on the deck
+rate                   angle on the deck to a place that moves with the commanded rate from the place at the onset
+all other modes        angle on the deck to the place at the onset
 """
 import typing
 

@@ -79,11 +79,11 @@ MAX_POINTING_RATIO = 1.15
 
 def pointing(case):
     """Return the rms of the true pointing error [deg], both axes, of one run of a Case; NaN if it left autotrack."""
-    flown = tracking.read(memory_recording.record(case.loaded()))
-    begun = np.flatnonzero(flown.mode == 'autotrack')
-    if not begun.size or np.any(flown.mode[begun[0]:] != 'autotrack'):
+    tracked = tracking.read(memory_recording.record(case.loaded()))
+    begun = np.flatnonzero(tracked.mode == 'autotrack')
+    if not begun.size or np.any(tracked.mode[begun[0]:] != 'autotrack'):
         return math.nan
-    return flown.pointing(tracking.known_rms)
+    return tracked.pointing(tracking.known_rms)
 
 
 def batch(item):
