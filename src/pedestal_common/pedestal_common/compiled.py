@@ -61,8 +61,8 @@ def compiled(law):
 def inlined(law):
     """Compile a small law as `compiled` does, and inline it into its callers, as decorator.
 
-    Only if its laws are inlined does a loop over the lanes of the drive (trials computed together) become vector
-    instructions. A bank of filters is also faster.
+    A loop over the lanes of the drive (trials that are computed together) becomes vector instructions only if its laws
+    are inlined. A bank of filters is also faster.
     """
     return _law(law, forceinline=True)
 

@@ -32,7 +32,7 @@ MAX_CACHE_AGE_DAYS = 7.0
 """Age after which an unused law cache is deleted [days]."""
 _ROOT = pathlib.Path(getattr(numba.config, 'CACHE_DIR', '') or user_cache_dir()) / 'pedestal'
 if not _ROOT.is_absolute():
-    # Without a home, as in a container, '~' is not expanded.
+    # Without a home folder, as in a container, '~' is not expanded.
     _ROOT = pathlib.Path(tempfile.gettempdir()) / f'pedestal-{os.getuid()}'
 
 

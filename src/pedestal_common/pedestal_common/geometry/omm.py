@@ -1,7 +1,7 @@
 """Reader of an Orbit Mean-Elements Message (OMM, CCSDS 502.0-B): it checks the elements of a satellite for SGP4.
 
-Unlike a TLE, an OMM does not limit the number of digits of its elements and of the catalogue number. SGP4 does not use
-the number of the element set and of the revolution.
+Unlike a TLE, an OMM does not limit the number of digits of its elements and of the catalogue number. SGP4 uses
+neither the number of the element set nor the number of the revolution.
 """
 import datetime
 import json

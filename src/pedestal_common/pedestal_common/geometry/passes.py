@@ -34,9 +34,9 @@ class Pass(typing.NamedTuple):
     """Pass of a satellite.
 
         rise, set                   UTC as datetime; None if it is more than MAX_PASS_DAYS outside the search
-        top                         UTC of the highest place
+        top                         UTC of the highest elevation, the culmination
         rise_azimuth, set_azimuth   [deg]; NaN without rise or set
-        elevation                   at the top [deg]
+        elevation                   highest elevation [deg]
         begin                       UTC of the beginning of the search
     """
     rise: datetime.datetime | None
@@ -115,7 +115,7 @@ def passes_after(satrec, station, begin, days=SEARCH_DAYS) -> list[Pass]:
 
 
 def _until_below(elevation, start, step):
-    """Return (times [s], elevations [deg]) from `start` [s] on, in steps [s], up to the first below the horizon.
+    """Return (times [s], elevations [deg]) after `start` [s], in steps [s], up to the first below the horizon.
 
     A negative step goes back in time. The series ends at most MAX_PASS_DAYS away, or where SGP4 fails. elevation:
     function of times, which returns elevations.

@@ -71,7 +71,7 @@ class NoDataMark(typing.NamedTuple):
     """The convention by which a message states that it has no data for a field.
 
     field   name of the field
-    paths   of the numbers in the message that state it
+    paths   paths of the numbers in the message that state whether there is data
     absent  function of these numbers, scalars or arrays: True where there is no data
     """
     field: str

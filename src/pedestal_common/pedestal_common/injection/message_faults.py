@@ -17,7 +17,7 @@ MAX_HELD_NUMBERS = 32
 MESSAGE_FAULT_DTYPE = np.dtype([('drop', 'i8'), ('freeze', 'i8'), ('nan', 'i8'), ('holds', 'i8'),
                                 ('held', 'f8', (MAX_HELD_NUMBERS,)),
                                 ('sigma', 'f8'), ('seed', 'i8')], align=True)
-"""Faults in force.
+"""Record of the message faults of a node that are in force.
 
     drop, freeze, nan    1 while in force
     held                 numbers of the first frozen step; holds: 1 once they are stored
@@ -43,7 +43,10 @@ def codes(node):
 
 @compiled
 def apply(e, codes, fault, values):
-    """Apply a fault with its `values` if it is one of `codes`; other faults change nothing here."""
+    """Apply a fault if it is one of `codes`; other faults change nothing here.
+
+    e: as in `clear`; codes: result of the function `codes`; fault: code of the fault; values: its arguments.
+    """
     drop, freeze, nan, noise = codes
     if fault == drop:
         e.drop = 1
@@ -91,6 +94,7 @@ def _uniform(seed, stamp, i):
 
 @compiled
 def noise(e, stamp, i):
-    """Return white noise number i of a step: e.sigma times a standard normal (Box and Muller 1958)."""
+    """Return the white noise of number i of a message: e.sigma times a standard normal number (Box and Muller 1958).
+    stamp: of the step [ns]."""
     u, v = _uniform(e.seed, stamp, 2 * i), _uniform(e.seed, stamp, 2 * i + 1)
     return e.sigma * math.sqrt(-2.0 * math.log(u)) * math.cos(2.0 * math.pi * v)

@@ -155,8 +155,8 @@ class Shell(Node):
         self.listeners = []
 
     def _place(self, name):
-        """Return (namespace of the graph, prefix of this node's beam in the graph, '' for a node without a beam). Both
-        end with a '/'."""
+        """Return (namespace of the graph, prefix of this node's beam in the graph), each with a '/' at its end. The
+        prefix is '' for a node without a beam."""
         namespace = self.get_namespace().rstrip('/') + '/'
         prefix = next((prefix for prefix in nodes.prefixes(self.graph.beams) if name in nodes.NODE_NAMES
                        and nodes.row(name).of_beam and namespace.endswith('/' + prefix)), '')

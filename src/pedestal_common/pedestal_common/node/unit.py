@@ -103,12 +103,12 @@ class Unit(typing.Protocol):
 
     @classmethod
     def inputs_type(cls) -> np.dtype:
-        """Return the record of its inputs, without the topics of rate `once` (see `decode`)."""
+        """Return the type of the record of its inputs, without the topics of rate `once` (see `decode`)."""
         return records.of(*(name for name in cls.NODE.reads if topics.TOPIC_BY_NAME[name].rate != 'once'))
 
     @classmethod
     def outputs_type(cls) -> np.dtype:
-        """Return the record of its outputs."""
+        """Return the type of the record of its outputs."""
         return records.of(*cls.NODE.writes)
 
     @property

@@ -4,14 +4,16 @@ An accepted message is valid and newer than the last one. Messages of all other 
 The table states when a publisher becomes active:
 
 first publisher      at once
-restarted publisher  once the active publisher was silent for SILENCE_LIMIT_NS; its sequence numbers begin again
+restarted publisher  once the active publisher was silent for SILENCE_LIMIT_NS
 different node       after it was the only publisher for CONFIRMED_TAKEOVER_NS, while the graph shows no unexpected
-                     publisher. A different node overlapped with the active publisher: both sent at the same time. Or
-                     its sequence numbers are too high for a restart in this silence
-unclear publishers   never: if a message may be of several publishers, it is dropped, so the motion that the topic
-                     commands stops
+                     publisher
+unclear publishers   never
 
-The module uses neither ROS nor a clock.
+The sequence numbers of a restarted publisher begin again. A publisher is a different node if it overlapped with the
+active publisher: both sent at the same time. It is also a different node if its numbers are too high for a restart in
+this silence. Publishers are unclear if a message may be of several of them. Because these messages are dropped, the
+motion that the topic commands stops. An unexpected publisher is a node that should not publish the topic, according to
+the table of nodes. The module uses neither ROS nor a clock.
 """
 import collections
 
@@ -52,7 +54,7 @@ class PublisherGate:
     oldest      largest accepted time from sending to reception [ns]; None: any
 
     dropped     {reason: count}
-    reason, detail, dropped_at    of the last dropped message: reason, its numbers as text, time [ns]
+    reason, detail, dropped_at    of the last dropped message: its reason, details as text, time of reception [ns]
     after_gap   True if messages may be missing before the last accepted message, because the publisher changed or
                 the stamps went back
     offset      smallest time from sending to reception since the publisher became active [ns]

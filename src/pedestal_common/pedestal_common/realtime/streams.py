@@ -14,8 +14,8 @@ NUMBER_SLACK = 4
 """Numbers by which a stream may grow in addition to its backlog and to twice the numbers of its pace."""
 
 MAX_BACKLOG_NS = 1_000_000_000
-"""Largest backlog of a stream, the messages by which it is behind its pace; as time at its mean interval [ns]. A
-publisher that stalled sends its backlog in a burst, of which some messages are lost."""
+"""Largest backlog of a stream, as time at its mean interval [ns]. The backlog is the number of messages by which the
+stream is behind its pace. A publisher that stalled sends its backlog in a burst, of which some messages are lost."""
 
 MAX_PAUSE_INTERVALS = 4.0
 """Longest time between two messages that counts for the mean interval of their stream [intervals]."""
@@ -28,15 +28,17 @@ PACE_WINDOW_MESSAGES, PACE_STRIDE_MESSAGES = 40, 8
 the median of the time per number in all pairs. A late message, or a burst of a few, does not change it."""
 
 MAX_PACE_RATIO = 0.85
-"""Largest ratio of the paces of two unclear streams that are identified by pace, the faster one over the slower one
-[time per number]. The pace of each must also stay within the square root of this ratio."""
+"""Largest ratio of the paces (times per number) of two unclear streams that are identified by pace, the smaller over
+the larger. Each pace must also equal its value before the streams became unclear, within the square root of this
+ratio."""
 
 ACTIVE_LIMIT_NS = 200_000_000
 """Time since its last message within which a stream is active [ns]. Of two unclear streams one has left when all
 messages continued a single stream for this time."""
 
 RECENT_LIMIT_NS = 1_000_000_000
-"""Silence after which a stream is continued only by one of its next few numbers [ns]."""
+"""Silence up to which a stream takes part in the first comparison with a message [ns]. An inactive stream takes part
+only if the number is at most CLOSE_NUMBER_GAP ahead. All other streams are compared if no stream fits."""
 
 EXPIRY_LIMIT_NS = 30_000_000_000
 """Silence after which a stream is deleted [ns]."""
@@ -157,12 +159,13 @@ class Streams:
         return sum(now - stream.arrival < ACTIVE_LIMIT_NS for stream in self.streams) > 1
 
     def _silent(self, number, source):
-        """Return a list of the streams that the message can continue, reduced to the one with the latest message."""
+        """Return [the stream with the latest message] among all streams that the message can continue; [] without
+        one."""
         return sorted((stream for stream in self.streams if stream.fits(number, source)),
                       key=lambda stream: stream.arrival)[-1:]
 
     def _begun(self, number, source, now):
-        """Add a new stream. It is marked `overlapped` if its publisher may have been close to another publisher."""
+        """Add a new stream and return it. It is `overlapped` if its numbers may have been those of unclear streams."""
         self.streams = [other for other in self.streams if now - other.arrival < EXPIRY_LIMIT_NS]
         stream = Stream(number, source, now)
         stream.unclear = bool(self._close)

@@ -1,9 +1,9 @@
 """Messages of the topics, as objects of the library rosbags: the same classes in a node, a bag and a test.
 
 Nodes publish bytes that rosbags serialised. The serialiser of rclpy leaves the alignment padding of CDR, the byte
-format of DDS, undefined. Two recordings would then never be identical: measured were bytes of earlier messages in the
-padding of 297 of 300 diagnostics. The serialiser of rosbags writes zeros there. rosbags also reads a JointState in
-half the time.
+format of DDS, undefined. Two recordings would then never be identical: in 297 of 300 diagnostics, the padding had
+bytes of earlier messages. The serialiser of rosbags writes zeros there. rosbags also reads a JointState in half the
+time.
 """
 import struct
 

@@ -150,7 +150,8 @@ def _bracketed(name):
 
 
 def headers(host):
-    """Return the headers [(name, value)] of every answer: content of this site only, revalidated, without frames."""
+    """Return the headers [(name, value)] of every answer. They allow content of this site only, require the browser to
+    check its cache, and forbid frames. host: `Host` of the request."""
     return [('content-security-policy',
              "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self'; "
              f"connect-src 'self' ws://{host} wss://{host}; "

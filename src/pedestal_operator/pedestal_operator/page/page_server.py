@@ -182,7 +182,8 @@ class PageServer:
         self._thread.join(3.0 * SHUTDOWN_TIMEOUT_S)
 
     def _guarded(self, app):
-        """Return the app behind page_security, with the headers on its answers."""
+        """Return an ASGI app that checks each request by page_security before `app` answers, and adds headers to each
+        answer."""
         async def guarded(scope, receive, send):
             request = _request(scope)
             try:

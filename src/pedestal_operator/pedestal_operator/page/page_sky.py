@@ -10,7 +10,7 @@ from pedestal_common.graph import topics
 from pedestal_common.wire import messages
 
 HORIZON_STEP_DEG = 5.0
-"""Azimuth between two points of a line around the horizon [deg]."""
+"""Difference in azimuth between two points of a line around the horizon [deg]."""
 
 MAX_PATH_POINTS = 240
 """Largest number of points of a path."""
@@ -107,7 +107,10 @@ class Deck:
         return [round(math.degrees(angle), 3) for angle in earth]
 
     def line(self, points):
-        """Return a line of deck angles [deg] in earth angles [[azimuth, elevation], ...], one per HORIZON_STEP_DEG."""
+        """Return a line in earth angles [[azimuth, elevation], ...] [deg], with a point every HORIZON_STEP_DEG.
+
+        points: corners of the line in deck angles [deg].
+        """
         found = []
         for (A, E), (B, F) in zip(points, points[1:]):     # azimuth and elevation of two neighbours
             count = max(int(abs(B - A) / HORIZON_STEP_DEG), 1)

@@ -109,7 +109,7 @@ def _dated(antenna, alarm):
 
 
 def epoch(antenna):
-    """Return time 0 of the graph in UTC [s]: graph.start, or the start of the day."""
+    """Return the UTC at which the time of the graph is 0 [s]: graph.start, or the start of the day."""
     return antenna.configuration.get('graph.start', 0) * 1e-9 or antenna.now // 86400.0 * 86400.0
 
 

@@ -34,7 +34,7 @@ class Lines:
         self._has_line_ends = False
 
     def take(self, data):
-        """Return the lines that bytes complete, None for a line that is too long."""
+        """Return a list of the lines that these bytes complete; None stands for a line that is too long."""
         *lines, self._remainder = (self._remainder + data).replace(b'\r', b'\n').split(b'\n')
         found, self._has_line_ends = [], self._has_line_ends or bool(lines)
         for line in lines:

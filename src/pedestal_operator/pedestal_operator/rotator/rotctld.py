@@ -74,7 +74,7 @@ class Request(typing.NamedTuple):
 
 
 def read(line) -> Request | None:
-    """Return the Request of a line, None for a line that has no answer. line: without the characters at its end."""
+    """Return the Request of a line (without its line end), None for a line that has no answer."""
     line = line.strip()
     if not line or line.startswith('#'):
         return None
@@ -115,7 +115,7 @@ def _values(name, given):
 
 
 def is_complete(line) -> bool:
-    """Return True if a text without an end of line is a valid command with all its arguments."""
+    """Return True if a line (without its line end) is a valid command with all its arguments."""
     request = read(line)
     return request is not None and request.error == RESULT_OK
 
