@@ -2,7 +2,7 @@
 
 drive_unit.step calls `speed_control`, `current_control` and `plant_step` at their own periods. These functions work on
 the records s (state) and c (constants) of the axis, or m and k of one motor. This module builds both records as nested
-dictionaries.
+dictionaries from p, the AxisParameters.
 """
 import math
 
@@ -432,7 +432,7 @@ def plant_step(s, c, external):
 
 @compiled
 def read(s, c, y):
-    """Write the present outputs of the axis: values of its sensors and controllers, and the true load."""
+    """Write the present outputs y of the axis: values of its sensors and controllers, and the true load."""
     m1, m2, k1, k2 = s.motor_1, s.motor_2, c.motor_1, c.motor_2
     s.reading = _load_counts(s, c)
     y.position = c.rad * s.reading

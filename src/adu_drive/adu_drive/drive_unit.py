@@ -151,7 +151,7 @@ def initial_state(params: AduParameters) -> np.ndarray:
 
 @compiled
 def _plausible(x):
-    """Return True if an input is valid; NaN is not."""
+    """Return True if an input x is valid, as MAX_PLAUSIBLE_INPUT states; NaN is invalid."""
     return abs(x) <= MAX_PLAUSIBLE_INPUT
 
 

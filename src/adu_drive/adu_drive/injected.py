@@ -1,4 +1,7 @@
-"""Injected faults of the drive and its plant: their effects on the record and the messages of a drive (unit.py)."""
+"""Injected faults of the drive and its plant: their effects on the record and the messages of a drive.
+
+Argument m is the record of a drive (unit.RECORD_DTYPE), s the state of one axis.
+"""
 import numpy as np
 
 from adu_drive import axis
@@ -34,7 +37,7 @@ def _clear_faults(s):
 
 @compiled
 def _apply_fault(m, fault, values):
-    """Apply a fault to the record of the drive (unit.RECORD_DTYPE).
+    """Apply a fault to the record of the drive.
 
     values: the arguments of the fault in the order of its row of table.INJECTED_FAULTS. The first argument is the
     axis, except for faults of the whole drive, such as `delay`.

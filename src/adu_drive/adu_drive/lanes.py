@@ -13,6 +13,9 @@ to the last bit. A function for records and for Lanes loops by
 
 For a single record, `count` is 1 and `at` returns the record. Lanes exist in compiled code only, as pointers into the
 flat array. The flat array must exist as long as its Lanes.
+
+The private functions below are the hooks by which numba types and compiles these operations: `_type_..` and `generic`
+return the type of a result, the others generate its code.
 """
 import hashlib
 import operator

@@ -59,6 +59,7 @@ class Timekeeper(unit_node.UnitNode):
                         self.reader(name, unit_node.decoding(decoder), self._newest_receiver(name))
 
     def _count_from_first_step(self):
+        """Reset the numbers of steps, and the newest messages and stamps of commands."""
         self.k, self.made = -1, 0
         self.lost_steps = self.missed_steps = self.late_ticks = 0
         self.newest, self.command_stamps = {}, {}

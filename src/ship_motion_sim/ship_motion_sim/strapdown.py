@@ -47,7 +47,7 @@ def from_rotvec(x, y, z):
 
 @compiled
 def set_attitude(s, qx, qy, qz, qw):
-    """Set the attitude of a STATE_DTYPE record to a quaternion, scaled to length 1."""
+    """Set the attitude of a STATE_DTYPE record s to the quaternion (qx, qy, qz, qw), scaled to length 1."""
     scale = 1.0 / math.sqrt(qx * qx + qy * qy + qz * qz + qw * qw)
     q = s.quaternion
     q[0], q[1], q[2], q[3] = scale * qx, scale * qy, scale * qz, scale * qw

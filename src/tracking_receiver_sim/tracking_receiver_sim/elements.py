@@ -259,10 +259,12 @@ def _xml(path):
     satellites, open_elements, texts = [], [], {}
 
     def doctype(*_):
+        """Raise TableError for a document type declaration."""
         raise lines.wrong(path, parser.CurrentLineNumber, parser.CurrentColumnNumber + 1,
                           'a document type declaration: an OMM has none')
 
     def start(name, _attributes):
+        """Begin an element; a segment begins a new satellite. Raises TableError if it is nested too deeply."""
         if len(open_elements) >= MAX_XML_DEPTH:
             raise csv_table.TableError(f'{path}: line {parser.CurrentLineNumber}: must be at most {MAX_XML_DEPTH} '
                                        'nested elements')
@@ -273,10 +275,12 @@ def _xml(path):
             texts['line'] = parser.CurrentLineNumber
 
     def text(data):
+        """Add a part of the text of a keyword."""
         if open_elements and open_elements[-1] in omm.KEYWORDS:
             texts[open_elements[-1]] = (texts.get(open_elements[-1], '') + data)[:MAX_VALUE_CHARS]
 
     def end(_name):
+        """End an element; the end of a segment completes its satellite."""
         if open_elements.pop() == 'segment':
             line = texts.pop('line', 1)
             satellites.append(_omm(line, {keyword: value.strip() for keyword, value in texts.items()}))

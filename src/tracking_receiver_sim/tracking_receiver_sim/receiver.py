@@ -12,6 +12,8 @@ parameters select them, each result also holds the rate of the error at the stam
 Voltages are scaled so that the noise of one channel has the power 1 in one sample. The carrier power on axis is then
 C/N0 tau, with the time tau of a sample. The receiver knows the noise power and subtracts 1 from the measured sum
 power.
+
+Arguments: s state, c constants, i inputs, o outputs (records of this module).
 """
 import math
 from collections import namedtuple

@@ -61,7 +61,7 @@ def decode(u, switches, command):
 
 @compiled
 def encode(y, switches, stamp, outputs):
-    """Write the outputs of the beam into the records of its messages.
+    """Write the outputs y of the beam into the records of its messages, with a stamp [ns].
 
     A beam has no rate and no torque, and its reported angles are the true ones.
     """

@@ -32,5 +32,5 @@ def shared(T_1, T_2, T_b, omega_1, omega_2, K_d):
 
 @inlined
 def limited(T, limit):
-    """Return the torque [Nm] limited to +-limit."""
+    """Return the torque T [Nm] limited to +-limit [Nm]."""
     return min(max(T, -limit), limit)

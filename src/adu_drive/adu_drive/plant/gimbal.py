@@ -15,6 +15,8 @@ turns with omega = C(E) (R(A) w + (0, -E', -A')). Both signs are negative, becau
 and elevation lifts the beam, against y. The torque on the elevating part is I omega' + omega x I omega. The yoke turns
 with the azimuth only, so it has only the inertia J_yoke. Bodies turn about the intersection of the axes; gravity acts
 by the unbalance of an axis. The test compares with Lagrange's equations of the same bodies.
+
+Argument c of the functions: see `constants`.
 """
 import math
 
@@ -39,7 +41,7 @@ def constants(p):
 
 @compiled
 def _times(m, x, y, z):
-    """Return the product of a matrix (3, 3) and a vector (x, y, z)."""
+    """Return the product of a matrix m (3, 3) and a vector (x, y, z)."""
     return (m[0, 0] * x + m[0, 1] * y + m[0, 2] * z, m[1, 0] * x + m[1, 1] * y + m[1, 2] * z,
             m[2, 0] * x + m[2, 1] * y + m[2, 2] * z)
 

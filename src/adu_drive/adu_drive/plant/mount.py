@@ -49,7 +49,7 @@ def constants(p):
 
 @compiled
 def _leaning(c, x, y, z):
-    """Return a vector of the elevating part in the frame of the yoke, whose elevation axis leans."""
+    """Return a vector (x, y, z) of the elevating part in the frame of the yoke, whose elevation axis leans."""
     return x, c.cos_lean * y + c.sin_lean * z, c.cos_lean * z - c.sin_lean * y
 
 
@@ -57,8 +57,8 @@ def _leaning(c, x, y, z):
 def beam(c, A, E, A_dot, E_dot):
     """Return ((azimuth, elevation) [rad], their rates [rad/s]) of the beam, as deck angles.
 
-    A, E, A_dot, E_dot: angles [rad] and rates [rad/s] of the axes. Among azimuths whole turns apart, the result is
-    nearest to A. If the elevation axis is beyond 90 deg, the elevation of the beam is too.
+    c: see `constants`; A, E, A_dot, E_dot: angles [rad] and rates [rad/s] of the axes. Among azimuths whole turns
+    apart, the result is nearest to A. If the elevation axis is beyond 90 deg, the elevation of the beam is too.
     """
     E_beam, E_beam_dot = E - c.sag * math.cos(E), (1.0 + c.sag * math.sin(E)) * E_dot
     cos_E, sin_E = c.cos_off * math.cos(E_beam), c.cos_off * math.sin(E_beam)

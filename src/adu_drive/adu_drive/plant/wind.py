@@ -71,7 +71,7 @@ def turbulence(t, amplitude, omega, phase):
 
 @compiled
 def torques(c, t):
-    """Return the torques [Nm] on the azimuth and elevation loads at the time t [s]."""
+    """Return the torques [Nm] on the azimuth and elevation loads at the time t [s]; c: see `constants`."""
     if c.kind == GUST_SPECTRUM:
         g = 1.0 + turbulence(t, c.amplitude, c.omega, c.phase)
         return c.azimuth * g * abs(g), c.elevation * g * abs(g)    # A gust that reverses the wind reverses the torque.

@@ -56,7 +56,10 @@ def constants(p):
 
 @compiled
 def torques(c, t, A, E):
-    """Return the torques [Nm] on the azimuth and elevation loads at the time t [s] with the axes at A, E [rad]."""
+    """Return the torques [Nm] on the azimuth and elevation loads at the time t [s] with the axes at A, E [rad].
+
+    c: see `constants`.
+    """
     u, v, w = (turbulence(t, c.amplitude[0], c.omega[0], c.phase[0]),
                turbulence(t, c.amplitude[1], c.omega[1], c.phase[1]),
                turbulence(t, c.amplitude[2], c.omega[2], c.phase[2]))
@@ -70,5 +73,5 @@ def torques(c, t, A, E):
 
 
 def initial_torques(p, A, E):
-    """Return the torques [Nm] of WindFieldParameters on azimuth and elevation at t = 0."""
+    """Return the torques [Nm] of WindFieldParameters p on both loads at t = 0 with the axes at A, E [rad]."""
     return torques.py_func(types.SimpleNamespace(**constants(p)), 0.0, A, E) if p.speed > 0.0 else (0.0, 0.0)

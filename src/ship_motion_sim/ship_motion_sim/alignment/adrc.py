@@ -82,7 +82,7 @@ def azimuth_sigma(c, k, o, window):
 
 @compiled
 def level_sigma(c, k, o, t):
-    """Return the 1 sigma [rad] of level t [s] after power-up.
+    """Return the 1 sigma [rad] of level t [s] after power-up; other arguments as of `azimuth_sigma`.
 
     The result is the root sum square of two parts. The first part is the observed tilt or the 1 sigma of the settled
     loop, whichever is larger. Innovations above the expected ones increase that 1 sigma. The second part is the share

@@ -99,7 +99,10 @@ def predict_covariance(o, k, h):
 
 @compiled
 def correct_covariance(o, l1, l2, l3, r):
-    """Correct the covariance o.p for any gains l: (I - l H) p (I - l H)^T + l r l^T, H = (1, 0, 0); r [m2/s2]."""
+    """Correct the covariance o.p for any gains l = (l1, l2, l3): (I - l H) p (I - l H)^T + l r l^T with H = (1, 0, 0).
+
+    r: variance of the measured velocity [m2/s2].
+    """
     p = o.p
     p11, p12, p13 = p[0], p[1], p[2]
     p22, p23, p33 = p[3], p[4], p[5]
@@ -122,7 +125,10 @@ def predict(o, h):
 
 @compiled
 def correct(o, v_east, v_north, l1, l2, l3, s, h):
-    """Correct z of both channels with measured velocities [m/s]; s: expected variance of the innovations [m2/s2]."""
+    """Correct z of both channels with measured velocities [m/s].
+
+    l1, l2, l3: gains; s: expected variance of the innovations [m2/s2]; h: step [s].
+    """
     e_east, e_north = v_east - o.z[0, 0], v_north - o.z[1, 0]
     o.innovation_ratio = innovation_ratio(o.innovation_ratio, e_east, e_north, s, h)
     for i in range(2):

@@ -36,8 +36,10 @@ STATE_DTYPE = np.dtype([
 
 @compiled
 def gravity_integral(t, k):
-    """Return b [m/s] in n0 after t [s], in closed form: the integral of the reaction to gravity, which turns with the
-    earth."""
+    """Return b [m/s] in n0 after t [s], in closed form; k: record of CONDITIONS_DTYPE.
+
+    b is the integral of the reaction to gravity, which turns with the earth.
+    """
     north, up = k.earth_rate[1], k.earth_rate[2]
     w = math.sqrt(north * north + up * up)
     n, u = north / w, up / w
@@ -136,6 +138,9 @@ def solve(s):
 
 @compiled
 def attitude(s, k, qx, qy, qz, qw):
-    """Return the present quaternion (x, y, z, w) deck -> n; qx, qy, qz, qw: deck -> b0 from the gyros."""
+    """Return the present quaternion (x, y, z, w) deck -> n.
+
+    s, k: records STATE_DTYPE, CONDITIONS_DTYPE; qx, qy, qz, qw: quaternion deck -> b0 from the gyros.
+    """
     turned = strapdown.from_rotvec(-s.t * k.earth_rate[0], -s.t * k.earth_rate[1], -s.t * k.earth_rate[2])
     return product(turned, product(solve(s), (qx, qy, qz, qw)))

@@ -31,8 +31,10 @@ STATE_DTYPE = np.dtype([
 
 @compiled
 def advance_covariance(o, k, h):
-    """Advance the covariance of o by one step h [s] and its measurement; return (l1, l2, l3, expected variance of the
-    innovation [m2/s2])."""
+    """Advance the covariance of the observer o by one step h [s] with its measurement; k: record of CONDITIONS_DTYPE.
+
+    Return (l1, l2, l3, expected variance of the innovation [m2/s2]).
+    """
     r = k.velocity_density / h
     extended_observer.predict_covariance(o, k, h)
     s = o.p[0] + r

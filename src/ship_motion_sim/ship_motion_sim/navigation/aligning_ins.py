@@ -2,6 +2,7 @@
 
 This INS takes the messages of `ship/imu/data_raw` and puts out attitude and deck rate after a latency, as `ins` does.
 Its `ship` parameters serve only for the latitude and for the true velocity, which an aid measures with noise.
+Arguments: s state, c constants, i inputs, out outputs (records of this module and of ins).
 """
 import math
 

@@ -4,6 +4,8 @@ The node `ins` subscribes only to `ship/imu/data_raw`, which has no attitude (RE
 reserves it for `imu/data`). So the INS evaluates the stateless law of the ship motion (sea.motion) at the stamp of
 each IMU message, and adds its errors. Its `ship` parameters must be those of ship_motion_node. The INS compares the
 rate of the IMU with that of the law, and its status reports a difference. `aligning_ins` integrates the IMU instead.
+
+Arguments: s state, c constants, i inputs, out outputs (records of this module).
 """
 import math
 
@@ -104,7 +106,7 @@ def constants(params: InsParameters) -> np.ndarray:
 
 
 def model_variance(p):
-    """Return the variance of roll, pitch and heading [rad2] that method model declares."""
+    """Return the variance of roll, pitch and heading [rad2] that the method `model` declares; p: InsParameters."""
     return (p.roll_bias**2 + p.tilt_wander**2 + p.tilt_noise**2, p.pitch_bias**2 + p.tilt_wander**2 + p.tilt_noise**2,
             p.heading_bias**2 + p.heading_wander**2 + p.heading_noise**2)
 

@@ -13,6 +13,7 @@ n, n'       ENU; frame that the INS computes as its estimate of n. n' is n turne
             which is unknown at first, and tilted by small level errors
 w_c, w_cN   commanded rate of n' against the earth, and its north component [rad/s]
 w_N         north component of the earth rate [rad/s]
+s, c, h     arguments: state, constants (records of this module), time since the last step of the method [s]
 Methods     classical: gyrocompass; adrc, adrc_scheduled: ADRC; riccati_eso: extended state observer with Kalman
             gains; oba: optimisation-based alignment
 """
@@ -94,7 +95,7 @@ def initial_state(constants, quaternion) -> np.ndarray:
 
 @compiled
 def begin(s, c, qx, qy, qz, qw):
-    """Set the state s (zeros of STATE_DTYPE) to the state at power-up; c: record of CONSTANTS_DTYPE."""
+    """Set the state s (zeros of STATE_DTYPE) to the state at power-up; qx, qy, qz, qw: assumed attitude deck -> n'."""
     if c.method == METHOD_OBA:
         qx, qy, qz, qw = 0.0, 0.0, 0.0, 1.0
     strapdown.set_attitude(s.strapdown, qx, qy, qz, qw)

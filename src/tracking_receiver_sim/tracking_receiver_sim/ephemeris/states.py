@@ -23,7 +23,10 @@ GAP_STEP_RATIO = 3.0
 
 
 def gaps(t):
-    """Return a mask (n - 1,): True for steps between times (n,) that exceed GAP_STEP_RATIO times both neighbours."""
+    """Return a mask (n - 1,) of the steps between the times t (n,): True for a gap.
+
+    A gap is longer than GAP_STEP_RATIO times each of its neighbours.
+    """
     step = np.diff(t)
     longest = np.maximum(np.append(0.0, step[:-1]), np.append(step[1:], 0.0))
     return (step > GAP_STEP_RATIO * longest) & (longest > 0.0)

@@ -24,7 +24,7 @@ PATH_DTYPE = np.dtype([('refractivity', 'f8'), ('light_time', 'i8')], align=True
 
 
 def constants(p) -> np.ndarray:
-    """Return PATH_DTYPE (1,) of PathParameters."""
+    """Return PATH_DTYPE (1,) of PathParameters p."""
     return np.array([(p.refractivity, p.light_time)], PATH_DTYPE)
 
 
