@@ -250,6 +250,7 @@ class Law(CPUDispatcher):
         return self._translated[args]
 
     def _translate(self, args):
+        """Return the CompileResult of a new translation for arguments of these types."""
         flags = compiler.Flags()
         self.targetdescr.options.parse_as_flags(flags, self.targetoptions)
         flags.no_compile = flags.no_cpython_wrapper = flags.no_cfunc_wrapper = True

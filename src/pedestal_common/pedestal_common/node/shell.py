@@ -77,6 +77,7 @@ _HOOKS = '_raw_object_cache_getbuffer', '_raw_object_cache_notify'
 
 
 def _on_signal(_number, frame):
+    """Note the signal, so that `main` stops the node. Raise Stopped if the process compiles laws."""
     _stop.append(True)
     if not _compiling:
         return
@@ -163,6 +164,7 @@ class Shell(Node):
         return namespace.removesuffix(prefix), prefix
 
     def _declare(self, live):
+        """Check the given ROS parameters, store them in `parameters` and `graph`, and declare them in ROS."""
         given = {name: given.value for name, given in self._parameter_overrides.items()}
         given = parameters.without_ros({name: list(value) if isinstance(value, array.array) else value
                                         for name, value in given.items()})
@@ -195,6 +197,7 @@ class Shell(Node):
                 if change.name in fields else change for change in changes]
 
     def _changed(self, changes):
+        """Return the parameters of the node with changed ROS parameters. Raises ParameterError."""
         values = parameters.as_dict(self.parameters)
         values.update({change.name: change.value for change in changes if change.name in values})
         changed = parameters.build(self._parameters_type, values)
@@ -202,6 +205,7 @@ class Shell(Node):
         return changed
 
     def _on_set(self, changes):
+        """Accept or refuse changed ROS parameters, for rclpy."""
         try:
             self._changed(changes)
         except parameters.ParameterError as error:
@@ -209,6 +213,7 @@ class Shell(Node):
         return SetParametersResult(successful=True)
 
     def _post_set(self, changes):
+        """Store accepted changes, for rclpy."""
         self.parameters = self._changed(changes)
         self.reconfigure()
 

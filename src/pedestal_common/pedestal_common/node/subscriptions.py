@@ -167,6 +167,7 @@ class TopicSubscriber:
         self._subscriptions = subscribe()
 
     def _hold(self, data, info):
+        """Hold a text until every publisher of its topic has a name."""
         self._held.append((self._node.clock()[0], data, info))
         self._take_held()
 
@@ -186,6 +187,7 @@ class TopicSubscriber:
         return any(UNDISCOVERED_NODE_NAME in name for name in self._node.publishers_of(self._ros_name))
 
     def _receive(self, data, info):
+        """Pass a message on if the PublisherGate accepts it; otherwise publish diagnostics for a serious reason."""
         gate = self.gate
         now, utc = self._node.clock()
         message = gate.take(data, info['publication_sequence_number'], info['source_timestamp'], now, utc)

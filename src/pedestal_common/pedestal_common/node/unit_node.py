@@ -186,6 +186,7 @@ class UnitNode(shell.Shell):
                     self._waiting_for_once.add(name)
 
     def _command_taker(self, port):
+        """Return take(message), which passes a command to the unit."""
         def take(message):
             try:
                 port.command(commands.of_message(message))
@@ -195,12 +196,14 @@ class UnitNode(shell.Shell):
         return take
 
     def _text_taker(self, port, name):
+        """Return take(message), which passes a text to the unit."""
         def take(message):
             self._look_for_replay()
             port.unit.take_text(name, message.data)
         return take
 
     def _once_taker(self, port, name):
+        """Return take(message), which passes a message of rate `once` to the unit."""
         def take(message):
             self._look_for_replay()
             stamp = messages.nanoseconds(message.header.stamp)
@@ -284,6 +287,8 @@ class UnitNode(shell.Shell):
         self.restart()
 
     def _step_taker(self, name):
+        """Return take(message, after_gap), which passes the messages of one input to the Steps. After a gap it first
+        resets the state that depends on earlier messages."""
         steps = self.steps
 
         def take(message, after_gap):

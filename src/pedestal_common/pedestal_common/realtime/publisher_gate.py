@@ -180,5 +180,6 @@ class PublisherGate:
         self.offset = offset if self.offset is None else min(self.offset, offset)
 
     def _drop(self, reason, detail, now):
+        """Count a dropped message, and note its reason and time. Return None, the result of `take`."""
         self.dropped[reason] += 1
         self.reason, self.detail, self.dropped_at = reason, detail, now

@@ -50,6 +50,7 @@ class Places:
             raise ValueError(f'{len(data)} bytes are no {type_name}: {error}') from None
 
     def _fields(self, type_name, prefix):
+        """Find the places in the next bytes, those of a type. prefix: beginning of the paths of its fields."""
         for name, node in ROS_TYPESTORE.fielddefs[type_name][1]:
             self._node(node, prefix + name)
 
@@ -62,11 +63,13 @@ class Places:
         return start
 
     def _length(self, path):
+        """Return the length of a text or a list, which stands before its content."""
         start = self._take(4, 4, path)
         self.fixed.append((start, self.stop))
         return struct.unpack_from(self.order + 'I', self.data, start)[0]
 
     def _node(self, node, path):
+        """Find the places in the next bytes, those of one field. node: type of the field, by rosbags."""
         kind, what = node
         if kind == Nodetype.NAME:
             self._fields(what, path + '.')

@@ -54,6 +54,7 @@ class PageRequests:
             self._send(client, {'error': 'unknown message: must have jog or ask'})
 
     def _forward(self, client, message, now):
+        """Check a command of a page, and forward it to the control unit."""
         verb, given, number = message['ask'], message.get('arguments') or {}, message.get('id')
         if not (isinstance(given, dict) and len(given) <= MAX_ARGUMENTS and _is_allowed(verb) and all(
                 _is_allowed(name) and isinstance(value, (str, int, float)) and _is_allowed(str(value))
@@ -68,6 +69,8 @@ class PageRequests:
         self._waiting[self._request(str(client), verb, given)] = client, number, verb, now
 
     def _jog(self, client, rates, now, age):
+        """Check a jog of a page, and forward it. rates: (azimuth, elevation) [deg/s], both 0 at its end; age: age of
+        the last state on the page [s]."""
         refusal = page_security.refusal_reason(client.role, 'rate', {})
         if refusal:
             self._send(client, {'verb': 'rate', 'granted': False, 'reply': refusal})
@@ -90,6 +93,7 @@ class PageRequests:
         self._waiting[number] = client, None, 'rate', now
 
     def _end_jog(self, client, now):
+        """Stop the axes if the page jogs and the antenna still follows a jog."""
         if self._jogs.pop(client, None) is not None and self._is_jogging():
             self._rate(client, (0.0, 0.0), now)
 
@@ -106,6 +110,7 @@ class PageRequests:
                 self._forward_reply(client, page_number, verb, reply, now)
 
     def _forward_reply(self, client, page_number, verb, reply, now):
+        """Send a Reply to the page that sent the command; the Reply to an accepted jog is left out."""
         if verb == 'stop' and not reply.granted:  # standby is the fallback if the control unit cannot hold the axes
             self._waiting[self._request(str(client), 'standby', {})] = client, page_number, 'standby', now
         if verb != 'rate' or not reply.granted:
