@@ -20,9 +20,9 @@ Symbols
     w_N, g          north part of the earth's rate, gravity                         [rad/s, m/s2]
     v_E, v_N        level velocity in n' less that of an aid: the error            [m/s]
     x1, x2, x3      state of a channel: v_N or v_E, its rate, the rate of x2 without command [m/s, m/s2, m/s3]
-    z1, z2, z3      estimates of x1, x2, x3
                     north: x2 = g a_x, x3 = g (-sin az w_N - eps_E), b0 = g
                     east: x2 = -g a_y, x3 = -g ((1 - cos az) w_N - eps_N), b0 = -g
+    z1, z2, z3      estimates of x1, x2, x3
     b0 u            effect of a command on the rate of x2: u = w_cE (north channel), w_cN (east)
     v1, v2          reference of x1, x2 from the tracking differentiator
     w_o, w_c (level)    bandwidth of the observer and of the level control          [rad/s]
