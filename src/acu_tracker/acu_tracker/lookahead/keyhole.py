@@ -89,8 +89,7 @@ def _fit(slew, passage, turn, t1):
 
 @compiled
 def _unwrap(slew, path, azimuth):
-    """Put a fitted slew on the azimuth wrap of the axis; azimuth: that of the axis at the first row of the path
-    [rad]."""
+    """Put a fitted slew on the azimuth wrap of the axis; azimuth: of the axis at the first row of the path [rad]."""
     first = path.rows[int((slew.t1 - path.t0) / path.h), paths.AZIMUTH_COLUMN]
     revolutions = math.floor((azimuth - path.rows[0, paths.AZIMUTH_COLUMN]) / (2.0 * math.pi) + 0.5)
     start = 2.0 * math.pi * revolutions + first + wrap(slew.azimuth1 - first)
@@ -179,8 +178,8 @@ def plan(slew, path, azimuth, limits, tilt):
     slew: records (2,) of SLEW_DTYPE, the first for the best slew, the second for trials. The other arguments are those
     of Passage.
 
-    The effort is bounded. For each of the two directions the first level evaluates SLEW_CANDIDATE_COUNT + 1 slews, and
-    each of the next REFINEMENT_COUNT - 1 levels evaluates 9, with SLEW_SAMPLE_COUNT samples each. The last level
+    The effort is bounded. For each of the two directions the first level evaluates SLEW_CANDIDATE_COUNT + 1 slews of
+    SLEW_SAMPLE_COUNT samples. Each of the next REFINEMENT_COUNT - 1 levels evaluates 9 such slews. The last level
     evaluates one slew with ten times as many samples.
     """
     first, last, needed = find(path, limits.rate, limits.acceleration)

@@ -15,8 +15,12 @@ PATH_ROW_COUNT, PATH_COLUMN_COUNT = 1025, 6
 """Largest number of rows of a path, and number of its columns."""
 
 UP_COLUMN, AZIMUTH_COLUMN, LEAST_AZIMUTH_COLUMN, LARGEST_AZIMUTH_COLUMN = range(2, PATH_COLUMN_COUNT)
-"""Columns of a path: upward component of the unit vector [-]; azimuth without jumps of a turn [rad]; least and largest
-azimuth from this row to the end of the path, or of the program [rad]."""
+"""Columns of a path.
+
+UP              upward component of the unit vector [-]
+AZIMUTH         azimuth, without jumps of a turn [rad]
+LEAST, LARGEST  least and largest azimuth from this row to the end of the path, or to the end of the program [rad]
+"""
 
 Path = namedtuple('Path', 'rows t0 h')
 """Path of the target.
@@ -63,8 +67,7 @@ def along_great_circle(path, mat, u, du):
 
 @compiled
 def complete(path, travel):
-    """Write the azimuth columns; travel: the Travel of the azimuth after the end of the path, until the program
-    ends."""
+    """Write the azimuth columns; travel: the Travel of the azimuth from the end of the path to that of the program."""
     rows, n = path.rows, len(path.rows)
     before = math.atan2(-rows[0, 1], rows[0, 0])
     rows[0, AZIMUTH_COLUMN] = before

@@ -24,8 +24,7 @@ LOOK_AHEAD_PERIOD_S = 1.0
 """Time between two look-aheads [s]."""
 
 FORECAST_TEXTS = ('none', 'keyhole', 'no turn')
-"""Names of the forecasts: no keyhole; a keyhole with a planned slew; a keyhole without a slew, because no azimuth wrap
-holds it inside the limits."""
+"""Names of the forecasts: no keyhole; a keyhole with a planned slew; a keyhole for which no slew fits the limits."""
 FORECAST_NONE, FORECAST_KEYHOLE, FORECAST_NO_WRAP = range(len(FORECAST_TEXTS))
 
 PLANNER_DTYPE = np.dtype([

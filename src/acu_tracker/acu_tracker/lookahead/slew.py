@@ -69,9 +69,11 @@ def true_deck_share(slew, t):
 def best_elevation(azimuth, sight):
     """Return the AxisMotion of the elevation at which the beam is closest to the target.
 
-    azimuth: AxisMotion of the beam; sight: LineOfSight to the target, FLU. The elevation is E = atan2(z, b). Here x,
-    y, z are the components of the direction, a is the azimuth, and b = x cos a - y sin a is the part of the direction
-    along the azimuth of the beam; c = db/da. An elevation above pi/2 is past the zenith.
+    azimuth: AxisMotion of the beam; sight: LineOfSight to the target, FLU. An elevation above pi/2 is past the zenith.
+
+        E = atan2(z, b),  b = x cos a - y sin a,  c = db/da
+
+    E is the elevation, a the azimuth, x, y, z the direction of the target, b its part along the azimuth of the beam.
     """
     a, da, dda = azimuth
     u, du, ddu = sight
