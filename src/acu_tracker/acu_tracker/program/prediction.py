@@ -1,11 +1,10 @@
-"""Predicted tables for the modes tle and sun: earth angles over time of a satellite, from its elements, and of the
-sun.
+"""Predicted tables for the modes tle and sun: earth angles over time of a satellite (by its elements) and of the sun.
 
 `unit.Acu` calls the Predictor and gives the tables to the law. A table begins shortly before the time at which it is
 made. It is replaced in its second half, if possible while its target is below the horizon, because then no mode
 follows it. Refraction is neglected.
 
-A stamp counts seconds from the begin of the run in lockstep, and from the UTC epoch in realtime.
+Stamps [s] count from an epoch. In realtime the epoch is a known UTC time; in lockstep its UTC is not known.
 """
 import dataclasses
 import datetime
@@ -102,7 +101,7 @@ class Predictor:
 
     @property
     def _utc_known(self):
-        """True if the UTC of the stamps is known. In lockstep stamps count from 0, so start_time must be given."""
+        """True if the UTC of the stamps is known. In lockstep only the parameter start_time gives it."""
         return self.parameters.start_time != '' or self.epoch > 0
 
     def satellite(self, stamp) -> Predicted:

@@ -14,8 +14,8 @@ from pedestal_common.graph.topics import AXES
 MAX_GAP_INTERVALS = 3.0
 """Longest time between two segments that are joined, in row intervals.
 
-The row interval is the shorter of two times: that between the last two rows of the earlier segment, and that between
-the first two rows of the later segment.
+The row interval is the shorter of two times: between the last two rows of the earlier segment, and between the first
+two rows of the later one.
 """
 
 

@@ -89,8 +89,7 @@ def initialise(s):
 
 @compiled
 def take_level(s, p, z, stamp, locked):
-    """Take the level z [dB-Hz] that was measured at a stamp [s]; locked: True if the receiver measures angle
-    errors."""
+    """Take the level z [dB-Hz] of a stamp [s]; locked: True if the receiver measures angle errors."""
     level.take(s.level, p, z, stamp, locked)
 
 

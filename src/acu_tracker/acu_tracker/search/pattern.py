@@ -68,8 +68,7 @@ def rotated(p, angle):
 
 @compiled
 def circle(radius, period, t):
-    """Return the Point at t [s] of a circle about the centre; its radius [rad] grows from 0 during the first period
-    [s].
+    """Return the Point at t [s] of a circle; its radius grows from 0 to `radius` [rad] during the first period [s].
 
     The circle is no search pattern. `acquisition` uses it to check the slopes of the receiver errors.
     """
@@ -107,8 +106,7 @@ def point(area, t):
 
 @compiled
 def _turn_of(area):
-    """Return the angle [rad] at which the spiral ends: half a pitch beyond the radius, so that all of the edge is
-    seen."""
+    """Return the angle [rad] at which the spiral ends: half a pitch beyond the radius, to cover all of the edge."""
     return 2.0 * math.pi * (area.radius / area.pitch + 0.5)
 
 
@@ -193,10 +191,9 @@ def _leg_length(area, i):
 
 @compiled
 def _leg_time(area, i):
-    """Return the time [s] from corner i - 1 to corner i, from rest to rest, with the acceleration v /
-    SPEED_RISE_TIME_S.
+    """Return the time [s] from corner i - 1 to corner i, from rest to rest.
 
-    v: speed of the beam along its path.
+    The acceleration is v / SPEED_RISE_TIME_S; v: speed of the beam along its path.
     """
     L, v = _leg_length(area, i), area.speed
     return L / v + SPEED_RISE_TIME_S if L > v * SPEED_RISE_TIME_S else 2.0 * math.sqrt(L * SPEED_RISE_TIME_S / v)
