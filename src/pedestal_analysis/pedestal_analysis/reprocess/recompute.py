@@ -1,5 +1,4 @@
-"""`pedestal recompute`: feed the recorded inputs of a node to its unit, and compare its outputs with the recorded
-outputs.
+"""`pedestal recompute`: feed the recorded inputs of a node to its unit, and compare new outputs with recorded outputs.
 
 A unit is the set of step functions of a node with their state, without ROS. The module uses the code of the nodes
 themselves: pedestal_common.graph.steps matches inputs to steps, and the unit decodes and encodes messages. Accuracy:
