@@ -46,11 +46,13 @@ INDEX_FIELDS = [(name, 'i8') for name in ('channel', 'sequence', 'log', 'publish
 _UNREADABLE, _OTHER_PUBLISHER = 1, 2
 """Values of the field `foreign` for a foreign message: its reason. The value 0 means a message of the graph."""
 _DECLARED = (Opcode.HEADER, Opcode.SCHEMA, Opcode.CHANNEL, Opcode.STATISTICS, Opcode.METADATA)
+"""Kinds of records outside chunks that hold no messages and are read."""
 Content = typing.TypeVar('Content')
 MetadataRecords = Mapping[str, Mapping[str, str]]
 """Metadata records of a bag, {name: {text: text}}."""
 
 _NUMBERED = re.compile(r'(.+)_(\d+)\.mcap')
+"""Pattern of the file name NAME_0.mcap, NAME_1.mcap and so on of a bag."""
 
 
 def read(path: str | pathlib.Path, beam: str | None = None) -> 'Bag':
@@ -314,6 +316,10 @@ class Bag:
                 block['foreign'][rows[~self._judges[channel].mask(data, start, stop)]] = _UNREADABLE
 
     def _declare(self, number: int, opcode: int, content: bytes) -> None:
+        """Note the schema, channel, metadata or statistics in a record of the file with a number.
+
+        Raises BagError for a channel that is not CDR, ValueError for an invalid record.
+        """
         record, base = mcap_file.parsed(opcode, content), number << 16
         if opcode == Opcode.SCHEMA:
             self._schemas[base | record.id] = record.name
@@ -470,6 +476,7 @@ class Bag:
         return lines
 
     def _foreign_line(self, name: str, rows: np.recarray, reason: int) -> str:
+        """Return the line on the foreign messages of a topic that have one reason; rows: their rows of the index."""
         shown = ', '.join(f'{(row.log - self.start) / 1e9:.6f} s ({row.stop - row.start} bytes)'
                           for row in rows[:MAX_SHOWN_FOREIGN_MESSAGES])
         more = f' and {rows.size - MAX_SHOWN_FOREIGN_MESSAGES} more' if rows.size > MAX_SHOWN_FOREIGN_MESSAGES else ''

@@ -80,6 +80,7 @@ def table(bag, name):
 
 
 def _times(stamps):
+    """Return the first two columns of a table, from the stamps (n,) [ns]."""
     return {TIME_COLUMN: stamps / 1e9, STAMP_COLUMN: stamps}
 
 
@@ -146,12 +147,14 @@ def _write_csv(file, content, _description):
 
 
 def _texts(values):
+    """Return a column of a table as a list of cells for CSV; texts and whole numbers stay unchanged."""
     if isinstance(values, list) or values.dtype.kind == 'i':
         return values
     return ['NaN' if value != value else repr(value) for value in values.tolist()]
 
 
 def _parquet_writer():
+    """Return the function write(file, table, {text: text} for the metadata) for Parquet. Raises ValueError."""
     try:
         import pyarrow
         import pyarrow.parquet

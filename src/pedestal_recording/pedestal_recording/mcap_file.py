@@ -51,6 +51,7 @@ _READ = {Opcode.HEADER: records.Header.read, Opcode.SCHEMA: records.Schema.read,
          Opcode.METADATA: records.Metadata.read, Opcode.STATISTICS: records.Statistics.read,
          Opcode.CHUNK: records.Chunk.read, Opcode.FOOTER: records.Footer.read,
          Opcode.MESSAGE_INDEX: records.MessageIndex.read}
+"""{kind of record: function of the mcap library that reads its content}."""
 
 
 class BagError(ValueError):
@@ -116,6 +117,7 @@ def _zstd(data, size):
 
 _UNPACK = {'': lambda data, size: data, 'zstd': _zstd,
            'lz4': lambda data, size: lz4.frame.LZ4FrameDecompressor().decompress(data, max_length=size + 1)}
+"""{name of a compression: function(compressed bytes, size of the unpacked bytes) -> unpacked bytes}."""
 
 
 class McapFile:
@@ -150,6 +152,7 @@ class McapFile:
         self._messages = 0
 
     def _check_lock(self):
+        """Raise BagError if another process holds the lock of the file, because it writes the file."""
         try:
             fcntl.flock(self._stream, fcntl.LOCK_SH | fcntl.LOCK_NB)
             fcntl.flock(self._stream, fcntl.LOCK_UN)
@@ -189,6 +192,7 @@ class McapFile:
             raise
 
     def _frames(self):
+        """Yield (opcode, start, stop) of each record up to the footer. Raises EOFError if the file ends early."""
         at, opcode = len(MAGIC), None
         while opcode != Opcode.FOOTER:
             if at + 9 > self.size:

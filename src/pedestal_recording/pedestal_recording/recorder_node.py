@@ -164,6 +164,7 @@ class RecorderNode(shell.Shell):
             subscriptions.subscribe(self, topic, topic.name, take, 'recorded')
 
     def _record_last(self):
+        """Subscribe to LAST_OPENED_TOPIC, once the executor runs."""
         self._opening.cancel()
         for index, topic in self._last:
             self._record(index, topic)
@@ -229,6 +230,7 @@ class RecorderNode(shell.Shell):
         return count
 
     def _losses(self):
+        """Return a text on the lost messages of each topic."""
         return 'lost ' + ', '.join(f'{count} of {name}' for name, count in self._lost.items())
 
     def _fail(self, reason):
@@ -343,6 +345,7 @@ class RecorderNode(shell.Shell):
             self._fail(str(error))
 
     def _diagnosis(self):
+        """Return the Diagnosis of the recorder: level, message, and counts."""
         level, message = LEVEL_OK, 'recording'
         if self._without_stamp or self._order.unplaced:
             level, message = LEVEL_WARN, 'recording; some messages have no valid stamp or no place in a step'

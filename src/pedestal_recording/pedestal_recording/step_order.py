@@ -105,6 +105,7 @@ class StepOrder:
         self._unplaced.append((index, data))
 
     def _open(self, stamp):
+        """Add a bucket for the step with a stamp [ns], and return it. Raises OrderError if too many steps wait."""
         if len(self._stamps) >= MAX_WAITING_STEPS:
             first = self._stamps[0]
             raise OrderError(f'step {first / NS_PER_SECOND:.6f} s still waits for {", ".join(self.missing(first))} '
@@ -129,10 +130,12 @@ class StepOrder:
         return [f'{topic.name} of {node}' if node else topic.name for _, topic, node in slots]
 
     def _advance(self):
+        """Write the earliest waiting steps as long as they are complete."""
         while self._stamps and not self._buckets[self._stamps[0]][0] and not self._missing_slots(self._stamps[0]):
             self._write_first_step()
 
     def _write_first_step(self):
+        """Write the messages of the earliest waiting step, whether it is complete or not."""
         stamp = heapq.heappop(self._stamps)
         bucket = self._buckets.pop(stamp)
         write = self._write
@@ -147,6 +150,7 @@ class StepOrder:
         self._put_unplaced()
 
     def _put_unplaced(self):
+        """Write the messages without a place in a step, with the stamp of the last written step."""
         unplaced, self._unplaced = self._unplaced, []
         for index, data in unplaced:
             self._write(index, max(self.written, 0), max(self.written, 0), data)

@@ -119,6 +119,7 @@ class BagFile:
         self._start(_Disk(self.file, stream))
 
     def _start(self, disk):
+        """Begin a new file by a new Writer of the mcap library on a _Disk."""
         self._disk = disk
         self._mcap = writer.Writer(disk, chunk_size=sys.maxsize)  # flush() alone ends a chunk
         self._mcap.start('ros2', 'pedestal')
@@ -141,6 +142,7 @@ class BagFile:
                                               metadata=metadata))
 
     def _declared(self, record):
+        """Write a schema or channel before the first chunk too, and return its number."""
         builder = RecordBuilder()
         record.write(builder)
         self._disk.write(builder.end())
@@ -275,6 +277,7 @@ class _Content:
         self.first, self.last, self.total = min(times, default=0), max(times, default=0), self._counts.total()
 
     def _declare(self, record):
+        """Note a record of metadata, a schema or a channel."""
         if isinstance(record, records.Metadata):
             self.metadata[record.name] = record.metadata
         elif isinstance(record, records.Schema):
@@ -296,6 +299,7 @@ def _times(contents):
 
 
 def _profiles(channel):
+    """Return the quality of service that a records.Channel states (offered_qos_profiles), [] if unreadable."""
     try:
         return plain_yaml.parse(channel.metadata.get('offered_qos_profiles', ''), aliases=True) or []
     except yaml.YAMLError:

@@ -16,6 +16,7 @@ from pedestal_analysis.results.tracking import stretches
 INK_COLOUR = '#20242a'
 RAW_COLOUR, FILTERED_COLOUR, TRUTH_COLOUR = '#8d949e', '#1f6fd1', '#e57a00'
 MOTOR_1_COLOUR, MOTOR_2_COLOUR = '#0b8f8c', '#a04fc4'
+"""Colours of texts and marks, of measured, filtered and true values, and of both motors."""
 FIGURE_WIDTH_INCH = 7.4
 """Width of a figure [inch]."""
 

@@ -262,6 +262,7 @@ def _provenance_table(bag, data):
 
 
 def _page(bag, data, check):
+    """Return the text of the page; check: verify.Report of the bag."""
     name = (bag.metadata.get('scenario') or bag.file.stem) + f'/{bag.beam}'.rstrip('/')
     parts = [
         f'<h1>Tracking run: {html.escape(name)}</h1>',

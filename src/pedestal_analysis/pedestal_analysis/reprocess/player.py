@@ -285,6 +285,7 @@ class Player(Node):
         self._await_arrival(name, self.deadline)
 
     def _send(self, name, stamp, data):
+        """Publish a message. Before it, wait if too many messages are unacknowledged (MAX_UNACKNOWLEDGED_MESSAGES)."""
         channel = self.channels[name]
         if channel.sent - channel.arrived >= MAX_UNACKNOWLEDGED_MESSAGES:
             self._await_arrival(name, self.deadline)
@@ -352,6 +353,7 @@ class Player(Node):
         return next((node for node in self.under_test if node.owes(stamp)), None)
 
     def _show_position(self, now):
+        """Show the position, the pace and the keys in the status line; now: steady time [s]."""
         if now >= self._next_refresh:
             self._next_refresh = now + POSITION_REFRESH_S
             start, end = self.playlist.origin, self.playlist.end

@@ -117,6 +117,7 @@ def _substitutes(recording, done):
 
 
 def _input_problems(done):
+    """Return lines on inputs that could not be matched to steps."""
     lines = []
     if done.feed.problem:
         lines.append(f'NOT recomputed to the end: {done.feed.problem}')

@@ -70,6 +70,7 @@ class RerunResult:
 
 
 def _line(topic):
+    """Return a difference.MessageDifference as one line."""
     counts = f'{topic.was} messages' if topic.was == topic.now else f'{topic.was} messages, now {topic.now}'
     more = f' and {len(topic.changes) - MAX_SHOWN_FIELDS} more fields' if len(topic.changes) > MAX_SHOWN_FIELDS else ''
     return (f'{topic.name}: {counts}, {topic.different} differ, the first at {topic.first / 1e9:.6f} s: '

@@ -183,6 +183,7 @@ RESULTS = (
     Result('restarts', 'restarts', 'supervised', lambda run: float(run.restarts),
            'Number of times that `pedestal run` restarted a node that had died, in realtime.'),
 )
+"""All results, in the order in which tables show them."""
 
 RESULT_BY_NAME = {result.name: result for result in RESULTS}
 

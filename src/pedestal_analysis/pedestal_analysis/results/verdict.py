@@ -19,6 +19,7 @@ from pedestal_common.wire import commands
 
 TRIPPED, REFUSED, NOT_LOCKED, NOT_TRACKED = 'tripped', 'refused', 'never locked', 'never tracked'
 TRACKED, ON_THE_WAY, NO_TARGET = 'tracked', 'ended on the way', 'no target'
+"""Words of the verdicts."""
 FAILURE_WORDS = TRIPPED, REFUSED, NOT_LOCKED, NOT_TRACKED
 """Words of a verdict on a failed run. The other words belong to runs that did what was commanded."""
 

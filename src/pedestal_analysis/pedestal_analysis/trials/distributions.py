@@ -41,6 +41,7 @@ DISTRIBUTION_KINDS = {
 """{name of a distribution: Kind}."""
 
 _WRITTEN = re.compile(r'(\w+)\((.*)\)(x?)')
+"""Pattern of the text of a distribution: name, arguments, x for a factor."""
 
 
 class VaryError(ValueError):
@@ -102,6 +103,7 @@ def parse(text) -> Distribution:
 
 
 def _number(text, value):
+    """Return a value as a float. Raises VaryError, with the text of the distribution, for no finite number."""
     try:
         number = float('nan' if isinstance(value, bool) else value)
     except (TypeError, ValueError):

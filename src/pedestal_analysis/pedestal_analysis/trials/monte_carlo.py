@@ -127,6 +127,10 @@ def _end_local():
 
 
 def _client(address):
+    """Return the client of the Dask scheduler at an address. Raises RuntimeError.
+
+    Its workers must have equal versions of the pedestal packages and of numba, because the numbers depend on them.
+    """
     try:
         import distributed
     except ImportError:

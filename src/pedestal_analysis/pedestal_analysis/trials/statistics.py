@@ -82,6 +82,7 @@ class Requirement(typing.NamedTuple):
 
 
 _REQUIRED = re.compile(r'\s*(\S+)\s*(<=|>=|<|>)\s*(\S+)\s*')
+"""Pattern of the text of a Requirement: name of the result, sign, limit."""
 
 
 def check_result(option, name, known):
