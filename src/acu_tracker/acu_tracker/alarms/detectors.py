@@ -139,9 +139,11 @@ def initialise(d, y, dy):
 def encoder_motor_mismatch(d, y, dy, dt, acceleration):
     """Return x, the difference between the motions of encoder and motors in this step [rad].
 
-    x = y - y' - (dy + dy') dt / 2; y', dy': values of the previous step. acceleration: 0, or the possible acceleration
-    of the axis [rad/s2] if steps are missing before this one. The motors may then have moved by acceleration dt^2 / 4
-    more than this formula gives. The function subtracts this uncertainty from |x|.
+        x = y - y' - (dy + dy') dt / 2;    y', dy': values of the previous step
+
+    acceleration: 0, or the possible acceleration of the axis [rad/s2] if steps are missing before this one. The motors
+    may then have moved by acceleration dt^2 / 4 more than the formula gives. The function subtracts this uncertainty
+    from |x|.
     """
     x = y - d.y - 0.5 * (dy + d.dy) * dt
     return math.copysign(max(abs(x) - 0.25 * acceleration * dt * dt, 0.0), x)
@@ -243,8 +245,9 @@ def resists(T, dy, high, low, friction):
 
     The axis stands if its rate is below IMMOBILE_RATE_SHARE of the smallest recent command. Its commands and its
     torque must have one sign, and the commands must be above STANDSTILL_RATE_RAD_S. The axis moves if its motors move
-    it at more than MIN_DRAG_RATE_RAD_S; the torque must then be above DRAG_TORQUE_RATIO. friction: Coulomb friction
-    [Nm].
+    it at more than MIN_DRAG_RATE_RAD_S; the torque must then be above DRAG_TORQUE_RATIO.
+
+    friction: Coulomb friction [Nm].
     """
     if abs(dy) > MIN_DRAG_RATE_RAD_S and abs(T) > DRAG_TORQUE_RATIO * friction:
         return T * dy > 0.0

@@ -91,8 +91,10 @@ def _rates(arguments):
 
 
 def _take_preset(unit, arguments):
-    """Set the direction of the mode preset: angles or a named point, and rates; raise ValueError for an unknown
-    point."""
+    """Set the direction of the mode preset: angles or a named point, and rates.
+
+    Raise ValueError for an unknown point.
+    """
     angles = [arguments[axis] for axis in AXES]
     if arguments['point']:
         named = points(unit.parameters.points)

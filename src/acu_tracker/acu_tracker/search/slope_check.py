@@ -62,8 +62,10 @@ def take(s, d, e):
 
 @compiled
 def slopes(s):
-    """Return the slopes (K_xx, K_ee) of cross-elevation and elevation [-]; NaN until the beam has moved on both
-    axes."""
+    """Return the slopes (K_xx, K_ee) of cross-elevation and elevation [-].
+
+    They are NaN until the beam has moved on both axes.
+    """
     det = s.dd[0] * s.dd[2] - s.dd[1] * s.dd[1]
     return ((s.ed[0, 0] * s.dd[2] - s.ed[0, 1] * s.dd[1]) / det,
             (s.ed[1, 1] * s.dd[0] - s.ed[1, 0] * s.dd[1]) / det)
