@@ -48,6 +48,7 @@ _UNREADABLE, _OTHER_PUBLISHER = 1, 2
 _DECLARED = (Opcode.HEADER, Opcode.SCHEMA, Opcode.CHANNEL, Opcode.STATISTICS, Opcode.METADATA)
 """Kinds of records outside chunks that hold no messages and are read."""
 Content = typing.TypeVar('Content')
+"""Type of the values in a dictionary {topic or node: value}."""
 MetadataRecords = Mapping[str, Mapping[str, str]]
 """Metadata records of a bag, {name: {text: text}}."""
 
@@ -151,7 +152,7 @@ def start(metadata_records: MetadataRecords) -> int:
 def planned_end(metadata_records: MetadataRecords) -> int | None:
     """Return the planned end of a run, a stamp [ns], from the metadata records of its bag; None if unknown."""
     planned = _nanoseconds(metadata_records.get('pedestal', {}).get('planned_end_ns'))
-    if planned is None:  # older recordings have the parameter only
+    if planned is None:  # an older recording has only the parameter `duration` of the recorder
         with contextlib.suppress(KeyError, TypeError, ValueError, OverflowError, yaml.YAMLError):
             planned = round(plain_yaml.parse(metadata_records['parameters']['recorder'])['duration'] * 1e9) or None
     return None if planned is None else start(metadata_records) + planned

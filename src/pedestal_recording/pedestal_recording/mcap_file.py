@@ -37,6 +37,7 @@ and publish time [ns]. The CDR bytes of the message follow."""
 
 SQLITE_MAGIC = b'SQLite format 3'
 ZSTD_MAGIC = b'\x28\xb5\x2f\xfd'
+"""First bytes of an SQLite file, and of data in the compression zstd."""
 
 COMPRESSED_MAGIC = {
     ZSTD_MAGIC: ('zstd', 'zstd -dc'), b'\x1f\x8b': ('gzip', 'gunzip -c'), b'\xfd7zXZ': ('xz', 'xz -dc'),
@@ -44,9 +45,9 @@ COMPRESSED_MAGIC = {
 """{first bytes of a compressed file: (its format, the command that writes its content to the standard output)}."""
 
 _RECORD = struct.Struct('<BQ')
-"""Opcode of a record, and length of its content."""
+"""Opcode of a record, and length of its content [bytes]. The content begins after these 9 bytes."""
 _WINDOW = 1_000_000
-"""Number of bytes that one access reads from the disk, also largest size of a piece of messages (McapFile.pieces)."""
+"""Number of bytes that one access reads from the disk. It is also the largest size of a piece of McapFile.pieces."""
 _READ = {Opcode.HEADER: records.Header.read, Opcode.SCHEMA: records.Schema.read, Opcode.CHANNEL: records.Channel.read,
          Opcode.METADATA: records.Metadata.read, Opcode.STATISTICS: records.Statistics.read,
          Opcode.CHUNK: records.Chunk.read, Opcode.FOOTER: records.Footer.read,
@@ -121,9 +122,11 @@ _UNPACK = {'': lambda data, size: data, 'zstd': _zstd,
 
 
 class McapFile:
-    """An open MCAP file, read in pieces. size: its length [bytes].
+    """An open MCAP file, which is read in pieces.
 
-    locked: True if this process itself writes the file. Otherwise the lock of a recorder on the file is an error.
+    size     length of the file [bytes]
+    locked   True if this process itself writes the file and holds its lock. Otherwise a lock on the file is an error.
+
     Raises BagError if the file is missing, empty, not regular or not MCAP, or while its recorder still writes it.
     """
 

@@ -46,7 +46,7 @@ next heartbeat, by default every 3 s.
 """
 
 LAST_OPENED_TOPIC = 'diagnostics'
-"""Topic that the recorder opens last, when the executor serves all other topics.
+"""Topic to which the recorder subscribes last, when the executor already serves all other topics.
 
 Every node publishes this topic, and in lockstep waits for its subscriber before the first step. Because the recorder
 subscribes to it last, no message waits when the executor starts. The executor would take waiting messages in another
@@ -79,9 +79,11 @@ class TopicPublishers:
     def take(self, data, info):
         """Return True for a message of the graph, False for a message of a foreign publisher; data: CDR bytes.
 
-        A message is foreign if the gate rejects it as that of another publisher, and two more conditions hold. The
-        graph's publisher is still sending, distinguished from the others. ROS names a foreign publisher of the topic.
-        A doubtful message counts as a message of the graph.
+        A message is foreign if three conditions hold:
+        - The gate rejects it as a message of another publisher.
+        - The graph's publisher is distinguished from the others, and sent a message in the last CONFIRMED_TAKEOVER_NS.
+        - ROS names a foreign publisher of the topic.
+        In doubt, a message counts as a message of the graph.
         """
         now, utc = self._node.clock()
         taken = self._gate.take(data, info['publication_sequence_number'], info['source_timestamp'], now, utc)
@@ -111,6 +113,16 @@ class RecorderNode(shell.Shell):
     """Recorder of the graph. It writes in the order of steps (StepOrder) in lockstep, of arrival in realtime.
 
     In realtime the publish time of a message is the wall time of the publisher, and the log time is its stamp.
+
+    _bag, _order     Writer of the bag; StepOrder for lockstep
+    _end             planned end of the run, since its start [ns]; None without a limit
+    _stamp           newest time of the drive [ns]
+    _heard           {topic: TopicPublishers} in realtime
+    _lost            {topic: number of lost messages}
+    _without_stamp   number of messages without a valid stamp
+    _received        number of received messages of each recorded topic
+    _last_arrival    (steady time [s], number of received messages) at the last arrival, after the end of the run
+    _error           reason why the node ends early, or None
     """
 
     def __init__(self):
@@ -206,7 +218,7 @@ class RecorderNode(shell.Shell):
                     self._lost[topic.name] += number - numbers.next
                     self._bag.skip(index, number - numbers.next)
                     self._fail(self._losses())
-                elif number != 1:
+                elif number != 1:  # a publisher that begins again counts from 1
                     self._fail(f'{topic.name} has more than one publisher: another graph runs on ROS_DOMAIN_ID '
                                f'{self.context.get_domain_id()}; set a free one')
             numbers.note(number)

@@ -37,14 +37,18 @@ _COPIED_OPCODES = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.METADATA, Opcode.CHUNK)
 _END_OPCODES = (Opcode.DATA_END, Opcode.FOOTER)
 """Kinds of records that end the messages of a file."""
 _COMPRESSION = re.compile(rb'\x04\x00\x00\x00zstd|\x03\x00\x00\x00lz4')
-"""Name of the compression in a chunk record, after the length of the name. A search for it finds chunks."""
+"""Length and name of the compression in a chunk record. The search for intact chunks looks for these bytes."""
 _BEFORE_COMPRESSION = 9 + 8 + 8 + 8 + 4
-"""Length of a chunk record before the name of its compression [bytes]."""
+"""Length of a chunk record before the name of its compression [bytes].
+
+It consists of opcode and length, first and last log time, unpacked size, checksum, and length of the name.
+"""
 
 _UNUSABLE = 0
 """Value in place of an opcode, for bytes that are no readable record."""
 
 _LENGTH = struct.Struct('<Q')
+"""Length of the compressed data in a chunk record [bytes]."""
 _FOOTER = 9 + 20 + len(MAGIC)
 """Length of the footer record and the last bytes of a whole file [bytes]."""
 
@@ -120,10 +124,11 @@ class Recovered:
 
 
 def recover(path, output=None) -> Recovered:
-    """Write the readable messages of a bag as a new bag, by default beside it with '-recovered' after its name.
+    """Write the readable messages of the bag at a path to a new bag. The old bag stays unchanged.
 
-    Raises BagError if nothing is readable, the bag is being written, or the new bag cannot be written. Then no part of
-    the new bag remains. The old bag is only read.
+    output: directory of the new bag, by default beside the old bag, with '-recovered' after its name.
+    Raises BagError if nothing is readable, if the old bag is being written, or if the new bag cannot be written. After
+    an error, no part of the new bag remains.
     """
     files = [McapFile(file) for file in bags.locate(path)]
     if output is None:
@@ -273,7 +278,7 @@ class _Salvage:
                 self._declare(record)
         except BagError:
             raise
-        except Exception:  # a decoder may raise anything on broken bytes; the file itself repeats the declarations
+        except Exception:  # a decoder may raise anything on broken bytes; the file itself declares all again
             pass
         for opcode, start, stop, record in _pieces(file, data):
             try:

@@ -2,10 +2,13 @@
 
 The recorder node, `pedestal recover` and the recomputation write bags by this module. It works without ROS.
 
-The Writer of the mcap library makes the records of the file. This module adds four properties. A
-chunk (a group of messages) ends after one second of log time, so a crash loses one second at most. The file stays
-readable on a full disk. The file is locked while it is written. All schemas (message types) and channels (topics) also
-stand before the first chunk, so a broken chunk does not lose them.
+The Writer of the mcap library makes the records of the file. This module adds four properties:
+
+    chunks        A chunk (a group of messages) ends after one second of log time, so a crash loses one second at most.
+    full disk     The file stays readable if the disk is full.
+    lock          The file is locked while it is written.
+    declarations  All schemas (message types) and channels (topics) also stand before the first chunk. A broken chunk
+                  therefore does not lose them.
 
 The file does not depend on its path, the host or the wall clock, so equal messages give equal bytes.
 
@@ -94,9 +97,13 @@ class _Disk:
 
 
 class BagFile:
-    """A bag that is being written. path: its directory; file: its MCAP file.
+    """A bag that is being written.
 
-    directory: path of the bag, must not exist, except with earlier files; earlier: files of the bag before this file.
+    path        absolute path of its directory
+    file        path of its MCAP file that is being written
+    directory   path of the bag; must not exist, unless the bag has earlier files
+    earlier     MCAP files of the bag before this file
+
     Raises BagError with the name of the file if the disk is full. The earlier chunks then stay readable. All later
     messages are dropped, so a bag has no gap.
     """
