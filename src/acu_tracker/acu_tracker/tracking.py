@@ -1,7 +1,7 @@
 """Tracking of the target by the receiver: histories of beam and deck, target filter, and monitors of the errors.
 
-`control_unit` and `guidance` call this module. It takes each error of the receiver and gives the estimate of the
-target, and the conditions for autotrack.
+`control_unit` and `guidance` call this module. The functions take each error of the receiver, and return the estimate
+of the target and the conditions for autotrack.
 
 k     record of TRACKING_DTYPE
 c     record of control_unit.CONSTANTS_DTYPE

@@ -424,8 +424,8 @@ class Acu(Unit):
     def diagnose(self):
         """Return the Diagnosis and clear the bits of the invalid inputs.
 
-        Its level is ERROR for a latched fault or invalid inputs since the last diagnosis. It is WARN for gated errors,
-        a turn of the azimuth, a limit that holds the beam, an end of travel ahead, or coasting.
+        The level is ERROR for a latched fault or invalid inputs since the last diagnosis. The level is WARN for gated
+        errors, a turn of the azimuth, a limit that holds the beam, an end of travel ahead, or coasting.
         """
         result = diagnosis.of(self)
         self.parts['invalid'] = 0
@@ -435,7 +435,7 @@ class Acu(Unit):
     def calls(self):
         """Services of the drive that the unit calls now.
 
-        It calls the emergency stop during uncommanded motion, and the reset for a short time after a reset by an
+        The unit calls the emergency stop during uncommanded motion, and the reset for a short time after a reset by an
         operator.
         """
         stop, reset = self.CALLS
@@ -458,7 +458,7 @@ class Acu(Unit):
     def urgent(self):
         """Values whose change is published at once in the diagnostics.
 
-        They are faults, mode, silence, lock, state of the drive, pins and alignment.
+        The values are faults, mode, silence, lock, state of the drive, pins and alignment.
         """
         outputs, inputs = self.parts['outputs'], self.parts['inputs']
         return (control_unit.latched(self.parts['state']), outputs['mode'], outputs['reason'] == Reason.SILENCE,

@@ -3,9 +3,9 @@
 The conditions of a step become alarms after their delays. The first alarm of a burst is marked (first-out), because it
 often shows the cause of the burst.
 
-An alarm may be the consequence of another alarm by the table. It then stands under this alarm, its parent, in two
-cases: the condition of the parent is present, or both were raised within CAUSE_WINDOW_S of each other. Only an alarm
-without a parent is annunciated (`report`).
+By the table an alarm may be the consequence of another alarm, its parent. The alarm stands under its parent in two
+cases: the condition of the parent is present, or both were raised within CAUSE_WINDOW_S. Only an alarm without a
+parent is annunciated (`report`).
 
 s: record of ALARM_LIST_DTYPE; i: index of an alarm in table.ALARMS; t: stamp of the step [s].
 """
@@ -68,7 +68,7 @@ def restart(s, t):
 def _parent(s, i, t):
     """Return the index of the parent of alarm i, or NO_ALARM.
 
-    It is the first possible cause in the table that is listed, not shelved, and present or raised within
+    The parent is the first possible cause in the table that is listed, not shelved, and present or raised within
     CAUSE_WINDOW_S.
     """
     for j in range(i):

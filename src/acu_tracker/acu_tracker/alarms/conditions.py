@@ -36,7 +36,7 @@ INVALID_INPUT_FLAGS = Flag.ENCODER | Flag.ERROR | Flag.ERROR_STAMP | Flag.PROGRA
 BRAKE_GRIP_DEADLINE_S = 2.5
 """Time within which the brakes must hold after the drive has ceased to follow commands [s].
 
-It is longer than the longest stop of the drive.
+The time is longer than the longest stop of the drive.
 """
 
 JUDGED_ALWAYS, JUDGED_WITH_MOTORS, JUDGED_MOVING, JUDGED_FOLLOWING = table.JUDGED_ALARM_BITS

@@ -56,15 +56,15 @@ IMMOBILE_RATE_SHARE = 0.1
 EXCESS_TORQUE_RATIO = 50.0
 """Ratio of torque to Coulomb friction above which the torque is excessive [-].
 
-No free axis needs such a torque for long without a gust. It is half of the torque that the brakes hold, and twice the
+No free axis needs such a torque for long without a gust. The torque is half of what the brakes hold, and twice the
 torque of a strong wind.
 """
 
 DRAG_TORQUE_RATIO = 80.0
 """Ratio of torque to Coulomb friction above which the brakes drag on an axis that its motors move [-].
 
-It is five sixths of the torque that the brakes hold. Below it dragging brakes cannot be distinguished from a head
-wind, because both take work from the motors.
+The torque is five sixths of what the brakes hold. Below this torque dragging brakes cannot be distinguished from a
+head wind, because both take work from the motors.
 """
 
 MIN_DRAG_RATE_RAD_S = 2e-4
@@ -79,7 +79,7 @@ WIND_TORQUE_SHARE = 0.5
 MIN_GIVE_RAD = 1e-4
 """Motion against the excess torque that shows a gust [rad].
 
-It is 200 times the resolution of the encoders of the motors, and a tenth of the motion under a gust of 3000 Nm.
+The motion is 200 times the resolution of the motor encoders over a step, and a tenth of that under a gust of 3000 Nm.
 """
 
 INERTIA_UNCERTAINTY = 2.0
@@ -110,7 +110,7 @@ FOLLOWING_ERROR_BEAMWIDTHS = 0.25
 MIN_HALF_WAVE_AREA = 1e-4
 """Smallest area of a half wave of the following error that counts [rad s].
 
-It is 2 a / w for an amplitude a of 1 mrad and a frequency w / (2 pi) of 3 Hz.
+The area is 2 a / w for an amplitude a of 1 mrad and a frequency w / (2 pi) of 3 Hz.
 """
 
 OSCILLATION_WINDOW_S = 5.0
@@ -187,7 +187,7 @@ def immobile(d, dy, high, low):
     """Return True if the motors do not follow the recent commands.
 
     The recent commands must have one sign and be above MIN_COMMANDED_RATE_RAD_S. The axis becomes immobile when its
-    rate is below IMMOBILE_RATE_SHARE of the smallest of these commands. It stays immobile up to three times this
+    rate is below IMMOBILE_RATE_SHARE of the smallest of these commands. The axis stays immobile up to three times this
     share, and until the commands fall below half of MIN_COMMANDED_RATE_RAD_S. A fast motion against the commands does
     not count as immobile.
     """
@@ -243,9 +243,9 @@ def pushed_by_wind(d, T, dy, inertia, limit, dt):
 def resists(T, dy, high, low, friction):
     """Return True if an axis with excess torque stands in spite of its commands, or moves with an even larger torque.
 
-    The axis stands if its rate is below IMMOBILE_RATE_SHARE of the smallest recent command. Its commands and its
-    torque must have one sign, and the commands must be above STANDSTILL_RATE_RAD_S. The axis moves if its motors move
-    it at more than MIN_DRAG_RATE_RAD_S; the torque must then be above DRAG_TORQUE_RATIO.
+    The axis stands if its rate is below IMMOBILE_RATE_SHARE of the smallest recent command. Commands and torque must
+    have one sign, and the commands must be above STANDSTILL_RATE_RAD_S. The axis moves if its motors move it at more
+    than MIN_DRAG_RATE_RAD_S; the torque must then be above DRAG_TORQUE_RATIO.
 
     friction: Coulomb friction [Nm].
     """

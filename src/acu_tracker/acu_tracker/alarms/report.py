@@ -26,7 +26,7 @@ def order(s):
 def annunciated(s):
     """Return the indices of the annunciated alarms, which call for the attention of an operator.
 
-    They are the first MAX_ANNUNCIATED_ALARMS alarms that are no consequence of another one.
+    The annunciated alarms are the first MAX_ANNUNCIATED_ALARMS alarms that are no consequence of another one.
     """
     return [i for i in order(s) if annunciator.active_parent(s, i) == annunciator.NO_ALARM][:MAX_ANNUNCIATED_ALARMS]
 

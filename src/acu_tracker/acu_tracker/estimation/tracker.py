@@ -194,8 +194,8 @@ def _converged(f, k, m, initial_rate):
 def locked(t, p, since_accepted):
     """Return True if the tracker has lock: autotrack can begin.
 
-    It has lock if lock_count consecutive measurements were accepted, the last of them is at most coast_after old, and
-    the filter has converged.
+    Three conditions make lock: lock_count consecutive measurements were accepted, the last of them is at most
+    coast_after old, and the filter has converged.
 
     since_accepted: age of the last accepted measurement, less the receiver's latency [s].
     """

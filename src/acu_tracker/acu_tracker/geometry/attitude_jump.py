@@ -25,7 +25,7 @@ ATTITUDE_JUMP_DTYPE = np.dtype([('c', 'f8', (4,)), ('apart', 'i8')], align=True)
 MAX_UNEXPLAINED_ANGLE_RAD = 3e-3
 """Largest angle between measured and predicted attitude that is not a jump [rad].
 
-It is a hundred times the noise of an INS. In a step of 5 ms a rate with an error of 0.5 rad/s gives such an angle.
+The angle is a hundred times the noise of an INS. In a step of 5 ms a rate with an error of 0.5 rad/s gives this angle.
 """
 
 JUMP_DECAY_RATE_RAD_S = 1e-3

@@ -64,7 +64,7 @@ def to_earth(f, motion):
 
 @compiled
 def to_frame(f, sight):
-    """Return the Motion in the frame; sight: the LineOfSight in ENU. This is the inverse of to_earth."""
+    """Return the Motion in the frame; sight: the LineOfSight in ENU. The function is the inverse of to_earth."""
     if f.tilted:
         mat = rotation(f.mat)
         sight = LineOfSight(rotated_back(mat, sight.u), rotated_back(mat, sight.du), rotated_back(mat, sight.ddu))
@@ -83,9 +83,9 @@ def direction_to_frame(f, azimuth, elevation):
 def verticals(f, azimuth, elevation):
     """Return (across, along), the vertical components of two unit vectors at a right angle to a direction.
 
-    The first vector points to growing azimuth, the second to growing elevation. Their components along the earth's
-    vertical are 0 and cos(elevation) in a level frame. `measurement.attitude_variances` needs them to separate the
-    errors of heading and tilt. azimuth, elevation: angles of the direction in the frame [rad].
+    The first vector points to growing azimuth, the second to growing elevation. In a level frame their components
+    along the earth's vertical are 0 and cos(elevation). `measurement.attitude_variances` needs these components to
+    separate the errors of heading and tilt. azimuth, elevation: angles of the direction in the frame [rad].
     """
     # z: the earth's vertical, as components in the frame.
     s, c, z = math.sin(azimuth), math.cos(azimuth), f.mat[2]

@@ -36,8 +36,8 @@ def from_ins(s, r, measured, running, v):
     measured  range of the target from the antenna [m]; NaN: no range
     running   True if the filter of the target runs
 
-    The function smooths R and adds the lever arm to rho v. It does so only for a filter that started with a range;
-    otherwise it returns v. This avoids an estimate that mixes the lines of sight from the INS and from the antenna.
+    For a filter that started with a range the function smooths R and adds the lever arm to rho v. For another filter
+    the function returns v. This avoids an estimate that mixes the lines of sight from the INS and from the antenna.
     """
     along, r2 = v.x * r.x + v.y * r.y + v.z * r.z, r.x * r.x + r.y * r.y + r.z * r.z
     known = measured > 0.0

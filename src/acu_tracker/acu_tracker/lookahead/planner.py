@@ -104,7 +104,7 @@ def another_program(h, program):
 def due(h, t):
     """Return True if a look-ahead is due at t [s].
 
-    It is due LOOK_AHEAD_PERIOD_S after the last one, but not before the end of a planned slew.
+    A look-ahead is due LOOK_AHEAD_PERIOD_S after the last one, but not before the end of a planned slew.
     """
     return not (t - h.looked < LOOK_AHEAD_PERIOD_S or (h.forecast == FORECAST_KEYHOLE and t <= h.slew.t2))
 
@@ -174,7 +174,7 @@ def _search(h, c, path, count, azimuth, travel):
 def _find_sectors(h, sectors, path):
     """Find the first time in which a sector hides the target.
 
-    It counts as a new blockage if it begins after the end of the previous one.
+    A time that begins after the end of the previous one counts as a new blockage.
     """
     first = last = -1
     for i in range(len(path.rows)):

@@ -21,8 +21,8 @@ from pedestal_common.geometry import line_of_sight as pointing
 SIDE_LOBE_TIME_S = 0.3
 """Time for which the level must be that of a side lobe before autotrack ends [s].
 
-The time may begin in the mode program, before autotrack. It is below 0.4 s, because on the slopes of a side lobe the
-filter diverges within 0.4 s.
+The time may begin in the mode program, before autotrack. Because the filter diverges within 0.4 s on the slopes of a
+side lobe, the time is shorter.
 """
 
 

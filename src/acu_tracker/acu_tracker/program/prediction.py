@@ -1,8 +1,8 @@
 """Predicted tables for the modes tle and sun: earth angles over time of a satellite (by its elements) and of the sun.
 
 `unit.Acu` calls the Predictor and gives the tables to the law. A table begins shortly before the time at which it is
-made. It is replaced in its second half, if possible while its target is below the horizon, because then no mode
-follows it. Refraction is neglected.
+made. The table is replaced in its second half, if possible while its target is below the horizon, because then no mode
+follows the table. Refraction is neglected.
 
 Stamps [s] count from an epoch. In realtime the epoch is a known UTC time; in lockstep its UTC is not known.
 """
@@ -122,7 +122,7 @@ class Predictor:
     def diagnostic_values(self, stamp):
         """Return the values for the diagnostics [(key, text)] at a stamp [s].
 
-        They are the azimuth and elevation of the sun, if UTC is known, and the elements of the satellite, if any.
+        The values are azimuth and elevation of the sun, if UTC is known, and the elements of the satellite, if any.
         """
         sun_now = np.degrees(self._sun_angles(np.array([stamp]))[0]) if self._utc_known else ()
         lines = () if self._satellite is None else ('omm',) if self.parameters.omm else ('line_1', 'line_2')

@@ -53,7 +53,7 @@ class Segments:
         followed       True if a mode follows the track; then turnarounds are checked
 
         A segment that begins at `now` or before is a new program and replaces all pieces. A later segment replaces the
-        rows from its first row on. It is joined to the rows before it unless there is a gap.
+        rows from its first row on. The later segment is joined to the rows before it unless there is a gap.
         """
         new = checked(times, angles)
         if new.times[0] <= now:

@@ -232,7 +232,7 @@ def _go_to_best(s, beamwidth, t):
 
 @compiled
 def _peak(s, t):
-    """Begin the phase `peak` at the centre. It begins with place 1, because the level at the centre is known."""
+    """Begin the phase `peak` with place 1, because the level at the centre (place 0) is known."""
     _enter(s, Phase.PEAK, t)
     s.place_number, s.peak_count = 1, s.peak_count + 1
 

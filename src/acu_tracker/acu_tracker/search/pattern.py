@@ -1,8 +1,8 @@
 """Search patterns: the path on which the beam covers an area around the expected place of the target.
 
-The path is a pure function of time. It passes every place of the area within half a pitch, the distance between
-neighbouring lines. Only the square passes a few places near its centre within 0.57 of a pitch. The beam moves along
-its path at a constant speed v:
+The path is a pure function of time. The path passes every place of the area within half a pitch; the pitch is the
+distance between neighbouring lines. Only the square passes a few places near its centre within 0.57 of a pitch. The
+beam moves along its path at a constant speed v:
 
     v <= b / (4 tau)
 
@@ -58,9 +58,9 @@ def highest_speed(beamwidth, time_constant, share):
 
 @compiled
 def rotated(p, angle):
-    """Return a Point p turned by an angle [rad].
+    """Return a Point p turned by an angle [rad]: from along and across the track to cross-elevation and elevation.
 
-    It converts from along and across the track to cross-elevation and elevation; angle: place.track of the target.
+    angle: place.track of the target.
     """
     s, c = math.sin(angle), math.cos(angle)
     return Point(c * p.x - s * p.y, s * p.x + c * p.y, c * p.dx - s * p.dy, s * p.dx + c * p.dy)

@@ -1,7 +1,7 @@
 """The expected place of a lost target without a program: it moves on along the great circle of the last estimate.
 
-The last known rate becomes less and less certain. It is therefore expected to fade, as the acceleration does in a
-Singer model (Singer 1970). In the time T the target has moved by the angle
+The last known rate becomes less and less certain. The rate is therefore expected to fade, as the acceleration does in
+a Singer model (Singer 1970). In the time T the target has moved by the angle
 
     W tau (1 - exp(-T / tau))
 

@@ -25,7 +25,7 @@ SLOPES_DTYPE = np.dtype([('n', 'i8'), ('d', 'f8', (2,)), ('e', 'f8', (2,)), ('dd
 MIN_SLOPE = 0.5
 """Slope below which autotrack does not begin [-].
 
-It is the slope of axes that are turned by 60 deg. Such a turn uses up the phase margin of the loop.
+Axes that are turned by 60 deg have this slope. Such a turn uses up the phase margin of the loop.
 """
 
 VERDICT_UNKNOWN, VERDICT_RIGHT, VERDICT_WRONG = range(3)
@@ -64,7 +64,7 @@ def take(s, d, e):
 def slopes(s):
     """Return the slopes (K_xx, K_ee) of cross-elevation and elevation [-].
 
-    They are NaN until the beam has moved on both axes.
+    Both slopes are NaN until the beam has moved on both axes.
     """
     det = s.dd[0] * s.dd[2] - s.dd[1] * s.dd[1]
     return ((s.ed[0, 0] * s.dd[2] - s.ed[0, 1] * s.dd[1]) / det,

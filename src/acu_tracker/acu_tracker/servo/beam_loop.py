@@ -19,7 +19,7 @@ eq. 6:
     v(k)     = v(k-1) + beta / T nu
 
 The paper prints R + R T in the first line. Because the unit of R T is not that of an angle, R T is read as v T. The
-paper prints s(k/k-1) in eq. 6. It is read as R(k/k-1), the only predicted angle of the loop.
+paper prints s(k/k-1) in eq. 6. This term is read as R(k/k-1), the only predicted angle of the loop.
 
 On a ramp (a target of constant rate) v is constant in the steady state. Then nu = 0, because beta / T nu is the change
 of v. Therefore error = v T, whatever alpha, delay and smoothing are.

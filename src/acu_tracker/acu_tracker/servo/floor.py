@@ -1,7 +1,7 @@
 """The floor: the lowest elevation that the antenna may have at each azimuth, in every mode.
 
-It keeps the dish clear of structures around it. A table of points, joined by straight lines, defines it. Where the
-floor rises, the azimuth waits until the elevation is above the floor ahead.
+The floor keeps the dish clear of structures around the antenna. A table of points, joined by straight lines, defines
+the floor. Where the floor rises, the azimuth waits until the elevation is above the floor ahead.
 
 c, u: records of control_unit.CONSTANTS_DTYPE and of signals.INPUTS_DTYPE; floor: record of FLOOR_DTYPE; limits: record
 of the LimitsParameters of an axis; A, E: azimuth and elevation in deck angles [rad].

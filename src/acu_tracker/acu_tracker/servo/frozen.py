@@ -5,7 +5,7 @@
     u    rate command of an axis [rad/s]
     x    travel that the commands have added up while the measurements repeat [rad]
 
-A drive that moves has noise in its currents and steps in its encoders. Its measurements are therefore constant only at
+A drive that moves has noise in its currents and steps in its encoders. The measurements are therefore constant only at
 rest. If all measurements repeat while x grows, the motion is not measured, and the position loop is open.
 
 s: record of FROZEN_DTYPE.
@@ -26,7 +26,7 @@ frozen  1 from the detection of a frozen drive until its reset
 FROZEN_TEST_TRAVEL_RAD = 3e-3
 """Travel within which a measurement must change [rad].
 
-It is ten times the lash of a gear, and a sixth of a beamwidth of one degree.
+The travel is ten times the lash of a gear, and a sixth of a beamwidth of one degree.
 """
 
 

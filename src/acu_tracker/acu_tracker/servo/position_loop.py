@@ -65,7 +65,7 @@ angle_limited, rate_limited, acceleration_limited  True if the angle, the rate o
 """
 
 MAX_DELAY_PHASE_RAD = 0.5
-"""Largest product of bandwidth and delay of the command [rad]. It is the loss of phase margin by the delay."""
+"""Largest product of bandwidth and delay of the command [rad]: the loss of phase margin by the delay."""
 
 
 def slowed(params, delay):
@@ -101,7 +101,7 @@ def limited(wanted, before, dt, rate, acceleration):
 def realised(command, dy):
     """Return the part of a rate command [rad/s] that an axis realises while it moves at the rate dy [rad/s].
 
-    It is 0 if the axis moves against the command, the command if the axis is faster, and else dy.
+    The part is 0 if the axis moves against the command, the command if the axis is faster, and else dy.
     """
     return min(max(dy, min(command, 0.0)), max(command, 0.0))
 

@@ -1,9 +1,9 @@
 """The shaper: it turns the raw target of an axis into a reference that the axis can follow.
 
-The reference keeps the limits of rate, acceleration and jerk. It comes from fhan, the time-optimal acceleration of a
-double integrator in discrete time (Han 2009). This function acts on the difference shaped minus raw, and the rate and
-acceleration of the raw target are fed forward. The reference therefore follows a raw target within the limits without
-lag. After a jump it reaches the raw target in minimum time without overshoot.
+The reference keeps the limits of rate, acceleration and jerk. The acceleration of the reference comes from fhan, the
+time-optimal acceleration of a double integrator in discrete time (Han 2009). The function fhan acts on the difference
+shaped minus raw, and the rate and acceleration of the raw target are fed forward. The reference therefore follows a
+raw target within the limits without lag. After a jump it reaches the raw target in minimum time without overshoot.
 """
 import math
 
@@ -62,8 +62,8 @@ def shape(before, raw, dt, limits):
     p, v, a = before
     h = dt / SUB_STEP_COUNT
     # p, v, a: shaped angle, rate, acceleration; e, de: shaped minus raw; back: time from a sub-step to the end of dt.
-    # r: acceleration for reducing e. It is what the acceleration of the raw target leaves of the limit, and at least a
-    # fifth of the limit.
+    # r: acceleration for reducing e: the part of the limit that the acceleration of the raw target leaves, and at
+    # least a fifth of the limit.
     r = max(limits.acceleration - abs(raw.acceleration), 0.2 * limits.acceleration)
     rate_limited = acceleration_limited = False
     for i in range(SUB_STEP_COUNT):

@@ -6,7 +6,7 @@
     h_k, l_k   upper and lower end of the envelope [rad/s]
     a          share by which the envelope approaches u_k in a step of dt [s] [-]
 
-a is dt / ENVELOPE_TIME_CONSTANT_S. It is 0 as long as the command that made the end of the envelope may be in force.
+a is dt / ENVELOPE_TIME_CONSTANT_S, but 0 as long as the command that made the end of the envelope may be in force.
 
 An axis may lag behind its commands and overshoot them. Therefore every rate between 0 and the envelope is allowed. The
 rate may also exceed this range by a threshold and a share of the width of the envelope.

@@ -308,8 +308,8 @@ def estimates(c, t, y, R, y_rate, R_rate, initial_rate, out):
     initial_rate     standard deviation of the rate at the start [rad/s]
     out              (n,) of ESTIMATE_DTYPE; row k is the estimate after measurement k
 
-    The filter starts at the first angle; earlier rows are NaN. It ignores an angle that is NaN or whose stamp does not
-    advance. The row of such an angle is the prediction from the last accepted angle.
+    The filter starts at the first angle; earlier rows are NaN. The filter ignores an angle that is NaN or whose stamp
+    does not advance. The row of such an angle is the prediction from the last accepted angle.
     """
     state = np.zeros(1, FILTER_DTYPE)
     f, model = state[0], c[0]

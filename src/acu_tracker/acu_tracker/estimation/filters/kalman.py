@@ -1,9 +1,9 @@
 """Laws of a Kalman filter with three states: angle, rate and acceleration of the target on one axis.
 
-The angle is measured, and the rate if a sensor measures it. If both are measured at one instant, they are taken one
-after the other. This is exact, because their errors are independent.
+The angle is measured, and the rate if a sensor measures it. Two measurements of one instant are taken one after the
+other, which is exact because their errors are independent.
 
-The covariance P is kept as its upper triangle. It is therefore always symmetric. Every product of 3 x 3 matrices is
+The covariance P is kept as its upper triangle, so that P is always symmetric. Every product of 3 x 3 matrices is
 written out.
 
     x, P    estimate and its covariance
@@ -75,8 +75,8 @@ def _corrected(x, k1, k2, k3, nu):
 def update(g, nu, R):
     """Return the Gaussian after a measured angle of variance R [rad2] with the innovation nu [rad].
 
-    H = [1 0 0], K = P H' / S (paper 000, eq. 8, 9, 10). The first row of the new P is p1j - k1 p1j. It is computed as
-    kj R, which is equal and loses no digits in a difference.
+    H = [1 0 0], K = P H' / S (paper 000, eq. 8, 9, 10). The first row of the new P is p1j - k1 p1j. The equal form kj
+    R is used, because it loses no digits in a difference.
     """
     P, S = g.P, g.P.p11 + R
     k1, k2, k3 = P.p11 / S, P.p12 / S, P.p13 / S

@@ -3,12 +3,13 @@
 The filters of the axes (`axes_filter`) always run. The Cartesian filter (`unscented`) runs if the kind of the filter
 is imm_ukf and the receiver measures the range:
 
-1. It starts from the estimate of the axis filters, when the standard deviation of a measured range is at most
-   ukf.range_share of the range.
-2. An axis uses it once its standard deviation of the rate is at most half of that of the axis filter. This margin
-   avoids a hand-over that gains little.
-3. It stops when the standard deviation of its own range exceeds ukf.range_share of the range. The axis filters then
-   continue from its estimate.
+1. The Cartesian filter starts from the estimate of the axis filters, when the standard deviation of a measured range
+is
+   at most ukf.range_share of the range.
+2. An axis uses the Cartesian filter once this filter knows the rate with at most half the standard deviation of the
+   axis filter. This margin avoids a hand-over that gains little.
+3. The Cartesian filter stops when the standard deviation of its own range exceeds ukf.range_share of the range. The
+   axis filters then continue from its estimate.
 
 Measured rates go to the axis filters only. The prior fields of a filter hold its prediction.
 
@@ -148,7 +149,7 @@ def expected(f):
 def outlook(f, c, T):
     """Return the predicted Motion T [s] >= 0 after the last measurement.
 
-    It is that of `expected` after `predict`. Where only the axis filters are used, no covariance is computed.
+    The result equals that of `expected` after `predict`. If only the axis filters are used, no covariance is computed.
     """
     if f.predicted == T or f.used[0] or f.used[1]:
         predict(f, c, T)
