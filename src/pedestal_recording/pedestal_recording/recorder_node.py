@@ -79,11 +79,9 @@ class TopicPublishers:
     def take(self, data, info):
         """Return True for a message of the graph, False for a message of a foreign publisher; data: CDR bytes.
 
-        A message is foreign if three conditions hold:
-        - The gate rejects it as a message of another publisher.
-        - The graph's publisher is distinguished from the others, and sent a message in the last CONFIRMED_TAKEOVER_NS.
-        - ROS names a foreign publisher of the topic.
-        In doubt, a message counts as a message of the graph.
+        A message is foreign if the gate rejects it as a message of another publisher, and two more conditions hold.
+        The graph's publisher is distinguished from the others, and has sent within CONFIRMED_TAKEOVER_NS. ROS names a
+        foreign publisher of the topic. In doubt, a message counts as a message of the graph.
         """
         now, utc = self._node.clock()
         taken = self._gate.take(data, info['publication_sequence_number'], info['source_timestamp'], now, utc)

@@ -44,11 +44,11 @@ def _true_error(direction, relative, attitude, error):
 def _view_from_beam(beam, attitude, known_attitude, estimate, filtered, beam_earth):
     """Fill filtered (n, 2): direction of the estimate minus the beam; and beam_earth (n, 2): earth angles of the beam.
 
-    filtered              (cross-elevation, elevation) [rad]
-    beam (n, 2)           deck angles [rad]
-    attitude (n, 4)       true attitude
-    known_attitude (n, 4) attitude that the INS reports
-    estimate (n, 2)       earth angles [rad], computed with the attitude that the INS reports
+    filtered                (cross-elevation, elevation) [rad]
+    beam (n, 2)             deck angles [rad]
+    attitude (n, 4)         true attitude
+    known_attitude (n, 4)   attitude that the INS reports
+    estimate (n, 2)         earth angles [rad], computed with the attitude that the INS reports
     """
     mat_ed, known = np.empty((3, 3)), np.empty((3, 3))
     for k in range(len(beam)):

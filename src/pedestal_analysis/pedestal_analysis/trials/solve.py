@@ -28,7 +28,7 @@ DEFAULT_RUNS = 12
 GRID_COUNT, MAX_BISECTIONS = 9, 12
 """Number of values that fill the range; largest number of bisections."""
 BRACKET_TOLERANCE = 0.01
-"""Width of a pair of values, divided by the larger absolute value, below which the search ends [-]."""
+"""Distance of two neighbouring values, divided by the larger absolute value, below which the search ends [-]."""
 MAX_LINEAR_RATIO = 20.0
 """Largest ratio of the ends of a positive range whose values have equal differences [-].
 

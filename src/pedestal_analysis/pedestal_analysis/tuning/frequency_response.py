@@ -99,7 +99,7 @@ SPEED_SWEEP = Sweep(period=1.0, lowest=1.0, highest=900.0, points=120, dropped=2
 """Sweep of the speed loop; peak in rad/s at the load. It needs 6 Nm of a motor, less than the bias torque."""
 
 FLEXIBLE_SPEED_SWEEP = dataclasses.replace(SPEED_SWEEP, period=8.0, lowest=0.25, points=400, dropped=3, kept=2)
-"""Sweep of the speed loop of a flexible axis, whose swing is narrow and decays slowly."""
+"""Sweep of the speed loop of an axis with a declared structure, whose resonance is narrow and decays slowly."""
 
 POSITION_SWEEP = Sweep(period=8.0, lowest=0.25, highest=95.0, points=300, dropped=2, kept=3, peak=0.012)
 """Sweep of the position loop, up to nearly half of its sampling rate 1 / 5 ms; peak in rad/s.

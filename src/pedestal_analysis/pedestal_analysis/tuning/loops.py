@@ -11,14 +11,14 @@ loops are then measured on the simulated plant, with its gears, lash, friction, 
     a = 3/4 (2 T_max N - T_load) / J_A          acceleration of the shaper [rad/s2]
     j = 3/4 a w_s                               jerk of the shaper [rad/s3]
     h0 = 3.5 / w_s                              filter step of the shaper [s]
-    0.4, 0.47 and 1.5 of the rated torque       bias torque; torque up to which the bias torque is full; torque at
-    which
-                                                it is zero
+    T_b = 0.4 T_r                               bias torque of a motor [Nm]. It is full up to a motor torque of
+                                                0.47 T_r, and zero from 1.5 T_r on.
 
     J_m, J_L   inertia of one motor, of the load [kg m2]
     N          gear ratio from motor to load
     w_s        crossover of the speed loop [rad/s]
     T_max      torque limit of a motor [Nm]
+    T_r        rated torque of a motor [Nm]
     T_load     sum of friction, unbalance and mean wind, at the load [Nm]
 
 The feed-forward takes J_A and the friction of the load. A required crossover of the position loop takes the place of
@@ -57,7 +57,7 @@ TORQUE_SHARE, SHAPER_RATE_SHARE = 0.75, 0.94
 """Acceleration and rate of the shaper, as shares of the acceleration and rate that the axis can reach [-]."""
 
 MAX_BEND_RAD, BEND_SHARE = 0.8e-3, 0.1
-"""Largest bend of a structure under the shaper's acceleration [rad], and its largest ratio to the beamwidth [-]."""
+"""Largest bend of a structure by the acceleration of the shaper [rad]; its largest ratio to the beamwidth [-]."""
 
 CLOSED_TEETH_SHARE = 0.5
 """Share of the torque limit that the shaper uses on a flexible structure [-].
