@@ -44,10 +44,11 @@ SINE_PEAK_RAD_S = 0.004
 
 @dataclasses.dataclass(frozen=True)
 class RateLoop:
-    """Identified rate loop of one axis. w (n,): angular frequencies [rad/s]; W (n,): complex response without delay
-    [-].
+    """Identified rate loop of one axis.
 
-    f (SERIES_TERMS,): terms of the series of 1 / W, see the module.
+    w (n,)              angular frequencies [rad/s]
+    W (n,)              complex response without the known delay [-]
+    f (SERIES_TERMS,)   terms of the series of 1 / W, see the module
     """
     w: np.ndarray
     W: np.ndarray

@@ -1,8 +1,8 @@
 """Verdict on a run: one sentence on what happened, from the recording alone.
 
-A run has failed if its drive tripped, if a command of the scenario was refused, or if it never tracked although a
-commanded mode tracks. A run has not failed if no commanded mode tracks, or if the run ended on the way to
-the target, before the receiver could lock.
+A run has failed in three cases: its drive tripped, a command of the scenario was refused, or a commanded mode should
+have tracked the target and never did. A run has not failed if no commanded mode tracks, or if the run ended on the way
+to the target, before the receiver could lock.
 """
 import contextlib
 import math
