@@ -15,7 +15,20 @@ from pedestal_common.wire import inputs
 
 INVALID_INPUTS = ('stamp', 'encoder', 'error', 'error_stamp', 'error_gated', 'attitude', 'program', 'preset',
                   'step_gap', 'error_noisy', 'attitude_error')
-"""Names of the bits of outputs.invalid_input: bit i stands for INVALID_INPUTS[i]."""
+"""Names of the bits of outputs.invalid_input: bit i stands for INVALID_INPUTS[i].
+
+stamp           the stamp of the step does not advance, or is not finite
+encoder         the encoder angles are missing or not finite
+error           a number of the receiver is not finite
+error_stamp     an error is not newer than the last one, or its time is outside the history of the encoders
+error_gated     an error is outside the gate of the filter
+attitude        the attitude is missing or not valid
+program         a table contains an angle that is not finite
+preset          a preset is not finite
+step_gap        the previous step is more than the parameter step_gap ago
+error_noisy     the errors of the receiver are only noise
+attitude_error  the INS has published statistics of its error that are out of range
+"""
 Flag = bits(INVALID_INPUTS)
 """Bits of outputs.invalid_input, by name."""
 

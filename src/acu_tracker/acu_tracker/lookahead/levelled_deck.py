@@ -1,6 +1,6 @@
 """The levelled deck: the frame of the mean attitude of the ship, in which the look-ahead predicts keyholes.
 
-The future attitude of a rolling ship is not known. The mean attitude is the best prediction of it.
+Because the future attitude of a rolling ship is not known, the look-ahead uses the mean attitude.
 """
 import math
 

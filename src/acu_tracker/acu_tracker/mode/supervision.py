@@ -1,6 +1,6 @@
 """Latched faults of the control unit, which stay until a reset, and their effect on the modes.
 
-There are three: uncommanded motion of an axis, a drive that repeats its angles (frozen), and divergence of the filter.
+The faults are uncommanded motion of an axis, a drive that repeats its angles (frozen), and divergence of the filter.
 """
 from acu_tracker.alarms import annunciator, table
 from acu_tracker.modes import Reason

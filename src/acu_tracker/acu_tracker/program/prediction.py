@@ -4,7 +4,8 @@
 made. The table is replaced in its second half, if possible while its target is below the horizon, because then no mode
 follows the table. Refraction is neglected.
 
-Stamps [s] count from an epoch. In realtime the epoch is a known UTC time; in lockstep its UTC is not known.
+Stamps [s] count from an epoch. In realtime the UTC of the epoch is known, in lockstep only by the parameter
+start_time.
 """
 import dataclasses
 import datetime

@@ -1,6 +1,6 @@
 """Position of the sun, for the mode sun and the diagnostics.
 
-The formula is the low-precision one of the Astronomical Almanac. Its error is below 0.01 deg from 1950 to 2050.
+The formula is the low-precision one of the Astronomical Almanac, with an error below 0.01 deg from 1950 to 2050.
 
     n          days since 2000-01-01 12:00 (J2000)
     L          mean longitude of the sun, corrected for aberration [rad]

@@ -16,7 +16,8 @@ three thresholds above m:
     track  = detect + 1 dB    after a level above it for acquire_time, a target is present
     loss   = detect - 2 dB    after a level below it for loss_time, no target is present
 
-The threshold loss is at least m + 2 sqrt(V). Below this level the noise alone would count as a target for ever.
+The threshold loss is at least m + 2 sqrt(V). With a lower threshold the noise alone would count as a target after the
+target is lost.
 
 s, p: records of LEVEL_DTYPE and of AcquisitionParameters.
 """

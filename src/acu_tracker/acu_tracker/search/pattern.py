@@ -25,7 +25,8 @@ PATTERN_SPIRAL, PATTERN_RASTER, PATTERN_SQUARE, PATTERN_SECTOR = range(len(SEARC
 """Shapes of a pattern.
 
     spiral      Archimedean
-    raster      lines along the track of the target, the middle line first: a late prediction is off along the track
+    raster      lines along the track of the target, the middle line first, because a target that is early or late is
+                on its track
     square      expanding, along the track and across
     sector      lines from one edge of the area to the other
 """

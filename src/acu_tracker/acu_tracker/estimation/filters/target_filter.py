@@ -4,8 +4,7 @@ The filters of the axes (`axes_filter`) always run. The Cartesian filter (`unsce
 is imm_ukf and the receiver measures the range:
 
 1. The Cartesian filter starts from the estimate of the axis filters, when the standard deviation of a measured range
-is
-   at most ukf.range_share of the range.
+   is at most ukf.range_share of the range.
 2. An axis uses the Cartesian filter once this filter knows the rate with at most half the standard deviation of the
    axis filter. This margin avoids a hand-over that gains little.
 3. The Cartesian filter stops when the standard deviation of its own range exceeds ukf.range_share of the range. The
