@@ -81,7 +81,10 @@ def _parent(s, i, t):
 
 @compiled
 def _raised(s, i, t):
-    """Note that alarm i has been raised: set its first-out mark and its parent, and make it the parent of others."""
+    """Note that alarm i has been raised: set its first-out mark and its parent.
+
+    Alarm i also becomes the parent of its recent consequences, if these have no parent yet.
+    """
     a = s.alarm[i]
     a.first = t - s.burst > FIRST_OUT_WINDOW_S
     if a.first:

@@ -1,7 +1,7 @@
 """Conditions of the alarms in a step: which rows of the table of alarms have their condition.
 
-They come from the detectors of both axes, from the state of the drive, and from facts of the control unit. The result
-is a number with one bit for each alarm (table.Bit), which the annunciator takes.
+The conditions come from the detectors of both axes, from the state of the drive, and from facts of the control unit.
+The result is a number with one bit for each alarm (table.Bit), which the annunciator takes.
 
 s: record of SUPERVISION_DTYPE; u, o: records of signals.INPUTS_DTYPE and of signals.OUTPUTS_DTYPE; facts: the Facts.
 """

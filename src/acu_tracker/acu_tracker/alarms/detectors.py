@@ -29,7 +29,8 @@ AXIS_DETECTORS_DTYPE = np.dtype([
 disagrees, stuck, immobile, overloaded, behind, moves, oscillates  1 while the condition of a detector is present
 mean_torque  mean of the absolute torque [Nm]
 resisted     time for which a brake has resisted the motors [s]
-work, pushed work of the load on the motors [J], and direction of the torque in a gust: 1, -1, or 0 without a gust
+work         work of the load on the motors [J]
+pushed       direction of the torque during a gust: 1 or -1; 0 without a gust
 e            last following error other than 0 [rad]
 area         area of the present half wave of the following error [rad s]
 half_waves   number of half waves, which decays
@@ -99,7 +100,7 @@ MAX_MISMATCH_RAD = 1e-2
 """Largest sum of the differences between encoder and motors [rad]: five times lash and wind-up of a gear."""
 
 MISMATCH_TIME_CONSTANT_S = 2.0
-"""Time constant with which this sum decays [s]."""
+"""Time constant with which the sum of the differences between encoder and motors decays [s]."""
 
 STANDSTILL_RATE_RAD_S = 2e-3
 """Rate above which an axis moves [rad/s]."""
@@ -221,7 +222,7 @@ def pushed_by_wind(d, T, dy, inertia, limit, dt):
     E     kinetic energy of the axis [J]; J: `inertia` [kg m2]
     f     INERTIA_UNCERTAINTY while the axis slows down, its inverse while the axis accelerates. Therefore an inertia
           that differs from J by this factor does not look like a gust
-    limit excess torque [Nm]
+    limit  excess torque [Nm]
 
     W counts while the torque has one sign and is above WIND_TORQUE_SHARE of the limit. The result stays True as long.
     """

@@ -3,12 +3,12 @@
 The target is converted to deck angles, and its azimuth is put on an azimuth wrap inside the limits. Near a keyhole the
 reference is a planned slew of the look-ahead instead. `control_unit` calls this module in each step.
 
-g     record of GUIDANCE_DTYPE
-k     record of tracking.TRACKING_DTYPE
-c     record of control_unit.CONSTANTS_DTYPE
-way   bridge.Way: the program, rotated to the place where the target was last tracked
-gap   outage.Outage: the time without a signal of the receiver
-order the Order of the step
+g      record of GUIDANCE_DTYPE
+k      record of tracking.TRACKING_DTYPE
+c      record of control_unit.CONSTANTS_DTYPE
+way    bridge.Way: the program, rotated to the place where the target was last tracked
+gap    outage.Outage: the time without a signal of the receiver
+order  the Order of the step
 """
 import math
 from collections import namedtuple

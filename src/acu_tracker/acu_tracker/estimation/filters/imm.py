@@ -43,8 +43,7 @@ def switching(T, dwell, count):
 def mix(mu, count, stay, switch, j, weights):
     """Set weights[i] to the probability that model i held before, if model j holds now. Return cbar_j.
 
-    stay, switch: result of `switching`. A model with the probability 0 gets the weight 1 on itself, and so keeps its
-    own state.
+    stay, switch: result of `switching`. If cbar_j is 0, model j gets the weight 1 and so keeps its own state.
     """
     total = 0.0
     for i in range(count):

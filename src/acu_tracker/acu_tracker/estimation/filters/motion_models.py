@@ -41,7 +41,7 @@ class MotionModel(typing.NamedTuple):
                    the start [rad/s2]
 
     If initial_sigma returns NaN, the number of the standard deviation of the rate at the start [rad/s] is used. In one
-    second the rate may then change by as much as it is uncertain.
+    second the rate may then change by as much as the rate is uncertain.
     """
     name: str
     doc: str

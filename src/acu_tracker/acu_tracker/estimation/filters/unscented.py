@@ -2,7 +2,7 @@
 
 The filter is an IMM of two unscented Kalman filters, called modes: CV (constant velocity) and CA (constant
 acceleration). The state of each mode is X = (east north up, velocity, acceleration) [m, m/s, m/s2], relative to the
-antenna. CV keeps its acceleration at zero. Without a range only the two angles are used; the variance of the range
+antenna. CV keeps its acceleration at zero. Without a range only the angles are used, and the variance of the range
 grows.
 
 An unscented filter evaluates the measurement at sigma points, states that represent mean and covariance of X (points
