@@ -302,6 +302,7 @@ class Loops:
         drive = case.loaded().node_parameters('adu')
         axis = getattr(drive, name)
         if loop == 'current':
+            # frequency.current measures the azimuth, so this axis takes its place, with the travel of the azimuth.
             travel = drive.azimuth.limits
             limits = dataclasses.replace(axis.limits, lower=travel.lower, upper=travel.upper)
             found = frequency.current(dataclasses.replace(drive, azimuth=dataclasses.replace(axis, limits=limits)))
