@@ -60,6 +60,7 @@ class Operator(Shell):
         return True
 
     def _open_publishers(self, names):
+        """Open a publisher for each of these topics, unless it is open."""
         for name in names:
             if name not in self._publish_by_topic:
                 self._publish_by_topic[name] = self.writer(name)
@@ -75,6 +76,7 @@ class Operator(Shell):
             time.sleep(0.02)
 
     def _note_diagnostics(self, array):
+        """Take a DiagnosticArray: keep its time, and call on_diagnostics for each status of the watched nodes."""
         for status in array.status:
             if status.name in self._names:
                 self.time = max(self.time, messages.nanoseconds(array.header.stamp) * 1e-9)

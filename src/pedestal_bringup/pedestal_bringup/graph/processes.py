@@ -112,6 +112,7 @@ class Graph:
 
     @contextlib.contextmanager
     def _disk_errors_named(self):
+        """Turn the OSErrors in this context into a RunError that names the bag and the file."""
         try:
             yield
         except OSError as error:
@@ -226,6 +227,7 @@ class Graph:
         return [process.wait() for process in processes]
 
     def _log_of(self, node):
+        """Return the path of the log of a node or server."""
         return self.log / f'{node.replace("/", ".")}.log'
 
     def _lines(self, node):

@@ -37,6 +37,7 @@ def run(graph, tracks, progress):
 
 
 def _in_lockstep(graph, operator, tracks, progress):
+    """Run a graph in lockstep and return its Outcome; arguments as of `run`, operator: Operator."""
     graph.begin(parameters_of_all(graph.scenario, graph.bag, 0))
     try:
         lockstep.watch(graph, operator, tracks, progress)
@@ -47,6 +48,7 @@ def _in_lockstep(graph, operator, tracks, progress):
 
 
 def _in_realtime(graph, operator, tracks, progress):
+    """Run a graph in realtime and return its Outcome; arguments as of `run`, operator: Operator."""
     supervisor.prepare(graph.scenario)
     start = begins(graph.scenario)
     for track in tracks.values():

@@ -40,10 +40,12 @@ def compile_unit(unit):
 
 
 def _unit_of_scenario(name, node):
+    """Return the unit of a node of the scenario `name`."""
     return scenario.load(name).unit(node)
 
 
 def _compile_unit(name, node):
+    """Compile the laws of a node of the scenario `name`. Return (text that names them, time that this took [s])."""
     begun = time.perf_counter()
     compile_unit(_unit_of_scenario(name, node))
     return f'{node} of {name}', time.perf_counter() - begun
@@ -56,6 +58,7 @@ def _loop_done(name, count):
 
 
 def _compile_loop(name, count):
+    """Compile `count` parallel closed loops of the scenario `name`. Return (text that names them, time taken [s])."""
     begun = time.perf_counter()
     loops = [closed_loop.Loop(scenario.load(name, duration=COMPILE_RUN_S)) for _ in range(count)]
     if count > 1:

@@ -127,6 +127,7 @@ def can_run_parallel(loops):
 
 
 def _shape(loop):
+    """Return the numbers that must be equal for loops that run side by side: times, counts and array shapes."""
     receiver = loop.units['tracking_receiver'].memory
     constants = loop.units['adu'].parts['constants']
     return (loop.period_ns, loop.steps, int(constants['speed_ticks']), int(constants['substeps']),

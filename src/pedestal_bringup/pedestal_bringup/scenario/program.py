@@ -26,9 +26,11 @@ class Plan:
         return {prefix: self._built(prefix, self._parameters(prefix)) for prefix in self.scenario.prefixes}
 
     def _parameters(self, prefix):
+        """Return the TargetParameters of the receiver of a beam."""
         return self.scenario.node_parameters(prefix + 'tracking_receiver').target
 
     def _built(self, prefix, parameters):
+        """Return the target.Target of TargetParameters for the run of this scenario."""
         mask = self.scenario.node_parameters(prefix + 'tracking_receiver').receiver.horizon_mask
         return target.build(parameters, self.scenario.header.duration, mask)
 

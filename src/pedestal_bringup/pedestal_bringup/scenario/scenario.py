@@ -190,6 +190,7 @@ class Scenario:
 
 
 def _folder() -> 'Traversable':
+    """Return the folder of the scenarios that come with the product."""
     return importlib.resources.files('pedestal_bringup') / 'scenarios'
 
 
@@ -227,6 +228,7 @@ def _values_of(sections: Sections, node: str) -> dict[str, typing.Any]:
 
 
 def _is_node(name: str) -> bool:
+    """Return True if a name is that of a node with a section in a scenario, such as acu or beam_2/acu."""
     return nodes.plain(name) in (BEAM_NODES if nodes.beam_of(name) else SECTION_NODES)
 
 
@@ -568,6 +570,7 @@ def _share_with_beam(name: str, node: str, sections: Sections, header: ScenarioP
 
 
 def _checked(name: str, section: str, parameters_type: type[_P], values: Mapping[str, typing.Any]) -> _P:
+    """Return the parameter dataclass of a section of the scenario `name`. Raises ScenarioError."""
     with _errors_named(f'scenario {name}, {section}'):
         return _built(parameters_type, values if section == 'scenario' else parameters.without_ros(values))
 
