@@ -1,6 +1,6 @@
 """Node that owns the time of the drive: clock, steps and pacing.
 
-Its units are one drive, or one for each beam of an array.
+It is the base of `adu_node`, whose unit is one drive, and of `beam_steering_node`, with a unit for each beam.
 """
 import time
 
@@ -14,7 +14,7 @@ Because the queue of a subscriber holds 5000 messages (Fast DDS), a slow recorde
 """
 
 MAX_WAIT_S = 0.1
-"""Longest wait between two readings of the clock, which may be stepped [s]."""
+"""Longest wait between two readings of the UTC clock [s]. A step of that clock is noticed within this time."""
 
 MIN_RECEIVE_FRACTION = 0.25
 """Smallest share of a period for receiving messages in realtime, also for a drive that is late for its next step."""
@@ -23,7 +23,8 @@ MIN_RECEIVE_FRACTION = 0.25
 class Timekeeper(unit_node.UnitNode):
     """Node that makes the steps. Step k uses the messages of step k - 1 and publishes the state at t_k.
 
-    In lockstep, step k begins when step k - 1 has been answered; in realtime at k T after the epoch (UTC).
+    In lockstep, step k begins when all nodes have answered step k - 1. In realtime, step k begins k periods after the
+    start time, the epoch (UTC).
 
     missed_steps    steps that were not made in their period, because the node was late
     lost_steps      missed steps, and steps without the command of the previous step
@@ -31,7 +32,7 @@ class Timekeeper(unit_node.UnitNode):
     """
 
     PRECEDENCE = 1
-    """Precedence over other nodes, whose searches and predictions may take longer than a step."""
+    """Priority above that of the other nodes, whose searches and predictions may take longer than a step."""
 
     def __init__(self, module):
         super().__init__(module, serves_beams=True)
@@ -58,6 +59,7 @@ class Timekeeper(unit_node.UnitNode):
                         self.reader(name, unit_node.decoding(decoder), self._newest_receiver(name))
 
     def _count_from_first_step(self):
+        """Reset the numbers of steps, and the newest messages and stamps of commands."""
         self.k, self.made = -1, 0
         self.lost_steps = self.missed_steps = self.late_ticks = 0
         self.newest, self.command_stamps = {}, {}
@@ -109,9 +111,9 @@ class Timekeeper(unit_node.UnitNode):
     def spin(self, executor):
         """Receive messages until the next step of realtime, then make it.
 
-        This avoids a timer of rclpy. At each reset EventsExecutor (rclpy 7.1.6) queues all due timers again, also
-        timers that are in its queue. The queue of a drive too slow for its steps would grow without limit, and
-        messages would wait for minutes.
+        This avoids a timer of rclpy. At each reset of a timer, EventsExecutor (rclpy 7.1.6) queues all due timers
+        again, also those that its queue already holds. In a drive too slow for its steps, the queue would grow without
+        limit, and messages would wait for minutes.
         """
         if self.graph.lockstep:
             super().spin(executor)
@@ -135,9 +137,9 @@ class Timekeeper(unit_node.UnitNode):
         self.wait = min(max(wait, min_wait), MAX_WAIT_S)
 
     def _make_realtime_step(self, k, stamp, now):
-        """Make step k of a stamp [ns] at the time now of the monotonic clock [ns].
+        """Make step k of a stamp [ns]. now: time of the monotonic clock [ns].
 
-        Earlier steps that were not made are not published; they count as missed and lost.
+        Skipped earlier steps are not published. They count as missed and as lost.
         """
         before = stamp - self.period_ns
         if self.made:
@@ -163,7 +165,10 @@ class Timekeeper(unit_node.UnitNode):
         return take
 
     def draining(self):
-        """Return True at the end of a realtime run, until the axes have stopped and the brakes hold."""
+        """Return True at the end of a realtime run, until the axes have stopped and the brakes hold.
+
+        The first call disables the drive.
+        """
         if self.graph.lockstep or self.failure or not self.made:
             return False
         if not self.stopping:

@@ -1,4 +1,4 @@
-"""Scenarios with their parameters."""
+"""Scenarios of the Python library: `pedestal.load` returns a Scenario, whose parameters can be read and changed."""
 from __future__ import annotations
 
 import dataclasses

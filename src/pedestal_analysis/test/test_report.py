@@ -58,7 +58,8 @@ def step(k, rng, locked=True, effort=True):
     point.velocities[:] = 0.1 + 0.01 * noise[0], 0.01 * noise[1]
     told = messages.template('acu/filter')
     told.position[:] = [value for nu in noise for value in (
-        nu, math.nan, (nu / NOISE)**2, 0.1 * NOISE, 0.02 * NOISE, 0.0, NOISE, 0.3, 0.3, math.nan, 0.4)]
+        nu, math.nan, (nu / NOISE)**2, 0.1 * NOISE, 0.02 * NOISE, 0.0, NOISE, 0.3, 0.3, math.nan, 0.4,
+        *[math.nan] * (len(topics.MOTION_MODELS) - 4))]
     made = {'joint_states': joints, 'adu/truth': truth, 'acu/filter': told, 'adu/motor_states': motors,
             'target/truth': target, 'tracking_receiver/angle_error': error, 'acu/estimate': estimate}
     return {name: stamped(message, k) for name, message in made.items()}

@@ -28,7 +28,7 @@ from pedestal_operator.page.page_server import PageServer
 from pedestal_operator.remote_node import Remote
 
 STATE_PERIOD_S, POLL_PERIOD_S, SLOW_STATE_PERIOD_S = 0.05, 0.01, 1.0
-"""Periods of the states sent to pages, of the check for their commands, and of the slow part of the state [s]."""
+"""Periods of the state sent to the pages, of the check for their commands, and of the slow part of the state [s]."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -135,7 +135,7 @@ class PageNode(Remote):
                               'sky': page_state.sky(self, self._upcoming_passes.look(self))})
 
     def _request_parameters(self, node, names):
-        """Request the parameters of a node at its start and at each restart."""
+        """Request parameters of a node when it appears, and again after each time in which it was silent."""
         client, future = self._parameter_requests.get(node) or (None, None)
         if not self.present(node):
             self._parameter_requests[node] = client, None

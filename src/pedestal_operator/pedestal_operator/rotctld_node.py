@@ -1,4 +1,4 @@
-"""ROS node that serves the rotctld protocol over TCP to clients of Hamlib and to gpredict.
+"""ROS node that serves the rotator protocol of rotctld over TCP to gpredict and to other clients of Hamlib.
 
 In the folder rotator, rotctld.py reads the lines and controller.py turns them into commands.
 
@@ -38,7 +38,8 @@ class RotctldParameters(ServerParameters):
 
 
 class RotctldClient(Client):
-    """line, request, pending: line without an answer, its rotctld.Request, and its controller.PendingRequest."""
+    """A connected program. line: the line that waits for its answer; request, pending: its rotctld.Request and its
+    controller.PendingRequest."""
     line = request = pending = None
 
 
@@ -49,7 +50,8 @@ class RotctldNode(ServerNode):
         super().__init__('rotctld', RotctldParameters, rotctld.MAX_LINE_BYTES, RotctldClient)
 
     def serve(self, client, now):
-        """Answer the lines in order; a command of the antenna is answered after the reply of the control unit."""
+        """Answer the lines in order. A line that commands the antenna is answered after the reply of the control unit.
+        """
         client.end_line(rotctld.is_complete)    # gpredict for Windows sends no line end.
         while client.pending or client.lines:
             if client.pending:
@@ -90,6 +92,7 @@ class RotctldNode(ServerNode):
             self.refuse(client, client.request.name, client.line, reason)
 
     def _move(self, client, request, now):
+        """Begin a request that moves or stops the antenna, or refuse it if the server is read only."""
         if self.parameters.read_only:
             self._answer(client, RESULT_REJECTED, 'this server is read only (parameter read_only)')
             return

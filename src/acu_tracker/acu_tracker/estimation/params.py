@@ -1,4 +1,4 @@
-"""Parameters of the target filter: of the kinds of axis filter, of the Cartesian filter, of gate and lock."""
+"""Parameters of the target filter: axis filters, Cartesian filter, models of receiver and INS, gate and lock."""
 import dataclasses
 import math
 
@@ -134,8 +134,8 @@ class ReceiverModelParameters(Parameters):
 class AttitudeModelParameters(Parameters):
     """Error model of an INS, for a ship whose INS does not publish the statistics of its error.
 
-    The part that changes from sample to sample is in every measurement. The slow part cancels, because the target is
-    measured and pointed at with the same attitude; its changes, however, look like a motion of the target.
+    The noise changes from sample to sample and is added to every measurement. The slow error cancels, because
+    measurement and pointing use the same attitude. Changes of the slow error look like a motion of the target.
     """
 
     tilt_noise: float = parameter(3e-5, 0.0, 0.1, 'rad', 'rms white noise of roll and pitch, per sample')

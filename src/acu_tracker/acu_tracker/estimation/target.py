@@ -1,10 +1,13 @@
-"""The target: conversion between the deck, for measurement and pointing, and the frame of its filter.
+"""The estimate of the target: conversion of measurements from the deck to the frame of the filter, and back.
 
-With a measured range the estimate is the line of sight of the INS, otherwise that of the antenna (`lever_arm`). Its
-angles are those of a frame whose equator passes through the target (`estimate_frame`).
+The equator of the filter's frame passes through the target (`estimate_frame`). With a measured range the filter
+estimates the line of sight from the INS, otherwise the one from the antenna (`lever_arm`). The module `tracking` calls
+this module.
 
-g: record of TARGET_DTYPE; p, c: records of SharedParameters and of tracker.CONSTANTS_DTYPE; deck: record of
-ATTITUDE_DTYPE.
+g     record of TARGET_DTYPE
+p     record of SharedParameters
+c     record of tracker.CONSTANTS_DTYPE
+deck  record of ATTITUDE_DTYPE, except where a function states otherwise
 """
 import math
 from collections import namedtuple
@@ -31,14 +34,18 @@ from pedestal_common.geometry import line_of_sight as pointing
 
 TARGET_DTYPE = np.dtype([('tracker', tracker.TRACKER_DTYPE), ('frame', estimate_frame.FRAME_DTYPE),
                          ('lever_arm', lever_arm.LEVER_ARM_DTYPE)], align=True)
-"""tracker: the filter with its gates; frame: the frame of the estimate; lever_arm: the arm from INS to antenna."""
+"""tracker: the filter with its gates; frame: the frame of the filter; lever_arm: the vector from INS to antenna."""
 
 OUTCOME_GATED, OUTCOME_STALE, OUTCOME_NOISY = tracker.OUTCOME_GATED, tracker.OUTCOME_STALE, tracker.OUTCOME_NOISY
 OUTCOME_NO_ATTITUDE = OUTCOME_NOISY + 1
 """Outcome of `take` without an attitude; the other outcomes are those of the tracker."""
 
 Source = namedtuple('Source', 'framed motion')
-"""The Motion of the target to point at: in the frame of the estimate (framed 1) or in earth angles (framed 0)."""
+"""Target to which the antenna points.
+
+framed  1 if the Motion is in the frame of the filter, 0 if it is in earth angles
+motion  its Motion
+"""
 
 
 def initialise(g):
@@ -48,10 +55,13 @@ def initialise(g):
 
 @compiled
 def _measured_direction(g, p, mat_ed, distance, azimuth, elevation):
-    """Return (azimuth, elevation) [rad] in the filter's frame of a direction in deck angles [rad].
+    """Return (azimuth, elevation) [rad] of a measured direction in the frame of the filter.
 
-    mat_ed: Rotation deck -> earth; distance: measured range [m], NaN for none. A filter that does not run yet starts
-    here, in a frame that is laid at this direction.
+    mat_ed              Rotation deck -> earth
+    distance            measured range [m]; NaN: no range
+    azimuth, elevation  deck angles of the direction [rad]
+
+    For a filter that does not run yet the frame is laid at this direction first.
     """
     x, y, z = pointing.direction(azimuth, elevation)
     v = lever_arm.from_ins(g.lever_arm, p.lever_arm, distance, g.tracker.running, Vector(x, y, z))
@@ -65,8 +75,14 @@ def _measured_direction(g, p, mat_ed, distance, azimuth, elevation):
 
 @compiled
 def _measured_rates(g, deck, u, at):
-    """Return (azimuth, elevation) rates [rad/s] of the target in the filter's frame, from the rates of the antenna and
-    of the error. deck: its Attitude; at: Pointing of the antenna."""
+    """Return (azimuth rate, elevation rate) [rad/s] of the target in the frame of the filter.
+
+    The rates are the sum of the rates of the antenna and of the receiver error.
+
+    deck   Attitude of the deck when the error was measured
+    u      record of signals.INPUTS_DTYPE
+    at     Pointing of the antenna when the error was measured
+    """
     n = pointing.displaced_motion(at.A, at.E, at.dA, at.dE, u.cross_elevation, u.elevation, u.error_rate[0],
                                   u.error_rate[1])
     v, dv = lever_arm.to_ins(g.lever_arm, Vector(n[0], n[1], n[2]), Vector(n[3], n[4], n[5]))
@@ -75,13 +91,14 @@ def _measured_rates(g, deck, u, at):
 
 @compiled
 def take(g, p, c, deck, u, at, measured, restart_gap):
-    """Filter the receiver's error of INPUTS u.
+    """Filter an error of the receiver. Return (its outcome, the Innovation).
 
-    Return (OUTCOME_STARTED, OUTCOME_ACCEPTED, OUTCOME_GATED, OUTCOME_STALE,
-    OUTCOME_NOISY or OUTCOME_NO_ATTITUDE; the Innovation).
+    The outcomes are those of the tracker and OUTCOME_NO_ATTITUDE.
 
-    at: Pointing of the antenna when the error was measured; restart_gap: as in tracker.observe. `measured`: deck
-    angles (azimuth, elevation) [rad] of the target, which are the antenna's, displaced by the error.
+    u            record of signals.INPUTS_DTYPE
+    at           Pointing of the antenna when the error was measured
+    measured     deck angles (azimuth, elevation) of the target [rad]: those of the antenna, displaced by the error
+    restart_gap  time without accepted errors after which the filter restarts [s]
     """
     e = p.tracker.receiver
     t = u.error_stamp - e.age
@@ -93,9 +110,10 @@ def take(g, p, c, deck, u, at, measured, restart_gap):
     azimuth_rate, elevation_rate = math.nan, math.nan
     if math.isfinite(u.error_rate[0] + u.error_rate[1] + u.error_rate_sigma):
         azimuth_rate, elevation_rate = _measured_rates(g, now, u, at)
+    # R_cross, R_elevation: variances of the measured direction in cross-elevation and elevation [rad2].
     R_cross = R_elevation = error_variance(u.cross_elevation, u.elevation, u.cn0_dbhz, e)
     cos_el = max(math.cos(elevation), 0.01)     # This avoids a division by zero at the zenith.
-    # walk_cross, walk_elevation: growth of the variances by the wander of the attitude [rad2/s].
+    # walk_cross, walk_elevation: growth of these variances by the random walk of the attitude error [rad2/s].
     walk_cross = walk_elevation = 0.0
     if deck.stabilised:
         verticals = estimate_frame.verticals(g.frame, azimuth, elevation)
@@ -139,7 +157,7 @@ def earth_outlook(g, c, t):
 
 @compiled
 def on_deck(g, p, deck, t, source):
-    """Return the Motion on the deck (record of ATTITUDE_DTYPE) at t [s] of a Source; p: record of SharedParameters."""
+    """Return the Motion in deck angles at t [s]; source: the Source."""
     if not source.framed:
         return attitude.on_deck(deck, p, t, source.motion)
     sight = estimate_frame.to_earth(g.frame, source.motion)
@@ -151,7 +169,10 @@ def on_deck(g, p, deck, t, source):
 
 @compiled
 def levelled_azimuth(g, level, source):
-    """Return the azimuth AxisMotion of a Source on a deck at rest; level: Rotation deck -> earth."""
+    """Return the AxisMotion of the azimuth of a Source on a levelled deck at rest.
+
+    level: Rotation from this deck to the earth.
+    """
     still = Attitude(level, ZERO_VECTOR, ZERO_VECTOR)
     if source.framed:
         still = estimate_frame.of_deck(g.frame, still)
@@ -160,7 +181,7 @@ def levelled_azimuth(g, level, source):
 
 @compiled
 def read(g, p, c, deck, t):
-    """Return the Estimate at t [s] in earth angles of the antenna."""
+    """Return the Estimate at t [s] in earth angles, as seen from the antenna."""
     framed, variances = tracker.read(g.tracker, c, t)
     azimuth, elevation = variances
     motion = earth_angles(estimate_frame.to_earth(g.frame, framed))

@@ -6,6 +6,8 @@ process noise, and no direction is singular.
 
 The frame is laid when the filter starts, and again when the target is more than MAX_FRAME_ELEVATION_RAD off the
 equator. Between these instants the frame is fixed to the earth.
+
+f: record of FRAME_DTYPE.
 """
 import math
 
@@ -22,13 +24,15 @@ MAX_FRAME_ELEVATION_RAD = math.radians(20.0)
 the squared rate. A smaller limit lays the frame more often on the way of a target that turns."""
 
 FRAME_DTYPE = np.dtype([('mat', 'f8', (3, 3))], align=True)
-"""mat: rotation frame -> earth."""
+"""mat: rotation matrix frame -> earth."""
 
 
 @compiled
 def lay(f, u, du):
-    """Lay the equator from the ENU unit vector u along its rate du [1/s], with azimuth 0 at u; the equator of a target
-    at rest is horizontal at u."""
+    """Lay the frame: azimuth and elevation 0 are at the target, and the equator leads along its motion.
+
+    u, du: ENU unit vector towards the target and its rate [1/s]. At a target at rest the equator is horizontal.
+    """
     speed, rho = math.sqrt(dot(du, du)), math.hypot(u.x, u.y)
     if speed > 0.0:
         along = Vector(du.x / speed, du.y / speed, du.z / speed)
@@ -44,14 +48,14 @@ def lay(f, u, du):
 
 @compiled
 def to_earth(f, motion):
-    """Return the LineOfSight in ENU of a Motion in the frame."""
+    """Return the LineOfSight in ENU; motion: the Motion in the frame."""
     sight, mat = line_of_sight(motion), rotation(f.mat)
     return LineOfSight(rotated(mat, sight.u), rotated(mat, sight.du), rotated(mat, sight.ddu))
 
 
 @compiled
 def to_frame(f, sight):
-    """Return the Motion in the frame of a LineOfSight in ENU; the inverse of to_earth."""
+    """Return the Motion in the frame; sight: the LineOfSight in ENU. The function is the inverse of to_earth."""
     mat = rotation(f.mat)
     return earth_angles(LineOfSight(rotated_back(mat, sight.u), rotated_back(mat, sight.du),
                                     rotated_back(mat, sight.ddu)))
@@ -59,7 +63,7 @@ def to_frame(f, sight):
 
 @compiled
 def direction_to_frame(f, azimuth, elevation):
-    """Return (azimuth, elevation) [rad] in the frame of a direction's earth angles."""
+    """Return (azimuth, elevation) [rad] of a direction in the frame; azimuth, elevation: its earth angles [rad]."""
     e, n, u = earth_direction(azimuth, elevation)
     v = rotated_back(rotation(f.mat), Vector(e, n, u))
     return math.atan2(v.x, v.y), math.atan2(v.z, math.hypot(v.x, v.y))
@@ -67,10 +71,14 @@ def direction_to_frame(f, azimuth, elevation):
 
 @compiled
 def verticals(f, azimuth, elevation):
-    """Return (across, along): components along the earth's vertical of the unit vectors in which azimuth and elevation
-    of a direction in the frame grow; both angles [rad]. In the earth's own frame they are 0 and cos(elevation).
+    """Return (across, along), the vertical components of two unit vectors at a right angle to a direction.
+
+    The first vector points to growing azimuth, the second to growing elevation. In the frame of the earth their
+    components along the earth's vertical are 0 and cos(elevation). `measurement.attitude_variances` needs these
+    components to separate the errors of heading and tilt. azimuth, elevation: angles of the direction in the frame
+    [rad].
     """
-    # z: the earth's vertical in the frame.
+    # z: the earth's vertical, as components in the frame.
     s, c, z = math.sin(azimuth), math.cos(azimuth), f.mat[2]
     return z[0] * c - z[1] * s, z[2] * math.cos(elevation) - (z[0] * s + z[1] * c) * math.sin(elevation)
 
@@ -84,15 +92,19 @@ def from_earth(f, mat):
 
 @compiled
 def of_deck(f, attitude):
-    """Return the Attitude, deck -> frame, of an Attitude deck -> earth."""
+    """Return the Attitude deck -> frame; attitude: the Attitude deck -> earth."""
     return Attitude(from_earth(f, attitude.mat), attitude.w, attitude.dw)
 
 
 @compiled
 def earth_variances(f, framed, earth, p_A, p_E):
-    """Return the variances [rad2] of azimuth and elevation in the earth's frame from those in the frame, p_A and p_E.
+    """Return the variances of azimuth and elevation in the earth frame, in the unit of p_A and p_E.
 
-    framed, earth: the Motion of the target in each frame. The correlation in the frame is unknown and taken as zero.
+    p_A, p_E       variances of azimuth and elevation in the frame of the filter, of angles [rad2] or of rates; or the
+                   covariances of angle and rate
+    framed, earth  Motion of the target in the frame of the filter and in the earth frame
+
+    The correlation of azimuth and elevation is taken as zero, because the filter does not estimate it.
     """
     A, E = framed.azimuth.angle, framed.elevation.angle
     azimuth, elevation = earth.azimuth.angle, earth.elevation.angle

@@ -1,4 +1,4 @@
-"""Diagnosis of the control unit for /diagnostics."""
+"""Diagnosis of the control unit on /diagnostics: a level, one line of text, and values; unit: the unit.Acu."""
 import math
 
 import numpy as np
@@ -20,21 +20,22 @@ FAULT_TEXTS = {
 GATED_ERROR_TEXTS = {('error_gated',): 'an error of the receiver was outside the gate and was not used',
                      ('error_noisy',): 'the errors of the receiver are noise and are not used',
                      ('error_gated', 'error_noisy'): 'the errors of the receiver are noise and are not used'}
-"""Texts of the diagnosis where only these bits of signals.INVALID_INPUTS are set."""
+"""{bits of signals.INVALID_INPUTS: text of the diagnosis}; the text is used if exactly these bits are set."""
 
 NEEDED_FIELDS = {'encoder': ('joint_states', ('position', 'velocity')),
                  'attitude': ('ship/imu/data', ('orientation', 'angular_velocity')),
                  'attitude_error': ('ins/error', ('position', 'velocity'))}
-"""{name in signals.INVALID_INPUTS: (topic, fields of its layout that the control unit needs)}."""
+"""{name in signals.INVALID_INPUTS: (topic, fields of its message that the control unit needs)}."""
 
 INPUTS_OF_REASONS = {Reason.ENCODER_INVALID: 'encoder', Reason.ATTITUDE_INVALID: 'attitude'}
-"""{reason: name in NEEDED_FIELDS}."""
+"""{reason of a refused mode: name in NEEDED_FIELDS of the input that is invalid}."""
 
 
 def missing(unit, name):
-    """Return the text of the numbers that the last message of an input lacks, a name in NEEDED_FIELDS; '' for none.
+    """Return the text that names the numbers which the last message of an input lacks; '' if it lacks none.
 
-    A number is missing where the message has no such number, where it is NaN, and where it is marked as no data.
+    name: name of the input in NEEDED_FIELDS. A number is missing if the message does not contain it, if it is NaN, or
+    if it is marked as no data.
     """
     topic, needed = NEEDED_FIELDS.get(name, ('', ()))
     if topic not in unit.reads and topic != unit.trigger:
@@ -48,7 +49,9 @@ def missing(unit, name):
 
 
 def beyond_limits(parameters, angles):
-    """Return the text of the axes whose deck angles [rad] are outside the limits of AcuParameters; else of the floor.
+    """Return the text why deck angles [rad] cannot be reached: axes outside their limits, or else the floor.
+
+    parameters: AcuParameters.
     """
     outside = [f'{axis} {math.degrees(angle):.2f} deg: must be {math.degrees(limits.low):.2f} to '
                f'{math.degrees(limits.high):.2f} deg'
@@ -59,7 +62,7 @@ def beyond_limits(parameters, angles):
 
 
 def of(unit):
-    """Return the Diagnosis of an Acu."""
+    """Return the Diagnosis of the unit; its text reports the gravest finding."""
     state, outputs = unit.parts['state'], unit.parts['outputs']
     invalid = tuple(name for i, name in enumerate(signals.INVALID_INPUTS) if unit.parts['invalid'] >> i & 1)
     faults = unit.faults
@@ -86,7 +89,10 @@ def of(unit):
 
 
 def _values(unit, faults, invalid):
-    """Return [(key, text)] of the diagnosis."""
+    """Return the values [(key, text)] of the diagnosis.
+
+    faults: names of the latched faults; invalid: names of the invalid inputs.
+    """
     state, outputs = unit.parts['state'], unit.parts['outputs']
     values = [('mode', modes.MODES[outputs['mode']]), ('reason', modes.REASONS[outputs['reason']]),
               ('fallback', modes.FALLBACK_NAMES[int(state['mode']['fallback'])]), ('control', unit.authority.holder),

@@ -1,7 +1,7 @@
 """Current control of one motor in rotor coordinates: i_d = 0, decoupled, inside the voltage circle.
 
     i_d, i_q        currents along and across the magnets [A]; i_q makes the torque
-    v_d, v_q        voltages of the same axes [V]; the voltage circle is v_d^2 + v_q^2 <= v_max^2
+    v_d, v_q        voltages along and across the magnets [V]; the voltage circle is v_d^2 + v_q^2 <= v_max^2
     sum_d, sum_q    integral parts of the two PI controllers [V]
     R, L, psi       phase resistance [ohm], inductance [H], flux linkage [Wb] of the motor
     w, T            bandwidth of the loop [rad/s], its period [s]; K_iT = K_i T

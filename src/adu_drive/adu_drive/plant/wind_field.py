@@ -13,8 +13,8 @@ The square law with a torque coefficient for A D is that of wind tunnels: Gawron
 and Telescopes (2008), section on wind disturbances. C is a measured curve there (JPL memo CP-6, 1964), of which c_1
 and c_2 are the first harmonics. The defaults have its size and shape: the largest value is 0.12, with the wind from
 behind at 130 deg. The components v and w have 0.78 and 0.55 of the intensity of u (ESDU 85020) and, for simplicity,
-the von Karman spectrum of u. Gusts smaller than the dish cancel over it: aerodynamic admittance
-1 / (1 + (2 f sqrt(A) / V)^(4/3)) (Vickery 1965).
+the von Karman spectrum of u. Gusts smaller than the dish cancel over its area. The aerodynamic admittance
+1 / (1 + (2 f sqrt(A) / V)^(4/3)) reduces their amplitude (Vickery 1965).
 """
 import math
 import types
@@ -56,7 +56,10 @@ def constants(p):
 
 @compiled
 def torques(c, t, A, E):
-    """Return the torques [Nm] on the azimuth and elevation loads at the time t [s] with the axes at A, E [rad]."""
+    """Return the torques [Nm] on the azimuth and elevation loads at the time t [s] with the axes at A, E [rad].
+
+    c: see `constants`.
+    """
     u, v, w = (turbulence(t, c.amplitude[0], c.omega[0], c.phase[0]),
                turbulence(t, c.amplitude[1], c.omega[1], c.phase[1]),
                turbulence(t, c.amplitude[2], c.omega[2], c.phase[2]))
@@ -70,5 +73,5 @@ def torques(c, t, A, E):
 
 
 def initial_torques(p, A, E):
-    """Return the torques [Nm] of WindFieldParameters on azimuth and elevation at t = 0."""
+    """Return the torques [Nm] of WindFieldParameters p on both loads at t = 0 with the axes at A, E [rad]."""
     return torques.py_func(types.SimpleNamespace(**constants(p)), 0.0, A, E) if p.speed > 0.0 else (0.0, 0.0)

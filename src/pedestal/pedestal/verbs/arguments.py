@@ -1,4 +1,4 @@
-"""Arguments that several verbs share."""
+"""Arguments that several verbs of the command line share: their definition, and the check of their values."""
 import argparse
 import os
 import pathlib
@@ -66,8 +66,9 @@ def check_elements(options: argparse.Namespace) -> None:
 
 
 def elements(options: argparse.Namespace) -> dict[str, str]:
-    """Return the arguments of the commands `tle` and `elements` from the file of --tle, {} without one. Raises
-    ValueError."""
+    """Return the arguments of the commands `tle` and `elements` from the file of --tle, {} without --tle.
+
+    Raises ValueError."""
     check_elements(options)
     if not options.tle:
         return {}

@@ -1,4 +1,4 @@
-"""Elements of report pages: numbers, tables, figures, and the page as one self-contained HTML file."""
+"""HTML elements of report pages: numbers, tables, figures, and the page as one self-contained file."""
 import html
 import io
 import math
@@ -33,7 +33,7 @@ figure svg { display: block; width: 100%; height: auto; min-width: 26rem; }
 
 
 def page(title, parts):
-    """Return the text of a page of parts, elements of HTML."""
+    """Return the text of an HTML page; parts: its elements as texts."""
     return ('<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
             '<meta name="viewport" content="width=device-width, initial-scale=1">'
             f'<title>{html.escape(title)}</title><style>{PAGE_CSS}</style></head>\n<body>\n'
@@ -41,7 +41,10 @@ def page(title, parts):
 
 
 def figure(spec, data, reason=''):
-    """Return the figure of a figures.Spec with title and caption; reason: why it cannot be drawn, else ''."""
+    """Return a figure as an HTML element with title and caption.
+
+    spec: figures.Spec; data: argument of its function `draw`; reason: why the figure cannot be drawn, or ''.
+    """
     caption = f'<h3>{html.escape(spec.title)}</h3>'
     if reason:
         return f'<figure id="{spec.key}">{caption}<p class="bad">Not drawn: {html.escape(reason)}.</p></figure>'
@@ -58,7 +61,10 @@ def number(value, unit=''):
 
 
 def table(head, rows, kind=''):
-    """Return an HTML table; the first cell of a row is its name; kind 'n' right-aligns the other cells."""
+    """Return an HTML table; head: texts of its header, or None; rows: lists of texts, the name of the row first.
+
+    kind: CSS class; 'n' aligns the other cells to the right, 'meta' is for the table at the head of a page.
+    """
     def line(cells, tag):
         rest = ''.join(f'<{tag} class="{kind}">{html.escape(cell)}</{tag}>' if kind != 'meta' and kind else
                        f'<{tag}>{html.escape(cell)}</{tag}>' for cell in cells[1:])

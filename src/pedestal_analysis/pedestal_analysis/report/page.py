@@ -27,11 +27,15 @@ MAX_DIAGNOSTICS_ROWS = 200
 
 
 def write(bag_path, output=None, png_folder=None, beam='', vector=None) -> pathlib.Path:
-    """Write the report of a bag and return its path: output, default report.html in the bag (beside a bare .mcap).
+    """Write the report of a bag, and return the path of its file.
 
-    beam: of several, default the first. png_folder: folder for the figures and the overview as PNG; vector: 'pdf' or
-    'svg' for a second file of each figure. The same bag gives the same bytes.
-    Raises bag.BagError if the bag cannot be read to its end, OSError if the report cannot be written.
+    output       file of the report, by default report.html in the bag (beside a bare .mcap)
+    png_folder   folder for the figures and the overview as PNG, None for no such files
+    beam         name of one of several beams, '' for the first
+    vector       'pdf' or 'svg' for a second file of each figure in that folder
+
+    Equal bags give equal bytes. Raises bag.BagError if the bag cannot be read to its end, OSError if the report cannot
+    be written.
     """
     whole = bags.read(bag_path)
     bag = whole.view(beam)
@@ -52,12 +56,12 @@ def write(bag_path, output=None, png_folder=None, beam='', vector=None) -> pathl
 
 
 def _of_axes(name, values, last=''):
-    """Return a row of numbers [(value, unit)] of azimuth and elevation."""
+    """Return a row of a table: name, numbers [(value, unit)] of azimuth and elevation, and the text `last`."""
     return [name, *(elements.number(*value) for value in values), last]
 
 
 def _pointing(bag, data, values):
-    """Return the rows of the table of pointing and torques, per axis."""
+    """Return the rows of the table of pointing errors and torques; values: those of results.measured."""
     noise = values['single_sample_noise_deg'][0]
 
     def row(name, *keys, scale=1.0, unit='deg'):
@@ -79,21 +83,28 @@ def _pointing(bag, data, values):
 
 
 def _torques(data):
+    """Return the rows of the motor torques, [] without them."""
     return [_of_axes(f'torque of motor {i}, rms of the run',
                      [(tracking.known_rms(data.motors[f'{axis}_motor_{i}.effort']), 'Nm') for axis in AXES])
             for i in (1, 2)] if data.motors else []
 
 
 def _labelled(parts, *names):
-    """Return rows [label, number] of results of some parts: the results in names, else all results with a label."""
+    """Return rows [label, number] of results with a label; parts: see results.measured.
+
+    They are the results in names or, without names, all of them.
+    """
     values = results.measured(parts)
     return [[results.RESULT_BY_NAME[name].label, elements.number(*values[name])] for name in names or values
             if results.RESULT_BY_NAME[name].label]
 
 
 def _loop(bag, check):
-    """Return rows on the control loop: rate in the time of the drive, in realtime also in wall time, and lost
-    steps."""
+    """Return rows on the control loop: its rate by the time of the drive, lost steps, and steps missing in the
+    recording.
+
+    In realtime they also state the rate and the jitter by the wall time. check: verify.Report.
+    """
     rows = []
     joints = run_data.table(bag, 'joint_states')
     if joints is not None and joints['t'].size > 1 and joints['t'][-1] > joints['t'][0]:
@@ -120,7 +131,7 @@ def _loop(bag, check):
 
 
 def _not_evaluated(run):
-    """Return a sentence on the reason why nothing of a tracking.Tracking was evaluated."""
+    """Return the sentence that states why a tracking.Tracking has no evaluated part."""
     unknown = run.t.size - np.sum(run.known_mode)
     if unknown == run.t.size:
         return 'The recording does not state the mode of the ACU, so nothing was evaluated.'
@@ -130,7 +141,7 @@ def _not_evaluated(run):
 
 
 def _results(bag, data, check):
-    """Return the section with the results of the run against the truth, if known, and of its control loop."""
+    """Return the section on the results of the run, against the truth if it was recorded, and on its control loop."""
     parts, rows = ['<h2 id="results">Results</h2>'], []
     if data.run is None:
         parts.append(f'<p class="bad">No comparison with the truth: {html.escape(data.no_truth)}.</p>')
@@ -154,7 +165,7 @@ def _results(bag, data, check):
 
 
 def _gaps(bag, check):
-    """Return the section on the problems that verify found and on topics without a message."""
+    """Return the section on the problems in a verify.Report, and on topics without a message."""
     parts = []
     if not check.complete:
         problems = check.problems + [f'{topic.name}: {problem}' for topic in check.topics
@@ -168,7 +179,7 @@ def _gaps(bag, check):
 
 
 def _warnings(check):
-    """Return the warnings above all results: aborted run, lost steps, foreign messages."""
+    """Return the warnings at the head of the page: aborted run, lost steps, foreign messages."""
     return [line for line in (check.ending, check.loss, *check.foreign) if line]
 
 
@@ -177,7 +188,7 @@ def _figures(module, data):
 
 
 def _consistency_table(known):
-    """Return the table of a consistency.Consistency and a sentence for each axis."""
+    """Return the table of a consistency.Consistency, and its verdict as a sentence for each axis."""
     judged = known.axes
 
     def row(name, field, marks=(), unit='', scale=1.0):
@@ -204,7 +215,7 @@ def _consistency_table(known):
 
 
 def _deck(bag, data):
-    """Return the section on the attitude of the INS and the isolation from the ship; [] ashore."""
+    """Return the section on the attitude of the INS and the isolation from the ship; [] for an antenna ashore."""
     if data.attitude is None:
         return []
     ship = isolation.read(bag, data.run) if data.run is not None else None
@@ -214,7 +225,10 @@ def _deck(bag, data):
 
 
 def _diagnostics(statuses):
-    """Return the section on diagnostics other than OK; a status that a node repeats is one row."""
+    """Return the section on diagnostics other than OK. A status that a node repeats is one row.
+
+    statuses: of run_data.RunData.
+    """
     title = '<h2 id="diagnostics">Diagnostics other than OK</h2>'
     rows = {}
     for node in dict.fromkeys(node for _, node, _, _ in statuses):
@@ -233,7 +247,7 @@ def _diagnostics(statuses):
 
 
 def _provenance_table(bag, data):
-    """Return the table of the subject, configuration, versions and file of a bag."""
+    """Return the table at the head of the page: subject, configuration, versions and file of a bag."""
     stamps = bag.index.log
     duration = (stamps.max() - stamps.min()) / 1e9 if stamps.size else 0.0
     versions = ', '.join(f'{key.removeprefix("version.")} {value}' for key, value in bag.metadata.items()
@@ -248,6 +262,7 @@ def _provenance_table(bag, data):
 
 
 def _page(bag, data, check):
+    """Return the text of the page; check: verify.Report of the bag."""
     name = (bag.metadata.get('scenario') or bag.file.stem) + f'/{bag.beam}'.rstrip('/')
     parts = [
         f'<h1>Tracking run: {html.escape(name)}</h1>',

@@ -1,4 +1,8 @@
-"""Figures of a report on the run: pointing, errors, angles, torques, signal, sky, modes. Angles in degrees."""
+"""Figures of a report on a run: pointing, errors, angles, torques, signal, sky plot and modes. Angles are in degrees.
+
+Each function of FIGURES takes the run_data.RunData of a recording (`data`). Functions named draw_ draw into given axes
+of matplotlib, and are also used by the overview.
+"""
 import functools
 import itertools
 
@@ -25,17 +29,18 @@ from pedestal_analysis.report.figures import (
 MODE_COLOURS = dict(zip(modes.MODES, itertools.cycle((
     '#9aa0a6', '#a87b51', '#8364c8', '#b9a3e3', '#e0ac00', '#2f9e5b', '#3aa6b9', '#d1495b', '#e58a95', '#f2b84b',
     '#5b6abf', '#7a8b2a', '#c46aa8', '#4f4f4f'))))
-"""{mode: colour} of the timeline."""
+"""{mode of the ACU: its colour}."""
 LEVEL_COLOURS = (('OK', '#a5d8b5'), ('WARN', '#f2772b'), ('ERROR', '#c81e1e'), ('STALE', '#9aa0a6'))
+"""(name, colour) of each level of the diagnostics, 0 to 3."""
 LOCKED_COLOUR = '#5f93c4'
 ZOOM_SPAN_S = 2.0
 """Span of a zoomed figure [s]."""
 
 
 def _continuous(angle, beside=None):
-    """Return an angle [rad] in degrees without the jump at +-180.
+    """Return an angle (n,) [rad] in degrees, without jumps at +-180.
 
-    beside: a continuous angle [deg]; the result stays within half a turn of it.
+    beside (n,): another angle without jumps [deg]. The result is then within half a turn of that angle.
     """
     angle = np.degrees(angle)
     if beside is not None:
@@ -47,14 +52,17 @@ def _continuous(angle, beside=None):
 
 
 def _middle(run):
-    """Return (first, last time) of the ZOOM_SPAN_S in the middle of the evaluated part, else of the run."""
+    """Return (first, last) time [s] of the ZOOM_SPAN_S in the middle of the evaluated part of a Tracking.
+
+    Without an evaluated part it is the middle of the run.
+    """
     t = run.t[run.tracking] if run.tracking.any() else run.t
     middle = 0.5 * (t[0] + t[-1])
     return middle - 0.5 * ZOOM_SPAN_S, middle + 0.5 * ZOOM_SPAN_S
 
 
 def _slowest(run, angles):
-    """Return (first, last time) of the ZOOM_SPAN_S of the evaluated part in which the angles (n, 2) changed least."""
+    """Return (first, last) time [s] of the ZOOM_SPAN_S of the evaluated part in which angles (n, 2) changed least."""
     steps = round(ZOOM_SPAN_S / np.median(np.diff(run.t)))
     if run.tracking.sum() <= steps or not 0 < steps < run.t.size:
         return _middle(run)
@@ -65,7 +73,10 @@ def _slowest(run, angles):
 
 
 def _scale_to(axes, t, values, tracking):
-    """Scale the axes to the evaluated part; add a note if values outside the part leave the frame."""
+    """Scale the axes of a figure to the evaluated part, and add a note if values outside this part leave the frame.
+
+    t, values (n,): the drawn line; tracking (n,): mask of the evaluated part.
+    """
     shown = np.abs(values[tracking & np.isfinite(values)])
     whole = np.abs(values[np.isfinite(values)])
     if not shown.size or shown.max() == 0.0:
@@ -78,12 +89,13 @@ def _scale_to(axes, t, values, tracking):
 
 
 AXIS_TITLES = (('cross-elevation', 'azimuth'), ('elevation', 'elevation'))
+"""(name of the error, name of the angle) of each axis."""
 
 
 def draw_errors(axes, data, i, window=None):
-    """Draw the receiver error and the filtered error [deg], i: 0 cross-elevation, 1 elevation.
+    """Draw the receiver error and the filtered error [deg]; i: 0 cross-elevation, 1 elevation.
 
-    In a window (first, last time [s]) the true error is drawn too.
+    window: (first, last) time [s] to draw, then together with the true error; None for the whole run.
     """
     run = data.run
     raw, filtered = np.degrees(run.measured[:, i]), np.degrees(run.filtered[:, i])
@@ -99,7 +111,7 @@ def draw_errors(axes, data, i, window=None):
 
 
 def error(data, window=None):
-    """Return the figure of receiver error and filtered error on both axes [deg]; window as in `draw_errors`."""
+    """Return the figure of receiver error and filtered error on both axes [deg]; window: see `draw_errors`."""
     figure, panels = new_panels(2, sharex=True)
     for i in range(2):
         draw_errors(panels[i, 0], data, i, window)
@@ -107,14 +119,14 @@ def error(data, window=None):
 
 
 def error_zoom(data):
-    """Return `error` over the middle ZOOM_SPAN_S, with the truth."""
+    """Return the figure `error` over ZOOM_SPAN_S in the middle of the evaluated part, with the true error."""
     return error(data, _middle(data.run))
 
 
 def angle(data, zoomed=False):
     """Return the figure of the measured and the filtered line of sight in earth angles [deg].
 
-    zoomed: the ZOOM_SPAN_S in which the target moved least, with the truth.
+    zoomed: True for the ZOOM_SPAN_S in which the target moved least, with the true line of sight.
     """
     run = data.run
     figure, panels = new_panels(2, y=[f'{name} [deg]' for _, name in AXIS_TITLES], sharex=True)
@@ -151,6 +163,7 @@ def azimuth(data):
 
 
 def _shade_modes(axes, data):
+    """Shade each time by the colour of its mode, and mark the changes of the mode by dotted lines."""
     for start, stop, mode in data.modes:
         axes.axvspan(start, stop, color=MODE_COLOURS.get(mode, RAW_COLOUR), alpha=0.10, linewidth=0.0)
     for start, _, _ in data.modes[1:]:
@@ -158,7 +171,10 @@ def _shade_modes(axes, data):
 
 
 def draw_pointing(axes, data, i):
-    """Draw the true pointing error [deg], i: 0 cross-elevation, 1 elevation; dashed: a tenth of the beamwidth."""
+    """Draw the true pointing error [deg]; i: 0 cross-elevation, 1 elevation.
+
+    Dashed lines mark a tenth of the beamwidth.
+    """
     run = data.run
     error = np.degrees((run.cross_elevation, run.elevation_error)[i])
     draw_line(axes, run.t, error, color=TRUTH_COLOUR, linewidth=0.8)
@@ -171,8 +187,10 @@ def draw_pointing(axes, data, i):
 
 
 def pointing(data):
-    """Return the figure of the true pointing error on both axes and of the angle off the beam [deg], with ACU
-    modes."""
+    """Return the figure of the true pointing error on both axes, and of the angle from the beam to the target [deg].
+
+    The background shows the modes of the ACU.
+    """
     run = data.run
     figure, panels = new_panels(3, sharex=True)
     distance = np.degrees(np.hypot(run.cross_elevation, run.elevation_error))
@@ -197,7 +215,10 @@ def _mode_legend(figure, data):
 
 
 def draw_torques(axes, data, axis, window=None):
-    """Draw the torques of both motors of an axis, 'azimuth' or 'elevation', and their bias torque [Nm]."""
+    """Draw the torques of both motors of an axis ('azimuth' or 'elevation'), and their bias torque [Nm].
+
+    window: (first, last) time [s] to draw, None for the whole run.
+    """
     motors = data.motors
     first, second = motors[f'{axis}_motor_1.effort'], motors[f'{axis}_motor_2.effort']
     width = 0.7 if window is None else 1.0
@@ -210,6 +231,7 @@ def draw_torques(axes, data, axis, window=None):
 
 
 def _start(data):
+    """Return (first, last) time [s] of the first ZOOM_SPAN_S of the motor torques."""
     start = data.motors['t'][0]
     return start, start + ZOOM_SPAN_S
 

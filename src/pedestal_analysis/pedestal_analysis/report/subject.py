@@ -1,4 +1,4 @@
-"""Subject of a recording in words: date, station and target."""
+"""Subject of a recording in words, for the head of its report: target, date, station and beamwidth."""
 import datetime
 import math
 
@@ -18,14 +18,14 @@ TARGET_DESCRIPTIONS = {
     'step': lambda target: f'step at {target.angle.start:g} s',
     'ramp': lambda target: f'constant rate from {target.angle.start:g} s on',
 }
-"""{kind of target: TargetParameters -> description}."""
+"""{kind of target: function of TargetParameters that returns a description}."""
 
 STATION_TARGET_KINDS = ('leo_pass', 'track_file')
 """Kinds of target that depend on the position of the station."""
 
 
 def place(station):
-    """Return StationParameters as text."""
+    """Return the position in StationParameters as text."""
     return f'latitude {station.latitude_deg:g}, longitude {station.longitude_deg:g} deg, height {station.height:g} m'
 
 
@@ -45,7 +45,7 @@ def rows(bag, data):
 
 
 def _sky(bag, data):
-    """Return rows on the UTC at 0 s and on the highest elevation, for a target with a date."""
+    """Return rows [name, text] on the UTC at 0 s and on the highest elevation; [] for a target without a date."""
     try:
         begin = orbit.instant('stamp_0_utc', _begin(bag))
     except orbit.TargetError:
@@ -61,7 +61,7 @@ def _sky(bag, data):
 
 
 def _begin(bag):
-    """Return the UTC of 0 s in the diagnostics of the receiver, '' if there is none."""
+    """Return the text of the UTC at 0 s that the receiver states in its diagnostics, '' if it states none."""
     if 'diagnostics' not in bag.topics or not bag.rows('diagnostics').size:
         return ''
     for _, _, _, array in bag.messages('diagnostics'):

@@ -1,9 +1,12 @@
-"""Pointing error in the modes that follow a direction without the receiver's errors.
+"""Pointing error of a recorded run in the modes that follow a direction without the angle errors of the receiver.
 
-In `program`, `tle` and `steptrack` the direction is that of the true target. In `preset` it is the requested deck
-angle, which is the reference of the position loop while that stands. The slew to the direction is left out: the part
-begins when the error has moved by less than MAX_DRIFT beamwidths per second for SETTLING_TIME_S. Because step track
-moves the beam on purpose, its part begins HANDOVER_SETTLING_S after the mode.
+In `program`, `tle` and `steptrack` the error is the direction to the true target minus that of the beam. In `preset`
+it is the requested deck angle minus that of the beam. The requested angle is the reference of the position loop while
+this reference stands.
+
+Only the settled part of a mode counts, without the slew to the direction. It begins when the error has moved by less
+than MAX_DRIFT beamwidths per second for SETTLING_TIME_S. Because step track moves the beam on purpose, its settled
+part begins HANDOVER_SETTLING_S after the begin of the mode.
 """
 import numpy as np
 
@@ -11,19 +14,20 @@ from pedestal_analysis.results import tracking
 from pedestal_analysis.results.tracking import DEG_PER_RAD
 
 FOLLOWING_MODES = ('program', 'tle', 'preset', 'steptrack')
-"""Modes with results of their own, each with a row of _PARTS."""
+"""Modes whose pointing error is a result of its own; _PARTS has a function for each."""
 SETTLING_TIME_S = 0.5
 """Time for which the error must be still before a mode counts as settled [s]."""
 MAX_DRIFT = 0.25
 """Largest motion of a still error [beamwidths/s]."""
 MAX_REFERENCE_STEP_RAD = 1e-5
-"""Largest motion of a standing reference in SETTLING_TIME_S [rad]."""
+"""Largest motion within SETTLING_TIME_S of a reference that counts as standing [rad]."""
 
 
 def read(bag, run) -> dict:
-    """Return {mode: errors (k, 2) [deg]} of the settled part of each mode of a bag.Bag and its tracking.Tracking.
+    """Return {mode: pointing errors (k, 2) [deg]} in the settled part of each mode; run: Tracking of the bag.Bag.
 
-    Columns: cross-elevation, elevation. A mode without a settled part is left out.
+    Columns: cross-elevation, elevation. An electronic beam has two rows per step: at the end and at the beginning of
+    the interval. A mode without a settled part is left out.
     """
     found = {}
     for mode in FOLLOWING_MODES:
@@ -43,18 +47,22 @@ def _window(run):
 
 
 def _moved(values, window):
-    """Return the distance (n,) that values (n, 2) moved in the window before each step; infinite without one."""
+    """Return the distance (n,) that values (n, 2) moved in the last `window` steps; infinite in the first rows."""
     out = np.full(len(values), np.inf)
     out[window:] = np.hypot(*(values[window:] - values[:-window]).T)
     return out
 
 
 def _to_target(run):
+    """Return the true pointing error (n, 2) (cross-elevation, elevation) [rad] of a tracking.Tracking."""
     return np.column_stack((run.cross_elevation, run.elevation_error))
 
 
 def _of_table(_, run, inside):
-    """Return (error (n, 2) [rad], mask (n,) of its settled steps) of a mode that follows a table."""
+    """Return (error (n, 2) [rad], mask (n,) of the settled steps) of a mode that follows a table of directions.
+
+    inside (n,): mask of the steps in the mode.
+    """
     error, window = _to_target(run), _window(run)
     on = np.zeros(run.t.size, bool)
     for first, last in tracking.stretches(inside):
@@ -66,7 +74,7 @@ def _of_table(_, run, inside):
 
 
 def _of_steps(_, run, inside):
-    """Return (error (n, 2) [rad], mask (n,) of its settled steps) of step track."""
+    """Return (error (n, 2) [rad], mask (n,) of the settled steps) of step track, whose steps are the mask `inside`."""
     on = np.zeros(run.t.size, bool)
     for first, last in tracking.stretches(inside):
         on[first:last] = run.t[first:last] >= run.t[first] + tracking.HANDOVER_SETTLING_S
@@ -74,7 +82,10 @@ def _of_steps(_, run, inside):
 
 
 def _of_preset(bag, run, inside):
-    """Return (error (n, 2) [rad] against the reference, mask (n,) of its settled steps) of preset angles."""
+    """Return (reference minus beam (n, 2) [rad], mask (n,) of the settled steps) of the mode `preset`.
+
+    inside (n,): mask of the steps in the mode. Columns: cross-elevation, elevation.
+    """
     columns, window = ('azimuth.position', 'elevation.position'), _window(run)
     beam = tracking.on_grid(bag, run.t, 'adu/truth' if 'adu/truth' in bag.topics else 'joint_states', columns)
     error, on = run.reference - beam, np.zeros(run.t.size, bool)
@@ -87,4 +98,4 @@ def _of_preset(bag, run, inside):
 
 
 _PARTS = {'program': _of_table, 'tle': _of_table, 'preset': _of_preset, 'steptrack': _of_steps}
-"""{mode: function(bag, run, steps of the mode (n,)) -> (error, settled steps)}."""
+"""{mode: function(bag, run, mask of the steps in the mode) -> (error (n, 2) [rad], mask of the settled steps)}."""

@@ -1,7 +1,8 @@
-"""Columns of a table by their names: the quantity, and the unit behind it, as in time_s, `az [deg]`, `Azimuth (rad)`.
+"""Search for the columns of a table by their names, for csv_table and the readers of tracks.
 
-The whole name is read. A name of a quantity and a known unit is a candidate; `az_rate` or `time_local` is another
-quantity, because `rate` and `local` are no units. Two candidates are refused by both names.
+The name of a column has a quantity and behind it a unit, as in time_s, `az [deg]`, `Azimuth (rad)`. A column is a
+candidate for a quantity if its name consists of this quantity and a known unit. `az_rate` or `time_local` is another
+quantity, because `rate` and `local` are no units. Two candidates are refused, by an error that names both.
 """
 import math
 import re
@@ -10,7 +11,7 @@ import typing
 from pedestal_common.graph.steps import SECONDS_PER_DAY
 
 METRES_PER_FOOT = 0.3048
-"""International foot [m]."""
+"""Length of the international foot [m]."""
 
 UTC, JULIAN_DATE, MODIFIED_JULIAN_DATE = 'UTC', 'JD', 'MJD'
 """Units of a time with a date: a calendar date (or seconds since 1970), a Julian date, a modified Julian date."""
@@ -39,11 +40,11 @@ _SIZES = {'s': 1.0, 'ms': 1e-3, 'us': 1e-6, 'ns': 1e-9, 'min': 60.0, 'h': 3600.0
 _UTC_PATTERN = re.compile(r'(ut|utc|utcg|gmt|z|zulu|utciso8601|iso8601|iso)?(hrmn(ss|sc)?(fff)?)?')
 """Words behind the name of a time in UTC; HR:MN:SS.fff is of JPL Horizons, UTCG of STK."""
 _APPARENT_NAMES = ('aapp', 'aappr', 'rapp')
-"""Words of JPL Horizons behind an apparent angle in degrees."""
+"""Words that JPL Horizons writes behind an apparent angle in degrees."""
 _BETWEEN_PATTERN = re.compile(r'[\s_\[\](){}<>|,:;.\-"\']+')
 _CAMEL_CASE_PATTERN = re.compile(r'(?<=[a-z])(?=[A-Z])')
 _DERIVED_WORDS = ('rate', 'vel', 'speed', 'acc', 'err', 'sigma', 'std', 'qual', 'valid')
-"""Beginnings of words that make another quantity of the quantity before them."""
+"""Beginnings of words behind a quantity that turn the name into that of another quantity, such as a rate."""
 MAX_LISTED_NAMES = 20
 """Number of names of columns that an error lists."""
 
@@ -56,8 +57,8 @@ class Quantity(typing.NamedTuple):
     """A quantity of a table.
 
         label       its name in errors
-        names       {name: unit of a column without one}; '' for a column that must name its unit
-        unit        unit in which the reader takes the values, a key of the known units
+        names       {name of the quantity in a column: unit if the column names none}; '': a column must name its unit
+        unit        unit in which the reader takes the values
     """
     label: str
     names: dict
@@ -65,7 +66,8 @@ class Quantity(typing.NamedTuple):
 
 
 class Column(typing.NamedTuple):
-    """A column that was taken: its name in the file, the unit of its values, and the size of this unit."""
+    """A column that was found: its name in the file, and the unit of its values. size: this unit in the unit of the
+    Quantity."""
     name: str
     unit: str
     size: float
@@ -84,8 +86,8 @@ def quantity(name):
 def find(names, wanted, required=True):
     """Return the Column of a Quantity among the names of a table; None if no name begins with the quantity.
 
-    Raises ColumnError for two candidates, and for names with the quantity of which none has a known unit. The rate or
-    the error of a quantity that is not required is no such name.
+    Raises ColumnError for two candidates. Also raises ColumnError if names begin with the quantity, but none has a
+    known unit. The name of the rate or the error of a quantity is ignored if the quantity is not required.
     """
     found, others = [], []
     for name in names:
@@ -126,7 +128,8 @@ def listed(names):
 
 
 def _known(name, wanted):
-    """Return (known name of the quantity, rest without blanks and brackets) of a column; None for another quantity."""
+    """Return (name of the quantity, rest without blanks and brackets) of a column's name; None for another
+    quantity."""
     for spaced in (name, _CAMEL_CASE_PATTERN.sub(' ', name)):
         text = ' '.join(spaced.lower().replace('_', ' ').split())
         for known in sorted(wanted.names, key=len, reverse=True):

@@ -16,7 +16,7 @@ SERVICE_CLIENT, SCHEDULE_CLIENT = 'service', 'scenario'
 """Clients of a command by service, whose caller is unknown, and of a command by schedule."""
 
 RESERVED_KEYS = ('granted', 'reply')
-"""Keys of a reply beside the arguments."""
+"""Keys of a reply in addition to the arguments of its command."""
 
 HELD_REFUSAL, LIMITS_REFUSAL, RANGE_REFUSAL = 'control is held by', 'outside limits', 'must be'
 """Parts of the texts of refusals by which a program distinguishes them: another client has control; the angles are
@@ -82,8 +82,10 @@ class CommandDefinition(typing.NamedTuple):
 
 
 def values(definitions, command) -> dict:
-    """Return {argument: number or text} of a command by its CommandDefinition, defaults included. Raises
-    ValueError."""
+    """Return {argument: number or text} of a Command, with the defaults of left-out arguments. Raises ValueError.
+
+    definitions: CommandDefinitions of the node, one of which must have the name of the command.
+    """
     definition = next((row for row in definitions if row.name == command.verb), None)
     if definition is None:
         names = [row.name for row in definitions]

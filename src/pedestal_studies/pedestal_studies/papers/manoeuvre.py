@@ -1,10 +1,10 @@
 """Rate and acceleration of filters through ever sharper reversals (paper 003, figures 3 and 4).
 
-A target moves to and fro through 20 deg at 3.5 deg/s. Its reversals are half a cosine and last 4, 2, 1, 0.5 and 0.35
-s, one after the other. It is measured at 100 Hz with 0.02 deg. Cases are reversal-<s>/<filter>, with the rms of a run
-inside the reversal. `cv` and `ca` are conventional filters of constant velocity and of constant acceleration. `imm-a`
-and `imm-b` are IMMs whose ca model has a process noise of 40 and of 5 deg/s3/sqrt(Hz): `imm` and `imm-b` of the study
-imm-feedforward.
+A target moves to and fro through 20 deg at 3.5 deg/s. In a reversal its rate is half a cosine. The reversals last 4,
+2, 1, 0.5 and 0.35 s, one after the other. The angle is measured at 100 Hz with a noise of 0.02 deg. Cases are
+reversal-<seconds>/<filter>; their metrics are the rms errors of rate and acceleration inside the reversal. `cv` and
+`ca` are conventional filters of constant velocity and of constant acceleration. `imm-a` and `imm-b` are IMMs whose ca
+model has a process noise of 40 and of 5 deg/s3/sqrt(Hz), as in `imm` and `imm-b` of the study imm-feedforward.
 """
 import math
 
@@ -30,7 +30,7 @@ BATCH_RUNS, NOISE_SEED = 25, 1
 """Runs of one batch; seed of their noise."""
 
 REVERSAL_DURATIONS_S = (4.0, 2.0, 1.0, 0.5, 0.35)
-"""Durations of the reversals [s], with peaks of 2.7 to 31 deg/s2."""
+"""Durations of the reversals [s]; their peak accelerations are 2.7 to 31 deg/s2."""
 
 LEAD_TIME_S = 5.0
 """Duration of the uniform motion before the first reversal [s]."""
@@ -54,7 +54,8 @@ RATE_RATIO_TARGET = '>= 3'
 
 def motion():
     """Return (times (n,) [s], truth (angle, rate, acceleration) (n,), {reversal: mask (n,)}) of all reversals."""
-    # legs: time at which the target is in the middle before each reversal; starts: begin of each reversal.
+    # begin: time at which the target is in the middle of its stroke before the next reversal; legs: these times of all
+    # reversals; starts: {reversal: time at which it starts}.
     stroke, rate = profiles.S_MOTION_STROKE_RAD, profiles.S_MOTION_RATE_RAD_S
     begin, legs, starts = LEAD_TIME_S, [], {}
     for reversal in REVERSAL_DURATIONS_S:
@@ -111,7 +112,7 @@ def measured(errors):
 
 
 def rows(values):
-    """Return the rows of values as of `measured`."""
+    """Return the rows of the study; values: as `measured` returns."""
     table = []
     for (reversal, name), (rate, acceleration) in values.items():
         case = f'reversal-{reversal:g}s/{name}'

@@ -1,10 +1,14 @@
 """The default target filter beside filters tuned for one target each: pointing in the closed loop.
 
-Cases are <target>/<filter>. The filter `default` has its default parameters. `tuned` is a filter of one model with the
-noise that points best at this target. `manoeuvre` is an IMM that expects a manoeuvre at any time.
-`current-statistical` is the filter of paper 000 with the default a_max. A ratio is the ratio to `tuned` under the same
-seed. A target whose name ends in -ship is seen from the deck of ship_pass. Targets that manoeuvre hard are those of
-`hard_targets`.
+Cases are <target>/<filter>:
+
+default               target filter with its default parameters
+tuned                 filter of one motion model, whose process noise gives the smallest pointing error at this target
+manoeuvre             IMM that expects a manoeuvre at any time
+current-statistical   filter of paper 000 with its default a_max, the largest acceleration of its model
+
+A ratio divides the pointing error of a case by that of `tuned` under the same seed. A target whose name ends in -ship
+is seen from the deck of the scenario ship_pass. The targets that manoeuvre hard are those of `hard_targets`.
 """
 import dataclasses
 import functools
@@ -45,7 +49,7 @@ TARGET_SCENARIOS: dict[str, tuple[str, dict]] = {
     'uav-500m': ('uav_flyby', {}), 'leo': ('leo_pass', {}), 'geo': ('leo_pass', FIXED_TARGET_PARAMETERS),
     'leo-ship': ('ship_pass', {}), 'leo-ship-ss6': ('ship_pass_ss6', {}),
     'geo-ship': ('ship_pass', FIXED_TARGET_PARAMETERS)}
-"""{target: (scenario, its parameters)}."""
+"""{target: (scenario, parameters that it changes)}."""
 
 HARD_TARGET_SCENARIOS = {
     'ashore': ('track_file', {}), 'ship': ('ship_pass', {'tracking_receiver.target.kind': 'track_file'})}
@@ -57,7 +61,7 @@ HARD_TARGET_DURATION_S = 60.0
 
 
 def _both(**changes):
-    """Return parameters of the filters of both axes."""
+    """Return parameters of the control unit with the same changes for the filters of both axes."""
     return {f'{axis}.filter.{name}': value for axis in ('azimuth', 'elevation') for name, value in changes.items()}
 
 
@@ -120,11 +124,11 @@ def loaded(case):
 
 def pointing(case):
     """Return the rms of the true pointing error [deg] of one run of a Case, both axes; NaN if it left autotrack."""
-    flown = tracking.read(memory_recording.record(loaded(case)))
-    begun = np.flatnonzero(flown.mode == 'autotrack')
-    if not begun.size or np.any(flown.mode[begun[0]:] != 'autotrack'):
+    tracked = tracking.read(memory_recording.record(loaded(case)))
+    begun = np.flatnonzero(tracked.mode == 'autotrack')
+    if not begun.size or np.any(tracked.mode[begun[0]:] != 'autotrack'):
         return math.nan
-    return flown.pointing(tracking.known_rms)
+    return tracked.pointing(tracking.known_rms)
 
 
 def batch(item):
@@ -134,7 +138,7 @@ def batch(item):
 
 
 def rows(values):
-    """Return the rows of values {case: (runs,)}."""
+    """Return the rows of the study; values: {case: pointing error (runs,) [deg]}."""
     table = []
     for name, of_runs in values.items():
         target, _, filter_name = name.partition('/')
@@ -153,7 +157,7 @@ def run(progress, runs=DEFAULT_RUNS, pool=None) -> Result:
 
 
 def figure(values):
-    """Draw the pointing error of every seed over the mean of the tuned filter; values as of `rows`."""
+    """Draw the pointing error of every seed, divided by the mean of the tuned filter; values as of `rows`."""
     drawn, axes = new_panels(1, height=5.4, x='pointing error over that of the tuned filter')
     for name, of_runs in values.items():
         relative = of_runs / values[f'{name.partition("/")[0]}/tuned'].mean()

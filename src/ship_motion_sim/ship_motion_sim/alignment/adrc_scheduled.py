@@ -1,4 +1,7 @@
-"""Level by ADRC with an observer whose bandwidth falls as 6/t: fast at first, little noise later. Azimuth from z3."""
+"""Alignment method: level by ADRC with an observer whose bandwidth falls with time, azimuth from its estimate z3.
+
+The bandwidth 6 / t makes the observer fast at first and its noise small later. Symbols: see the package.
+"""
 import math
 
 import numpy as np
@@ -14,7 +17,7 @@ MAX_OBSERVER_BANDWIDTH_RAD_S, MIN_CONTROL_BANDWIDTH_RAD_S = 1.0, 0.1
 STATE_DTYPE = np.dtype([
     ('t', 'f8'),                            # time since power-up [s]
     ('observer', extended_observer.STATE_DTYPE),
-    ('v1', 'f8', (2,)), ('v2', 'f8', (2,)),
+    ('v1', 'f8', (2,)), ('v2', 'f8', (2,)),     # tracking differentiator: reference of velocity and of its rate
     ('command', 'f8', (3,)), ('azimuth', 'f8'), ('azimuth_sigma', 'f8'), ('level_sigma', 'f8'),
 ], align=True)
 

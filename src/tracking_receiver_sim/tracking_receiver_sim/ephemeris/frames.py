@@ -1,8 +1,8 @@
 """Conversion of orbits from other frames to the earth-fixed frame, and of time systems of files to UTC.
 
-The rotations are those of skyfield: IAU 2006 precession and IAU 2000A nutation, UT1 - UTC and leap seconds from its
-built-in tables, no polar motion (up to 0.3", 9 m on the ground). Every ITRF is taken as WGS84; the difference is some
-centimetres. For dates after the end of the tables of UT1, an orbit may be off by some metres.
+The rotations are those of skyfield: IAU 2006 precession and IAU 2000A nutation, with UT1 - UTC and leap seconds from
+its built-in tables. They omit the polar motion (up to 0.3", 9 m on the ground). Every ITRF is taken as WGS84; the
+difference is some centimetres. For dates after the end of the tables of UT1, an orbit may be wrong by some metres.
 """
 import re
 
@@ -33,9 +33,11 @@ def names():
 
 
 def instants(system, days, seconds):
-    """Return the instants (n,), see track.instant, of days since 1970 and seconds of the day (n,) in a time system of
-    TIME_SYSTEM_OFFSETS_S. Raises ValueError(index of the row) for second 60 of a minute without a leap
-    second."""
+    """Return the instants (n,), see track.instant, of days since 1970 and seconds of the day (n,) in a time system.
+
+    system: key of TIME_SYSTEM_OFFSETS_S. Raises ValueError(index of the row) for second 60 of a minute without a leap
+    second.
+    """
     offset = TIME_SYSTEM_OFFSETS_S[system]
     if offset is None:
         late = np.flatnonzero(seconds >= SECONDS_PER_DAY)

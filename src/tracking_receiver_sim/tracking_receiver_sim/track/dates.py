@@ -1,4 +1,4 @@
-"""Calendar dates with a time of day in the notations of spreadsheets, JPL Horizons and STK, turned into ISO 8601."""
+"""Calendar dates of track files: notations of spreadsheets, JPL Horizons and STK, converted into ISO 8601."""
 import re
 
 MONTH_NAMES = 'jan feb mar apr may jun jul aug sep oct nov dec'.split()
@@ -13,8 +13,8 @@ DATE_PATTERNS = tuple(re.compile(f'{date}(?P<zone> ?(?:Z|UTC|[+-]\\d\\d:?\\d\\d)
                                    rf'(?P<day>\d{{1,2}})\.(?P<month>\d{{1,2}})\.(?P<year>\d{{4}}) {_CLOCK}',
                                    rf'(?:A\.D\. )?(?P<year>\d{{4}})-{_MONTH}-(?P<day>\d\d) {_CLOCK}',
                                    rf'(?P<day>\d{{1,2}}) {_MONTH} (?P<year>\d{{4}}) {_CLOCK}'))
-"""ISO 8601, its basic format (20180723T100000), with strokes, day.month.year, of JPL Horizons (2018-Jul-23), of STK
-(23 Jul 2018)."""
+"""Notations in this order: ISO 8601, its basic format (20180723T100000), year/month/day, day.month.year, JPL Horizons
+(2018-Jul-23), STK (23 Jul 2018)."""
 AMBIGUOUS_PATTERN = re.compile(r'\d{1,2}[/-]\d{1,2}[/-](?:\d{4}|\d\d)\b.*', re.ASCII)
 """A date whose order of day and month differs between countries."""
 DATE_EXAMPLES = ('2018-07-23T10:00:00Z, 2018/07/23 10:00:00, 23.07.2018 10:00:00, 2018-Jul-23 10:00:00 or '

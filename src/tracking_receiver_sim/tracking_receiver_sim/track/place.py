@@ -1,11 +1,12 @@
-"""Parameters that a recorded flight gives if the scenario does not: position of the station, reference range of the
-C/N0, duration of the run.
+"""Parameters of a run that a recorded flight gives if the scenario does not set them.
 
-The station stands beside the fix in the middle of the flight (by time), to the right of the line from the first fix
-to the last. Its distance is the smallest at which no fix comes nearer over ground than the least range. At this range
-the peak speed turns the azimuth by MAX_AZIMUTH_RATE_RAD_S; it is at least MIN_RANGE_M. Because the terrain is not
-known, the station is lower than the lowest fix by STATION_DEPTH_RATIO of the least range. This keeps a level flight
-above the horizon. The height is at most MAX_STATION_HEIGHT_M.
+These are the position of the station, the reference range of the C/N0 and the duration of the run.
+
+The station stands beside the fix in the middle of the flight (by time), to the right of the line from the first fix to
+the last. Its distance is the smallest at which no fix comes nearer over ground than the least range. The least range
+is the range at which the peak speed turns the azimuth by MAX_AZIMUTH_RATE_RAD_S, and at least MIN_RANGE_M. Because the
+terrain is not known, the station is lower than the lowest fix by STATION_DEPTH_RATIO times the least range. This keeps
+a level flight above the horizon. The height of the station is at most MAX_STATION_HEIGHT_M.
 """
 import dataclasses
 import math
@@ -21,7 +22,7 @@ MAX_AZIMUTH_RATE_RAD_S = 0.05
 MIN_RANGE_M = 100.0
 """Lower limit of the least range over ground [m]."""
 STATION_DEPTH_RATIO = 0.1
-"""Depth of the station below the lowest fix over the least range."""
+"""Depth of the station below the lowest fix, divided by the least range [-]."""
 MIN_STATION_HEIGHT_M, MAX_STATION_HEIGHT_M = -500.0, 3000.0
 """Range of the height of the station [m]."""
 MIN_DURATION_S, MAX_DURATION_S = 0.1, 86400.0
@@ -52,7 +53,10 @@ def station_for(fixes, track) -> StationParameters:
 
 
 def _clear_of(along, across, clearance):
-    """Return the least s >= 0 with (0, s) no nearer than the clearance to any of the points (along, across)."""
+    """Return the least s >= 0 at which the place (0, s) has the distance `clearance` or more from all points.
+
+    along, across (n,): coordinates of the points; all lengths in m.
+    """
     near = np.abs(along) < clearance
     half = np.sqrt(clearance**2 - along[near]**2)
     s = 0.0

@@ -1,5 +1,8 @@
-"""The target filter of the angles: one `axis_filter` each for azimuth and elevation;
-f and c are their records (2,)."""
+"""The filters of both axes: one `axis_filter` for the azimuth and one for the elevation of the target.
+
+f, c: records (2,) of axis_filter.FILTER_DTYPE and of axis_filter.CONSTANTS_DTYPE; m: a Measurement. The prior fields
+of a filter hold its prediction.
+"""
 import math
 
 from acu_tracker.estimation.filters import axis_filter
@@ -18,14 +21,17 @@ def start(f, c, m, rate_sigma):
 
 @compiled
 def predict(f, c, T):
-    """Predict by T [s] >= 0 from the last measurement into the prior fields."""
+    """Predict by T [s] >= 0 from the last measurement; the result is in the prior fields."""
     for i in range(2):
         axis_filter.predict(f[i], c[i], T)
 
 
 @compiled
 def innovation(f, c, m):
-    """Return the Innovation of a Measurement against the prediction; its range is NaN, as these filters have none."""
+    """Return the Innovation of a Measurement against the prediction.
+
+    The innovation of the range is NaN, because the filters of the axes use no range.
+    """
     return Innovation((axis_filter.innovation(f[0], c[0], m.axis[0]), axis_filter.innovation(f[1], c[1], m.axis[1])),
                       math.nan, math.nan)
 
@@ -45,7 +51,7 @@ def expected(f):
 
 @compiled
 def outlook(f, c, T):
-    """Return the Motion T [s] >= 0 after the last measurement; the prior fields stay."""
+    """Return the predicted Motion T [s] >= 0 after the last measurement, without a change of the prior fields."""
     return Motion(axis_filter.outlook(f[0], c[0], T), axis_filter.outlook(f[1], c[1], T))
 
 

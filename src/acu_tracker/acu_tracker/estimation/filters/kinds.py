@@ -1,4 +1,7 @@
-"""The table of filter kinds: each row defines the bank of motion models of an axis."""
+"""The table of filter kinds, which the parameter acu.AXIS.filter.kind selects.
+
+Each row defines the bank: the motion models of the filter of one axis, and its gains.
+"""
 import functools
 import typing
 
@@ -14,10 +17,11 @@ starts as a least-squares fit."""
 
 
 class Bank(typing.NamedTuple):
-    """The motion models of an axis.
+    """The motion models of the filter of one axis.
 
-    models (count,): records of motion_models.MOTION_MODEL_DTYPE; dwell: mean time for which one of several models
-    holds [s]; gains: alpha, beta, gamma [-] of a filter of constant gains, alpha 0 for a Kalman filter.
+    models  (count,) of motion_models.MOTION_MODEL_DTYPE
+    dwell   mean time for which one of several models holds [s]
+    gains   alpha, beta, gamma of a filter of constant gain [-]; alpha is 0 for a Kalman filter
     """
     models: np.ndarray
     dwell: float = 0.0
@@ -25,8 +29,12 @@ class Bank(typing.NamedTuple):
 
 
 class Kind(typing.NamedTuple):
-    """A row of FILTER_KINDS. doc: its meaning; bank: function of FilterParameters that returns the Bank of an axis;
-    cartesian: True if the Cartesian filter is used as well."""
+    """A row of FILTER_KINDS.
+
+    doc        meaning of the kind
+    bank       function of FilterParameters that returns the Bank of an axis
+    cartesian  True if the Cartesian filter is used as well
+    """
     doc: str
     bank: typing.Callable
     cartesian: bool = False
@@ -67,7 +75,10 @@ FILTER_KINDS = {
 
 
 def named_models(names) -> tuple:
-    """Return the names of the models in a text such as 'cv ca', in the order of MODEL_NAMES. Raises ParameterError."""
+    """Return the names of the models in a text such as 'cv ca', in the order of MODEL_NAMES.
+
+    Raise ParameterError for a wrong text.
+    """
     models = names.split()
     if not (2 <= len(models) == len(set(models)) and set(models) <= set(MODEL_NAMES)):
         raise ParameterError(f"models = '{names}': must be two or more of {', '.join(MODEL_NAMES)}, each once")

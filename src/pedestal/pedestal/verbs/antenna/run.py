@@ -66,7 +66,7 @@ def main(options: argparse.Namespace) -> int:
     for line in plan.announced():
         print(line)
     outcome = graph.run(plan, bag, console.progress_of_run(chosen.header.duration), servers)
-    # Because these modules import scipy, which takes half a second, they are loaded after the run.
+    # Because these modules import scipy, which takes half a second, the verb loads them after the run.
     from pedestal_analysis.results import results, tracking, verdict
     from pedestal_recording.bag import read
     from pedestal_recording.verify import verify
@@ -82,6 +82,7 @@ def main(options: argparse.Namespace) -> int:
     parts = [results.of_run(view, run) for view, run in zip(views, runs)]
     of_beams = [results.measured(part) for part in parts]
     realtime = chosen.header.pacing == 'realtime'
+    # whole: results of the run, such as lost steps, in contrast to the results of each beam
     whole = results.measured({'run': outcome, 'supervised': outcome if realtime else None})
     lost, steps = whole['lost_steps'][0], outcome.drive.get('steps')
     for beam, found in zip(beams, verdicts):
@@ -125,7 +126,7 @@ def main(options: argparse.Namespace) -> int:
 
 
 def _some(values: dict[str, tuple], names: Collection[str]) -> dict[str, tuple]:
-    """Return the results of some names."""
+    """Return the part of the results {name: (value, unit)} whose names are in `names`."""
     return {name: value for name, value in values.items() if name in names}
 
 
