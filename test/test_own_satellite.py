@@ -31,10 +31,14 @@ def test_a_pass_of_a_tle_file_is_run_from_its_rise(start_run, tmp_path):
     assert done.returncode == 0, done.stderr
     rise = re.search(r'rises (2019-12-10) (12:3\d:\d\d) UTC in azimuth \d+ deg, highest (5\d\.\d) deg', done.stdout)
     assert rise and f'0 s is {rise[1]} {rise[2]} UTC' in done.stdout
-    made = yaml.safe_load(bags.read(run.bag).configuration['scenario'])['tracking_receiver']['ros__parameters']
+    sections = yaml.safe_load(bags.read(run.bag).configuration['scenario'])
+    assert 'scenario.program.time_offset = 0 s in place of 0.2 s, which belongs to the satellite of leo_pass' in (
+        done.stdout.splitlines())
+    assert sections['scenario']['ros__parameters']['program.time_offset'] == 0.0
+    made = sections['tracking_receiver']['ros__parameters']
     assert made['target.leo_pass.start_time'] == f'{rise[1]}T{rise[2]}Z'
     assert made['target.station.latitude_deg'] == 47.5
-    known = yaml.safe_load(bags.read(run.bag).configuration['scenario'])['acu']['ros__parameters']
+    known = sections['acu']['ros__parameters']
     assert known['prediction.line_1'] == LeoPassParameters().line_1                   # mode tle knows it too
     assert known['prediction.start_time'] == f'{rise[1]}T{rise[2]}Z'
     assert known['prediction.station.latitude_deg'] == 47.5

@@ -280,7 +280,7 @@ def parse_override(text: str) -> tuple[str, str, typing.Any]:
     node, dot, key = left.partition('.')
     if not (equals and dot and key):
         raise ScenarioError(f'--param {text!r}: must be node.key=value, as in '
-                            'acu.azimuth.feedforward.bandwidth=20')
+                            'acu.azimuth.feedforward.bandwidth=12')
     parameters_of(node)
     try:
         return node, key, plain_yaml.parse(right)

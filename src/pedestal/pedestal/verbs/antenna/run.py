@@ -47,6 +47,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 START_TIME_PARAMETER = 'tracking_receiver.target.leo_pass.start_time'
+PROGRAM_DELAY_PARAMETER = 'scenario.program.time_offset'
 MAX_LOST_STEP_SHARE = 0.01
 """Largest share of lost steps of a realtime run, outside announced restarts."""
 
@@ -166,6 +167,11 @@ def _chosen(options: argparse.Namespace) -> 'Scenario | None':
         start, duration, line = selection.choose('next' if options.which is None else options.which, duration)
         print(line)
         changes = start + changes
+    if options.tle and (offset := draft.header.program.time_offset) and not any(
+            change.startswith(PROGRAM_DELAY_PARAMETER + '=') for change in changes):
+        print(f'{PROGRAM_DELAY_PARAMETER} = 0 s in place of {offset:g} s, which belongs to the satellite of '
+              f'{draft.name}')
+        changes.append(f'{PROGRAM_DELAY_PARAMETER}=0')
     return scenario.checked(draft.changed(changes), options.seed, duration, options.pacing)
 
 
