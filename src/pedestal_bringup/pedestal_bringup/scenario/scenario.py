@@ -340,6 +340,10 @@ class Draft:
         changes = [parse_override(override) for override in overrides]
         for node, key, value in changes:
             sections.setdefault(node, {})[key] = value
+        given = {f'{node}.{key}': value for node, key, value in changes}
+        if given.get('ship_motion.ship.motion') == 'recorded' and 'ship_motion.ship.heading_deg' not in given:
+            # The recording holds the heading, so that of the scenario ends.
+            sections['ship_motion'].pop('ship.heading_deg', None)
         for node, key, value in changes:
             absent = node in OPTIONAL_NODES and not sections['scenario'].get('ship')
             if absent and parameters.without_ros({key: value}):
