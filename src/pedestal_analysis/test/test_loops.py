@@ -1,5 +1,6 @@
 """`pedestal tune --loops`: the design against the drive as it comes, margins measured on the plant, refusals."""
 import math
+import re
 
 import pytest
 
@@ -30,6 +31,22 @@ def test_the_plant_that_comes_with_the_product_gets_the_gains_it_has(pedestal, t
         assert new.feedforward.bandwidth == pytest.approx(old.feedforward.bandwidth, rel=0.1)
         assert new.feedforward.inertia == pytest.approx(old.feedforward.inertia, rel=0.005)
     assert all(line.count('(>= ') == 2 for line in output.splitlines() if ' speed ' in line or ' position ' in line)
+
+
+def test_a_loop_slower_than_required_and_one_without_a_gain_margin_are_named(pedestal):
+    """The speed loop of leo_pass crosses below 28 Hz. The soft gear needs a slower position loop for its margins.
+    30 Hz is above an eighth of the speed loop. The current loops never reach -180 deg."""
+    slower = r'azimuth {} loop: {} Hz required, [\d.]+ Hz reached: {}'
+    for options, loop, wanted, reason in (
+            ((), 'speed', '28', 'the gains are those of a rigid axis'),
+            (('--param', SOFT[0], '--param', SOFT[1]), 'position', '3.5', 'a faster loop does not hold the required'),
+            (('--position-bandwidth', '30', '--speed-bandwidth', '28'), 'position', '30',
+             'a position loop has at most 1/8')):
+        code, output, _ = pedestal('tune', 'leo_pass', '--loops', '--axis', 'azimuth', '--output',
+                                   f'{loop}{wanted}.yaml', *options)
+        assert code == 0 and re.search(slower.format(loop, wanted, reason), output)
+        assert 'no gain margin of azimuth current: the open loop does not reach -180 deg' in output
+        assert 'beyond' not in output
 
 
 def test_a_soft_gear_makes_the_loop_slower_until_it_holds_its_margins():
