@@ -7,6 +7,9 @@ of 210 kg m2). The scaling keeps the resonance frequencies of gears and motors:
                 rated torque; inertia with the torque to the power 5/3; friction and brake with the torque
     gear, load  stiffness, damping and viscous friction with the load's inertia; other friction and unbalance with
                 the inertia to the power 2/3
+    receiver    C/N0 of the scenario for the area of the mirror: a satellite's power, and the noise of the receiver,
+                stay the same
+    wind        the diameter of the mirror
     structure   the data sheet's lowest frequency, or the average of antennas of this diameter (data_sheet_format)
     loops       the design of tuning/loops.py; `pedestal tune --loops` then measures the loops
 
@@ -25,6 +28,12 @@ from pedestal_common.text_files import parameter_file
 
 BACK_EMF_SHARE, RESISTANCE_VOLTAGE_SHARE, INDUCTANCE_VOLTAGE_SHARE = 0.85, 0.033, 0.24
 """Shares of the phase voltage: back-EMF at rated speed, drops over resistance and inductance at rated torque [-]."""
+
+KNOWN_MIRROR_M = 2.4
+"""Diameter of the mirror for which the C/N0 of the scenarios holds [m] (AntennaParameters)."""
+
+PROGRAM_ERRORS = {'program.time_offset', 'program.azimuth_offset', 'program.elevation_offset'}
+"""Errors of the program track in a scenario."""
 
 RATE_SHARE = 0.9
 """Ratio of the rate that replaces an unreachable rate to the rate that an axis reaches [-]."""
@@ -128,15 +137,42 @@ def _motors(name, values):
             raise ParameterError(f'adu.{name}: motor_{number}.{error}') from None
 
 
+def cn0(sheet):
+    """Return the C/N0 [dB-Hz] on the beam axis at the reference range: of the DataSheet, else by the area of the
+    mirror."""
+    known = _receiver(sheet).cn0_dbhz
+    return sheet.cn0 or float(f'{known + 20.0 * math.log10(sheet.mirror / KNOWN_MIRROR_M):.4g}')
+
+
+def _receiver(sheet):
+    """Return the ReceiverParameters of the scenario of a DataSheet."""
+    return scenario.load(sheet.like).node_parameters('tracking_receiver').receiver
+
+
+def _assumed(sheet):
+    """Return a line for each assumed value."""
+    lines = []
+    if not sheet.cn0:
+        receiver = _receiver(sheet)
+        lines.append(f'no --cn0: {cn0(sheet):.3g} dB-Hz at {1e-3 * receiver.reference_range:g} km, that of '
+                     f'{sheet.like} for the area of the mirror, is taken; the receiver locks at '
+                     f'{receiver.acquire_level_dbhz:g} dB-Hz')
+    if sheet.mode_share and not sheet.mode:
+        lines.append(f'no --mode: {sheet.structural_frequency:.3g} Hz, the average of antennas of {sheet.mirror:g} m, '
+                     'is taken for the structure')
+    return lines
+
+
 def sections(sheet, title):
     """Return {node: {key: value}} of the scenario of a DataSheet. Raises ScenarioError, ParameterError, LoopError."""
     from pedestal_analysis.tuning import loops
     _, content = scenario.text(sheet.like)
     found = scenario.by_node(parameter_file.parse(content))
     found['scenario']['title'] = title
-    if 'program.time_offset' in found['scenario']:  # keeps the offset in beamwidths
-        found['scenario']['program.time_offset'] *= min(1.0, sheet.theta / 0.0175)
-    found['tracking_receiver']['antenna.beamwidth'] = sheet.theta
+    for key in PROGRAM_ERRORS & set(found['scenario']):  # keeps the error in beamwidths
+        found['scenario'][key] *= min(1.0, sheet.theta / 0.0175)
+    found['tracking_receiver'] |= {'antenna.beamwidth': sheet.theta, 'receiver.cn0_dbhz': cn0(sheet)}
+    found['adu']['wind.field.diameter'] = sheet.mirror
     w_s = 2.0 * math.pi * loops.DEFAULT_SPEED_CROSSOVER_HZ
     for name in AXES:
         values = axis(sheet, name)
@@ -178,9 +214,7 @@ def new(sheet, name, command):
     Raises ScenarioError for values that contradict each other.
     """
     sheet, remarks = attainable(sheet)
-    if sheet.mode_share and not sheet.mode:
-        remarks.append(f'no --mode: {sheet.structural_frequency:.3g} Hz, the average of antennas of '
-                       f'{sheet.mirror:g} m, is taken for the structure')
+    remarks += _assumed(sheet)
     title = f'{sheet.mirror:g} m antenna, beam {math.degrees(sheet.theta):.3g} deg, on the mission of {sheet.like}'
     found = sections(sheet, title)
     content = text(found, (f'made by: {command}', 'Values that are not in the data sheet are scaled from the antenna '
