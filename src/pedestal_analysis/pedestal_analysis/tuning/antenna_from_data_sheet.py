@@ -32,9 +32,6 @@ BACK_EMF_SHARE, RESISTANCE_VOLTAGE_SHARE, INDUCTANCE_VOLTAGE_SHARE = 0.85, 0.033
 KNOWN_MIRROR_M = 2.4
 """Diameter of the mirror for which the C/N0 of the scenarios holds [m] (AntennaParameters)."""
 
-PROGRAM_ERRORS = {'program.time_offset', 'program.azimuth_offset', 'program.elevation_offset'}
-"""Errors of the program track in a scenario."""
-
 RATE_SHARE = 0.9
 """Ratio of the rate that replaces an unreachable rate to the rate that an axis reaches [-]."""
 
@@ -169,7 +166,7 @@ def sections(sheet, title):
     _, content = scenario.text(sheet.like)
     found = scenario.by_node(parameter_file.parse(content))
     found['scenario']['title'] = title
-    for key in PROGRAM_ERRORS & set(found['scenario']):  # keeps the error in beamwidths
+    for key in scenario.PROGRAM_ERRORS.keys() & set(found['scenario']):  # keeps the error in beamwidths
         found['scenario'][key] *= min(1.0, sheet.theta / 0.0175)
     found['tracking_receiver'] |= {'antenna.beamwidth': sheet.theta, 'receiver.cn0_dbhz': cn0(sheet)}
     found['adu']['wind.field.diameter'] = sheet.mirror

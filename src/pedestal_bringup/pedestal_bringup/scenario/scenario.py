@@ -49,6 +49,10 @@ class ProgramParameters(parameters.Parameters):
                                                'refraction is added to the prediction; 0: no refraction')
 
 
+PROGRAM_ERRORS = {'program.time_offset': 's', 'program.azimuth_offset': 'rad', 'program.elevation_offset': 'rad'}
+"""{error of the prediction in the header of a scenario: its unit}."""
+
+
 @dataclasses.dataclass(frozen=True)
 class RestartParameters(parameters.Parameters):
     """Restarts of nodes that die in a realtime `pedestal run`; in lockstep a dead node ends the run."""
