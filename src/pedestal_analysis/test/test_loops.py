@@ -30,7 +30,8 @@ def test_the_plant_that_comes_with_the_product_gets_the_gains_it_has(pedestal, t
         new, old = (getattr(each.node_parameters('acu'), axis) for each in (chosen, before))
         assert new.feedforward.bandwidth == pytest.approx(old.feedforward.bandwidth, rel=0.1)
         assert new.feedforward.inertia == pytest.approx(old.feedforward.inertia, rel=0.005)
-    assert all(line.count('(>= ') == 2 for line in output.splitlines() if ' speed ' in line or ' position ' in line)
+    rows = [line for line in output.splitlines() if re.match(r'\w+ (speed|position) +[\d.]+ Hz', line)]
+    assert len(rows) == 4 and all(line.count('(>= ') == 2 for line in rows)
 
 
 def test_a_loop_slower_than_required_and_one_without_a_gain_margin_are_named(pedestal):

@@ -6,7 +6,7 @@ encoders    tracking.Tracking with the true direction of the dish beside the enc
 filter      consistency.Consistency                     isolation   isolation.Isolation
 attitude    known_attitude.KnownAttitude                keyholes    tracking.keyholes
 run         start.Outcome                               supervised  start.Outcome in realtime
-MODE        errors of mode_pointing.read, for each of its FOLLOWING_MODES
+MODE        errors of mode_pointing.read, for each of its FOLLOWED_DIRECTIONS
 Errors are taken per axis and sample. "Both axes together" pools the samples of both axes; the result is not the angle
 between beam and target.
 """
@@ -48,8 +48,8 @@ MARK_MEANINGS = {'too sure': 'the errors are larger than it states',
 
 
 def _of_mode(mode):
-    """Return the rows of the pointing error in a mode of mode_pointing.FOLLOWING_MODES."""
-    against = 'requested angles minus true beam' if mode == 'preset' else 'true target minus true beam'
+    """Return the rows of the pointing error in a mode of mode_pointing.FOLLOWED_DIRECTIONS."""
+    against = f'{mode_pointing.FOLLOWED_DIRECTIONS[mode]} minus true beam'
     return (Result(f'{mode}_pointing_rms_deg', 'deg', mode, known_rms,
                    f'Rms of the true pointing error ({against}), both axes together, in settled `{mode}`.'),
             Result(f'{mode}_pointing_max_deg', 'deg', mode, largest,
@@ -76,7 +76,7 @@ RESULTS = (
     Result('pointing_loss_max_db', 'dB', 'tracking', pointing_loss.max_db,
            'Largest loss of received power by the true pointing error, from the pattern of the beam, in settled '
            'autotrack.', brief=True),
-    *itertools.chain.from_iterable(map(_of_mode, mode_pointing.FOLLOWING_MODES)),
+    *itertools.chain.from_iterable(map(_of_mode, mode_pointing.FOLLOWED_DIRECTIONS)),
     Result('cross_elevation_rms_deg', 'deg', 'tracking', lambda run: run.pointing(known_rms, 0),
            'Rms of the true pointing error in cross-elevation, in settled autotrack.'),
     Result('elevation_rms_deg', 'deg', 'tracking', lambda run: run.pointing(known_rms, 1),
