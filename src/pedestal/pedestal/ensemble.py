@@ -107,4 +107,5 @@ class Trials(Mapping[str, np.ndarray]):
         if not np.array_equal(self.seeds, other.seeds):
             raise ValueError('the trials have different seeds and cannot be paired')
         name, other_name = comparison.names(self._plan, other._plan)
-        return comparison.sentence(comparison.Sides(name, other_name, self._table, other._table), by)
+        return comparison.unchanged(self._plan, other._plan) or comparison.sentence(
+            comparison.Sides(name, other_name, self._table, other._table), by)

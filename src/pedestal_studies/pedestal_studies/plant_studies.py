@@ -73,7 +73,8 @@ def bode_study(source, progress):
                   for name, colour in zip(AXES, (FILTERED_COLOUR, TRUTH_COLOUR))}
         return lambda: bode.bode_figure(f'{loop} loops of {plant.name}', curves, None)
 
-    return Result(bode.rows(responses), {loop: drawn(loop) for loop in ('speed', 'position')})
+    return Result(bode.rows(responses), {loop: drawn(loop) for loop in ('speed', 'position')},
+                  bode.without_gain_margin(responses))
 
 
 def servo_study(source, progress):

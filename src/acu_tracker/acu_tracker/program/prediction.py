@@ -118,14 +118,14 @@ class Predictor:
         """Return the Predicted of the sun for a stamp [s]."""
         if not self._utc_known:
             return Predicted(NO_TRACK, Reason.NO_UTC)
-        return _table(self._sun_angles, stamp, SUN_ROW_INTERVAL_S)
+        return _table(self.sun_angles, stamp, SUN_ROW_INTERVAL_S)
 
     def diagnostic_values(self, stamp):
         """Return the values for the diagnostics [(key, text)] at a stamp [s].
 
         The values are azimuth and elevation of the sun, if UTC is known, and the elements of the satellite, if any.
         """
-        sun_now = np.degrees(self._sun_angles(np.array([stamp]))[0]) if self._utc_known else ()
+        sun_now = np.degrees(self.sun_angles(np.array([stamp]))[0]) if self._utc_known else ()
         lines = () if self._satellite is None else ('omm',) if self.parameters.omm else ('line_1', 'line_2')
         return [*((f'sun_{axis}_deg', f'{angle:.2f}') for axis, angle in zip(topics.AXES, sun_now)),
                 *((line, getattr(self.parameters, line)) for line in lines)]
@@ -137,7 +137,7 @@ class Predictor:
         if reason == Reason.TOO_OLD:
             return f'epoch {abs(self._age(stamp)):.1f} days from now; must be at most {self.parameters.oldest:g}'
         if reason == Reason.BELOW_HORIZON:
-            rises = _next_rise(self._satellite_angles if mode == Mode.TLE else self._sun_angles, stamp)
+            rises = _next_rise(self._satellite_angles if mode == Mode.TLE else self.sun_angles, stamp)
             if math.isnan(rises):
                 return f'no rise within {RISE_SEARCH_SPAN_S / SECONDS_PER_DAY:g} days'
             return f'next rise at {orbit.iso(*self._julian(rises))}'
@@ -162,7 +162,7 @@ class Predictor:
         julian, fraction = self._julian(0.0)
         return _angles(orbit.enu(self._satellite, self.parameters.station, julian, fraction, times)[0])
 
-    def _sun_angles(self, times):
+    def sun_angles(self, times):
         """Return azimuth and elevation (n, 2) [rad] of the sun at stamps (n,) [s]."""
         julian, fraction = self._julian(0.0)
         fractions = fraction + times / SECONDS_PER_DAY

@@ -19,7 +19,7 @@ def add_duration(parser: argparse.ArgumentParser, whole: str = 'a run') -> None:
                         'default: value of the scenario')
 
 
-def add_param(parser: argparse.ArgumentParser, example: str = 'acu.azimuth.feedforward.bandwidth=20') -> None:
+def add_param(parser: argparse.ArgumentParser, example: str = 'acu.azimuth.feedforward.bandwidth=12') -> None:
     """Add --param NODE.KEY=VALUE, which may be repeated."""
     parser.add_argument('--param', action='append', default=[], metavar='NODE.KEY=VALUE',
                         help=f'parameter and its new value, for example {example}; may be repeated')

@@ -8,6 +8,7 @@ from pedestal_analysis import console
 from pedestal_analysis.reprocess import difference, recompute, what_if
 from pedestal_analysis.results import tracking
 from pedestal_analysis.results.results import row
+from pedestal_common import parameters
 from pedestal_common.graph import topics
 from pedestal_common.graph.steps import NS_PER_SECOND
 from pedestal_common.wire import messages, records
@@ -76,7 +77,7 @@ def _node_report(recording, node, given, changes, options):
     if changes:
         new = recompute.recompute(recording, node, recompute.parameters_of(recording, node, given, changes),
                                   {step: [command for command, _ in made] for step, made in done.requests.items()})
-        report = _old_against_new(recording, done, new, tolerance, changes)
+        report = _old_against_new(recording, done, new, tolerance, _changed(params, changes, options.params_file))
     elif options.live:
         from pedestal_analysis.reprocess import live
         report = _against_recorded(recording, live.outputs(recording, done, params), done, tolerance)
@@ -179,14 +180,25 @@ def _encoder_note(recording):
     return [f'note: {tracking.ENCODER_BEAM_NOTE}'] if tracking.by_encoders(recording.bag) else []
 
 
-def _old_against_new(recording, old, new, tolerance, changes):
+def _changed(params, changes, params_file):
+    """Return the line on changes {key: value} of a parameter dataclass: which differ from its values and which do
+    not."""
+    values, origin = parameters.as_dict(params), params_file or 'the recording'
+    same = ', '.join(f'{key} = {value}' for key, value in changes.items() if value == values[key])
+    different = ', '.join(f'{key} = {value}' for key, value in changes.items() if value != values[key])
+    if not different:
+        return f'nothing is changed: {origin} has the same values ({same})'
+    return f'changed: {different}' + (f'; the same as in {origin}: {same}' if same else '')
+
+
+def _old_against_new(recording, old, new, tolerance, changed):
     """Return the NodeReport of a node with changed parameters: old and new results, and differences of the messages.
 
-    old, new: Recomputed with the unchanged and with the changed parameters; changes: {key: value}.
+    old, new: Recomputed with the unchanged and with the changed parameters; changed: line about the changes.
     """
     before = {name: recording.output(name) if recording.has(name) else output for name, output in old.outputs.items()}
     origin = 'recorded' if any(map(recording.has, old.outputs)) else 'recomputed with unchanged parameters'
-    lines = [f'changed: {", ".join(f"{key} = {value}" for key, value in changes.items())}; old: {origin}']
+    lines = [f'{changed}; old: {origin}']
     lines += [line for step, made in new.requests.items() for line in _requests_of_step(new, step, made)]
     rows = []
     if new.node == 'acu' and len(new.feed.stamps):

@@ -1,20 +1,30 @@
 """Pointing error of a recorded run in the modes that follow a direction without the angle errors of the receiver.
 
-In `program`, `tle` and `steptrack` the error is the direction to the true target minus that of the beam. In `preset`
-it is the requested deck angle minus that of the beam. The requested angle is the reference of the position loop while
-this reference stands.
+The error is the direction that the mode follows minus the direction of the beam. `program`, `tle` and `steptrack`
+follow the true target. `preset` follows the requested deck angle, which is the reference of the position loop while
+this reference stands. `slave` follows the commanded earth angle with its rates, `sun` the sun as seen from the
+station.
 
 Only the settled part of a mode counts, without the slew to the direction. It begins when the error has moved by less
-than MAX_DRIFT beamwidths per second for SETTLING_TIME_S. Because step track moves the beam on purpose, its settled
-part begins HANDOVER_SETTLING_S after the begin of the mode.
+than MAX_DRIFT beamwidths per second for SETTLING_TIME_S. In `preset` and `slave`, which may get another direction,
+each slew is left out. Because step track moves the beam on purpose, its settled part begins HANDOVER_SETTLING_S after
+the begin of the mode.
 """
 import numpy as np
 
+from acu_tracker.operating.command_table import ACU_COMMANDS
+from acu_tracker.program.prediction import PredictionParameters, Predictor
 from pedestal_analysis.results import tracking
 from pedestal_analysis.results.tracking import DEG_PER_RAD
+from pedestal_common.compiled import compiled
+from pedestal_common.geometry import line_of_sight
+from pedestal_common.graph.topics import AXES
+from pedestal_common.parameters import build
+from pedestal_common.wire import commands
 
-FOLLOWING_MODES = ('program', 'tle', 'preset', 'steptrack')
-"""Modes whose pointing error is a result of its own; _PARTS has a function for each."""
+FOLLOWED_DIRECTIONS = {'program': 'true target', 'tle': 'true target', 'preset': 'requested angles',
+                       'steptrack': 'true target', 'slave': 'commanded direction', 'sun': 'direction of the sun'}
+"""{mode with results of its own, and with a row of _PARTS: the direction that it follows}."""
 SETTLING_TIME_S = 0.5
 """Time for which the error must be still before a mode counts as settled [s]."""
 MAX_DRIFT = 0.25
@@ -30,13 +40,13 @@ def read(bag, run) -> dict:
     the interval. A mode without a settled part is left out.
     """
     found = {}
-    for mode in FOLLOWING_MODES:
+    for mode, direction in FOLLOWED_DIRECTIONS.items():
         inside = run.mode == mode
         if not inside.any():
             continue
         error, on = _PARTS[mode](bag, run, inside)
         if np.isfinite(error[on]).any():
-            parts = [error[on], run.begun[on]] if run.electronic and mode != 'preset' else [error[on]]
+            parts = [error[on], run.begun[on]] if run.electronic and direction == 'true target' else [error[on]]
             found[mode] = np.concatenate(parts) * DEG_PER_RAD
     return found
 
@@ -58,19 +68,44 @@ def _to_target(run):
     return np.column_stack((run.cross_elevation, run.elevation_error))
 
 
+@compiled
+def _fill_offsets(beam, directions, error):
+    """Fill error (n, 2) [rad] with the offsets of earth directions (n, 2) from the beam (n, 2)."""
+    for k in range(len(beam)):
+        x, y, z = line_of_sight.direction(directions[k, 0], directions[k, 1])
+        error[k, 0], error[k, 1] = line_of_sight.offsets(beam[k, 0], beam[k, 1], x, y, z)
+
+
+def _to_earth_direction(run, directions):
+    """Return the error (n, 2) [rad] of the true beam against earth angles (n, 2)."""
+    error = np.empty_like(directions)
+    _fill_offsets(run.beam_earth, directions, error)
+    return error
+
+
 def _of_table(_, run, inside):
     """Return (error (n, 2) [rad], mask (n,) of the settled steps) of a mode that follows a table of directions.
 
     inside (n,): mask of the steps in the mode.
     """
-    error, window = _to_target(run), _window(run)
+    return _after_slew(_to_target(run), run, inside)
+
+
+def _after_slew(error, run, inside):
+    """Return (error (n, 2) [rad], mask (n,) of the steps after the first slew of each stretch)."""
     on = np.zeros(run.t.size, bool)
     for first, last in tracking.stretches(inside):
-        still = _moved(error[first:last], window) < MAX_DRIFT * SETTLING_TIME_S * run.beamwidth
-        long = np.flatnonzero(np.convolve(still, np.ones(window, int))[:last - first] == window)
-        if long.size:
-            on[first + long[0]:last] = True
+        settled = np.flatnonzero(_settled(error[first:last], run))
+        if settled.size:
+            on[first + settled[0]:last] = True
     return error, on
+
+
+def _settled(error, run):
+    """Return the mask (n,) of the steps at which the error (n, 2) [rad] has been still for SETTLING_TIME_S."""
+    window = _window(run)
+    still = _moved(error, window) < MAX_DRIFT * SETTLING_TIME_S * run.beamwidth
+    return np.convolve(still, np.ones(window, int))[:len(error)] == window
 
 
 def _of_steps(_, run, inside):
@@ -97,5 +132,31 @@ def _of_preset(bag, run, inside):
     return error, on
 
 
-_PARTS = {'program': _of_table, 'tle': _of_table, 'preset': _of_preset, 'steptrack': _of_steps}
+def _of_slave(bag, run, inside):
+    """Return (error (n, 2) [rad] against the commanded direction, mask (n,) of its settled steps)."""
+    directions = np.full((run.t.size, 2), np.nan)
+    for t, command, reply in tracking.replies(bag, 'acu/command_result'):
+        if command.verb == 'slave' and reply.granted:
+            given, later = commands.values(ACU_COMMANDS, command), run.t >= t
+            moved = np.minimum(run.t[later] - t, given['moves'])
+            for i, axis in enumerate(AXES):
+                directions[later, i] = given[axis] + given[f'{axis}_rate'] * moved
+    error, on = _to_earth_direction(run, directions), np.zeros(run.t.size, bool)
+    for first, last in tracking.stretches(inside):
+        on[first:last] = _settled(error[first:last], run)
+    return error, on
+
+
+def _of_sun(bag, run, inside):
+    """Return (error (n, 2) [rad] against the sun, mask (n,) of its settled steps); NaN without recorded parameters."""
+    known = bag.configuration['parameters'].get('acu', {})
+    if not known:
+        return np.full((run.t.size, 2), np.nan), inside
+    given = {key: value for key, value in known.items() if key.startswith('prediction.')}
+    sun = Predictor(build(PredictionParameters, given, 'prediction.'), bag.start).sun_angles(run.t)
+    return _after_slew(_to_earth_direction(run, sun), run, inside)
+
+
+_PARTS = {'program': _of_table, 'tle': _of_table, 'preset': _of_preset, 'steptrack': _of_steps, 'slave': _of_slave,
+          'sun': _of_sun}
 """{mode: function(bag, run, mask of the steps in the mode) -> (error (n, 2) [rad], mask of the settled steps)}."""

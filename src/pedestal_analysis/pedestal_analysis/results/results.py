@@ -11,7 +11,7 @@ isolation   isolation.Isolation
 attitude    known_attitude.KnownAttitude
 run         pedestal_bringup.graph.start.Outcome
 supervised  the same Outcome, of a run in realtime
-MODE        pointing errors of mode_pointing.read in this mode, one of its FOLLOWING_MODES
+MODE        pointing errors of mode_pointing.read in this mode, one of its FOLLOWED_DIRECTIONS
 Errors are taken per axis and sample. "Both axes together" pools the samples of both axes; the result is not the angle
 between beam and target.
 """
@@ -55,8 +55,8 @@ MARK_MEANINGS = {'too sure': 'the errors are larger than it states',
 
 
 def _of_mode(mode):
-    """Return the two Results of the pointing error in a mode of mode_pointing.FOLLOWING_MODES: rms and maximum."""
-    against = 'requested angles minus true beam' if mode == 'preset' else 'true target minus true beam'
+    """Return the two Results of the pointing error in a mode of mode_pointing.FOLLOWED_DIRECTIONS: rms, maximum."""
+    against = f'{mode_pointing.FOLLOWED_DIRECTIONS[mode]} minus true beam'
     return (Result(f'{mode}_pointing_rms_deg', 'deg', mode, known_rms,
                    f'Rms of the true pointing error ({against}), both axes together, in settled `{mode}`.'),
             Result(f'{mode}_pointing_max_deg', 'deg', mode, largest,
@@ -83,7 +83,7 @@ RESULTS = (
     Result('pointing_loss_max_db', 'dB', 'tracking', pointing_loss.max_db,
            'Largest loss of received power by the true pointing error, from the pattern of the beam, in settled '
            'autotrack.', brief=True),
-    *itertools.chain.from_iterable(map(_of_mode, mode_pointing.FOLLOWING_MODES)),
+    *itertools.chain.from_iterable(map(_of_mode, mode_pointing.FOLLOWED_DIRECTIONS)),
     Result('cross_elevation_rms_deg', 'deg', 'tracking', lambda run: run.pointing(known_rms, 0),
            'Rms of the true pointing error in cross-elevation, in settled autotrack.'),
     Result('elevation_rms_deg', 'deg', 'tracking', lambda run: run.pointing(known_rms, 1),

@@ -15,6 +15,7 @@ from pedestal_common.compiled import compiled
 from pedestal_common.geometry import line_of_sight
 from pedestal_common.graph.steps import NS_PER_SECOND
 from pedestal_common.parameters import build
+from pedestal_common.wire import commands
 from tracking_receiver_sim.path import arrival
 from tracking_receiver_sim.path.params import PathParameters
 
@@ -350,6 +351,13 @@ def _first_mode(bag, change):
             if status.name == f'{bag.beam}acu' and (log - bag.start) / NS_PER_SECOND < change:
                 return next((value.value for value in status.values if value.key == 'mode'), '')
     return ''
+
+
+def replies(bag, topic):
+    """Yield (time [s], Command, Reply) of the replies on a topic of a bag."""
+    for _, log, _, message in bag.messages(topic) if topic in bag.topics else ():
+        with contextlib.suppress(ValueError):  # the message is no reply
+            yield ((log - bag.start) / NS_PER_SECOND, *commands.of_reply(message))
 
 
 def keyholes(bag):

@@ -4,7 +4,6 @@ A run has failed in three cases: its drive tripped, a command of the scenario wa
 have tracked the target and never did. A run has not failed if no commanded mode tracks, or if the run ended on the way
 to the target, before the receiver could lock.
 """
-import contextlib
 import math
 import typing
 
@@ -12,7 +11,7 @@ import numpy as np
 
 from acu_tracker.modes import REASON_TEXTS
 from acu_tracker.operating.command_table import ACU_COMMANDS
-from pedestal_analysis.results.tracking import DEG_PER_RAD
+from pedestal_analysis.results.tracking import DEG_PER_RAD, replies
 from pedestal_common.graph import modes, nodes
 from pedestal_common.graph.steps import NS_PER_SECOND
 from pedestal_common.wire import commands
@@ -87,9 +86,7 @@ def _trip(bag) -> str:
 def _replies(bag):
     """Yield (time [s], Command, Reply) of all replies in a bag."""
     for topic in REPLY_TOPICS:
-        for _, log, _, message in bag.messages(topic) if topic in bag.topics else ():
-            with contextlib.suppress(ValueError):  # the message is no reply
-                yield ((log - bag.start) / NS_PER_SECOND, *commands.of_reply(message))
+        yield from replies(bag, topic)
 
 
 def _refusals(bag) -> list[str]:

@@ -62,6 +62,18 @@ def names(*plans) -> tuple:
                                                    if values[i]]) or plan.name for i, plan in enumerate(plans))
 
 
+def unchanged(first, second) -> str:
+    """Return a sentence if two plan.Plans have the same parameters in every trial, else ''."""
+    a, b = first.scenario(0), second.scenario(0)
+    members = [node for node in a.nodes if node != 'operator']  # the operator has only the parameters of the header
+    if not (a.nodes == b.nodes and a.header == b.header and first.varied == second.varied and
+            all(a.node_parameters(node) == b.node_parameters(node) for node in members)):
+        return ''
+    texts = [text for text in dict.fromkeys((*first.overrides, *second.overrides))
+             if not (text in first.overrides and text in second.overrides)]
+    return 'Both sides have the same parameters' + (f': {" ".join(texts)} changes nothing.' if texts else '.')
+
+
 def _value(chosen, key):
     """Return the text of a parameter node.key in a scenario.Scenario, '' for a node that takes no part."""
     try:

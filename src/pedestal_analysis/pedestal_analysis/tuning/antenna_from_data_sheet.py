@@ -8,6 +8,9 @@ motors of paper 000 and a load of 210 kg m2. The scaling keeps the resonance fre
                 proportional to the rated torque.
     gear, load  Stiffness, damping and viscous friction: proportional to the inertia of the load. Other friction and
                 unbalance: proportional to the inertia of the load to the power 2/3.
+    receiver    C/N0 of the scenario for the area of the mirror. The power of the satellite and the noise of the
+                receiver stay the same.
+    wind        the diameter of the mirror
     structure   the lowest frequency of the data sheet, or the average of antennas of this diameter (data_sheet_format)
     loops       the design of tuning/loops.py. `pedestal tune --loops` then measures the loops.
 
@@ -29,6 +32,9 @@ BACK_EMF_SHARE, RESISTANCE_VOLTAGE_SHARE, INDUCTANCE_VOLTAGE_SHARE = 0.85, 0.033
 
 They are the back-EMF at rated speed, and the voltages over resistance and inductance at rated torque.
 """
+
+KNOWN_MIRROR_M = 2.4
+"""Diameter of the mirror for which the C/N0 of the scenarios holds [m] (AntennaParameters)."""
 
 RATE_SHARE = 0.9
 """Share of the rate that an axis reaches, which replaces an unreachable rate of the data sheet [-]."""
@@ -91,7 +97,8 @@ def _plant(sheet, name, values):
     from pedestal_analysis.tuning import loops
     known = getattr(AduParameters(), name)
     try:
-        return loops.Plant(name, build(type(known), {**as_dict(known), **values}), beamwidth=sheet.theta)
+        return loops.Plant(name, build(type(known), {**as_dict(known), **values}), beamwidth=sheet.theta,
+                           noise=loops.receiver_noise(sheet.theta, _receiver(sheet).antenna.slope, cn0(sheet)))
     except ParameterError as error:
         raise ParameterError(f'adu.{name}: {error}') from None
 
@@ -135,6 +142,32 @@ def _motors(name, values):
             raise ParameterError(f'adu.{name}: motor_{number}.{error}') from None
 
 
+def cn0(sheet):
+    """Return the C/N0 [dB-Hz] on the beam axis at the reference range: of the DataSheet, else by the area of the
+    mirror."""
+    known = _receiver(sheet).receiver.cn0_dbhz
+    return sheet.cn0 or float(f'{known + 20.0 * math.log10(sheet.mirror / KNOWN_MIRROR_M):.4g}')
+
+
+def _receiver(sheet):
+    """Return the TrackingReceiverParameters of the scenario of a DataSheet."""
+    return scenario.load(sheet.like).node_parameters('tracking_receiver')
+
+
+def _assumed(sheet):
+    """Return a line for each assumed value."""
+    lines = []
+    if not sheet.cn0:
+        receiver = _receiver(sheet).receiver
+        lines.append(f'no --cn0: {cn0(sheet):.3g} dB-Hz at {1e-3 * receiver.reference_range:g} km, that of '
+                     f'{sheet.like} for the area of the mirror, is taken; the receiver locks at '
+                     f'{receiver.acquire_level_dbhz:g} dB-Hz')
+    if sheet.mode_share and not sheet.mode:
+        lines.append(f'no --mode: {sheet.structural_frequency:.3g} Hz, the average of antennas of {sheet.mirror:g} m, '
+                     'is taken for the structure')
+    return lines
+
+
 def sections(sheet, title):
     """Return {node: {key: value}} of the scenario of a DataSheet; title: of the scenario.
 
@@ -144,9 +177,11 @@ def sections(sheet, title):
     _, content = scenario.text(sheet.like)
     found = scenario.by_node(parameter_file.parse(content))
     found['scenario']['title'] = title
-    if 'program.time_offset' in found['scenario']:  # a narrower beam needs a smaller offset, equal in beamwidths
-        found['scenario']['program.time_offset'] *= min(1.0, sheet.theta / 0.0175)
-    found['tracking_receiver']['antenna.beamwidth'] = sheet.theta
+    # A narrower beam needs a smaller error, equal in beamwidths.
+    for key in scenario.PROGRAM_ERRORS.keys() & set(found['scenario']):
+        found['scenario'][key] *= min(1.0, sheet.theta / 0.0175)
+    found['tracking_receiver'] |= {'antenna.beamwidth': sheet.theta, 'receiver.cn0_dbhz': cn0(sheet)}
+    found['adu']['wind.field.diameter'] = sheet.mirror
     w_s = 2.0 * math.pi * loops.DEFAULT_SPEED_CROSSOVER_HZ
     for name in AXES:
         values = axis(sheet, name)
@@ -195,9 +230,7 @@ def new(sheet, name, command):
     that contradict each other.
     """
     sheet, remarks = attainable(sheet)
-    if sheet.mode_share and not sheet.mode:
-        remarks.append(f'no --mode: {sheet.structural_frequency:.3g} Hz, the average of antennas of '
-                       f'{sheet.mirror:g} m, is taken for the structure')
+    remarks += _assumed(sheet)
     title = f'{sheet.mirror:g} m antenna, beam {math.degrees(sheet.theta):.3g} deg, on the mission of {sheet.like}'
     found = sections(sheet, title)
     content = text(found, (f'made by: {command}', 'Values that are not in the data sheet are scaled from the antenna '

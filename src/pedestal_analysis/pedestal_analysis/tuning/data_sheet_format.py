@@ -10,7 +10,7 @@ LIGHT_SPEED_M_GHZ = 0.299792458
 MIN_MODE_HZ = 1.0
 """Smallest structural frequency that the simulated plant allows [Hz]."""
 
-TEMPLATE_SCENARIOS = ('leo_pass', 'uav_flyby', 'ship_pass')
+TEMPLATE_SCENARIOS = ('leo_pass', 'geo_station', 'uav_flyby', 'ship_pass', 'ship_uav')
 """Scenarios from which a new scenario takes its target and its site."""
 
 
@@ -19,6 +19,8 @@ class DataSheet(Parameters):
     """Data sheet of an antenna. Both motors of an axis have equal data."""
     mirror: float = parameter(3.0, 0.1, 40.0, 'm', 'diameter of the mirror')
     frequency: float = parameter(2.3, 0.1, 100.0, 'GHz', 'frequency of the received signal')
+    cn0: float = parameter(0.0, 0.0, 120.0, 'dB-Hz', 'C/N0 on the beam axis at the reference range of the scenario; '
+                           '0: computed from that of the scenario for the area of the mirror')
     beamwidth: float = parameter(0.0, 0.0, 20.0, 'deg',
                                  'half-power beamwidth; 0: computed as 70 deg times wavelength divided by diameter')
     inertia_azimuth: float = parameter(210.0, 0.1, 1e6, 'kg m2', 'inertia of the load about the azimuth axis')

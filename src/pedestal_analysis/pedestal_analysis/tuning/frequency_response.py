@@ -251,6 +251,14 @@ def _crossings(f, y, angle):
     return f[i] * (f[i + 1] / f[i]) ** share, angle[i] + share * change
 
 
+def without_gain_margin(names):
+    """Return a line on the loops of these names, which have no gain margin; [] without a name."""
+    if not names:
+        return []
+    return [f'no gain margin of {", ".join(names)}: the open loop does not reach -180 deg in the measured band, so no '
+            'higher gain makes the loop unstable there']
+
+
 def margins(measured, above=0.0):
     """Return {metric: (value, unit)} of a Response; NaN if the measured band has no such frequency.
 

@@ -84,6 +84,9 @@ PLANT_CORNERS = tuple((inertia, mode) for inertia in (0.7, 1.3) for mode in (0.8
 WORST_SUFFIX = ', worst'
 """Suffix of the name of a loop in the row of the table with its smallest margins in all PLANT_CORNERS."""
 
+NEAR_SHARE = 0.95
+"""Share of a required crossover from which on a loop counts as fast enough [-]."""
+
 SLOWDOWN_FACTOR, MAX_SLOWDOWNS = 0.85, 12
 """Factor of the crossover from one try to the next, slower one [-]; largest number of tried crossovers."""
 
@@ -194,11 +197,12 @@ class Plant:
                 ) / self.whole_inertia
 
 
-def receiver_noise(receiver):
-    """Return the root density [rad/sqrt(Hz)] of the error noise at the reference range, from
-    TrackingReceiverParameters: beamwidth / (slope sqrt(2 C/N0))."""
-    density = 2.0 * 10.0**(0.1 * receiver.receiver.cn0_dbhz)
-    return receiver.antenna.beamwidth / (receiver.antenna.slope * math.sqrt(density))
+def receiver_noise(beamwidth, slope, cn0_dbhz):
+    """Return the root density of the noise of a receiver's error on the beam axis [rad/sqrt(Hz)].
+
+    beamwidth [rad]; slope: monopulse slope [-]; cn0_dbhz: C/N0 [dB-Hz].
+    """
+    return beamwidth / (slope * math.sqrt(2.0 * 10.0**(0.1 * cn0_dbhz)))
 
 
 def filter_gains(plant):
@@ -288,14 +292,21 @@ class Loops:
             raise LoopError(f'scenario {chosen.name}: an electronic beam has no loops to tune')
         self.source, self.overrides, self.name = source, tuple(overrides), chosen.name
         drive = chosen.node_parameters('adu')
-        receiver = chosen.node_parameters('tracking_receiver')
-        self.plants = {name: Plant(name, getattr(drive, name), getattr(drive.wind, name), receiver.antenna.beamwidth,
-                                   receiver_noise(receiver)) for name in AXES}
+        known = chosen.node_parameters('tracking_receiver')
+        noise = receiver_noise(known.antenna.beamwidth, known.antenna.slope, known.receiver.cn0_dbhz)
+        self.plants = {name: Plant(name, getattr(drive, name), getattr(drive.wind, name), known.antenna.beamwidth,
+                                   noise) for name in AXES}
         self.gains = {}
 
     def set(self, node, name, gains):
         """Set gains {key: value} of a node for the axis `name`, rounded to four digits."""
         self.gains |= {f'{node}.{name}.{key}': value for key, value in _rounded(gains).items()}
+
+    def designed(self, loop, name):
+        """Return the crossover [rad/s] for which the gains of a loop, speed or position, were designed."""
+        if loop == 'position':
+            return self.gains[f'acu.{name}.feedforward.bandwidth']
+        return self.gains[f'adu.{name}.speed_loop.proportional'] / self.plants[name].gear_inertia
 
     def _case(self, corner=(1.0, 1.0)):
         """Return the cases.Case of a measurement; corner: factors for axes with a structure, see PLANT_CORNERS."""
@@ -407,7 +418,8 @@ def design(loops, axes, required, progress):
         def set_position(w, name=name, plant=plant, w_s=w_s):
             loops.set('acu', name, control_gains(plant, w_s, w))
         _, closed = loops.close('position', name, required, set_position, w_p)
-        rows += [(loop, name, w_p / (2.0 * math.pi), margins) for loop, margins in closed]
+        wanted = required.position or w_p / (2.0 * math.pi)
+        rows += [(loop, name, wanted, margins) for loop, margins in closed]
     return rows
 
 
@@ -428,14 +440,34 @@ def table(rows, required):
         values = {key: value for key, (value, _) in margins.items()}
         limits = required.phase_margin, required.gain_margin
         floor = [f'(>= {limit:g})' for limit in limits] if loop != 'current' else ('', '')
-        lines.append(f'{f"{name} {loop}":{width}} {wanted:6.3g} Hz {_text(values["crossover_hz"]):>7} Hz '
-                     f'{_text(values["bandwidth_hz"]):>7} Hz {_text(values["phase_margin_deg"]):>9} deg {floor[0]:>7} '
-                     f'{_text(values["gain_margin_db"]):>9} dB {floor[1]:>7}')
+        lines.append(f'{f"{name} {loop}":{width}} {wanted:6.3g} Hz {_text(values["crossover_hz"], "Hz", 10)} '
+                     f'{_text(values["bandwidth_hz"], "Hz", 10)} {_text(values["phase_margin_deg"], "deg", 13)} '
+                     f'{floor[0]:>7} {_text(values["gain_margin_db"], "dB", 12)} {floor[1]:>7}'.rstrip())
     return lines
 
 
-def _text(value):
-    return f'{value:.3g}' if math.isfinite(value) else 'beyond'
+def _text(value, unit, width):
+    return f'{f"{value:.3g} {unit}" if math.isfinite(value) else "none":>{width}}'
+
+
+def remarks(loops, rows):
+    """Return lines on the rows of `design`: loops that are slower than required, with the reason, and loops without a
+    gain margin."""
+    lines = []
+    for loop, name, wanted, margins in rows:
+        got = margins['crossover_hz'][0]
+        if loop in ('speed', 'position') and got < NEAR_SHARE * wanted:
+            designed = loops.designed(loop, name) / (2.0 * math.pi)
+            speed = loops.designed('speed', name) / (2.0 * math.pi)
+            if designed > NEAR_SHARE * wanted:
+                reason = 'the gains are those of a rigid axis; gears, delays and friction make the loop slower'
+            elif loop == 'position' and designed > NEAR_SHARE * speed / CROSSOVER_RATIO:
+                reason = f'a position loop has at most 1/{CROSSOVER_RATIO:g} of the crossover of the speed loop'
+            else:
+                reason = 'a faster loop does not hold the required margins'
+            lines.append(f'{name} {loop} loop: {wanted:.3g} Hz required, {got:.3g} Hz reached: {reason}')
+    return [*lines, *frequency.without_gain_margin([f'{name} {loop}' for loop, name, _, margins in rows
+                                                    if math.isnan(margins['gain_margin_db'][0])])]
 
 
 def main(options, progress):
@@ -456,7 +488,7 @@ def main(options, progress):
     rows = design(loops, axes, required, progress)
     loops.gains = {key: value for key, value in loops.gains.items() if key.split('.')[1] in axes}
     refuse_outside(loops)
-    lines = table(rows, required)
+    lines = [*table(rows, required), *remarks(loops, rows)]
     made = [f'made by: {options.command}', f'git {configuration.git_revision() or "unknown"}', *lines]
     sections = {node: {key.removeprefix(f'{node}.'): value for key, value in loops.gains.items()
                        if key.startswith(f'{node}.')} for node in ('adu', 'acu')}

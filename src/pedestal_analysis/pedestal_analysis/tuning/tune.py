@@ -314,9 +314,13 @@ def main(options, command, progress):
         params, settings = feedforward(load(options.seed), source, axes, progress)
     else:
         params, settings = filters(source, options.filter, axes, progress)
+    whole = 0.0 if is_bag else scenario.load(options.source, options.param).header.duration
     progress(0.98, 'validating')
     old, new = source.score(source.params), source.score(params)
     lines = [*_table(source, old, new, axes), *_remarks(source, old, new, axes, settings)]
+    if options.duration and options.duration < whole:
+        lines.append(f'tuned on the first {options.duration:g} s of the {whole:g} s of the scenario: the parameters '
+                     'may be worse in the rest; without --duration the whole scenario counts')
     made = [f'made by: {" ".join(command.split())}', f'git {configuration.git_revision() or "unknown"}', *lines]
     file.write_text(''.join(f'# {line}\n' for line in made) + parameter_file.text({'acu': settings}))
     values = [f'{name:48} {value}' for name, value in settings.items()]

@@ -50,6 +50,10 @@ class ProgramParameters(parameters.Parameters):
                                                'refraction is added to the prediction; 0: no refraction')
 
 
+PROGRAM_ERRORS = {'program.time_offset': 's', 'program.azimuth_offset': 'rad', 'program.elevation_offset': 'rad'}
+"""{error of the prediction in the header of a scenario: its unit}."""
+
+
 @dataclasses.dataclass(frozen=True)
 class RestartParameters(parameters.Parameters):
     """Parameters of the restarts of nodes whose process dies in a realtime `pedestal run`. In lockstep a dead node
@@ -291,7 +295,7 @@ def parse_override(text: str) -> tuple[str, str, typing.Any]:
     node, dot, key = left.partition('.')
     if not (equals and dot and key):
         raise ScenarioError(f'--param {text!r}: must be node.key=value, as in '
-                            'acu.azimuth.feedforward.bandwidth=20')
+                            'acu.azimuth.feedforward.bandwidth=12')
     parameters_of(node)
     try:
         return node, key, plain_yaml.parse(right)
@@ -356,6 +360,10 @@ class Draft:
         changes = [parse_override(override) for override in overrides]
         for node, key, value in changes:
             sections.setdefault(node, {})[key] = value
+        given = {f'{node}.{key}': value for node, key, value in changes}
+        if given.get('ship_motion.ship.motion') == 'recorded' and 'ship_motion.ship.heading_deg' not in given:
+            # The recording holds the heading, so that of the scenario ends.
+            sections['ship_motion'].pop('ship.heading_deg', None)
         for node, key, value in changes:
             absent = node in OPTIONAL_NODES and not sections['scenario'].get('ship')
             if absent and parameters.without_ros({key: value}):

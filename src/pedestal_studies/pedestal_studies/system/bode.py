@@ -86,6 +86,12 @@ def rows(responses):
             for metric, (value, unit) in frequency.margins(measured).items()]
 
 
+def without_gain_margin(responses):
+    """Return a line on the loops of {name: Response} that have no gain margin in the measured band."""
+    return frequency.without_gain_margin([name for name, measured in responses.items()
+                                          if math.isnan(frequency.margins(measured)['gain_margin_db'][0])])
+
+
 def run(progress) -> Result:
     """Measure all loops, each with full and with half excitation to test that it is linear."""
     drive = AduParameters()
@@ -102,7 +108,8 @@ def run(progress) -> Result:
         responses |= measured
     worst = max(change, key=change.__getitem__)
     remarks = [f'The loops are linear: with half the excitation no open loop changes by more than '
-               f'{100.0 * change[worst]:.1f} % within 10 dB of |L| = 1 (largest change: {worst}).']
+               f'{100.0 * change[worst]:.1f} % within 10 dB of |L| = 1 (largest change: {worst}).',
+               *without_gain_margin(responses)]
     return Result(rows(responses), drawings(responses, drive), remarks)
 
 

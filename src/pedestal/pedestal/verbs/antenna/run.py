@@ -13,11 +13,12 @@ from collections.abc import Collection
 from pedestal import stop
 from pedestal.verbs import arguments
 from pedestal_analysis import console
+from pedestal_common import parameters
 
 __doc__ += console.exit_codes()
 
 if typing.TYPE_CHECKING:
-    from pedestal_bringup.scenario.scenario import Scenario
+    from pedestal_bringup.scenario.scenario import Draft, Scenario
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -167,7 +168,23 @@ def _chosen(options: argparse.Namespace) -> 'Scenario | None':
         start, duration, line = selection.choose('next' if options.which is None else options.which, duration)
         print(line)
         changes = start + changes
+    if options.tle:
+        changes += _without_prediction_errors(draft, changes)
     return scenario.checked(draft.changed(changes), options.seed, duration, options.pacing)
+
+
+def _without_prediction_errors(draft: 'Draft', changes: list[str]) -> list[str]:
+    """Return the changes that end the errors of the prediction in a scenario, which are of its own satellite, and
+    print them; an error in `changes` stays."""
+    from pedestal_bringup.scenario import scenario
+    given, header = {change.partition('=')[0] for change in changes}, parameters.as_dict(draft.header)
+    found = []
+    for key, unit in scenario.PROGRAM_ERRORS.items():
+        if header[key] and f'scenario.{key}' not in given:
+            print(f'scenario.{key} = 0 {unit} in place of {header[key]:g} {unit}, which belongs to the satellite of '
+                  f'{draft.name}')
+            found.append(f'scenario.{key}=0')
+    return found
 
 
 def _refuse_with_list(options: argparse.Namespace) -> None:

@@ -129,7 +129,8 @@ def _compare(options: argparse.Namespace) -> int:
         name, table = names[place], tables[place]
         rows += [*statistics.of_results(name, table), *statistics.of_requirements(name, table, required),
                  *statistics.of_questions(name, table), *statistics.of_sensitivity(name, table)]
-    lines = [comparison.sentence(pair(best, other), ranking) for other in order[1:]]
+    lines = [comparison.unchanged(plans[best], plans[other]) or comparison.sentence(pair(best, other), ranking)
+             for other in order[1:]]
     lines += _requirement_lines(rows, required)
     shown = trials_page.read(plans[0], tables[0], ranking, pair(best, order[1]) if lines and len(plans) > 1 else None,
                              lines, options.command, WORST_TRIAL_COUNT)
