@@ -11,6 +11,7 @@ import time
 
 import rclpy
 from rclpy.node import Node
+from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
@@ -25,7 +26,7 @@ COMMAND_TIMEOUT_S, ANSWER_TIMEOUT_S = 10.0 * PERIOD_S, 0.2
 
 
 class Drive(Node):
-    """Publisher of joint_states and adu/state; it commands the amplifiers at a UDP port."""
+    """Publisher of clock, joint_states and adu/state; it commands the amplifiers at a UDP port."""
 
     def __init__(self, port):
         super().__init__('adu')
@@ -33,6 +34,7 @@ class Drive(Node):
         self.socket.connect(('127.0.0.1', port))
         self.socket.setblocking(False)
         self.rates, self.commanded, self.answered, self.state = [0.0, 0.0], 0.0, 0.0, ''
+        self.clock = self.create_publisher(Clock, 'clock', middleware.qos('step'))
         self.joints = self.create_publisher(JointState, 'joint_states', middleware.qos('step'))
         self.states = self.create_publisher(String, 'adu/state', middleware.qos('change'))
         self.create_subscription(JointState, 'acu/rate_command', self.take, middleware.qos('step'))
@@ -51,6 +53,7 @@ class Drive(Node):
             self.answered = now
             joints = JointState(name=AXES, position=measured[:2], velocity=measured[2:])
             joints.header.stamp = self.get_clock().now().to_msg()     # UTC of the measurement
+            self.clock.publish(Clock(clock=joints.header.stamp))
             self.joints.publish(joints)
         self.report('enabled' if now - self.answered < ANSWER_TIMEOUT_S else 'fault: amplifiers silent')
         stale = now - self.commanded > COMMAND_TIMEOUT_S

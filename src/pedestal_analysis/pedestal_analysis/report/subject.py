@@ -30,9 +30,9 @@ MAX_VALUE_CHARACTERS = 80
 
 
 def date(bag):
-    """Return the date of a run as text: its start in realtime, else the date of the file."""
-    if bag.start:
-        return f'{_utc(bag.start / 1e9)} UTC'
+    """Return the date of a run as text: its first message in realtime, else the date of the file."""
+    if bag.start and bag.index.size:
+        return f'{_utc(bag.index.log.min() / 1e9)} UTC'
     written = f'file of {_utc(bag.file.stat().st_mtime)} UTC'
     return f'{written}; a lockstep recording states no date' if bag.metadata.get('pacing') == 'lockstep' else written
 
