@@ -38,12 +38,17 @@ def module_of(verb: str) -> types.ModuleType:
 
 
 def main(args: Sequence[str] | None = None) -> int:
-    """Run a verb.
+    """Run a verb; without any argument print the help.
 
     Return its exit code: 0; 1 with a line on stderr for an error; 2 for a wrong command line; 130 after a stop.
     """
-    options = _parser().parse_args(args)
-    options.command = shlex.join(('pedestal', *(sys.argv[1:] if args is None else args)))
+    given = sys.argv[1:] if args is None else args
+    parser = _parser()
+    if not given:
+        parser.print_help()
+        return 0
+    options = parser.parse_args(given)
+    options.command = shlex.join(('pedestal', *given))
     stop.on_stop(signal.default_int_handler)     # from here on a signal raises KeyboardInterrupt
     json_on_stdout = getattr(options, 'json', None) == STDOUT_PATH
     try:

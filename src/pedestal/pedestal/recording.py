@@ -73,7 +73,13 @@ class Run:
         return tuple(name for name in self._source.topics if name not in ('diagnostics', 'acu/program_track'))
 
     def __getitem__(self, topic: str) -> Table:
-        """Return the Table of a topic. Raises KeyError for a missing topic."""
+        """Return the Table of a topic. Raises KeyError for a missing topic.
+
+        >>> scenario = pedestal.load('leo_pass', {'acu.commands': '0.5 standby'}, duration=1.0)
+        >>> replies = pedestal.run(scenario)['acu/command_result']
+        >>> replies['name'].tolist(), replies['values'].tolist()
+        (['standby'], ['granted=true; reply=mode is standby'])
+        """
         if topic not in self.topics:
             raise KeyError(f'{topic!r} is not in {self.name}; there are {", ".join(self.topics)}')
         arrays = {name: np.asarray(values) for name, values in self._source.table(topic).items()}

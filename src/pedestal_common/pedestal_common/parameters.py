@@ -109,7 +109,8 @@ def _check_field(field: dataclasses.Field, name: str, value: typing.Any) -> None
         if field.type is int and not isinstance(value, int):
             raise ParameterError(f'{name} = {value!r}: must be a whole number')
         if not (math.isfinite(value) and meta['low'] <= value <= meta['high']):
-            raise ParameterError(f'{name} = {value:g} {meta["unit"]}: must be {meta["low"]:g} to {meta["high"]:g}')
+            given = f'{value:g} {meta["unit"]}'.rstrip()
+            raise ParameterError(f'{name} = {given}: must be {meta["low"]:g} to {meta["high"]:g}')
     elif 'options' in meta and value not in meta['options']:
         raise ParameterError(f'{name} = {value!r}: must be one of {", ".join(meta["options"])}')
     elif field.type is bool and not isinstance(value, bool):

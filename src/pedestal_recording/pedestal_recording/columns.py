@@ -20,6 +20,9 @@ CELL_LIMITS = 4_000_000, 4
 This avoids a huge table from a file whose messages each name other columns.
 """
 
+STATUS_TEXTS = ('name', 'hardware_id', 'message')
+"""Fields of a DiagnosticStatus that are texts."""
+
 
 def stamps(data, type_name, log):
     """Return the stamps (n,) [ns] in the headers of messages; data: list of their CDR bytes, log: log times (n,) [ns].
@@ -45,6 +48,7 @@ def table(data, type_name, log, start=0, as_sent=False):
     Odometry       position.x, orientation.w, twist.linear.x, twist.angular.z, ...
     Imu            orientation.w, angular_velocity.x, linear_acceleration.z, orientation_variance.z, ...
     String         data (a list of texts)
+    DiagnosticStatus  level, and lists of texts: name, hardware_id, message, values (values_text)
     others         the path of the field
     Covariances and header are omitted; a DiagnosticArray has `t` only. A number that a message does not hold is NaN in
     its row. A number that its message marks as no data (layouts.NO_DATA_MARKS) is NaN too, except with as_sent=True.
@@ -60,7 +64,17 @@ def table(data, type_name, log, start=0, as_sent=False):
             rows = np.flatnonzero(lengths == length)
             block = np.frombuffer(b''.join([data[row] for row in rows]), np.uint8).reshape(rows.size, length)
             _fill(out, block, rows, type_name, len(data), most, as_sent)
+    if type_name == 'diagnostic_msgs/msg/DiagnosticStatus':
+        texts = [cdr.Places(message, type_name).texts for message in data]
+        out.update({name: [of[name] for of in texts] for name in STATUS_TEXTS})
+        out['values'] = [values_text((of[path], of[f'{path[:-3]}value']) for path in of if path.endswith('].key'))
+                         for of in texts]
     return out
+
+
+def values_text(pairs):
+    """Return the (key, value) pairs of a DiagnosticStatus as one text, 'key=value; key=value'."""
+    return '; '.join(f'{key}={value}' for key, value in pairs)
 
 
 def _fill(out, block, rows, type_name, count, most, as_sent):

@@ -14,6 +14,7 @@ import numpy as np
 from pedestal_common.graph import layouts, nodes
 from pedestal_common.wire import messages
 from pedestal_recording import bag as bags
+from pedestal_recording import columns
 
 TIME_COLUMN, STAMP_COLUMN = 't [s]', 'stamp [ns]'
 
@@ -131,7 +132,8 @@ def _diagnostics(bag, name, stamps):
     return {**_times(np.array([stamp for stamp, _ in statuses], np.int64)),
             'level': np.array([status.level for _, status in statuses], np.int64),
             'name': [status.name for _, status in statuses], 'message': [status.message for _, status in statuses],
-            'values': ['; '.join(f'{value.key}={value.value}' for value in status.values) for _, status in statuses]}
+            'values': [columns.values_text((value.key, value.value) for value in status.values)
+                       for _, status in statuses]}
 
 
 def _write_csv(file, content, _description):

@@ -39,5 +39,5 @@ def attitude(data):
 
 FIGURES = (
     Spec('attitude', 'Attitude error of the INS', 'Error of the attitude that the control unit received (orange) and '
-         'the standard deviation that the INS states (blue).', ('attitude',), attitude),
+         'the standard deviation that the INS states (blue).', ('attitude',), attitude, timed=True),
 )

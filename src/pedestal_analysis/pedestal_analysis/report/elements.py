@@ -11,13 +11,13 @@ PAGE_CSS = """
   :root { --ink: #dfe3e8; --soft: #9aa3ae; --line: #3a414a; --paper: #16191d; --bad: #ff8a80; } }
 @media print {
   :root { color-scheme: light; --ink: #000000; --soft: #444444; --line: #bbbbbb; --paper: #ffffff; --bad: #b3261e; }
-  figure { break-inside: avoid; } body { padding: 0; max-width: none; } }
+  figure, tr { break-inside: avoid; } body { padding: 0; max-width: none; } }
 body { margin: 0 auto; padding: 1.2rem; max-width: 60rem; color: var(--ink); background: var(--paper);
        font: 1rem/1.45 system-ui, sans-serif; }
 h1 { font-size: 1.6rem; margin: 0 0 .2rem; }
 h2 { font-size: 1.15rem; margin: 2rem 0 .4rem; padding-top: .8rem; border-top: 1px solid var(--line); }
 p, figcaption { margin: .3rem 0; } .soft, figcaption { color: var(--soft); font-size: .92rem; }
-.bad { color: var(--bad); font-weight: 600; }
+.bad { color: var(--bad); font-weight: 600; } .verdict { font-size: 1.15rem; font-weight: 600; }
 .wide { overflow-x: auto; }
 table { border-collapse: collapse; margin: .5rem 0; font-size: .95rem; font-variant-numeric: tabular-nums; }
 th, td { padding: .22rem 1.4rem .22rem 0; text-align: left; vertical-align: top;

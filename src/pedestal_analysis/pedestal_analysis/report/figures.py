@@ -40,6 +40,8 @@ class Spec(typing.NamedTuple):
     needs            data that the figure needs: keys of run_data._NEEDS
     draw             function draw(data) -> Figure; data: run_data.RunData or trials_page.Trials
     dpi              dots per inch of its PNG
+    timed            True for panels over time, which get the marks of the events
+    paper            number of the same figure in the paper; 0: none
     """
     key: str
     title: str
@@ -47,6 +49,8 @@ class Spec(typing.NamedTuple):
     needs: tuple
     draw: typing.Callable
     dpi: int = 150
+    timed: bool = False
+    paper: int = 0
 
 
 def thin(t, y, bins=1000):
@@ -105,6 +109,41 @@ def outside_legend(figure, axes):
     return figure
 
 
+EVENT_COLOURS = {'alarm': '#c81e1e', 'refused': '#c81e1e', 'injected fault': '#b5179e', 'state': '#a87b51',
+                 'command': '#2f7d4f', 'mode': INK_COLOUR}
+"""{kind of event: colour of its mark}, the most urgent first."""
+
+MIN_MARK_DISTANCE = 0.02
+"""Smallest distance of two numbers on a panel [widths of the panel]; closer events share one number."""
+
+
+def mark(figure, events):
+    """Draw a vertical line for each of the events.Event on all panels, with its number, from 1, on the first row."""
+    for axes in figure.axes:
+        low, high = axes.get_xlim()
+        seen = [(number, event) for number, event in enumerate(events, start=1) if low < event.t < high]
+        for _, event in seen:
+            axes.axvline(event.t, color=EVENT_COLOURS[event.kind], linewidth=0.8, linestyle=':')
+        if axes.get_subplotspec().is_first_row():
+            for label, t, colour in _labels(seen, MIN_MARK_DISTANCE * (high - low)):
+                axes.text(t, 0.99, label, color=colour, fontsize=6.5, ha='right', va='top', rotation=90.0,
+                          transform=axes.get_xaxis_transform())
+
+
+def _labels(seen, distance):
+    """Return [(text, time, colour)] of the numbers of events; seen: [(number, Event)] in order; distance: smallest
+    distance of two numbers [s]."""
+    groups = []
+    for numbered in seen:
+        if groups and numbered[1].t - groups[-1][0][1].t < distance:
+            groups[-1].append(numbered)
+        else:
+            groups.append([numbered])
+    order = list(EVENT_COLOURS)
+    return [('-'.join(dict.fromkeys((str(group[0][0]), str(group[-1][0])))), group[0][1].t,
+             EVENT_COLOURS[min((event.kind for _, event in group), key=order.index)]) for group in groups]
+
+
 FILE_METADATA = {'png': {'Software': None}, 'pdf': {'CreationDate': None, 'Creator': None, 'Producer': None},
                  'svg': {'Date': None, 'Creator': None, 'Format': None, 'Type': None}}
 """{format of a file: metadata that are left out}. This avoids different bytes of equal figures."""
@@ -157,7 +196,10 @@ def store(figure, output, dpi=150):
 def render(spec, data, output):
     """Draw the figure of a Spec, and `store` it in a path or stream. Equal data give equal bytes."""
     with matplotlib.rc_context({**MATPLOTLIB_STYLE, 'svg.hashsalt': spec.key}):
-        store(spec.draw(data), output, spec.dpi)
+        figure = spec.draw(data)
+        if spec.timed:
+            mark(figure, data.events)
+        store(figure, output, spec.dpi)
 
 
 def inline(svg):

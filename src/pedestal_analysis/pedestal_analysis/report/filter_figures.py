@@ -99,11 +99,12 @@ def probabilities(data):
 FIGURES = (
     Spec('estimate', 'Error and stated sigma of the filter', 'Estimate minus truth (orange) and twice the standard '
          'deviation that the filter states (blue): about 95 % should lie between the lines. On a ship the error '
-         'includes the attitude error of the INS, which the filter does not model.', ('truth', 'filter'), estimate),
+         'includes the attitude error of the INS, which the filter does not model.', ('truth', 'filter'), estimate,
+         timed=True),
     Spec('innovations', 'Innovations', 'Innovation: measurement minus prediction. Mean NIS: mean square of the '
          f'innovations over their stated variance, over {NIS_SPAN_S:g} s. Above the band the stated variance is too '
          'small, or the target moves as no model predicts. Below the band the stated variance is too large.',
-         ('filter',), innovations),
+         ('filter',), innovations, timed=True),
     Spec('probabilities', 'Motion models', 'Probability of each motion model of the filter; a single model has '
-         'probability 1.', ('filter', 'bank'), probabilities),
+         'probability 1.', ('filter', 'bank'), probabilities, timed=True),
 )

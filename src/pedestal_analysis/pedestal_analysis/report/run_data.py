@@ -4,6 +4,7 @@ import typing
 
 import numpy as np
 
+from pedestal_analysis.report import events
 from pedestal_analysis.results import consistency, known_attitude, measured_direction, tracking
 from pedestal_common.graph import topics
 from pedestal_recording import bag as bags
@@ -19,6 +20,7 @@ class RunData:
     motors, receiver  tables of adu/motor_states and tracking_receiver/angle_error, None without a message
     modes             [(start [s], stop [s], mode)] of the modes of the ACU, in order
     statuses          [(time [s], node, level, message)] of the diagnostics; level: 0 OK, 1 WARN, 2 ERROR, 3 STALE
+    events            [events.Event], in the order of time
     beamwidth         half-power beamwidth [rad], NaN if the bag does not state it
     filter            consistency.Consistency, None without acu/filter
     attitude          known_attitude.KnownAttitude, None ashore
@@ -30,6 +32,7 @@ class RunData:
     receiver: typing.Any
     modes: list
     statuses: list
+    events: list
     beamwidth: float
     filter: typing.Any = None
     attitude: typing.Any = None
@@ -69,8 +72,9 @@ def read(bag) -> RunData:
     statuses = [((log - bag.start) / 1e9, status.name, int(status.level), status.message)
                 for _, log, _, array in bag.messages('diagnostics') for status in array.status
                 ] if table(bag, 'diagnostics') else []
-    return RunData(run, no_truth, raw, motors, table(bag, 'tracking_receiver/angle_error'), _modes(bag), statuses,
-                   tracking.beamwidth(bag), _filter(bag, run), _attitude(bag))
+    modes = _modes(bag)
+    return RunData(run, no_truth, raw, motors, table(bag, 'tracking_receiver/angle_error'), modes, statuses,
+                   events.read(bag, modes), tracking.beamwidth(bag), _filter(bag, run), _attitude(bag))
 
 
 def table(bag, topic):

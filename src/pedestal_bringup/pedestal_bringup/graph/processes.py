@@ -278,6 +278,10 @@ def exit_description(code):
 
 
 def log_folder(bag):
-    """Return the folder of the logs of a run: BAG.log, beside its bag."""
+    """Return the folder of the logs of a run beside its bag: BAG.log, or BAG.logs where BAG.log is a file.
+
+    `pedestal run --bag dish > dish.log` makes such a file.
+    """
     bag = pathlib.Path(bag)
-    return bag.with_name(bag.name + '.log')
+    folder = bag.with_name(bag.name + '.log')
+    return bag.with_name(bag.name + '.logs') if folder.is_file() else folder

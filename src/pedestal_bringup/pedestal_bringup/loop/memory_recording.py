@@ -8,6 +8,7 @@ from pedestal_bringup.loop import closed_loop
 from pedestal_common.graph.steps import NS_PER_SECOND
 from pedestal_common.parameters import as_dict
 from pedestal_common.wire import commands, messages
+from pedestal_recording import columns
 
 DIAGNOSTICS_TOPIC = 'diagnostics'
 
@@ -51,9 +52,8 @@ class MemoryRecording:
         if topic == DIAGNOSTICS_TOPIC:
             return {'t': np.array([stamp for stamp, _ in self._keyholes]) / NS_PER_SECOND}
         if topic in self._run.replies:
-            replies = self._run.replies[topic]
-            return {'t': np.array([stamp for stamp, *_ in replies]) / NS_PER_SECOND,
-                    'level': np.array([float(not reply.granted) for *_, reply in replies])}
+            return columns.table([messages.serialize(message) for *_, message in self.messages(topic)],
+                                 self.topics[topic], [stamp for stamp, *_ in self._run.replies[topic]])
         if topic not in self._tables:
             self._tables[topic] = self._run.table(topic)
         return self._tables[topic]

@@ -118,8 +118,19 @@ def _value(definition, argument, text):
     except ValueError:
         raise refused from None
     if not argument.low <= number <= argument.high:
-        raise refused
+        raise ValueError(f'{refused}{_in_degrees(number, argument)}')
     return number
+
+
+def _in_degrees(number, argument):
+    """Return a refused angle or rate and its range in degrees, '' for an Argument with another unit or for NaN.
+
+    `pedestal mode rate --az 500` gives degrees, and a client of the topic gives radians.
+    """
+    if argument.unit not in ('rad', 'rad/s') or math.isnan(number):
+        return ''
+    given, low, high = (f'{math.degrees(value):.4g}' for value in (number, argument.low, argument.high))
+    return f' ({given} {argument.unit.replace("rad", "deg")}: must be {low} to {high})'
 
 
 def of_message(status) -> Command:

@@ -6,6 +6,7 @@ Exit codes (1, 3 and 130 take precedence over 4):
 
 """
 import argparse
+import os
 import sys
 import typing
 from collections.abc import Collection
@@ -118,12 +119,20 @@ def main(options: argparse.Namespace) -> int:
     disturbed = [check.ending] if check.aborted else []
     if outcome.losses > MAX_LOST_STEP_SHARE * planned:
         disturbed.append(f'the drive lost {outcome.losses} of {planned:.0f} steps, more than '
-                         f'{MAX_LOST_STEP_SHARE:.0%}, outside announced restarts')
+                         f'{MAX_LOST_STEP_SHARE:.0%}, outside announced restarts: {_cure(chosen.header.priority)}')
     for reason in disturbed:
         print(f'pedestal: {reason}', file=sys.stderr)
     if disturbed:
         return console.EXIT_DISTURBED
     return console.EXIT_FAILED_RUN if any(found.failed for found in verdicts) else 0
+
+
+def _cure(priority: int) -> str:
+    """Return the remedy for lost steps; priority: the realtime priority of the scenario, 0 for none."""
+    load, cores = os.getloadavg()[0], len(os.sched_getaffinity(0))
+    text = f'load {load:.1f} on {cores} cores; end other programs or use a machine with more cores'
+    return text if priority else (f'{text}, or give the nodes a realtime priority: --param scenario.priority=10 '
+                                  '(docs/station.md)')
 
 
 def _some(values: dict[str, tuple], names: Collection[str]) -> dict[str, tuple]:
