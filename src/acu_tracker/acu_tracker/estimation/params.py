@@ -65,7 +65,7 @@ class ImmParameters(Parameters):
     rungs: int = parameter(6, 1, MAX_RUNG_COUNT, '', 'number of models ca, each with more white jerk than '
                            'the one before')
     rung_ratio: float = parameter(5.2, 1.01, 1000.0, '', 'white jerk of a model ca over that of the one before')
-    dwell: float = parameter(500.0, 1e-3, 1e6, 's', 'mean time for which one model is valid')
+    dwell: float = parameter(1000.0, 1e-3, 1e6, 's', 'mean time for which one model is valid')
     cv: CvParameters = group(CvParameters, noise=1e-5 * _DEG)
     ca: CaParameters = group(CaParameters, noise=5e-4 * _DEG)
     singer: SingerParameters = group(SingerParameters, alpha=0.1, sigma=0.25 * _DEG)
