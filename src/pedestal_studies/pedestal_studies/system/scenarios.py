@@ -1,5 +1,4 @@
-"""Scenarios over many seeds: the results that `pedestal run` prints for one seed, with their confidence
-intervals over the seeds.
+"""Scenarios over many seeds: the results of `pedestal run`, with confidence intervals over the seeds.
 
 Every run is the closed loop of the scenario without ROS, with another seed. The results are computed as from a
 recording of the run. Cases are <scenario> or <scenario>-<variant>; CASES gives the parameters that a variant changes.

@@ -1,5 +1,7 @@
-"""Calendar dates of track files: notations of spreadsheets, JPL Horizons and STK (Systems Tool Kit), converted into
-ISO 8601."""
+"""Calendar dates of track files: notations of spreadsheets, JPL Horizons and STK, converted into ISO 8601.
+
+STK is the Systems Tool Kit.
+"""
 import re
 
 MONTH_NAMES = 'jan feb mar apr may jun jul aug sep oct nov dec'.split()
