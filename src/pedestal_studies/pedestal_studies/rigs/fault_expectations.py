@@ -10,8 +10,8 @@ The drive must report a trip or missing commands within 0.1 s. A fault that show
 within 1 s. Nothing moves by itself after a fault that ended in standby.
 
 The modes that use the signal level (search, acquire, steptrack) lead to autotrack. The permitted error in these modes
-is the largest distance of their beam from the target: across the searched area, in the look-around (short motions of
-the beam about a peak of the level), or half a beamwidth.
+is the largest distance of their beam from the target. This is the distance across the searched area, the distance in
+the look-around (short motions of the beam about a peak of the level), or half a beamwidth.
 Because they point by the attitude as program does, the expectations of program hold for them. The faults of the
 receiver are the exception: they affect these modes as they affect autotrack.
 """
