@@ -116,10 +116,10 @@ def _heading_fault():
 LEVEL_MODE_ERRORS_DEG = {'search': 10.0, 'acquire': 2.0, 'steptrack': HALF_BEAMWIDTH_DEG}
 """Largest permitted distance of the beam from the target, for each mode that uses the signal level [deg].
 
-search: the searched area reaches five beamwidths (5 deg) to each side of the expected place, and beam and target may
-be on opposite sides. acquire: the beam looks around up to 1.2 beamwidths from the peak that was found, and the peak is
-within 0.7 beamwidths of the target (1.9 beamwidths together). steptrack: within the beam. A fade removes the level
-itself, so steptrack has to search and look around; it then has the limit of acquire.
+In search, the searched area reaches five beamwidths (5 deg) to each side of the expected place, and beam and target
+may be on opposite sides. In acquire, the beam looks around up to 1.2 beamwidths from the peak that was found. The peak
+is within 0.7 beamwidths of the target, so the sum is 1.9 beamwidths. In steptrack the target is within the beam. A
+fade removes the level itself, so steptrack has to search and look around; it then has the limit of acquire.
 """
 
 MODES_TO_AUTOTRACK = ('search', 'acquire', 'autotrack')
