@@ -16,8 +16,8 @@ EXIT_CODES = {
     EXIT_WRONG_COMMAND: 'the command line has a wrong argument',
     EXIT_DISTURBED: 'a realtime run ended early, or its drive lost more than 1 % of its steps (steps in the 5 s after '
                     'a node died are not counted)',
-    EXIT_FAILED_RUN: 'the drive tripped, a command of the scenario was refused, or a target was to be tracked and '
-                     'never was; the verdict above the table states which',
+    EXIT_FAILED_RUN: 'the drive tripped, a command of the scenario was refused, or the antenna never tracked a '
+                     'target that it should have tracked; the verdict above the table states which',
     EXIT_STOPPED: 'the run was stopped, for example by Ctrl-C'}
 """{exit code of `pedestal run`: its meaning}. The codes 1, 3 and 130 take precedence over 4."""
 

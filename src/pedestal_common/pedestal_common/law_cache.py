@@ -23,13 +23,15 @@ from numba.core.runtime import rtsys
 from numba.misc.appdirs import user_cache_dir
 
 COLUMN_PACKAGES = ('ship_motion_sim', 'tracking_receiver_sim', 'acu_tracker', 'adu_drive')
-"""Packages of the nodes with laws (columns); their laws call only laws of their own package and of pedestal_common."""
+"""Packages of the nodes that have laws. Such a package is called a column: its laws call only laws of the same package
+and of pedestal_common."""
 
 UPPER_PACKAGES = ('pedestal_bringup', 'pedestal_analysis', 'pedestal_studies')
-"""Packages above the columns; their laws may also call those of the columns, and of the packages before their own."""
+"""Packages above the columns; their laws may also call the laws of the columns, and of the packages that stand earlier
+in this tuple."""
 
 MAX_CACHE_AGE_DAYS = 7.0
-"""Age after which an unused law cache is deleted [days]."""
+"""Time without use after which a folder or file of the cache is deleted [days]."""
 _ROOT = pathlib.Path(getattr(numba.config, 'CACHE_DIR', '') or user_cache_dir()) / 'pedestal'
 if not _ROOT.is_absolute():
     # Without a home folder, as in a container, '~' is not expanded.
@@ -89,10 +91,12 @@ def _is_text(statement):
 
 @functools.cache
 def _folder_of(package) -> str | None:
-    """Return the folder of the laws of a package, None if it cannot be written. Delete folders that are too old.
+    """Return the folder of the laws of a package, None if it cannot be written.
 
-    The folder is named after the sources of the package, and of all packages whose laws its laws may call.
+    The folder is named after the sources of the package, and of all packages whose laws its laws may call. Folders and
+    files of the cache that were not used for MAX_CACHE_AGE_DAYS are deleted.
     """
+    # The laws of a package that is in neither tuple, such as a test, may call the laws of all packages in them.
     below = () if package == 'pedestal_common' or package in COLUMN_PACKAGES else (
         *COLUMN_PACKAGES, *(UPPER_PACKAGES[:UPPER_PACKAGES.index(package)] if package in UPPER_PACKAGES
                             else UPPER_PACKAGES))
@@ -132,6 +136,7 @@ class _Place(UserProvidedCacheLocator):
     def __init__(self, law, file):
         super().__init__(law, file)
         self._cache_path = os.path.join(folder(law), law.__module__)
+        # The qualified name of a law that is made inside a function contains '<locals>'.
         self._code = law.__code__ if '<' in law.__qualname__ else None
 
     def get_source_stamp(self):
@@ -152,7 +157,8 @@ class _Place(UserProvidedCacheLocator):
 
 
 class Contents(CompileResultCacheImpl):
-    """Conversion of an executable to its cached form and back; overridden for translations (law._Translated)."""
+    """Conversion of a compiled law to the form that is saved, and back; overridden for laws that are kept as LLVM code
+    without machine code (law._Translated)."""
     _locator_classes = [_Place]
 
 

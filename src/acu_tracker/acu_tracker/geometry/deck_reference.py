@@ -1,12 +1,13 @@
-"""The line of sight of a target, converted from the earth frame to the rotating deck, and its rates back.
+"""Conversion of the line of sight to a target from the earth frame to the rotating deck, and of its rates back.
 
 The conversion is exact: it differentiates the unit vector u to the target twice. The suffix _dot is a time derivative.
 
     M'_dot = -[w x] M',    u_d = M' u,    u_d_dot = M' du - w x u_d
     u_d_dot_dot = M' ddu - w x (2 M' du - w x u_d) - dw x u_d
 
-    M, M'        rotation deck -> earth, its transpose; near the zenith the frame of the filter replaces the earth
-    u, du, ddu   unit vector and its derivatives in the earth, or in the frame of the filter    [-, 1/s, 1/s2]
+    M, M'        rotation deck -> earth, its transpose (Attitude.mat is M); near the zenith the tilted frame of the
+                 filter takes the place of the earth frame (module estimate_frame)
+    u, du, ddu   unit vector and its derivatives in the earth frame, or in the frame of the filter  [-, 1/s, 1/s2]
     u_d          unit vector on the deck, FLU                                                   [-]
     w, dw        angular rate and angular acceleration of the deck, FLU                         [rad/s, rad/s2]
     [w x]        matrix of the cross product with w
@@ -23,7 +24,7 @@ ZERO_VECTOR = Vector(0.0, 0.0, 0.0)
 Attitude = namedtuple('Attitude', 'mat w dw')
 """Attitude of the deck and its motion.
 
-mat  Rotation from the deck to the frame in which the target is given
+mat  M, the rotation from the deck to the frame in which the target is given
 w    Vector of the angular rate of the deck, FLU [rad/s]
 dw   Vector of its angular acceleration, FLU [rad/s2]
 """

@@ -28,7 +28,8 @@ def initialise(s):
 def mode_after(s, mode, last, stamp, resume_time):
     """Return the mode after a silence: `mode`, or STANDBY if the silence was longer than resume_time [s].
 
-    last, stamp: stamps of the steps before and after the silence [s].
+    If the drive may have been restarted in the silence, keep the mode in s. last, stamp: stamps of the steps before
+    and after the silence [s].
     """
     if stamp > last + resume_time:
         return Mode.STANDBY
@@ -44,12 +45,12 @@ def is_pending(s):
 
 
 @compiled
-def pending(s, stamp, ended, locked, before):
-    """Return the request that is pending at `stamp` [s].
+def pending(s, stamp, ended, locked, request_before):
+    """Return the request that is pending at `stamp` [s]. The caller calls this function only while `is_pending`.
 
-    ended   True if the mode is standby because the drive was not ready
-    locked  True if autotrack can begin
-    before  request that was pending before this step
+    ended           True if the mode is standby because the drive was not ready
+    locked          True if autotrack can begin
+    request_before  request that was pending before this step
 
     A kept mode whose time is over is discarded. If autotrack cannot begin, `program` is requested, because `program`
     hands over to autotrack.
@@ -58,7 +59,7 @@ def pending(s, stamp, ended, locked, before):
         s.until = -math.inf
         return modes.NO_REQUEST
     if not ended:
-        return before
+        return request_before
     return Mode.PROGRAM if s.mode == Mode.AUTOTRACK and not locked else s.mode
 
 

@@ -20,7 +20,7 @@ FAULT_TEXTS = {
 GATED_ERROR_TEXTS = {('error_gated',): 'an error of the receiver was outside the gate and was not used',
                      ('error_noisy',): 'the errors of the receiver are noise and are not used',
                      ('error_gated', 'error_noisy'): 'the errors of the receiver are noise and are not used'}
-"""{bits of signals.INVALID_INPUTS: text of the diagnosis}; the text is used if exactly these bits are set."""
+"""{names in signals.INVALID_INPUTS: text of the diagnosis}; the text is used if exactly these inputs are invalid."""
 
 NEEDED_FIELDS = {'encoder': ('joint_states', ('position', 'velocity')),
                  'attitude': ('ship/imu/data', ('orientation', 'angular_velocity')),
@@ -34,13 +34,13 @@ INPUTS_OF_REASONS = {Reason.ENCODER_INVALID: 'encoder', Reason.ATTITUDE_INVALID:
 def missing(unit, name):
     """Return the text that names the numbers which the last message of an input lacks; '' if it lacks none.
 
-    name: name of the input in NEEDED_FIELDS. A number is missing if the message does not contain it, if it is NaN, or
-    if it is marked as no data.
+    name: name of the input in NEEDED_FIELDS. In a decoded message a number is NaN if the message does not contain it
+    or marks it as no data.
     """
     topic, needed = NEEDED_FIELDS.get(name, ('', ()))
     if topic not in unit.reads and topic != unit.trigger:
         return ''
-    message, absent = unit.inputs[0][topic], []
+    message, absent = unit.inputs[0][topic], []     # inputs (1,): the record of the last step
     for field in needed:
         numbers = np.isnan(message[field])
         names = [column.name for column in layouts.columns(topic) if column.field == field]
@@ -49,9 +49,9 @@ def missing(unit, name):
 
 
 def beyond_limits(parameters, angles):
-    """Return the text why deck angles [rad] cannot be reached: axes outside their limits, or else the floor.
+    """Return the reason why deck angles [rad] cannot be reached: the axes outside their limits, or else the floor.
 
-    parameters: AcuParameters.
+    The floor is the lowest elevation that is allowed at an azimuth. parameters: AcuParameters.
     """
     outside = [f'{axis} {math.degrees(angle):.2f} deg: must be {math.degrees(limits.low):.2f} to '
                f'{math.degrees(limits.high):.2f} deg'
@@ -78,6 +78,8 @@ def of(unit):
     mode, reason = modes.MODES[outputs['mode']], modes.REASONS[outputs['reason']]
     if state['guidance']['turn']['under_way']:
         return Diagnosis(LEVEL_WARN, f'{mode} ({reason}): {announcement.turn(unit)}', values)
+    # held: last instant at which a limit held the beam off the target [s]; the instant of a command is not before the
+    # stamp of its step.
     if state['guidance']['held'] >= state['stamp']:
         return Diagnosis(LEVEL_WARN, f'{mode} ({reason}): an axis is held at a limit, and the beam is off the target',
                          values)

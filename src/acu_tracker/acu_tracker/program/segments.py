@@ -12,7 +12,7 @@ from acu_tracker.program.program_track import NO_TRACK, ProgramTrack, ProgramTra
 from pedestal_common.graph.topics import AXES
 
 MAX_GAP_INTERVALS = 3.0
-"""Longest time between two segments that are joined, in row intervals.
+"""Longest time between two segments that counts as no gap, in row intervals; the two segments are then joined.
 
 The row interval is the shorter of two times: between the last two rows of the earlier segment, and between the first
 two rows of the later one.
@@ -27,8 +27,9 @@ class DuePiece(typing.NamedTuple):
     """The piece that is due at a stamp.
 
     piece   the table of the piece
-    in_gap  True if the piece begins after the stamp, so that rows are missing at the stamp
-    until   stamp at which the next piece follows [s]; inf: no next piece
+    in_gap  True if the stamp is between the end of the piece before and the beginning of this piece, where rows are
+            missing
+    until   end of this piece, from which on the next piece is due [s]; inf: no next piece
     """
     piece: ProgramTrack
     in_gap: bool
@@ -101,8 +102,9 @@ class Segments:
 def _rows(piece, begin, end):
     """Return the rows of a piece that are kept: from three rows before `begin` [s] to the last row before `end` [s].
 
-    If the piece ends before `begin`, its last three rows are kept. Because the slope at a row follows from its
-    neighbours, three rows keep the path at `begin` as it was. Three rows also give the slope at the end of a piece.
+    If the piece ends before `begin`, its last three rows are kept. The slope at a row follows from this row and its
+    two neighbours. Three rows before `begin` therefore keep the path at `begin` unchanged, and the last three rows of
+    a piece that has ended keep the slope at its end.
     """
     first = max(min(int(np.searchsorted(piece.times, begin)), len(piece.times)) - 3, 0)
     last = int(np.searchsorted(piece.times, end))

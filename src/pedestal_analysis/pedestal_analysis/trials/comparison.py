@@ -49,13 +49,13 @@ class Sides(typing.NamedTuple):
 def names(*plans) -> tuple:
     """Return a name for each of several plan.Plans.
 
-    The name states the scenario and the parameters of --param that differ between the plans. Plans that do not differ
-    have the name of their scenario.
+    The name states the scenario, if the plans have different scenarios, and the parameters of --param that differ
+    between the plans. Plans that do not differ have the name of their scenario.
     """
-    firsts = [plan.scenario(0) for plan in plans]
+    first_scenarios = [plan.scenario(0) for plan in plans]
     keys = dict.fromkeys(change.partition('=')[0] for plan in plans for change in plan.overrides
                          if change.partition('=')[0] not in plan.varied)
-    given = {key: [_value(chosen, key) for chosen in firsts] for key in keys}
+    given = {key: [_value(chosen, key) for chosen in first_scenarios] for key in keys}
     different = {key: values for key, values in given.items() if len(set(values)) > 1}
     several = len({plan.name for plan in plans}) > 1
     return tuple(' '.join([plan.name] * several + [f'{key}={values[i]}' for key, values in different.items()
@@ -99,7 +99,7 @@ def ranked(tables, by) -> list:
 def gain(a, b, larger):
     """Return (gain, low, high) [%] of a (n,) over b (n,), as the module states; low, high: 95 % interval.
 
-    No value is below 0. larger: True if larger values are better.
+    a and b must not contain a value below 0. larger: True if larger values are better.
     """
     def gain_of_sums(sum_a, sum_b):
         return 100.0 * (sum_a / sum_b - 1.0 if larger else 1.0 - sum_a / sum_b)

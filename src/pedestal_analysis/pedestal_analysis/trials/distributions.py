@@ -1,8 +1,8 @@
 """Distributions by which trials vary a parameter: `pedestal trials --vary NODE.KEY=KIND(numbers)`.
 
 NODE.KEY=KIND(numbers) draws the value of the parameter. With an x at the end, NODE.KEY=KIND(numbers)x, it draws a
-factor of the value in the scenario. Each draw is the quantile of a number u between 0 and 1. Because u may be random
-or a point of a Sobol sequence, both methods use the functions of this module.
+factor of the value in the scenario. Each draw is the quantile of a number u between 0 and 1. The number u is random,
+or a coordinate of a point of a Sobol sequence; the functions of this module serve both.
 """
 import re
 import typing
@@ -21,8 +21,8 @@ class Kind(typing.NamedTuple):
     usage      text of its syntax
     arguments  number of its arguments, None for one or more
     quantile   quantile(u (n,), arguments) -> values (n,)
-    extremes   extremes(arguments) -> smallest and largest values, which must be in the range of the parameter. None
-               for a distribution without bounds.
+    extremes   extremes(arguments) -> values that must all be in the range of the parameter: low and high, or all
+               options of a `choice`. None for a distribution without bounds.
     """
     usage: str
     arguments: int | None
@@ -40,7 +40,7 @@ DISTRIBUTION_KINDS = {
 }
 """{name of a distribution: Kind}."""
 
-_WRITTEN = re.compile(r'(\w+)\((.*)\)(x?)')
+_TEXT_PATTERN = re.compile(r'(\w+)\((.*)\)(x?)')
 """Pattern of the text of a distribution: name, arguments, x for a factor."""
 
 
@@ -73,13 +73,13 @@ class Distribution(typing.NamedTuple):
 
     @property
     def extremes(self):
-        """Smallest and largest values, which must be in the range of the parameter; None without bounds."""
+        """Values (or factors) that bound or list all draws, see Kind.extremes; None without bounds."""
         return DISTRIBUTION_KINDS[self.kind].extremes(self.arguments)
 
 
 def parse(text) -> Distribution:
     """Return the Distribution of a text such as 'normal(1, 0.1)x'. Raises VaryError."""
-    match = _WRITTEN.fullmatch(text.strip())
+    match = _TEXT_PATTERN.fullmatch(text.strip())
     usage = ', '.join(kind.usage for kind in DISTRIBUTION_KINDS.values())
     if not match:
         raise VaryError(f'{text!r}: must be one of {usage}; a factor has an x at the end')
@@ -103,7 +103,8 @@ def parse(text) -> Distribution:
 
 
 def _number(text, value):
-    """Return a value as a float. Raises VaryError, with the text of the distribution, for no finite number."""
+    """Return a value as a float. Raises VaryError if it is not a finite number. text: of the distribution, for the
+    error."""
     try:
         number = float('nan' if isinstance(value, bool) else value)
     except (TypeError, ValueError):

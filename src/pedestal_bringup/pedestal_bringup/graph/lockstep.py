@@ -8,7 +8,8 @@ from pedestal_bringup.graph.processes import RunError, exit_description
 from pedestal_common.graph import nodes
 
 ACCUSATION_TIME_S = 0.5
-"""Time that the other nodes get to end and to name the node that they waited for, before the error is made [s]."""
+"""Time between a failure and the error message [s]. In this time the other nodes end, and name (accuse) the node for
+which they waited."""
 
 SELF_ENDING_NODES = (nodes.DRIVE_NODE, 'recorder')
 """Nodes that end by themselves at the end of the run."""
@@ -40,7 +41,7 @@ def watch(graph, operator, tracks, progress):
         if silent:
             raise failure(graph, stuck_nodes, silent)
     progress(header.duration)
-    if not graph.stop():
+    if not graph.stop():     # a node did not end with exit code 0
         raise failure(graph, stuck_nodes)
 
 
@@ -62,17 +63,18 @@ def failure(graph, stuck_nodes, without_diagnostics=None):
     lines = {node: graph.last_lines(node) for node in graph.processes}
     accused = {name for node in early for name in graph.result(node).get('silent', ())}
     killed = [node for node, code in early.items() if code < 0]
-    silent = [node for node in graph.processes if node in accused and node not in early] or [
+    suspects = [node for node in graph.processes if node in accused and node not in early] or [
         node for node in (without_diagnostics,) if node is not None and node not in early]
-    if silent and not killed:
+    if suspects and not killed:
         stuck = stuck_nodes([node for node in graph.processes if node not in early])
-        # A node that waits for the recorder's acknowledgement does not answer either; the recorder waits for no node.
-        silent = [node for node in stuck if node == 'recorder'] or [
-            node for node in silent if node in stuck] or stuck or silent
-    culprit = (killed or silent or list(early))[0]
+        # A node that waits for the acknowledgement of the recorder does not answer either. Because the recorder waits
+        # for no node, a stuck recorder is the cause and is named first.
+        suspects = [node for node in stuck if node == 'recorder'] or [
+            node for node in suspects if node in stuck] or stuck or suspects
+    culprit = (killed or suspects or list(early))[0]
     if culprit in killed:
         reason = exit_description(early[culprit])
-    elif culprit in silent:
+    elif culprit in suspects:
         reason = 'has fallen silent'
     else:
         reason = f'ended before the run did, with exit code {early[culprit]}'

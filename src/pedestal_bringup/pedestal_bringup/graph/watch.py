@@ -16,7 +16,7 @@ from pedestal_common.wire import messages
 
 
 def run(graph, tracks, progress):
-    """Start the held nodes (child.Child) of a graph, watch the nodes to their end or until Ctrl-C, and return the
+    """Let the held nodes (child.Child) of a graph begin, watch the nodes to their end or until Ctrl-C, and return the
     Outcome.
 
     graph: processes.Graph; tracks: {topic: program track}; progress: function of the time of the run [s]. Raises

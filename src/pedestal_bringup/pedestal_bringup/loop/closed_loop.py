@@ -71,8 +71,8 @@ def loop(units, first, period_ns, before, injected, steps, truth):
     units      memories of drive, ship, INS, receiver and control unit; ship and INS are None ashore
     period_ns  time of one step [ns]
     before     (1,) of STEP_DTYPE: the previous step, from which the drive takes its commands; changed to the last step
-    injected   (n, 2) for azimuth and elevation: added to the rate commands [rad/s] and also to the commanded angles
-               [rad] on their way to the drive
+    injected   (n, 2) for azimuth and elevation: added to the commands on their way to the drive. A drive follows the
+               rates [rad/s], the beam of an array follows the angles [rad]; the number is added to both.
     steps      (n,) of STEP_DTYPE, filled
     truth      (n,) of TRUTH_DTYPE, filled
     """
@@ -102,7 +102,7 @@ class Run:
     """Result of a run of the closed loop, kept in memory; memory_recording gives it the interface of a recording.
 
     steps      (n,) of STEP_DTYPE, or of some of its topics
-    truth      (n,) of TRUTH_DTYPE; empty for a run of side_by_side
+    truth      (n,) of TRUTH_DTYPE; empty for one of several runs that the module side_by_side computes together
     stamps     stamps of the steps (n,) [ns]
     units      {node: Unit} after the run
     forecasts  [(stamp [ns], announcement.numbers)] at every whole second: the keyhole forecasts of the control unit
@@ -174,11 +174,12 @@ class Loop:
         self.replies = {}
         period = self.units[nodes.DRIVE_NODE].parameters.period
         self.period_ns = round(period * NS_PER_SECOND)
+        # steps: number of steps of the run
         self.steps = round(scenario.header.duration / period) + 1
 
     def before_step(self, first, forecasts):
-        """Prepare the step number `first`: execute the scheduled commands of the units that are due, and keep their
-        replies. If a second of the run begins, append the forecast to the list `forecasts`."""
+        """Prepare the step number `first`: execute the scheduled commands that are due, and keep their replies. If a
+        second of the run begins, append the forecast to the list `forecasts`."""
         stamp = first * self.period_ns
         if stamp // NS_PER_SECOND > (stamp - self.period_ns) // NS_PER_SECOND:
             forecasts.append((stamp, announcement.numbers(self.units['acu'].parts['state']['guidance']['lookahead'])))

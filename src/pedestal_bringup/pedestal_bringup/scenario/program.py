@@ -50,7 +50,8 @@ class Plan:
         angles  (n, 2) rad: earth azimuth (unwrapped), elevation
 
         The prediction omits two effects of the true target: UT1 - UTC and the travel time of the signal. It includes
-        refraction only if the header's `refractivity` is above 0. Before or after its known path the target stays at
+        refraction only if `program.refractivity` of the header is above 0. `program` may also add an intended error of
+        time, azimuth and elevation. Before or after its known path the target stays at
         the first or last known place.
         """
         program, duration = self.scenario.header.program, self.scenario.header.duration
@@ -82,7 +83,8 @@ class Plan:
         return motion.summary(self.scenario.node_parameters('ship_motion').ship)
 
     def announced(self):
-        """Return the lines that a user reads before the run: on changed values, the file of the ship and the targets.
+        """Return the lines that a user reads before the run: the notes of the scenario, the file of the ship motion,
+        and the targets.
 
         The lines of a target describe a recorded flight, and state when the target is highest, rises and sets. Equal
         lines of several beams appear once. Raises csv_table.TableError for a file that cannot be used.
@@ -104,7 +106,7 @@ class Plan:
 
 def _sky(built, kind, duration):
     """Return lines on a Target `built`: its rise and set if they are within the run, and its highest place if it has a
-    date and no summary.
+    date and no summary. (The summary of a recorded flight already states the highest place.)
 
     kind: name of its kind, as in target.kind; duration: length of the run [s].
     """

@@ -138,7 +138,8 @@ parameters, which are true if the topic exists (topics.Topic)."""
 
 
 class ScenarioError(ValueError):
-    """Error of a scenario that is unknown or has an invalid value; one line with file, node, key and value."""
+    """Error of a scenario that is unknown or has an invalid value. Its text is one line with file, node, key and
+    value."""
 
 
 @dataclasses.dataclass(frozen=True)

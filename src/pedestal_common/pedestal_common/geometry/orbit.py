@@ -35,7 +35,7 @@ MAX_TLE_AGE_DAYS = 30.0
 
 
 class TargetError(ValueError):
-    """Error of a target that cannot be built; one line that names the file or the TLE line, the row, field and value.
+    """Error of a target that cannot be built. Its text is one line that names the file or TLE line, row, field, value.
     """
 
 

@@ -21,8 +21,8 @@ SECONDS_PER_DAY = 86_400
 
 
 class GraphError(RuntimeError):
-    """Error in the graph around a node; one line that names topic, stamp or node. silent: names of the silent
-    nodes."""
+    """Error in the graph around a node. Its text is one line that names topic, stamp or node. silent: names of the
+    silent nodes."""
 
     def __init__(self, message: str, silent: Iterable[str] = ()) -> None:
         super().__init__(message)

@@ -47,7 +47,8 @@ _DECIMAL_COMMA_PATTERN = re.compile(r'[-+]?\d+,\d+(?:[eE][-+]?\d+)?', re.ASCII)
 
 
 class TableError(ValueError):
-    """Error of a file that is no valid table; one line that names file, line, column, value and allowed range."""
+    """Error of a file that is no valid table. Its text is one line that names file, line, column, value and allowed
+    range."""
 
 
 class Rows(typing.NamedTuple):

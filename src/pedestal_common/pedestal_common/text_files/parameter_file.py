@@ -18,7 +18,7 @@ EVERY_NODE = '*'
 
 
 class ParameterFileError(ValueError):
-    """Error of a parameter file that cannot be read; one line with the file and the section."""
+    """Error of a parameter file that cannot be read. Its text is one line with the file and the section."""
 
 
 def text(sections):

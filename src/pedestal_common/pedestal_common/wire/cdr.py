@@ -1,4 +1,4 @@
-"""Places of the numbers of a message in its bytes, for the Decoder and the Encoder of `records`.
+"""Places (byte positions) of the numbers of a message in its bytes, for the Decoder and the Encoder of `records`.
 
 The bytes are in CDR, the format of DDS. Messages of a topic that differ only in their numbers have their numbers at
 the same places. One message is therefore parsed by the definition of its type, and the others are read at the places
@@ -50,12 +50,15 @@ class Places:
             raise ValueError(f'{len(data)} bytes are no {type_name}: {error}') from None
 
     def _fields(self, type_name, prefix):
-        """Find the places in the next bytes, those of a type. prefix: beginning of the paths of its fields."""
+        """Find the places in the next bytes, which hold a value of this type. prefix: beginning of the paths of its
+        fields."""
         for name, node in ROS_TYPESTORE.fielddefs[type_name][1]:
             self._node(node, prefix + name)
 
     def _take(self, size, alignment, path):
-        """Return the start of the next `size` bytes."""
+        """Return the start of the next `size` bytes, and move `stop` behind them. path: path of the field, for an
+        error.
+        """
         self.stop += -(self.stop - CDR_HEADER_BYTES) % alignment     # CDR aligns numbers from the end of the header
         start, self.stop = self.stop, self.stop + size
         if self.stop > len(self.data):
@@ -69,7 +72,7 @@ class Places:
         return struct.unpack_from(self.order + 'I', self.data, start)[0]
 
     def _node(self, node, path):
-        """Find the places in the next bytes, those of one field. node: type of the field, by rosbags."""
+        """Find the places in the next bytes, which hold one field. node: type of the field, by rosbags."""
         kind, what = node
         if kind == Nodetype.NAME:
             self._fields(what, path + '.')

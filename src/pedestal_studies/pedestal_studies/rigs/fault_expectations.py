@@ -10,7 +10,8 @@ The drive must report a trip or missing commands within 0.1 s. A fault that show
 within 1 s. Nothing moves by itself after a fault that ended in standby.
 
 The modes that use the signal level (search, acquire, steptrack) lead to autotrack. The permitted error in these modes
-is the distance to which their beam may leave the target: the searched area, the look-around, or half a beamwidth.
+is the largest distance of their beam from the target. This is the distance across the searched area, the distance in
+the look-around (short motions of the beam about a peak of the level), or half a beamwidth.
 Because they point by the attitude as program does, the expectations of program hold for them. The faults of the
 receiver are the exception: they affect these modes as they affect autotrack.
 """
@@ -115,9 +116,10 @@ def _heading_fault():
 LEVEL_MODE_ERRORS_DEG = {'search': 10.0, 'acquire': 2.0, 'steptrack': HALF_BEAMWIDTH_DEG}
 """Largest permitted distance of the beam from the target, for each mode that uses the signal level [deg].
 
-search: across the area of five beamwidths about the expected place. acquire: a look-around of 1.2 beamwidths about a
-peak within 0.7 beamwidths. steptrack: within the beam. A fade removes the level itself, so steptrack has to search and
-look around; it then has the limit of acquire.
+In search, the searched area reaches five beamwidths (5 deg) to each side of the expected place, and beam and target
+may be on opposite sides. In acquire, the beam looks around up to 1.2 beamwidths from the peak that was found. The peak
+is within 0.7 beamwidths of the target, so the sum is 1.9 beamwidths. In steptrack the target is within the beam. A
+fade removes the level itself, so steptrack has to search and look around; it then has the limit of acquire.
 """
 
 MODES_TO_AUTOTRACK = ('search', 'acquire', 'autotrack')

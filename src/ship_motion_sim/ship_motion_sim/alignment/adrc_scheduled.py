@@ -1,6 +1,12 @@
 """Alignment method: level by ADRC with an observer whose bandwidth falls with time, azimuth from its estimate z3.
 
-The bandwidth 6 / t makes the observer fast at first and its noise small later. Symbols: see the package.
+The bandwidth 6 / t [rad/s], with the time t [s] since power-up, makes the observer fast at first and its noise small
+later.
+
+    n'              frame that the INS computes for east, north, up
+    z3              estimate of x3, the rate of change of the tilt (times g) without command; x3 depends on the azimuth
+    w_o             bandwidth of the observer                               [rad/s]
+    l1, l2, l3      gains of the observer
 """
 import math
 

@@ -5,7 +5,10 @@
 
     v, f            velocity error (v_E, v_N) [m/s] and specific force [m/s2], both level, in n'
     w_cE .. w_cU    commanded rates of n' about east, north and up [rad/s]
-    s, s0           Laplace variable, bandwidth [rad/s]; other symbols: see the package
+    s, s0           Laplace variable, bandwidth [rad/s]
+    n', az          frame that the INS computes for east, north, up; its azimuth misalignment [rad]
+    w_N, g          north part of the rate of the earth [rad/s], gravity [m/s2]
+    K1, k2, K3, K4  gains of the loop; a_x: tilt of n' about east [rad]
 
 All four poles are at -s0 +- j s0. An azimuth error of 180 deg is an unstable equilibrium. Because the loop is closed
 from power-up, the transient of the first levelling leaves this equilibrium. The velocities are those of a gyrocompass,
@@ -38,7 +41,7 @@ STATE_DTYPE = np.dtype([
 
 
 def constants(k, s0, h) -> np.ndarray:
-    """Return the record () of CONSTANTS_DTYPE for the bandwidth s0 [rad/s] and steps of h [s]; k: CONDITIONS_DTYPE."""
+    """Return one record of CONSTANTS_DTYPE for the bandwidth s0 [rad/s] and steps of h [s]; k: CONDITIONS_DTYPE."""
     record = np.zeros((), CONSTANTS_DTYPE)
     g, w_north = float(k['gravity']), float(k['earth_rate'][1])
     K1 = K4 = 2.0 * s0

@@ -16,7 +16,7 @@ CONDITIONS_DTYPE = np.dtype([
 
 
 def conditions(p, latitude) -> np.ndarray:
-    """Return the record () of CONDITIONS_DTYPE of AlignmentParameters p at a latitude [rad]."""
+    """Return one record of CONDITIONS_DTYPE for AlignmentParameters p at a latitude [rad]."""
     record = np.zeros((), CONDITIONS_DTYPE)
     record['gravity'], record['earth_rate'] = earth.gravity(latitude), earth.rate(latitude)
     record['velocity_density'] = p.velocity_disturbance**2 * p.step

@@ -2,9 +2,18 @@
 
     dx1/dt = x2, dx2/dt = x3 + b0 u, dx3/dt = 0, y = x1        paper 001 equation (9)
 
-Symbols: see the package. The observer of the paper is linear too, because its delta = 20000 keeps the nonlinear
-function fal in its linear zone. The gains are fixed, scheduled, or those of a Kalman filter; the covariance is valid
-for any gains. Arguments: o is a record of STATE_DTYPE, k of CONDITIONS_DTYPE.
+    x1, x2, x3      of the north and of the east channel: velocity error [m/s], its rate [m/s2], the rate of x2 without
+                    command [m/s3]
+    z1, z2, z3      estimates of x1, x2, x3; p11 to p33: elements of their covariance
+    u, b0 u         level command of the channel [rad/s]; its effect on the rate of x2 [m/s3]
+    w_o, h          bandwidth of the observer [rad/s], step [s]
+    l1, l2, l3      gains of the observer
+    n', az          frame that the INS computes for east, north, up; its azimuth misalignment [rad]
+    w_N, g          north part of the rate of the earth [rad/s], gravity [m/s2]
+
+The observer of the paper is linear too, because its delta = 20000 keeps the nonlinear function fal in its linear zone.
+The gains are fixed, scheduled, or those of a Kalman filter; the covariance is valid for any gains. Arguments: o is a
+record of STATE_DTYPE, k of CONDITIONS_DTYPE.
 """
 import math
 

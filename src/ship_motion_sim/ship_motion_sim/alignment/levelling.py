@@ -1,8 +1,16 @@
 """Level commands of an ADRC: tracking differentiator and nonlinear combination, equations (7), (8), (11) of paper 001.
 
-Symbols: see the package. The correct form of (11) is u = (u0 - z3) / b0, but the paper prints u0 - z3 / b0. With the
-printed form the east channel (b0 < 0) has positive feedback and ends at 180 deg of level, and the gain of the north
-channel is g times too high.
+    x1, x2          of the north and of the east channel: velocity error [m/s] and its rate [m/s2]
+    z1, z2, z3      estimates of x1, x2 and of the rate of x2 without command [m/s3]
+    v1, v2          reference of x1 and x2 from the tracking differentiator
+    u, b0           level command of a channel [rad/s]; its effect on the rate of x2: g north, -g east [m/s2 per rad]
+    u0              rate of x2 that the nonlinear function fhan demands [m/s3]
+    w_c, h          bandwidth of the level control [rad/s], step [s]
+    w_cE .. w_cU    commanded rates of the frame of the INS about east, north and up [rad/s]
+
+The correct form of (11) is u = (u0 - z3) / b0, but the paper prints u0 - z3 / b0. With the printed form the east
+channel (b0 < 0) has positive feedback and ends at 180 deg of level, and the gain of the north channel is g times too
+high.
 """
 from pedestal_common.compiled import compiled
 from pedestal_common.fhan import fhan

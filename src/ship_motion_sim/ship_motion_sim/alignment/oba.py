@@ -1,15 +1,18 @@
-"""Optimisation-based alignment: the rotation that best maps measured specific force onto gravity. No feedback loop.
+"""Alignment method: the rotation that best maps the measured specific force onto gravity (optimisation-based).
+
+The attitude follows from sums of vectors, without a feedback loop. An observer beside them gives only the 1 sigmas.
 
     a = int C_b^b0 f dt        integral of the measured specific force f, turned by the gyros only [m/s]
     b = -int C_n^n0 g dt       integral of the reaction to gravity g, turned by the rotation of the earth [m/s]
 
-    b0, n0    frames of the deck and of ENU at power-up, fixed in inertial space; b (in C_b^b0), n: deck and ENU now
-    C_x^y     rotation from a frame x to a frame y
+    C_x^y     rotation from a frame x to a frame y; x and y are one of these frames:
+    b0, n0    frames of the deck and of ENU at power-up, fixed in inertial space
+    b, n      frames of the deck and of ENU now; as an index of C, b is this frame, otherwise the vector above
 
 Except for the velocity of the ship, a is C_n0^b0 b. The rotation b0 -> n0 that brings the vectors a onto b with least
 squares is an eigenvector of a 4 x 4 matrix (Horn 1987). The mean of all a and the mean of all b are subtracted, which
-removes the unknown velocity at power-up. With the usual assumption of zero velocity the error is 15 times larger at
-100 s. The rest of the swell averages out.
+removes the unknown velocity of the ship at power-up. If this velocity is assumed to be zero, as is usual, the error
+of the alignment at 100 s is 15 times larger. The velocity of the swell after power-up averages out.
 """
 import math
 
@@ -25,13 +28,15 @@ MAX_JACOBI_SWEEPS = 12
 
 STATE_DTYPE = np.dtype([
     ('t', 'f8'),                                        # time since power-up [s]
-    ('observer', extended_observer.STATE_DTYPE),        # of x, y of a: its covariance is the information limit
+    ('observer', extended_observer.STATE_DTYPE),        # gives the 1 sigmas from the x, y parts of a
     ('coriolis', 'f8', (3,)),                           # int w_ie x v dt [m/s]
     ('count', 'f8'),                                    # number of pairs (a, b)
     ('sum_a', 'f8', (3,)), ('sum_b', 'f8', (3,)), ('sum_ab', 'f8', (3, 3)),     # sums of a, b, a b^T
     ('matrix', 'f8', (4, 4)), ('vectors', 'f8', (4, 4)),        # matrix of Horn; its eigenvectors, in columns
     ('azimuth_sigma', 'f8'), ('level_sigma', 'f8'),
 ], align=True)
+"""State of the method. The observer does not change the attitude. Its covariance is the information limit: the least
+that any linear method can reach with these measurements (module riccati_eso)."""
 
 
 @compiled
@@ -51,8 +56,9 @@ def gravity_integral(t, k):
 def step(s, k, a, v, h):
     """Add one pair of vectors, h [s] after the last; s, k: records STATE_DTYPE, CONDITIONS_DTYPE.
 
-    a: int C_b^b0 f dt in b0, less the velocity of a log [m/s], three floats; v: velocity in n of a GNSS [m/s], zeros
-    without GNSS. With a log, the model omits the Coriolis force: 7 m/s tilt the level by 0.1 arcmin.
+    a: int C_b^b0 f dt in b0, three floats [m/s]; if the ship has a speed log, its velocity is subtracted. v: velocity
+    in n by GNSS [m/s], zeros without GNSS. With a speed log, the model omits the Coriolis force: at 7 m/s the level
+    then has an error of 0.1 arcmin.
     """
     s.t += h
     o = s.observer

@@ -1,7 +1,7 @@
 """Alignment method: the extended observer with Kalman gains, the best linear estimate of azimuth on the assumed sea.
 
     x1, x2, x3   of the north and of the east channel: velocity error [m/s], its rate [m/s2], the rate of x2 without
-                 command [m/s3]. Tilt is x2 / g, and x3 depends on the azimuth (see the package)
+                 command [m/s3]. Tilt is x2 / g, and x3 depends on the azimuth, see alignment/__init__.py
     z1, z2, z3   their estimates
     r, q         variance of the measured velocity per step [m2/s2]; growth of the variance of x2, the random walk of
                  the gyros times g [(m/s2)2/s]

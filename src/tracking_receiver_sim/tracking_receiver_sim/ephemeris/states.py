@@ -35,9 +35,9 @@ def gaps(t):
 class Segment(typing.NamedTuple):
     """States that consecutive polynomials join.
 
-        line        (n,) line in the file
-        t           (n,) [s], growing
-        r, v        (n, 3) [m], [m/s]; v is None if the file has no velocities
+        line        (n,) line of each state in the file
+        t           (n,) times of the states after Ephemeris.midnight [s], growing
+        r, v        (n, 3) positions [m] and velocities [m/s] in `frame`; v is None if the file has no velocities
         frame       name of a frame that frames.earth_fixed supports
         method      HERMITE or LAGRANGE, see interpolation.py; degree: of the polynomials
         begin, end  usable range of t [s]
@@ -59,8 +59,8 @@ class Segment(typing.NamedTuple):
 
 
 class Ephemeris(typing.NamedTuple):
-    """The orbit of one object. midnight: instant (see track.instant) of t = 0; segments: in order of time;
-    description: format, number of states, frame and interpolation."""
+    """The orbit of one object. midnight: instant of t = 0 [s], on the time of track files (module track.instant);
+    segments: in order of time; description: format, number of states, frame and interpolation."""
     path: str
     midnight: float
     segments: tuple
@@ -68,12 +68,12 @@ class Ephemeris(typing.NamedTuple):
 
     @property
     def begin(self):
-        """First usable t."""
+        """First usable time t [s]."""
         return self.segments[0].begin
 
     @property
     def end(self):
-        """Last usable t."""
+        """Last usable time t [s]."""
         return self.segments[-1].end
 
 

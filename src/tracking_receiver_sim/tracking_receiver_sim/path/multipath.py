@@ -6,7 +6,9 @@ The factor of the reflected wave is
 
     Gamma = -rho exp(-2 (2 pi sigma_h sin E / lambda)^2) exp(-j 4 pi h sin E / lambda)
 
-    rho     amplitude factor of smooth ground; other symbols: see the package
+    rho         amplitude factor of smooth ground [-]
+    h, sigma_h  height of the antenna over the ground, rms roughness of the ground [m]
+    lambda      wavelength [m]
 
 Roughness: W. S. Ament, Proceedings of the IRE 41 (1953) 142; the geometry: Barton, Modern Radar System Analysis,
 chapter on multipath. The model omits diffuse scattering and the curvature of the earth.
