@@ -118,8 +118,8 @@ def _values(unit, faults, invalid):
 
 def _uncommanded_motion(movement):
     """Return the text of the measured and commanded rates; movement: view of uncommanded_motion.ENVELOPE_DTYPE."""
-    return ', '.join(f'{axis} {rate:.3g} rad/s, commanded {low:.3g} to {high:.3g}'
-                     for axis, (rate, low, high) in zip(topics.AXES, movement['measured']))
+    return ', '.join('{} {:.3g} deg/s, commanded {:.3g} to {:.3g}'.format(axis, *map(math.degrees, rates))
+                     for axis, rates in zip(topics.AXES, movement['measured']))
 
 
 def _pins(code):

@@ -59,8 +59,8 @@ def checked(times, angles):
                                 f'must be after {times[back[0]]:g} s')
     high = np.flatnonzero(np.abs(angles[:, 1]) > 0.5 * math.pi)
     if high.size:
-        raise ProgramTrackError(f'program track row {high[0]}: elevation {angles[high[0], 1]:g} rad; '
-                                'must be -1.5708 to 1.5708')
+        raise ProgramTrackError(f'program track row {high[0]}: elevation {math.degrees(angles[high[0], 1]):.6g} deg; '
+                                'must be -90 to 90')
     return ProgramTrack(times, angles)
 
 

@@ -84,11 +84,11 @@ class Segments:
             rate = abs(math.remainder(distance, 2.0 * math.pi) if i == 0 else distance) / time
             acceleration = abs(rate_after - rate_before) / time
             if rate > max_rate:
-                raise TurnaroundError(f'turnaround too fast: {axis} {rate:g} rad/s; must be at most '
-                                      f'{max_rate:g} rad/s')
+                raise TurnaroundError(f'turnaround too fast: {axis} {math.degrees(rate):.4g} deg/s; must be at most '
+                                      f'{math.degrees(max_rate):.4g} deg/s')
             if acceleration > max_acceleration:
-                raise TurnaroundError(f'turnaround too fast: {axis} {acceleration:g} rad/s2; must be at most '
-                                      f'{max_acceleration:g} rad/s2')
+                raise TurnaroundError(f'turnaround too fast: {axis} {math.degrees(acceleration):.4g} deg/s2; must be '
+                                      f'at most {math.degrees(max_acceleration):.4g} deg/s2')
 
     def at(self, t):
         """Return the DuePiece at t [s]: the first piece that has not ended, or the last piece."""
