@@ -83,8 +83,8 @@ TUNED_FILTERS = {
     'helicopter': _one('ca', math.radians(0.03), math.radians(0.03))}
 """{target: parameters of its filter of one model}. A target seen from a ship has the filter of the target ashore.
 
-The filter is the best of a grid over the noise of cv and ca, and over alpha and sigma of singer, on seeds from 101 on:
-two for the targets of hard_targets, three for the others, whose noise was chosen for each axis.
+The filter is the best of a grid: over the noise of cv and ca, and over alpha and sigma of singer. The targets of
+hard_targets had two seeds from 101 on. The other targets had three seeds, and a noise for each axis.
 """
 
 
