@@ -5,10 +5,12 @@ import signal
 
 import pytest
 
-# A session in the background, or under nohup, ignores them and hands that on.
-for number in (signal.SIGINT, signal.SIGHUP):
+# A shell starts a command in the background with SIGINT ignored, and nohup one with SIGHUP ignored. The processes of
+# the tests would inherit this. `pedestal` itself keeps ignoring what its parent ignores (pedestal/stop.py): a script
+# that starts it with & must not lose it to a Ctrl-C, and ends it by SIGTERM.
+for number, handler in ((signal.SIGINT, signal.default_int_handler), (signal.SIGHUP, signal.SIG_DFL)):
     if signal.getsignal(number) is signal.SIG_IGN:
-        signal.signal(number, signal.SIG_DFL)
+        signal.signal(number, handler)
 
 STDERR = pytest.StashKey()
 

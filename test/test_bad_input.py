@@ -146,7 +146,7 @@ def test_track_file_that_is_not_there(capsys, one_line, tmp_path):
 
 def test_recorded_ship_is_read_before_the_run(capsys, one_line, tmp_path):
     (tmp_path / 'ship.csv').write_text('time,roll\n0,1\n')
-    changes = ('motion=recorded', 'heading_deg=0', 'sea_state=0', 'speed=0', f'recorded.path={tmp_path}/ship.csv')
+    changes = ('motion=recorded', 'sea_state=0', 'speed=0', f'recorded.path={tmp_path}/ship.csv')
     line = refused(capsys, one_line, 'run', 'ship_pass', '--bag', tmp_path / 'bag',
                    *(part for change in changes for part in ('--param', f'ship_motion.ship.{change}')))
     assert f"{tmp_path}/ship.csv: line 1: column 'time': must end with a known unit" in line

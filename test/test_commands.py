@@ -43,6 +43,18 @@ def test_a_schedule_is_obeyed_in_its_steps_and_what_came_of_it_is_recorded(sched
     assert modes['data'][-1] == 'autotrack'
 
 
+def test_the_output_of_a_run_may_be_a_file_beside_the_bag(start_run, tmp_path):
+    """As by `pedestal run --bag bag > bag.log`. A parameter file without the operator is no reason for a warning."""
+    file = tmp_path / 'tuned.yaml'
+    file.write_text('/**/acu:\n  ros__parameters:\n    tracker.lock_count: 30\n')
+    run = start_run('uav_flyby', '--duration', '1', '--params-file', file,
+                    prefix=('sh', '-c', 'exec "$@" > bag.log', 'sh'))
+    result = run.finish()
+    assert (result.returncode, result.stderr) == (0, '')
+    assert 'mcap sha256' in run.log.read_text()
+    assert (run.bag.with_name('bag.logs') / 'parameters.yaml').is_file()
+
+
 def test_a_refused_command_leaves_the_preset_as_it_was(scheduled):
     table = bags.read(scheduled).table('acu/reference')
     before_program = (table['t'] > 3.9) & (table['t'] < 4.0)

@@ -1,12 +1,16 @@
-"""The runnable file of docs/how-to: what a datagram says is published with the stamp of the drive."""
+"""The runnable files of docs/how-to: a receiver publishes what a datagram says with the stamp of the drive, and two
+drives move their axes to where the control unit commands them."""
 import math
 import pathlib
 import socket
 import sys
+import threading
+import time
 
+import numpy as np
 import pytest
 
-from pedestal_common.wire import messages
+from pedestal_common.wire import commands, messages
 
 FILE = pathlib.Path(__file__).parents[1] / 'docs' / 'how-to' / 'receiver.py'
 
@@ -34,3 +38,107 @@ def test_a_receiver_of_ones_own(start_process, connect, domain_id):
     measured = next(vector for vector in map(step, range(2, 200)) if not math.isnan(vector.x))
     assert (measured.x, measured.y, measured.z) == pytest.approx((0.001, -0.002, 46.5))
     assert math.isnan(step(200).x)
+
+
+def test_a_receiver_of_ones_own_without_error_channels(start_process, connect, reserve_domain):
+    """Step track climbs to the target by a level, 20 times a second. First the ACU learns the noise off target."""
+    domain, target, beamwidth = reserve_domain(), np.array((0.506, 0.6)), 0.0175
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
+        free.bind(('127.0.0.1', 0))
+        port = free.getsockname()[1]
+    start_process([sys.executable, FILE.with_name('level_receiver.py'), port], ROS_DOMAIN_ID=str(domain))
+    graph = ('graph.pacing:=realtime', 'graph.nodes:=acu,adu', 'period:=0.02')
+    for module, changes in (('adu_drive.adu_node', ('initial_azimuth:=0.7', 'initial_elevation:=0.6')),
+                            ('acu_tracker.acu_node', ('steptrack.cycle:=4.0', 'steptrack.dwell:=0.3',
+                                                      'azimuth.feedforward.bandwidth:=4.0',
+                                                      'elevation.feedforward.bandwidth:=4.0'))):
+        start_process([sys.executable, '-m', module, '--ros-args',
+                       *(part for change in (*graph, *changes) for part in ('-p', change))], ROS_DOMAIN_ID=str(domain))
+    client, last = connect(domain, 'level'), [-math.inf]
+    noise = np.random.default_rng(1)
+
+    def send(joints):
+        if time.monotonic() - last[0] > 0.05:
+            last[0] = time.monotonic()
+            off = (np.array(joints.position) - target) * (math.cos(target[1]), 1.0) / beamwidth
+            level = max(50.0 - 12.0 * float(off @ off), 20.0) + 0.02 * noise.standard_normal()
+            with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as hardware:
+                hardware.sendto(str(level).encode(), ('127.0.0.1', port))
+
+    def error():
+        return abs(client.heard['joint_states'][-1].position[0] - target[0]) / beamwidth
+
+    client.read('joint_states', send)
+    client.read('acu/mode')
+    client.write('acu/command')
+    client.spin(4.0)
+    client.publish('acu/command', commands.message(commands.Command('preset', 'client', '1', {
+        'azimuth': 0.5, 'elevation': 0.6})))
+    client.until(lambda: error() < 0.4)
+    client.spin(2.0)
+    client.publish('acu/command', commands.message(commands.Command('steptrack', 'client', '2')))
+    client.until(lambda: error() < 0.03, told=lambda: f'{error():.3f} beamwidths off')
+    assert client.heard['acu/mode'][-1].data == 'steptrack'
+
+
+class Amplifiers(threading.Thread):
+    """Amplifiers of two axes at a UDP port: of first order in rate, or in angle where they close the position loop."""
+
+    RATE_LOOP, POSITION_LOOP, LARGEST_RATE = 30.0, 10.0, 0.35
+    """Bandwidths [rad/s] and largest rate [rad/s]."""
+
+    def __init__(self, angles):
+        super().__init__(daemon=True)
+        self.angles, self.rates, self.commands = list(angles), [0.0, 0.0], []
+        self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self.socket.bind(('127.0.0.1', 0))
+        self.port = self.socket.getsockname()[1]
+
+    def move(self, axis, command, dt):
+        """One step of an axis that follows rates."""
+        self.rates[axis] += (command - self.rates[axis]) * min(self.RATE_LOOP * dt, 1.0)
+
+    def run(self):
+        before = time.monotonic()
+        while True:
+            text, client = self.socket.recvfrom(200)
+            now = time.monotonic()
+            for axis, command in enumerate(map(float, text.split())):
+                if not math.isnan(command):
+                    self.move(axis, command, now - before)
+                    self.rates[axis] = min(max(self.rates[axis], -self.LARGEST_RATE), self.LARGEST_RATE)
+                self.angles[axis] += self.rates[axis] * (now - before)
+            before = now
+            self.socket.sendto(' '.join(map(str, (*self.angles, *self.rates))).encode(), client)
+
+
+class PositionAmplifiers(Amplifiers):
+    def move(self, axis, command, dt):
+        self.rates[axis] = (command - self.angles[axis]) * self.POSITION_LOOP
+
+
+@pytest.mark.parametrize('file, amplifiers, delay', [('rate_drive.py', Amplifiers, 0.05),
+                                                     ('position_drive.py', PositionAmplifiers, 0.12)])
+def test_a_drive_of_ones_own(file, amplifiers, delay, start_process, connect, reserve_domain):
+    """Both axes go where a preset says, and the control unit keeps its mode; without amplifiers there is a fault."""
+    domain, motors = reserve_domain(), amplifiers((0.1, 0.4))
+    start_process([sys.executable, FILE.with_name(file), motors.port], ROS_DOMAIN_ID=str(domain))
+    client = connect(domain, file.partition('.')[0])
+    for name in ('adu/state', 'joint_states'):
+        client.read(name)
+    client.until(lambda: [state.data for state in client.heard['adu/state']] == ['fault: amplifiers silent'])
+    motors.start()
+    start_process([sys.executable, '-m', 'acu_tracker.acu_node', '--ros-args', '--params-file',
+                   FILE.with_name('drive.yaml'), '-p', f'command_delay:={delay}'], ROS_DOMAIN_ID=str(domain))
+    for name in ('acu/mode', 'acu/alarms', 'acu/command_result'):
+        client.read(name)
+    client.write('acu/command')
+    client.until(lambda: client.heard['adu/state'][-1].data == 'enabled' and client.heard['joint_states'])
+    client.publish('acu/command', commands.message(commands.Command(
+        'preset', 'client', '1', {'azimuth': 0.5, 'elevation': 0.8})))
+    assert commands.of_reply(client.until(lambda: client.heard['acu/command_result'])[-1])[1].granted
+    client.until(lambda: np.allclose(client.heard['joint_states'][-1].position, (0.5, 0.8), rtol=0.0, atol=5e-4),
+                 told=lambda: str((client.heard['joint_states'][-1].position, client.heard['acu/alarms'][-1:])))
+    assert client.heard['acu/mode'][-1].data == 'preset'
+    raised = {status.name for array in client.heard['acu/alarms'] for status in array.status}
+    assert not raised & {'drive frozen', 'uncommanded motion', 'azimuth runaway', 'elevation runaway'}

@@ -1,4 +1,5 @@
-"""What hangs is ended within its limit and named with its stacks: in a step of `.ci/run` and in a phase of a test."""
+"""What hangs is ended within its limit and named with its stacks: in a step of `.ci/run` and in a phase of a test.
+Tests in the background end as in the foreground."""
 import pathlib
 import shutil
 import subprocess
@@ -67,6 +68,15 @@ def test_a_command_that_hangs_is_named_with_the_stacks_of_its_processes(tmp_path
     assert f'{sys.executable} -m pytest --numprocesses 1: not ended after 10 s' in done.stderr
     assert 'waits_for_itself (test_hangs.py:' in done.stderr and 'sleep 600' in done.stderr
     assert is_gone(tmp_path)
+
+
+def test_tests_that_send_signals_pass_in_the_background():
+    """Where a shell ignores SIGINT, and nohup SIGHUP, for all processes below."""
+    done = subprocess.run(['nohup', 'sh', '-c', 'trap "" INT; exec "$@"', 'sh', sys.executable, '-m', 'pytest',
+                           '--numprocesses', '1', '-p', 'no:cacheprovider', '-k', 'stopped_while_it_imports',
+                           'src/pedestal_analysis/test/test_console.py'],
+                          cwd=HOME, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=120.0)
+    assert done.returncode == 0 and '3 passed' in done.stdout, done.stdout + done.stderr
 
 
 def test_the_exit_code_is_that_of_the_command():

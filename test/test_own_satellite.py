@@ -7,6 +7,7 @@ import yaml
 
 from acu_tracker.modes import Mode
 from pedestal import cli, satellite
+from pedestal.verbs.antenna import run as run_verb
 from pedestal_bringup.loop import closed_loop
 from pedestal_bringup.scenario import scenario
 from pedestal_recording import bag as bags
@@ -31,13 +32,31 @@ def test_a_pass_of_a_tle_file_is_run_from_its_rise(start_run, tmp_path):
     assert done.returncode == 0, done.stderr
     rise = re.search(r'rises (2019-12-10) (12:3\d:\d\d) UTC in azimuth \d+ deg, highest (5\d\.\d) deg', done.stdout)
     assert rise and f'0 s is {rise[1]} {rise[2]} UTC' in done.stdout
-    made = yaml.safe_load(bags.read(run.bag).configuration['scenario'])['tracking_receiver']['ros__parameters']
+    sections = yaml.safe_load(bags.read(run.bag).configuration['scenario'])
+    assert 'scenario.program.time_offset = 0 s in place of 0.2 s, which belongs to the satellite of leo_pass' in (
+        done.stdout.splitlines())
+    assert sections['scenario']['ros__parameters']['program.time_offset'] == 0.0
+    made = sections['tracking_receiver']['ros__parameters']
     assert made['target.leo_pass.start_time'] == f'{rise[1]}T{rise[2]}Z'
     assert made['target.station.latitude_deg'] == 47.5
-    known = yaml.safe_load(bags.read(run.bag).configuration['scenario'])['acu']['ros__parameters']
+    known = sections['acu']['ros__parameters']
     assert known['prediction.line_1'] == LeoPassParameters().line_1                   # mode tle knows it too
     assert known['prediction.start_time'] == f'{rise[1]}T{rise[2]}Z'
     assert known['prediction.station.latitude_deg'] == 47.5
+
+
+def test_own_elements_end_the_prediction_errors_of_the_scenario_but_no_given_one(tmp_path, capsys):
+    tle = tmp_path / 'iss.tle'
+    tle.write_text(f'ISS\n{LeoPassParameters().line_1}\n{LeoPassParameters().line_2}\n')
+    for scenario_name, change, expected in (
+            ('leo_pass', '0.5', (0.5, 0.0, 0.0)), ('geo_station', '', (0.0, 0.0, 0.0))):
+        given = ('--param', f'scenario.program.time_offset={change}') if change else ()
+        options = cli._parser().parse_args(['run', scenario_name, '--tle', str(tle), '--pass', UTC, *given])
+        program = run_verb._chosen(options).header.program
+        assert (program.time_offset, program.azimuth_offset, program.elevation_offset) == expected
+    lines = [line for line in capsys.readouterr().out.splitlines() if line.startswith('scenario.')]
+    assert lines == [f'scenario.program.{axis}_offset = 0 rad in place of {value} rad, which belongs to the satellite '
+                     'of geo_station' for axis, value in (('azimuth', '0.003'), ('elevation', '-0.002'))]
 
 
 def test_a_pass_is_tracked_until_it_sets():

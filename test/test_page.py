@@ -308,6 +308,14 @@ def test_a_recording_on_the_page(browser, start_process):
     reads(page, '#link', 'recording')
     assert page.locator('#stop').is_disabled()
     reads(page, '#play', 'play')
+    slewed = page.evaluate("""async () => {
+        const t = Array.from({length: 200}, (_, i) => 0.5 * i);
+        const rates = t.map((at) => at < 2 ? -130 : 0.2), missing = t.map(() => null);
+        const {shownRates} = await import('./charts.js');
+        return [shownRates(t, [rates, missing]), shownRates(t.slice(0, 20), [rates.slice(0, 20)]),
+                shownRates(t, [missing])];
+    }""")
+    assert slewed == [[0.2, 0.2], [-130, 0.2], [None, None]]     # a slew leaves the scale, and at first it is on it
     for moment in (3.0, 1.0):
         page.locator('#slider').fill(f'{moment:g}')
         row = int((joints['t'] - joints['t'][0] > moment + 1e-9).argmax()) - 1

@@ -1,5 +1,7 @@
 """README.md in its own order: every command line of it is executed from an empty folder, or named below with the
 reason why not; the command lines of docs/ are at least understood."""
+import ast
+import doctest
 import os
 import pathlib
 import re
@@ -9,8 +11,11 @@ import sys
 
 import pytest
 
+import pedestal
 from pedestal import cli, samples
 from pedestal_analysis.console import EXIT_DISTURBED
+from pedestal_analysis.trials import plan as trial_plans
+from pedestal_bringup.scenario import scenario
 
 ROOT = pathlib.Path(__file__).parents[1]
 
@@ -79,14 +84,102 @@ def test_readme_runs_in_its_own_order(reserve_domain, tmp_path, capsys):
                 print(f'\nnot executed: {line} ({of_table(line, NOT_RUN)})', end='')
 
 
-@pytest.mark.parametrize('page', ['README.md', *(f'docs/{path.relative_to(ROOT / "docs")}' for path in
-                                                 sorted((ROOT / 'docs').rglob('*.md')))])
+PAGES = ['README.md', *(f'docs/{path.relative_to(ROOT / "docs")}' for path in sorted((ROOT / 'docs').rglob('*.md')))]
+
+
+@pytest.mark.parametrize('page', PAGES)
 def test_the_commands_of_every_page_are_understood(page):
     """By the parser of `pedestal`: verb, options and their values."""
     parser = cli._parser()
     for line in command_lines((ROOT / page).read_text()):
         if line.startswith('pedestal '):
             parser.parse_args(shlex.split(line.removesuffix(' &'))[1:])
+
+
+def documented_changes(text):
+    """Yield (command, scenario, overrides that hold before, texts node.key=value) of each `pedestal` command of a
+    page that changes parameters: of its lines and of its code in a sentence. The scenario of a recording is that of
+    the command above it that wrote the recording."""
+    parser, recorded = cli._parser(), {}
+    inline = re.findall(r'`(pedestal \w+ [^`]*--(?:param|against-param|side) [^`]*=[^`]*)`', text)
+    for line in [*command_lines(text), *inline]:
+        if not line.startswith('pedestal '):
+            continue
+        options = parser.parse_args(shlex.split(line.removesuffix(' &'))[1:])
+        verb = line.split()[1]
+        if verb == 'recompute':
+            node = f'{options.node[0]}.' if len(options.node) == 1 else ''
+            yield line, recorded[str(options.bag)], [], [
+                text if text.startswith(node) else node + text for text in options.param]
+            continue
+        source, given = getattr(options, 'scenario', None), getattr(options, 'param', [])
+        if verb == 'run' and options.bag:
+            recorded[str(options.bag)] = source
+        yield line, source, [], given
+        yield line, source, given, getattr(options, 'against_param', [])
+        for _, *more in getattr(options, 'side', []):
+            yield line, source, given, more
+
+
+def changes_of_code(text):
+    """Yield (code, scenario, [], texts node.key=value) of each pedestal.load and .changed of Python code."""
+    calls = [(call, call.func.attr) for call in ast.walk(ast.parse(text))
+             if isinstance(call, ast.Call) and isinstance(call.func, ast.Attribute)]
+    source = next((ast.literal_eval(call.args[0]) for call, name in calls if name == 'load'), None)
+    for call, name in calls:
+        for values in [ast.literal_eval(arg) for arg in call.args if isinstance(arg, ast.Dict)]:
+            if name in ('load', 'changed'):
+                yield ast.unparse(call), source, [], [scenario.override(*item) for item in values.items()]
+
+
+def without_effect(changes):
+    """Return (command, text node.key=value) of each change to the value that its scenario has anyway."""
+    found = []
+    for command, source, before, texts in changes:
+        for text in texts:
+            node, key, value = scenario.parse_override(text)
+            # The other changes of a command may need each other, for example the file of a flight and its kind.
+            if trial_plans.value_in(scenario.load(source, before), f'{node}.{key}') == value:
+                found.append((command, text))
+    return found
+
+
+def test_a_change_without_effect_is_found():
+    page = ("""
+    pedestal run uav_flyby --param acu.azimuth.filter.kind=imm --bag my_bag
+    pedestal recompute my_bag --node acu --param azimuth.filter.kind=imm --param elevation.filter.kind=ca
+    pedestal trials uav_flyby --param acu.azimuth.filter.kind=ca --against-param acu.azimuth.filter.kind=ca
+    pedestal trials uav_flyby --side a acu.azimuth.filter.kind=cv --side b acu.azimuth.filter.kind=imm
+
+Text with `pedestal run leo_pass --param acu.tracker.handover=true`.
+""")
+    assert [text for _, text in without_effect(documented_changes(page))] == [
+        'acu.azimuth.filter.kind=imm', 'acu.azimuth.filter.kind=imm', 'acu.azimuth.filter.kind=ca',
+        'acu.azimuth.filter.kind=imm', 'acu.tracker.handover=true']
+    code = "pedestal.load('leo_pass').changed({'acu.azimuth.filter.kind': 'imm', 'adu.period': 0.004})"
+    assert [text for _, text in without_effect(changes_of_code(code))] == ['acu.azimuth.filter.kind=imm']
+
+
+@pytest.mark.parametrize('page', PAGES)
+def test_every_documented_change_changes_something(page, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert cli.main(['samples']) == 0
+    assert cli.main(['samples', 'samples']) == 0
+    text = (ROOT / page).read_text()
+    code = '\n'.join(line for line in re.findall(r'^    (.*)$', text, re.MULTILINE) if 'pedestal.load(' in line)
+    assert without_effect([*documented_changes(text), *changes_of_code(code)]) == []
+
+
+@pytest.mark.parametrize('module', sorted(pathlib.Path(pedestal.__file__).parent.glob('*.py')),
+                         ids=lambda path: path.stem)
+def test_every_change_of_a_docstring_changes_something(module):
+    """The examples that help(pedestal) shows."""
+    found = []
+    for node in ast.walk(ast.parse(module.read_text())):
+        if isinstance(node, (ast.Module, ast.ClassDef, ast.FunctionDef)) and (text := ast.get_docstring(node)):
+            code = '\n'.join(example.source for example in doctest.DocTestParser().get_examples(text))
+            found += without_effect([*documented_changes(text), *changes_of_code(code)])
+    assert found == []
 
 
 def test_samples_are_never_overwritten(tmp_path, capsys, one_line):

@@ -266,6 +266,17 @@ def test_a_changed_parameter_on_a_ship_and_rows_alone_on_the_standard_output(run
     assert 'acu: ' in done.stderr and 'Traceback' not in done.stderr
 
 
+def test_a_parameter_with_its_recorded_value_is_named(runs, pedestal):
+    same, other = 'azimuth.filter.kind=imm', 'elevation.filter.kind=ca'
+    code, said, _ = pedestal(runs['leo'].bag, '--node', 'acu', '--param', same)
+    assert code == 0
+    assert ('nothing is changed: the recording has the same values (azimuth.filter.kind = imm); old: recorded'
+            in said.splitlines())
+    _, said, _ = pedestal(runs['leo'].bag, '--node', 'acu', '--param', same, '--param', other)
+    assert ('changed: elevation.filter.kind = ca; the same as in the recording: azimuth.filter.kind = imm; '
+            'old: recorded') in said.splitlines()
+
+
 def test_a_bag_with_inputs_only_and_a_changed_parameter(inputs_only, pedestal):
     code, said, _ = pedestal(inputs_only, '--node', 'acu', '--param', 'azimuth.filter.imm.dwell=2')
     assert code == 0

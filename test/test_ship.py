@@ -31,6 +31,19 @@ def track(name, *overrides):
     return chosen, run, automatic & (run.t >= run.t[automatic][0] + tracking.HANDOVER_SETTLING_S)
 
 
+def test_a_recorded_motion_sets_its_own_heading(tmp_path):
+    """The heading of the file in place of the scenario's 60 deg; a heading given beside the file is refused."""
+    file = tmp_path / 'ship.csv'
+    file.write_text('time_s,roll_deg,pitch_deg,heading_deg\n' + ''.join(f'{t},0,0,200\n' for t in range(9)))
+    recorded = ('ship_motion.ship.motion=recorded', f'ship_motion.ship.recorded.path={file}')
+    chosen = scenario.load('ship_pass', recorded, duration=2.0)
+    x, y, z, w = closed_loop.Loop(chosen).run()['ship/truth']['orientation'][-1]
+    yaw = math.degrees(math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)))
+    assert (90.0 - yaw) % 360.0 == pytest.approx(200.0)
+    with pytest.raises(scenario.ScenarioError, match='heading_deg = 30 deg: must be 0 with motion = recorded'):
+        scenario.load('ship_pass', (*recorded, 'ship_motion.ship.heading_deg=30'))
+
+
 def pointing(name, *overrides):
     """Pointing error [deg] rms of a scenario."""
     _, run, on = track(name, *overrides)

@@ -95,6 +95,8 @@ def test_scenario_and_the_file_in_a_run(pedestal, folder, one_line):
     assert (code, errors) == (0, '')
     old, new = told(output, 'azimuth: pointing error rms')
     assert new < old
+    warning = 'tuned on the first 6 s of the 60 s of the scenario: the parameters may be worse in the rest'
+    assert warning in output and f'# {warning}' in file.read_text()
     values = written(file)
     assert set(values) == {'azimuth.filter.kind', 'azimuth.filter.alpha_beta.alpha'}
     chosen = scenario.load('uav_flyby', scenario.file_overrides(file))

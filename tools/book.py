@@ -1,7 +1,7 @@
-"""The pages of the documentation that are generated from the code: parameters of every node, verbs, laws.
+"""Book: the folder of Markdown pages from which `make book` builds the documentation as a web site.
 
-`python -m tools.book FOLDER` (make book) copies docs/ into the folder and writes the pages under reference/ in it.
-CONTRIBUTING.md, which lies outside docs/, becomes the page contributing.md.
+`python -m tools.book FOLDER` copies docs/ into the folder. It adds three pages generated from the code, in reference/:
+the parameters of every node, the verbs, the laws. CONTRIBUTING.md, which is outside docs/, becomes contributing.md.
 """
 import argparse
 import ast
@@ -18,7 +18,7 @@ from pedestal_common.graph import nodes
 from pedestal_common.graph.graph_parameters import GraphParameters
 
 LAW_PACKAGES = ('pedestal_common', 'tracking_receiver_sim', 'acu_tracker', 'adu_drive', 'ship_motion_sim')
-"""Packages that hold laws, in the order of the signal."""
+"""Packages with laws, in the order of the page of laws."""
 
 
 def parameter_page():
@@ -55,7 +55,8 @@ def verb_page():
 
 
 def law_page(root):
-    """Return the lines of the page of laws: docstring, compiled functions and tests of every module with laws."""
+    """Return the lines of the page of laws: docstring, compiled functions and tests of every module with laws. root:
+    folder of the checkout."""
     lines = ['# Laws', '', 'Every control law, filter, motor and wave is a compiled function in a small module. This '
              'page is a copy of the docstrings of these modules: equations, symbols, sources.']
     for package in LAW_PACKAGES:
@@ -74,19 +75,20 @@ def law_page(root):
 
 
 def _docstring(module):
-    """Return the docstring of a module, a path."""
+    """Return the docstring of a module. module: path of its file."""
     return ast.get_docstring(ast.parse(module.read_text())) or ''
 
 
 def _imported(test):
-    """Yield the dotted names that a test imports."""
+    """Yield the dotted names that a test module imports with `from`. test: path of its file."""
     for node in ast.walk(ast.parse(test.read_text())):
         if isinstance(node, ast.ImportFrom):
             yield from (node.module, *(f'{node.module}.{alias.name}' for alias in node.names))
 
 
 def _laws(module):
-    """Return [(signature, first sentence)] of the public compiled functions of a module, or None."""
+    """Return [(signature, first paragraph of the docstring)] of the public compiled functions of a module; None for a
+    module without compiled functions. module: path of its file."""
     compiled = [node for node in ast.parse(module.read_text()).body if isinstance(node, ast.FunctionDef) and any(
         ast.unparse(decorator) in ('compiled', 'inlined') for decorator in node.decorator_list)]
     return [(f'{node.name}({", ".join(argument.arg for argument in node.args.args)})',
@@ -95,13 +97,15 @@ def _laws(module):
 
 
 def contributing_page(root):
-    """Return CONTRIBUTING.md for the folder of the pages; links to other files outside docs/ become plain text."""
+    """Return the text of CONTRIBUTING.md for the book. Its links to docs/ fit the new place, and its links to other
+    files outside docs/ become plain text."""
     text = (root / 'CONTRIBUTING.md').read_text().replace('](docs/', '](')
     return re.sub(r'\[([^]]*)\]\([A-Z][^)]*\)', r'\1', text)
 
 
 def main(folder, root='.') -> int:
-    """Write all pages of the book into a folder."""
+    """Write all pages of the book of a checkout (root) into a folder, whose old content is deleted. Return the exit
+    code 0."""
     root, folder = pathlib.Path(root), pathlib.Path(folder)
     shutil.rmtree(folder, ignore_errors=True)
     shutil.copytree(root / 'docs', folder)

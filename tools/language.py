@@ -1,7 +1,8 @@
-"""Check of the language: `python -m tools.language [PATH ...]` prints the texts that break a rule of CONTRIBUTING.md.
+"""Check of the language of the documentation and of the docstrings, comments and texts of the code. The test
+test/test_language.py uses it.
 
-Without PATH it reads README.md, CONTRIBUTING.md, CHANGELOG.md, docs/, and the docstrings, comments and texts of all
-modules.
+`python -m tools.language [PATH ...]` prints the texts that break a rule of CONTRIBUTING.md: forbidden words and long
+sentences. Without PATH it reads README.md, CONTRIBUTING.md, CHANGELOG.md, docs/ and all modules except the tests.
 """
 import ast
 import io
@@ -12,7 +13,8 @@ import tokenize
 
 MAX_SENTENCE_WORDS = 35
 FORBIDDEN_WORD = re.compile(r'\b(told|tells|says|asked|anew|strangers?|whoever|somebody|nobody)\b', re.IGNORECASE)
-"""Words of a private language, in which machines speak and actors have no name."""
+"""Words that the rules of the language forbid: words with which machines speak, and words for actors without a
+name."""
 
 ALLOWED = {
     ('src/pedestal_studies/pedestal_studies/papers/phased_array.py', 'best-told-10ms-less'):
@@ -38,8 +40,8 @@ def paths():
 
 
 def markdown_texts(text):
-    """Yield (line number, paragraph or table cell, True if it consists of sentences) of a Markdown page without its
-    code."""
+    """Yield (line number, text, True if it consists of sentences) of each paragraph, heading and table cell of a
+    Markdown page. Code and comments of the page are omitted."""
     blank = lambda match: '\n' * match[0].count('\n')  # noqa: E731  keeps line numbers
     text = re.sub(r'(?ms)^ *(```|~~~).*?^ *\1[^\n]*$', blank, text)
     text = re.sub(r'(?s)<!--.*?-->', blank, text)
@@ -69,8 +71,8 @@ def docstrings(tree):
 
 
 def python_texts(source):
-    """Yield (line number, text, True if it consists of sentences) of the docstrings, comments and other texts of a
-    module."""
+    """Yield (line number, text, True if it consists of sentences) of the docstrings, comments and string constants of
+    a module. source: text of the module."""
     tree = ast.parse(source)
     documented = dict(docstrings(tree))
     for start, text in documented.items():
@@ -94,19 +96,19 @@ def python_texts(source):
 
 
 def _indent(text):
-    """Return the indentation of a docstring below its first line."""
+    """Return the number of spaces before the text of a docstring, below its first line."""
     lines = [line for line in text.split('\n')[1:] if line.strip()]
     return min((len(line) - len(line.lstrip()) for line in lines), default=0)
 
 
 def sentences(text):
-    """Return the sentences of a paragraph, inline code as one word each."""
+    """Return the sentences of a paragraph. Inline code becomes one word each, and links lose their address."""
     text = re.sub(r'\]\([^)]*\)', ']', re.sub(r'`[^`]*`', '`x`', text))
     return _SENTENCE_END.split(_ABBREVIATION.sub(r'\1 ', text))
 
 
 def faults(path):
-    """Yield (line number, what is wrong, text) for each rule that a file breaks."""
+    """Yield (line number, broken rule, text) for each text of a file that breaks a rule."""
     source = path.read_text(encoding='utf-8')
     for line, text, prose in (python_texts if path.suffix == '.py' else markdown_texts)(source):
         for word in FORBIDDEN_WORD.findall(re.sub(r'`[^`]*`', '', text)):
@@ -117,12 +119,12 @@ def faults(path):
 
 
 def allowed(path):
-    """Return the parts of texts of a file that may break a rule."""
+    """Return the parts of texts that ALLOWED lists for a file, and that may therefore break a rule."""
     return [part for name, part in ALLOWED if path.resolve() == ROOT / name]
 
 
 def broken_rules(path):
-    """Return [(line number, what is wrong, text)] of a file without the allowed exceptions."""
+    """Return [(line number, broken rule, text)] of a file without the exceptions of ALLOWED."""
     parts = allowed(path)
     return [fault for fault in faults(path) if not any(part in fault[2] for part in parts)]
 
@@ -137,7 +139,8 @@ def public_constants(path):
 
 
 def main(names):
-    """Print the rules that files break, by default all files; return 1 if there are any."""
+    """Print the broken rules of the files of these names, or of all files if there is no name. Return the exit code: 1
+    if a rule is broken, otherwise 0."""
     broken = [f'{path}:{line}: {rule}: {text[:200]}' for path in (map(pathlib.Path, names) if names else paths())
               for line, rule, text in broken_rules(path)]
     print(*broken, sep='\n')

@@ -1,6 +1,7 @@
-"""The tables of README.md and docs/, written from the tables of the code and from docs/rows.json: `make docs`.
+"""Generated tables of README.md and docs/, which `make docs` (`python -m tools.reference`) writes again.
 
-A table stands between <!-- table NAME --> and <!-- end --> in a file. A test compares the files with the code.
+A reference table comes from the tables of the code. A table of measured numbers comes from docs/rows.json. A table
+stands between <!-- table NAME --> and <!-- end --> in a file. A test compares the files with the code.
 """
 import pathlib
 import re
@@ -25,6 +26,7 @@ GENERATED_PAGES = ('README.md', *(f'docs/{name}.md' for name in (
     'acquisition', 'budget', 'faults', 'graph', 'measured', 'operating', 'papers', 'parameters', 'studies', 'tools',
     'troubleshooting')))
 """Files with generated tables."""
+
 TABLE_PARAMETERS = (
     'scenario.pacing', 'scenario.seed', 'adu.period', 'adu.transport_delay', 'adu.command_timeout',
     'adu.azimuth.speed_loop.proportional', 'adu.azimuth.bias.schedule',
@@ -42,16 +44,17 @@ TABLE_PARAMETERS = (
 
 RATE_TEXTS = {'step': 'every step', 'once': 'once, latched or not', 'second': '1 Hz', 'change': 'on change, latched',
               'reply': 'after each request', 'command': 'on request'}
-"""{rate of a topic: text in the table of topics}."""
+"""{rate of a topic, as in topics.Topic: its text in the table of topics}."""
 
 
 def _table(head, rows):
-    """Return the lines of a Markdown table."""
+    """Return the lines of a Markdown table. head: texts of the header; rows: sequences of as many texts."""
     return ['| ' + ' | '.join(head) + ' |', '|' + '---|' * len(head), *('| ' + ' | '.join(row) + ' |' for row in rows)]
 
 
 def node_table():
-    """Return the table of the nodes: executable, function, and the equipment for which it stands on a real antenna."""
+    """Return the table of the nodes: executable, function, and the equipment of a real antenna that the node stands
+    for."""
     rows = [(f'`{node.name}`', f'`{node.executable}` ({node.package})' if node.module else '', node.doc,
              node.stands_for) for node in (*nodes.NODES, nodes.ARRAY_DRIVE)]
     return _table(('node', 'executable (package)', 'function', 'stands for'), rows)
@@ -70,14 +73,15 @@ def topic_table():
 
 
 def service_table():
-    """Return the table of the services of every node."""
+    """Return the table of the services of each node that has services."""
     rows = [(f'`{node.name}` ({node.executable})', ', '.join(f'`{name}`' for name in node.unit_type().REQUESTS))
             for node in nodes.UNIT_NODES if node.unit_type().REQUESTS]
     return _table(('node', 'services (std_srvs/Trigger)'), rows)
 
 
 def command_table():
-    """Return the table of the commands of every node on its topic of commands."""
+    """Return the table of the commands of each node on its topic of commands. Injected faults have a table of their
+    own."""
     rows = [(f'`{node.obeys}`', f'`{verb.name}`', ', '.join(map(_argument, verb.arguments)), verb.doc)
             for node in nodes.UNIT_NODES if node.obeys and node.name not in INJECTED_FAULTS
             for verb in node.unit_type().VERBS]
@@ -85,20 +89,21 @@ def command_table():
 
 
 def injection_table():
-    """Return the table of the faults that can be injected into every simulated node."""
+    """Return the table of the faults that can be injected into each simulated node."""
     rows = [(f'`{node}`', f'`{fault.name}`', ', '.join(map(_defaulted, fault.arguments[:-1])), fault.doc,
              '' if fault.lockstep else 'no') for node, faults in INJECTED_FAULTS.items() for fault in faults]
     return _table(('node', 'fault', 'arguments', 'effect', 'in lockstep'), rows)
 
 
 def _defaulted(argument):
-    """Return an argument of a fault with its default, range, unit and meaning."""
+    """Return the text of an argument of a fault: its name, default, range, unit and meaning."""
     text = f'{argument.name} = {argument.default}' if argument.options else f'{argument.name} = {argument.default:g}'
     return f'`{text}` ({argument.range} {argument.unit}; {argument.doc})'.replace(' ;', ';')
 
 
 def expectation_table():
-    """Return the table of the expectations for every fault; modes with the same expectation share a line."""
+    """Return the table of the expected reactions to each injected fault, by mode of the control unit. Modes with equal
+    expectations share a line."""
     rows = []
     for fault, of_modes in FAULT_EXPECTATIONS.items():
         alike = {}
@@ -109,7 +114,7 @@ def expectation_table():
 
 
 def _argument(argument):
-    """Return an argument with its range and unit, in brackets if it is optional."""
+    """Return the text of an argument of a command with its range and unit, in brackets if it is optional."""
     text = f'{argument.name} = {argument.range} {argument.unit}'.rstrip()
     return f'`{text}`' if argument.default is None else f'[`{text}`]'
 
@@ -133,7 +138,8 @@ def fault_table():
 
 
 def alarm_table():
-    """Return the table of the alarms of the control unit; an alarm of both axes has one line."""
+    """Return the table of the alarms of the control unit. An alarm that each axis has takes one line, with AXIS as the
+    name of the axis."""
     def both(text):
         return text.replace(f'{topics.AXES[0]} ', 'AXIS ')
     return _table(('alarm', 'priority', 'delay on, off [s]', 'latched', 'consequence of', 'meaning',
@@ -157,7 +163,7 @@ def study_table():
 
 
 def parameter_table():
-    """Return the table of TABLE_PARAMETERS."""
+    """Return the table of TABLE_PARAMETERS: default, range, unit, meaning."""
     rows = []
     for name in TABLE_PARAMETERS:
         node, _, key = name.partition('.')
@@ -171,7 +177,8 @@ def parameter_table():
 
 
 def result_table(table=results.RESULTS):
-    """Return the table of the results of a run: name, unit, meaning, target."""
+    """Return the table of results: name, unit, meaning, target. table: rows of results.RESULTS, by default those of a
+    run."""
     return _table(('result', 'unit', 'meaning', 'target'),
                   [(f'`{name}`', unit, sentence, target) for name, unit, sentence, target in
                    results.documented(table)])
@@ -189,13 +196,13 @@ REFERENCE_TABLES = {'nodes': node_table, 'studies': study_table, 'scenarios': sc
                     'results': result_table, 'exit codes': exit_code_table,
                     'recomputed results': lambda: result_table(what_if.COMPARISON_RESULTS),
                     'first parameters': parameter_table}
-"""{name of a table: function -> its lines}."""
+"""{name of a table: function that returns its lines}."""
 
 
 def with_tables(text, rows):
-    """Return the text of a file with its tables written again; rows: published.Rows.
+    """Return the text of a file in which every generated table is replaced by its present content.
 
-    Raises KeyError for an unknown table.
+    rows: published.Rows, the measured numbers of docs/rows.json. Raises KeyError for an unknown table.
     """
     def table(match):
         name = match[1]
@@ -205,7 +212,8 @@ def with_tables(text, rows):
 
 
 def main(root='.') -> int:
-    """Write the tables of every file under a checkout."""
+    """Write the generated tables of a checkout (root) again, and print the names of the changed files. Return the exit
+    code 0."""
     rows = published.read(root)
     for name in GENERATED_PAGES:
         file = pathlib.Path(root, name)

@@ -1,13 +1,16 @@
-"""Two writers of one command on a machine that is short of time: how often the wrong one is obeyed.
+"""Two publishers of one command on a machine that is short of time: how often the wrong publisher is accepted.
 
     python docs/reliability/starved.py [SEEDS]
 
-The control unit writes every 5 ms; for 1.5 or 5 s a stranger that began up to 3 s after it writes every 2 to 6 ms, so
-that their numbers are near each other or meet. Both writers and the reader are held up, each by itself: so many times
-a second, for so long on average, both exponential. A writer that was held up leaves out what was due meanwhile, or
-catches up at once; the reader finds the last 8 messages that came. Prints for each machine, of SEEDS (default 200)
-trials, in how many more than 3 messages of the stranger were obeyed, how many in all and in a row at the most, and
-how much of what the right writer wrote was obeyed.
+The control unit publishes every 5 ms. A foreign publisher begins 0.1 to 3 s after it, and publishes every 2 to 6 ms
+for 1.5 or 5 s, so that the sequence numbers of both publishers are near each other or meet. Both publishers and the
+subscriber stall, each by itself. The time between two stalls and the duration of a stall are exponential. After a
+stall a publisher leaves out the messages that were due, or sends them at once. The subscriber takes the last 8
+messages.
+
+The output has a line for each machine, with SEEDS (default 200) trials: the number of trials with more than 3 accepted
+messages of the foreign publisher, these messages in all trials and at most in a row, and the share of the messages of
+the control unit that were accepted.
 """
 import argparse
 import sys
@@ -25,11 +28,14 @@ QUEUE = 8
 
 MACHINES = ((0.5, 0.02), (0.5, 0.08), (0.5, 0.25), (2.0, 0.02), (2.0, 0.08), (2.0, 0.25), (5.0, 0.02), (5.0, 0.08),
             (5.0, 0.25))
-"""How often each process is held up [1/s], and for how long on average [s]."""
+"""Each machine: (number of stalls of a process per running second [1/s], mean duration of a stall [s])."""
 
 
 def held_up(times, rng, rate, mean):
-    """Times (n,) [s] of a process that is held up: those within a stall are at its end."""
+    """Return times (n,) [s] of a process that stalls: a time within a stall is moved to the end of the stall.
+
+    rate: stalls per running second [1/s]; mean: mean duration of a stall [s].
+    """
     begins, ends, t = [], [], rng.exponential(1.0 / rate)
     while t < DURATION:
         begins.append(t)
@@ -42,7 +48,7 @@ def held_up(times, rng, rate, mean):
 
 
 def sent(rng, begin, end, period, machine):
-    """When a writer sends its messages [s]."""
+    """Return the times [s] at which a publisher sends its messages. machine: row of MACHINES."""
     times = held_up(np.arange(begin, end, period), rng, *machine) + rng.exponential(3e-4)
     if rng.random() < 0.5:
         return times[np.diff(times, prepend=-1.0) > 0.3 * period]
@@ -50,7 +56,7 @@ def sent(rng, begin, end, period, machine):
 
 
 def trial(machine, seed):
-    """(times [s] at which a message of the stranger was obeyed, part of the right writer's that was)."""
+    """Return (times [s] at which a foreign message was accepted, accepted share of the right messages)."""
     rng = np.random.default_rng(seed)
     begin = rng.uniform(0.1, 3.0)
     right = sent(rng, 0.0, DURATION, PERIOD, machine)
@@ -77,11 +83,12 @@ def trial(machine, seed):
 
 
 def main(args=None):
-    """Print the table; the exit code."""
+    """Print the table and return the exit code."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument('seeds', nargs='?', type=int, default=200)
     seeds = parser.parse_args(args).seeds
-    print('| held up | for | stranger obeyed | messages | in a row | right writer obeyed |\n|---|---|---|---|---|---|')
+    print('| stalls | mean duration | more than 3 accepted | accepted | in a row | right ones accepted |\n'
+          '|---|---|---|---|---|---|')
     for machine in MACHINES:
         obeyed, right = zip(*(trial(machine, seed) for seed in range(seeds)), strict=True)
         row = max(max((len(run) for run in np.split(times, np.flatnonzero(np.diff(times) > 0.05) + 1)), default=0)

@@ -1,12 +1,14 @@
-"""Antenna control unit: from the receiver's angle error to the rate command of the drive.
+"""Antenna control unit (ACU): from the angle error of the receiver to the rate command of the drive.
 
-`control_unit.step` runs once per drive step:
-    encoders, attitude, error in    -> measured angles of the target (`geometry`)
-    -> `estimation`: the target filter, its prediction to the instant of the command
-    -> `modes`: which target the axes follow; `program`: the time-tagged one; `lookahead`: slews through the keyhole
-    -> reference on the deck (`geometry`) -> `servo`: rate and torque of each axis, or the angles of a beam
-    -> `alarms`: the alarms that follow from all of this
-Each subpackage defines its own symbols. Common symbols:
+`control_unit.step` runs once per drive step. The packages take part in this order:
+    `geometry`      measured angles of the target from encoders, attitude of the deck and receiver error
+    `estimation`    target filter, and its prediction to the instant of the command
+    `mode`          mode of the step: which target the axes follow; `search`, `program`: other targets than the
+                    estimate
+    `guidance`      reference of the axes in deck angles; `lookahead`: slews through the keyhole
+    `servo`         rate and torque of each axis, or the angles of an electronic beam
+    `alarms`        alarms that follow from all of this
+`operating` serves the operator outside this step. Each package defines its own symbols. Common symbols:
     A, E            azimuth (clockwise), elevation; dA, ddA ... their time derivatives  [rad, rad/s, rad/s2]
     t_k             stamp of the drive step                                             [s]
     t_m             middle of the interval in which the command is in force             [s]

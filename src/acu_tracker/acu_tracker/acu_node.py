@@ -1,8 +1,8 @@
-"""ROS node of the antenna control unit: a rate command for each drive step, modes by service and by acu/command.
+"""Executable of the ROS node `acu`, the antenna control unit.
 
 This file only starts the node. `unit_node.UnitNode` runs the unit `acu_tracker.unit.Acu`, whose law is
-`control_unit.step`; change the behaviour there. `entry` is imported first, so that a signal during the other imports
-ends the process without a message.
+`control_unit.step`; change the behaviour there. `entry` is imported first, so that a signal of the operating system
+during the other imports ends the process without a message.
 """
 import pedestal_common.entry  # noqa: F401
 
@@ -13,7 +13,7 @@ from pedestal_common.node import unit_node
 
 
 def main(args=None):
-    """Run the node until it is stopped; args: those of the command line, None for sys.argv."""
+    """Run the node until it is stopped; args: arguments of the command line, None for sys.argv."""
     return unit_node.main('acu_tracker.acu_node', args)
 
 

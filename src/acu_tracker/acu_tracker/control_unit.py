@@ -1,7 +1,8 @@
-"""Antenna control unit: one `step` per drive step, from encoders, receiver error and attitude to the rate command.
+"""The law of the antenna control unit: `step` runs once per drive step and computes the rate command of both axes.
 
-The estimate lives in earth angles, near the zenith in those of a tilted `estimate_frame`. docs/architecture.md shows
-the order of a step. Each part of the state is written by its own module; this module connects the parts.
+Inputs are the encoder angles, the error of the receiver and the attitude of the deck. docs/architecture.md explains
+the order of a step. Each part of the state is written by its own module; this module connects the parts. `unit` calls
+`step`, and between two steps `request`, `refusals` and `reset`.
 
 One-letter names in all functions:
 s, c, u, o   records of STATE_DTYPE, CONSTANTS_DTYPE, signals.INPUTS_DTYPE and OUTPUTS_DTYPE
@@ -9,11 +10,12 @@ g, k, m      parts of s: guidance, tracking, mode
 t            s.stamp [s], also called t_k
 
 Other names:
-all_tables   the Tables
-no_signal    the outage.Outage: the time without a signal of the receiver
+all_tables   tables.Tables: the tables of directions that modes follow
+program      table that was followed last: the program track, or the predicted track of satellite or sun
+no_signal    outage.Outage: the time without a signal of the receiver
 silence      True if the previous step is more than step_gap ago
-rested       True if the axes had no motion command up to now, or the previous step is more than step_gap ago
-way          the bridge.Way: the program track, rotated to the place where the target was last tracked
+rested       True if the axes had no motion command before this step, or the previous step is more than step_gap ago
+way          bridge.Way: the program, rotated to the place where the target was last tracked
 table        mode whose table was followed last (s.mode.table)
 lock, slope, track   of modes.Conditions: autotrack can begin, has not diverged, has its target
 unasked      state of uncommanded_motion
@@ -53,18 +55,22 @@ CONSTANTS_DTYPE = np.dtype([('p', record_type(SharedParameters)), ('axis', AXIS_
                             ('tracker', tracker.CONSTANTS_DTYPE), ('lookahead', planner.CONSTANTS_DTYPE),
                             ('floor', floor.FLOOR_DTYPE)],
                            align=True)
-"""Constants of the control unit, and among them those of each axis.
+"""Constants of the control unit, and of each axis.
 
-p          parameters
-notch      coefficients of the filter
-reaction   time in front of a limit [s]; see AcuParameters.reaction
-braking    deceleration in front of a limit [rad/s2]
-lead       t_m - t_k [s]; t_m: middle of the interval in which the command of t_k is in force
+p          parameters: SharedParameters, or AxisParameters of an axis
+notch      coefficients of the notch filter of an axis
+reaction   reaction time of an axis in front of a limit [s]; see AcuParameters.reaction
+braking    deceleration of an axis in front of a limit [rad/s2]
+lead       t_m - t_k [s]; t_m: middle of the interval in which the command of the step at t_k is in force
+tracker, lookahead, floor  constants of these modules
 """
 
 
 def axis_constants(params, period, reaction) -> np.ndarray:
-    """Return the constants (1,) of AxisParameters for steps of period [s]; reaction [s]: AcuParameters.reaction."""
+    """Return the constants (1,) of an axis.
+
+    params: AxisParameters; period: of the steps [s]; reaction: AcuParameters.reaction [s].
+    """
     c, n = np.zeros(1, AXIS_CONSTANTS_DTYPE), params.notch
     c['p'] = record(params, AxisParameters)
     c['notch'] = notch.coefficients(n.frequency, n.width, n.depth, period)
@@ -102,15 +108,16 @@ def initial_state(params) -> np.ndarray:
 
 @compiled
 def latched(s):
-    """Return the bits of the alarms whose latched fault waits for a reset."""
+    """Return the bits of the alarms of the latched faults, which wait for a reset."""
     return supervision.latched(s.unasked.moves, s.frozen.frozen, s.tracking.divergence.diverged)
 
 
 @compiled
 def request(s, c, u, o, all_tables, mode):
-    """Request a mode (its code) between two steps; return True if it is accepted. Set outputs.mode and outputs.reason.
+    """Request a mode (its code) between two steps; return True if the request is accepted.
 
-    The decision uses the inputs of the last step. It takes effect on the command of the next step.
+    The decision uses the inputs of the last step. A change of mode acts on the command of the next step. The outputs
+    mode and reason are set at once.
     """
     result, _ = _change(s, c, u, o, all_tables, mode, _outage(s, c))
     o.mode, o.reason = s.mode.now, s.mode.reason
@@ -119,7 +126,7 @@ def request(s, c, u, o, all_tables, mode):
 
 @compiled
 def refusals(s, c, u, all_tables, why):
-    """Put into why (len(MODES),) for each mode NONE, or the reason why `request` would refuse the mode now."""
+    """Set why[mode] of each mode to Reason.NONE, or to the reason why `request` would refuse the mode now."""
     for mode in range(len(why)):
         now, _ = _situation(s, c, u, all_tables, mode, _outage(s, c))
         why[mode] = modes.obstacle(mode, now)
@@ -129,8 +136,8 @@ def refusals(s, c, u, all_tables, why):
 def reset(s):
     """Reset the latched faults and alarms between two steps.
 
-    Return annunciator.NO_ALARM, or the index of an alarm whose cause is still there; then nothing is changed. A reset
-    also discards a mode that waits to be entered: in standby nothing moves until a mode is commanded.
+    Return annunciator.NO_ALARM, or the index of an alarm whose cause is still present. In the second case nothing is
+    changed. A reset also discards a mode that waits to be entered, so that nothing moves until a mode is commanded.
     """
     alarms, t, fault = s.supervision.alarms, s.stamp, latched(s) != 0
     if s.unasked.moves and uncommanded_motion.beyond(s.unasked, t):
@@ -151,7 +158,8 @@ def reset(s):
 def step(s, c, u, o, all_tables):
     """Run one drive step.
 
-    A stamp that does not advance (or is NaN) changes nothing: the last command stays in force, `stamp` is flagged.
+    A stamp that does not advance, or is NaN, changes nothing: the last command stays in force, and the flag `stamp` is
+    set in invalid_input.
     """
     dt = u.stamp - s.stamp
     if not (dt > 0.0 and math.isfinite(u.stamp)):
@@ -182,13 +190,13 @@ def step(s, c, u, o, all_tables):
 
 @compiled
 def _observe(s, c, u, o, program, silence):
-    """Take the inputs of the step: encoders, attitude, receiver, preset; run the monitors on them.
+    """Take the inputs of the step (encoders, attitude, receiver, preset), and run the monitors on them.
 
-    Return the bits of signals.INVALID_INPUTS. silence: True if the previous step is more than step_gap ago.
+    Return the bits of signals.INVALID_INPUTS.
     """
     g, k, mode = s.guidance, s.tracking, s.mode.now
     way = bridge.way(g.bridge, program)
-    tracker.transfer(k.target.tracker, c.p.tracker, c.tracker)
+    tracker.transfer(k.target.tracker, c.tracker)
     flags = signals.Flag.STEP_GAP if silence else 0
     flags |= measurements.take_encoders(k.encoders, u) | _take_attitude(s, c, u) | _take_receiver(s, c, u, o, way)
     flags |= measurements.take_preset(g.preset, u)
@@ -202,7 +210,7 @@ def _observe(s, c, u, o, program, silence):
 
 @compiled
 def _take_attitude(s, c, u):
-    """Take the attitude of this step, also into the mean of the look-ahead. Return the flags of invalid values."""
+    """Take the attitude of this step; also add it to the levelled deck. Return the flags of invalid values."""
     h = s.guidance.lookahead
     if tracking.take_place(s.tracking, u):
         planner.clear_plan(h)
@@ -216,7 +224,7 @@ def _take_attitude(s, c, u):
 
 @compiled
 def _take_receiver(s, c, u, o, way):
-    """Take the receiver's error of this step. Return a flag where the error is not accepted, else 0."""
+    """Take the error of the receiver of this step. Return flags if it is not accepted, else 0."""
     g, k, mode = s.guidance, s.tracking, s.mode.now
     offset = guidance.pointing_offset(g, u.error_stamp - c.p.tracker.receiver.age)
     flags, used, at = tracking.used_error(k, c, u, modes.USES_SIGNAL_LEVEL[mode], offset)
@@ -232,7 +240,7 @@ def _take_receiver(s, c, u, o, way):
 
 @compiled
 def _outage(s, c):
-    """Return the Outage of the receiver at s.stamp."""
+    """Return the outage.Outage of the receiver at s.stamp."""
     return outage.now(s.outage, s.tracking.target.tracker.stamp, s.stamp, c.p)
 
 
@@ -244,9 +252,9 @@ def _rests(s, c, u):
 
 @compiled
 def _change(s, c, u, o, all_tables, request, no_signal):
-    """Select the mode at s.stamp, for a `request` or NO_REQUEST, and carry out what a change of mode requires.
+    """Select the mode at s.stamp, and carry out the consequences of a change of mode.
 
-    Return (result, flags of the tables).
+    request: a mode or NO_REQUEST. Return (result of the request, flags of bad tables).
     """
     g, k, before, table = s.guidance, s.tracking, s.mode.now, s.mode.table
     now, flags = _situation(s, c, u, all_tables, request, no_signal)
@@ -257,7 +265,7 @@ def _change(s, c, u, o, all_tables, request, no_signal):
     result = mode_change.change(s.mode, now, request)
     mode = s.mode.now
     if result == modes.REQUEST_ACCEPTED and modes.FOLLOWS_TABLE[mode]:
-        # Autotrack needs lock_count new measurements to begin again.
+        # After this, autotrack needs lock_count new measurements to begin.
         tracker.reset_accepted_count(k.target.tracker)
     if s.mode.table != table:
         bridge.clear(g.bridge)
@@ -275,10 +283,10 @@ def _change(s, c, u, o, all_tables, request, no_signal):
 
 @compiled
 def _situation(s, c, u, all_tables, request, no_signal):
-    """Return (modes.Situation at s.stamp, flags of the tables).
+    """Return (modes.Situation at s.stamp, flags of bad tables).
 
-    A table is evaluated only if its mode can matter in this step. `wanted` holds these modes: the request, the running
-    mode, the mode whose table was followed last, and the mode to which the running mode may fall back.
+    To save time, a table is evaluated only if its mode can matter in this step. `wanted` holds these modes: the
+    request, the running mode, the mode whose table was followed last, and the fallback of the running mode.
     """
     m, g, k, t = s.mode, s.guidance, s.tracking, s.stamp
     unstable, pins = tracking.unstable(k, c, u, t), stow.obstacle(s.stow, c.p.stow_pins, u.pins)
@@ -286,8 +294,8 @@ def _situation(s, c, u, all_tables, request, no_signal):
     lock, slope, track = tracking.conditions(k, c, t, no_signal, closed)
     if track == Reason.NONE and signal_level_modes.in_side_lobe(g.acquisition, c, t):
         track = Reason.SIDE_LOBE
-    # The fallback AUTOTRACK means coasting. Because a filter without an estimate cannot coast, the program replaces
-    # the fallback.
+    # The fallback AUTOTRACK means coasting. Because a filter without an estimate cannot coast, the fallback is then
+    # the program.
     chosen = m.fallback if m.fallback != Mode.AUTOTRACK or k.target.tracker.running else Mode.PROGRAM
     falls_back = m.now == Mode.SEARCH or (m.now == Mode.AUTOTRACK and track != Reason.NONE)
     wanted = request, m.now, m.table if falls_back else m.now, chosen if falls_back else m.now
@@ -329,7 +337,7 @@ def _wait(s, c, u, o):
 
 @compiled
 def _start_from_actual(s, c, u, rested, silence):
-    """Start both axes from their actual angles where they begin to move, and each axis that ignores its command."""
+    """Start the references from the actual angles: of both axes if they begin to move, and of an immobile axis."""
     if rested:
         guidance.start_from(s.guidance, u.position[0])
     watched = s.supervision.axis
@@ -365,9 +373,9 @@ def _move(s, c, u, o, program, no_signal, rested, dt):
 
 @compiled
 def _note_outage_reason(s, c):
-    """Note the reason why the receiver may be without signal. Return True if there is one.
+    """Note the reason why the receiver may be without signal. Return True if there is such a reason.
 
-    The target may be hidden, or the beam may slew through the keyhole or go round at a limit of its travel.
+    The target may be hidden, the beam may slew through the keyhole, or the azimuth may turn at a limit of its travel.
     """
     g, follows = s.guidance, modes.FOLLOWS_TARGET[s.mode.now]
     hidden = follows and blockage.blocked(c.lookahead.sectors, g.target_angles[0], g.target_angles[1])
@@ -380,7 +388,7 @@ def _note_outage_reason(s, c):
 
 @compiled
 def _write_outputs(s, c, u, o, flags):
-    """Put mode, flags, pins, times and the estimate into the outputs."""
+    """Write mode, flags, pins, times to the limits, and the estimate to the outputs."""
     of_axes = floor.ends(c, u, u.position[0])
     for i in range(2):
         o.time_to_limit[i] = ends.time_to(u.position[i], u.velocity[i], of_axes[i])
@@ -391,10 +399,10 @@ def _write_outputs(s, c, u, o, flags):
 
 @compiled
 def _supervise(s, c, u, o, dt):
-    """Bring the alarms to this step, dt [s] after the previous one."""
+    """Update the alarms; dt: time since the previous step [s]."""
     jumped, deck = dt > c.p.step_gap, s.tracking.attitude
     ship = deck.stabilised and deck.history.count > 0
-    # Autotrack is without signal, and no hidden sector or keyhole explains it.
+    # signal_lost: autotrack has no signal, and no hidden sector, keyhole or turn explains this.
     signal_lost = s.mode.reason == Reason.SIGNAL_LOST or (o.coasting and not _outage(s, c).permitted)
     attitude_known, _ = attitude.at(deck, c.p, s.stamp + c.lead)
     facts = conditions.Facts(
@@ -403,5 +411,5 @@ def _supervise(s, c, u, o, dt):
         unasked_rate=c.p.unasked_rate, beamwidth=c.p.tracker.receiver.beamwidth)
     mode = Mode.STANDBY if _rests(s, c, u) else s.mode.now
     conditions.take(s.supervision, mode, u, o, c.axis, s.unasked, facts)
-    # The count of the changes of the alarm list.
+    # A new revision makes the unit publish the list of alarms.
     o.alarms = s.supervision.alarms.revision

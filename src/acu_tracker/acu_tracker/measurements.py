@@ -1,6 +1,9 @@
-"""Measurements of a step: the encoders, the attitude of the ship, the error of the receiver, a preset.
+"""Checks of the inputs of a step: encoders, attitude of the ship, error of the receiver, preset.
 
-u, o: records of signals.INPUTS_DTYPE and OUTPUTS_DTYPE; flags: bits of signals.INVALID_INPUTS.
+Valid inputs go into the state of the control unit. For invalid inputs the functions return flags, which are bits of
+signals.INVALID_INPUTS.
+
+u, o: records of signals.INPUTS_DTYPE and of signals.OUTPUTS_DTYPE.
 """
 import math
 
@@ -12,20 +15,23 @@ from acu_tracker.geometry.azimuth_turn import MAX_OFFSET_BEAMWIDTHS
 from pedestal_common.compiled import compiled
 
 UNKNOWN_POINTING = encoders.Pointing(math.nan, math.nan, math.nan, math.nan)
-"""Pointing of the beam where no error is used."""
+"""Result of error_at in the place of the Pointing of the beam, if no error is used."""
 
 
 @compiled
 def take_encoders(s, u):
-    """Take the encoders of this step into ENCODERS_DTYPE. Return signals.Flag.ENCODER if they are invalid, else 0."""
+    """Take the encoder angles of this step. Return signals.Flag.ENCODER if they are invalid, else 0.
+
+    s: record of encoders.ENCODERS_DTYPE.
+    """
     return 0 if u.encoder_valid and encoders.take(s, u.stamp, u.position, u.velocity) else signals.Flag.ENCODER
 
 
 @compiled
 def take_attitude(s, p, u):
-    """Take the attitude of this step, and the error of it that the INS states, into ATTITUDE_DTYPE.
+    """Take the attitude of this step, and the statistics of its error that the INS publishes.
 
-    Return (flags signals.Flag.ATTITUDE and ATTITUDE_ERROR of invalid values, True if the attitude is a new one). p:
+    Return (flags of invalid values, True if the attitude is a new one). s: record of attitude.ATTITUDE_DTYPE; p:
     record of SharedParameters.
     """
     if not u.stabilised:
@@ -41,9 +47,9 @@ def take_attitude(s, p, u):
 
 @compiled
 def _wrong_level(s, u):
-    """Return the flag of a message whose level must not be used by a mode that relies on the level, else 0.
+    """Return the flag of a message of the receiver with an invalid signal level or stamp, else 0.
 
-    The level is used whether the receiver is locked or not. s: ENCODERS_DTYPE.
+    The modes that use the signal level use it also while the receiver is not locked. s: record of ENCODERS_DTYPE.
     """
     if not u.error_came:
         return 0
@@ -57,13 +63,16 @@ def _wrong_level(s, u):
 def error_at(s, receiver, u, uses_level, intended_offset):
     """Return (flags of the receiver's message, True if its error is used, the Pointing of the beam at the error).
 
-    The receiver error is a weighted mean of samples, target minus beam. The mean of the target belongs to the instant
-    receiver.age before the stamp of the error. The mean of the beam belongs to the instant receiver.beam_age before
-    it. The ages may differ, because an electronic beam jumps from step to step (docs/graph.md, Age of the error).
-    Linear interpolation between two steps is exact for a ramp, for all weights of the samples.
+    s                record of ENCODERS_DTYPE
+    receiver         record of ReceiverModelParameters
+    uses_level       True if the mode uses the signal level
+    intended_offset  angle by which the beam is off the target on purpose [rad]; no error is used if it is too large
 
-    No error is used while the beam is intentionally off the target by intended_offset [rad]. s: ENCODERS_DTYPE;
-    uses_level: True if the mode uses the level of the signal.
+    The receiver error is a weighted mean of samples; each sample is target minus beam. The mean of the target belongs
+    to the instant receiver.age before the stamp of the error. The mean of the beam belongs to the instant
+    receiver.beam_age before this stamp. The two ages may differ, because an electronic beam jumps from step to step
+    (docs/graph.md, Age of the error). The pointing between two steps is interpolated linearly. For an axis of constant
+    rate this is exact, whatever the weights of the samples are.
     """
     wrong = _wrong_level(s, u) if uses_level else 0
     if wrong or not u.error_valid:
@@ -78,7 +87,10 @@ def error_at(s, receiver, u, uses_level, intended_offset):
 
 @compiled
 def write_innovation(o, outcome, innovation):
-    """Put the Innovation of an error into the outputs. Return the flag of its outcome, 0 for accepted."""
+    """Write the Innovation of an error to the outputs. Return the flag of the outcome, 0 for an accepted error.
+
+    outcome: of target.take.
+    """
     for i in range(2):
         axis = innovation.axis[i]
         o.innovation[i], o.rate_innovation[i], o.nis[i] = axis.nu, axis.rate, measurement.nis(axis)
@@ -94,7 +106,10 @@ def write_innovation(o, outcome, innovation):
 
 @compiled
 def take_preset(s, u):
-    """Take a new preset into a DIRECTION_DTYPE. Return signals.Flag.PRESET where it is not finite, else 0."""
+    """Take a new preset, if one has come. Return signals.Flag.PRESET if it is not finite, else 0.
+
+    s: record of direction.DIRECTION_DTYPE.
+    """
     if not u.preset_valid:
         return 0
     if not math.isfinite(u.preset[0] + u.preset[1]):

@@ -1,4 +1,8 @@
-"""Mode machine: a pure transition function over one table decides which target the antenna follows, and why."""
+"""The mode machine: it decides in each step in which mode the control unit is, and why.
+
+A row of pedestal_common.graph.modes.MODE_ROWS describes each mode. `next_mode` is a pure function of the present mode,
+of a request and of the Situation. `mode.mode_change` calls it and keeps the result; control_unit makes the Situation.
+"""
 from collections import namedtuple
 
 from pedestal_common.codes import codes
@@ -6,26 +10,29 @@ from pedestal_common.compiled import compiled
 from pedestal_common.graph.modes import MODE_ROWS, MODES
 
 Mode = codes(MODES)
-"""Codes of the modes. The tables below hold a value for each mode, from its row of MODE_ROWS."""
+"""Codes of the modes. Each tuple below holds one value for each mode, from its row of MODE_ROWS."""
 FOLLOWS_TARGET = tuple(row.follows for row in MODE_ROWS)
 USES_SIGNAL_LEVEL = tuple(row.by_level for row in MODE_ROWS)
 FOLLOWS_TABLE = tuple(row.table for row in MODE_ROWS)
 _ALLOWED_WHEN_PINNED = tuple(row.pinned for row in MODE_ROWS)
 NO_HANDOVER = -1
-"""Code for a mode without a hand-over."""
+"""Code in _HANDOVER of a mode that does not hand over to another mode by itself."""
 _FALLBACK = tuple(MODES.index(row.fallback) if row.fallback else Mode.STANDBY for row in MODE_ROWS)
+"""Mode after the end of each mode."""
 
 FALLBACK_MODES = {'coast': Mode.AUTOTRACK, 'memory': Mode.STOP, 'program': Mode.PROGRAM, 'tle': Mode.TLE,
                   'search': Mode.SEARCH, 'preset': Mode.PRESET, 'standby': Mode.STANDBY}
-"""{choice for the loss of the track: mode}.
+"""{name of a fallback, the choice for the loss of the track: its mode}.
 
 `coast` stays in autotrack on the prediction of the filter. `memory` stops where the target was seen last. `program`
 returns to the table that was followed last.
 """
 
 FALLBACK_NAMES = {mode: name for name, mode in FALLBACK_MODES.items()}
+"""{mode: name of the fallback}."""
 
 _HANDOVER = tuple(MODES.index(row.handover) if row.handover else NO_HANDOVER for row in MODE_ROWS)
+"""Mode to which each mode hands over by itself, or NO_HANDOVER."""
 
 REASON_TEXTS = dict(
     NONE='none', REQUESTED='requested', LOCKED='locked', SIGNAL_LOST='signal lost',
@@ -42,55 +49,59 @@ REASON_TEXTS = dict(
 """{name of a reason: its text in replies and diagnostics}."""
 
 REASONS = tuple(REASON_TEXTS.values())
+"""Texts of the reasons, in the order of their codes."""
 Reason = codes(REASON_TEXTS)
+"""Codes of the reasons."""
 
 NO_REQUEST, REQUEST_REFUSED, REQUEST_ACCEPTED = -1, 0, 1
-"""Results of a request; NO_REQUEST is also the request of a step without one."""
+"""Results of a request. NO_REQUEST is also the value of `request` in a step without a request."""
 
 
 Conditions = namedtuple('Conditions', 'nothing stow pin preset direction program tle sun lock slope track level')
-"""For each condition of a mode: NONE, or the reason why the condition does not hold.
+"""Conditions of the modes. Each field is Reason.NONE if its condition holds, otherwise the reason why it does not.
 
 nothing    always holds
 stow       the stow angles can be reached
 pin        at least one stow pin is not out
 preset     the preset angles can be reached
-direction  a direction was commanded and is valid
-program, tle, sun  the table can be followed
+direction  a direction for the mode slave was commanded and is valid
+program, tle, sun  the table of the mode can be followed
 lock       autotrack can begin
 slope      autotrack has not diverged
 track      autotrack has its target
-level      the running mode, which uses the signal level, has neither failed nor lost its signal
+level      the running mode uses the signal level, and has neither failed nor lost its signal
 """
 
-# Index in Conditions of the condition that the entry of each mode needs, and of the condition whose loss ends it.
+# For each mode: index in Conditions of the condition for its entry, and of the condition whose loss ends the mode.
 _NEEDS, _ENDS = (tuple(Conditions._fields.index(name or 'nothing') for name in names)
                  for names in zip(*((row.needs, row.ends) for row in MODE_ROWS)))
 
 Situation = namedtuple('Situation', 'encoder_valid drive attitude pins handover table chosen conditions')
 """Facts that decide on a change of mode.
 
-encoder_valid  the encoders of this step are valid
-drive      NONE, or why the drive follows no commands; ends a running mode, and no mode begins
-attitude   NONE, or why the attitude is not known
-pins       NONE, or why the stow pins forbid motion
-handover   a mode may hand over by itself
-table      mode whose table was followed last
-chosen     mode for the loss of the track; AUTOTRACK: stay in autotrack
-conditions  the Conditions
+encoder_valid  True if the encoders of this step are valid
+drive          Reason.NONE, or why the axes may not be driven; the running mode then ends, and no mode begins
+attitude       Reason.NONE, or why the attitude of the deck is not known
+pins           Reason.NONE, or why the stow pins forbid motion
+handover       True if the running mode may hand over to another mode by itself
+table          mode whose table was followed last
+chosen         fallback: mode after the loss of the track; AUTOTRACK: stay in autotrack
+conditions     the Conditions
 """
 
 
 Decision = namedtuple('Decision', 'mode reason result')
-"""Mode from now on, its reason and the result of a request.
+"""Decision of a step.
 
-reason is NONE where nothing happened; result is NO_REQUEST, REQUEST_REFUSED or REQUEST_ACCEPTED.
+mode    mode from now on
+reason  why the mode has changed, or a request was refused; Reason.NONE if neither happened
+result  result of the request: NO_REQUEST, REQUEST_REFUSED or REQUEST_ACCEPTED
 """
 
 
 @compiled
 def obstacle(request, now):
-    """Return the reason why a mode cannot be entered in a Situation, or NONE."""
+    """Return the reason why a requested mode cannot be entered in a Situation `now`, or Reason.NONE."""
     if request == Mode.STANDBY:
         return Reason.NONE
     if request < Mode.STANDBY or request >= len(FOLLOWS_TARGET):
@@ -108,9 +119,9 @@ def obstacle(request, now):
 
 @compiled
 def _end(mode, now):
-    """Return the reason why a mode ends in a Situation, or NONE.
+    """Return the reason why a running mode ends in a Situation `now`, or Reason.NONE.
 
-    A table that leads outside the limits cannot be entered, but a running mode continues on it.
+    A mode cannot begin on a table that is outside the limits at present, but a running mode continues on it.
     """
     why = now.conditions[_ENDS[mode]]
     return Reason.NONE if FOLLOWS_TABLE[mode] and why == Reason.OUTSIDE_LIMITS else why
@@ -118,7 +129,7 @@ def _end(mode, now):
 
 @compiled
 def next_mode(mode, request, now):
-    """Return the Decision of one step in a Situation; request: a mode or NO_REQUEST."""
+    """Return the Decision of one step in a Situation `now`; mode: the present mode; request: a mode or NO_REQUEST."""
     why, result = Reason.NONE, NO_REQUEST
     if request != NO_REQUEST:
         why = obstacle(request, now)

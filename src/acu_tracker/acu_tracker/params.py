@@ -1,4 +1,7 @@
-"""Parameters of the antenna control unit: those of each axis, those shared by both, and those of its subpackages."""
+"""Parameters of the antenna control unit: of each axis, and shared by both axes. The groups come from the packages.
+
+Each parameter has a default, a range, a unit and a help text. The checks refuse values that do not go together.
+"""
 import dataclasses
 import math
 
@@ -61,7 +64,7 @@ class AxisParameters(Parameters):
 
 @dataclasses.dataclass(frozen=True)
 class ElevationParameters(AxisParameters):
-    """Parameters of the elevation axis: lighter, with its own limits, which are those of the drive."""
+    """Parameters of the elevation axis, with other defaults: its load and its limits are those of this axis."""
 
     stow: float = parameter(0.5 * math.pi, -20.0, 20.0, 'rad', 'deck angle in mode stow')
     preset: float = parameter(0.5, -20.0, 20.0, 'rad', 'deck angle in mode preset before the first preset command')
@@ -73,7 +76,7 @@ class ElevationParameters(AxisParameters):
 
 @dataclasses.dataclass(frozen=True)
 class SharedParameters(topic_flags(nodes.row('acu').reads)):  # type: ignore[misc]  # a field per flag of the topics
-    """Parameters that belong to no axis alone."""
+    """Parameters that both axes share."""
 
     period: float = parameter(0.005, 1e-4, 1.0, 's', 'drive step T')
     step_gap: float = parameter(0.05, 1e-3, 10.0, 's', 'gap between drive steps after which targets := actual')
@@ -108,13 +111,17 @@ class SharedParameters(topic_flags(nodes.row('acu').reads)):  # type: ignore[mis
 
 @dataclasses.dataclass(frozen=True)
 class AcuParameters(SharedParameters):
-    """Parameters of the antenna control unit."""
+    """All parameters of the antenna control unit."""
 
     azimuth: AxisParameters = group(AxisParameters)
     elevation: ElevationParameters = group(ElevationParameters)
 
     def check_graph(self, beams, lockstep):
-        """Raise ParameterError unless both controllers are `beam` for an array (beams > 0), or neither for motors."""
+        """Raise ParameterError if the controllers do not suit the drive.
+
+        beams: number of electronic beams of the drive, 0 for a drive with motors. An array (beams > 0) needs the
+        controller `beam` on both axes; motors need another one.
+        """
         array = beams > 0
         for axis in ('azimuth', 'elevation'):
             controller = getattr(self, axis).controller
@@ -127,17 +134,19 @@ class AcuParameters(SharedParameters):
 
     @property
     def reaction(self):
-        """Reaction time [s] of an axis in front of a limit: e tau.
+        """Reaction time of an axis in front of a limit [s]: e tau.
 
-        e is Euler's number. tau is the delay of a command plus two periods: one until the command's effect is
-        measured, one until the next command is in force. An axis at a distance x from its limit, which moves by dx/dt
-        = -f(x(t - tau)) with f <= x / (e tau), does not overshoot.
+        e is Euler's number. tau is the delay of a command plus two periods: one until the effect of the command is
+        measured, one until the next command is in force. Let x be the distance of the axis from its limit, and f the
+        rate towards it, so that dx/dt = -f(x(t - tau)). With f <= x / (e tau) the axis does not overshoot.
         """
         return math.e * (self.command_delay + 2.0 * self.period)
 
     def _check_travel(self):
-        """Raise ParameterError if an axis cannot brake from its full rate inside its travel, or if stow or preset is
-        below the floor."""
+        """Raise ParameterError if an axis needs more than half its travel to brake from its full rate.
+
+        Raise it also if the stow angles or the preset angles are below the floor.
+        """
         for name in ('azimuth', 'elevation'):
             axis = getattr(self, name)
             a = axis.limits.deceleration
@@ -156,15 +165,15 @@ class AcuParameters(SharedParameters):
     def check(self):
         """Raise ParameterError for parameters that do not go together.
 
-        A delay must fit into the histories, a notch lie below half the step rate, and an attitude be used before it
-        times out. `step_gap` must be longer than a step.
+        Each delay must fit into the histories of past steps. A notch must be below half the step rate. An attitude
+        must be used before it times out. `step_gap` must be longer than a step.
         """
         sectors(self.blockage)
         schedule('commands', self.commands, ACU_COMMANDS)
         points(self.points)
         # A history holds HISTORY_LENGTH steps; four of them are a margin for stamps between and ahead of the steps.
         kept = ['receiver_latency', 'attitude_latency']
-        # A beam keeps no history of its reference.
+        # command_delay does not matter for a beam, because a beam keeps no history of its reference.
         if {self.azimuth.controller, self.elevation.controller} != {'beam'}:
             kept.append('command_delay')
         for name in kept:

@@ -1,7 +1,12 @@
-"""State of the target as the receiver measures it: beam and deck of the last steps, the filter, the monitors.
+"""Tracking of the target by the receiver: histories of beam and deck, target filter, and monitors of the errors.
 
-k: record of TRACKING_DTYPE; c: record of control_unit.CONSTANTS_DTYPE; u, o: records of signals.INPUTS_DTYPE and
-OUTPUTS_DTYPE; gap: the outage.Outage.
+`control_unit` and `guidance` call this module. The functions take each error of the receiver, and return the estimate
+of the target and the conditions for autotrack.
+
+k     record of TRACKING_DTYPE
+c     record of control_unit.CONSTANTS_DTYPE
+u, o  records of signals.INPUTS_DTYPE and of signals.OUTPUTS_DTYPE
+gap   outage.Outage: the time without a signal of the receiver
 """
 import math
 
@@ -22,7 +27,13 @@ TRACKING_DTYPE = np.dtype([
     ('error', 'f8', (2,)),
     ('repetition', repetition.REPETITION_DTYPE), ('divergence', divergence.DIVERGENCE_DTYPE),
     ('slope_sign', slope_sign.SLOPE_SIGN_DTYPE)], align=True)
-"""error: of this step, in deck angles [rad]; NaN: no error."""
+"""State of the tracking.
+
+encoders, attitude  histories of the beam and of the deck
+target              target filter
+error               receiver error of this step, in deck angles (azimuth, elevation) [rad]; NaN: no error
+repetition, divergence, slope_sign  monitors of the errors
+"""
 
 
 def initialise(k):
@@ -32,7 +43,7 @@ def initialise(k):
 
 @compiled
 def take_place(k, u):
-    """Take whether the pedestal stands on a ship. Return True if that has changed, which ends the estimate."""
+    """Note whether the pedestal stands on a ship. Return True if that has changed; the estimate then ends."""
     another = attitude.put(k.attitude, u.stabilised)
     if another:
         tracker.stop(k.target.tracker)
@@ -43,7 +54,7 @@ def take_place(k, u):
 def used_error(k, c, u, by_level, offset):
     """Return (flags of the receiver's message, True if its error is used, the Pointing of the beam at the error).
 
-    by_level, offset: uses_level and intended_offset of measurements.error_at.
+    A repeated error is not used. by_level, offset: uses_level and intended_offset of measurements.error_at.
     """
     k.error[0] = k.error[1] = math.nan
     flags, used, at = measurements.error_at(k.encoders, c.p.tracker.receiver, u, by_level, offset)
@@ -52,14 +63,14 @@ def used_error(k, c, u, by_level, offset):
 
 @compiled
 def take_error(k, c, u, o, at, restart_gap, closed, follows):
-    """Filter y = encoder at the instant of the error, displaced by the error, and run the monitors.
+    """Filter an error of the receiver and run the monitors. Return a flag if the error is not accepted, else 0.
 
-    at           Pointing of the beam
-    restart_gap  as in tracker.observe
-    closed       whether the loop is closed on the errors, and no limit holds the beam
-    follows      whether the axes follow their commands, and no limit holds the beam
+    The filter receives the direction of the beam when the error was measured, displaced by the error.
 
-    Return a flag where the error is not accepted, else 0.
+    at           Pointing of the beam when the error was measured
+    restart_gap  time without accepted errors after which the filter restarts [s]
+    closed       True if the loop is closed on the errors (autotrack), and no limit holds the beam off the target
+    follows      True if the axes follow their commands, and no limit holds the beam off the target
     """
     receiver = c.p.tracker.receiver
     measured = pointing.displaced(at.A, at.E, u.cross_elevation, u.elevation)
@@ -74,7 +85,10 @@ def take_error(k, c, u, o, at, restart_gap, closed, follows):
 
 @compiled
 def _watch_slope(k, c, u, at):
-    """Note an error that shows that the slope of autotrack is reversed; at: Pointing of the beam at the error."""
+    """Test the sign of the slope with an error, and latch the divergence if the sign is reversed.
+
+    at: Pointing of the beam when the error was measured.
+    """
     p = c.p.tracker
     t = u.error_stamp - p.receiver.age
     _, deck = attitude.at(k.attitude, c.p, t)
@@ -86,10 +100,10 @@ def _watch_slope(k, c, u, at):
 
 @compiled
 def unstable(k, c, u, t):
-    """Return NONE, or the reason why the attitude is not known when the command of t [s] is in force."""
+    """Return Reason.NONE, or why the attitude of the deck is not known at the time when the command of t [s] acts."""
     if not k.attitude.stabilised:
         return Reason.NONE
-    # Before the first attitude the state of the INS may not have arrived yet.
+    # Before the first attitude the state of the INS may not have arrived; the reason is then ATTITUDE_INVALID.
     if u.aligning and k.attitude.history.count > 0:
         return Reason.INS_ALIGNING
     known, _ = attitude.at(k.attitude, c.p, t + c.lead)
@@ -98,10 +112,11 @@ def unstable(k, c, u, t):
 
 @compiled
 def conditions(k, c, t, gap, closed):
-    """Return the Conditions lock, slope and track of the modes at t [s].
+    """Return (lock, slope, track) of modes.Conditions at t [s].
 
-    closed: whether the loop is closed on axes that follow their commands.
+    closed: True if the loop is closed in autotrack, and the axes follow their commands.
     """
+    # unexplained: no keyhole, turn or hidden sector explains the outage; lost: autotrack must end.
     p, unexplained, running = c.p.tracker, not gap.permitted, k.target.tracker.running
     spread_now = spread(k, c, t) if running and unexplained and gap.coasting else 0.0
     lost = not running or (unexplained and coast.over(gap.since, p.coast_time, spread_now, p.receiver.beamwidth))
@@ -113,14 +128,14 @@ def conditions(k, c, t, gap, closed):
 
 @compiled
 def restart(k):
-    """Restart the monitors of filter and slope: a mode begins."""
+    """Restart the monitors of divergence and slope when a mode begins."""
     divergence.restart(k.divergence)
     slope_sign.restart(k.slope_sign)
 
 
 @compiled
 def spread(k, c, t):
-    """Return the standard deviation of the estimate across the line of sight at t [s], in rad."""
+    """Return the standard deviation of the estimate across the line of sight at t [s] [rad]."""
     estimate = target.read(k.target, c.p, c.tracker, k.attitude, t)
     azimuth, elevation = estimate.variances
     return coast.sigma(azimuth.p11, elevation.p11, estimate.motion.elevation.angle)
@@ -128,13 +143,13 @@ def spread(k, c, t):
 
 @compiled
 def sight(k, c, t):
-    """Return the LineOfSight in ENU of the estimate at t [s]."""
+    """Return the LineOfSight (ENU) of the estimate at t [s]."""
     return target.earth_outlook(k.target, c.tracker, t)
 
 
 @compiled
 def beam(k, c, t):
-    """Return (ENU unit vector along the beam at t [s], zero rate)."""
+    """Return (ENU unit vector along the beam at t [s], rate of the vector: taken as zero)."""
     _, at = encoders.at(k.encoders, t)
     _, deck = attitude.at(k.attitude, c.p, t)
     return rotated(deck.mat, Vector(*pointing.direction(at.A, at.E))), place.ZERO_VECTOR
@@ -142,9 +157,9 @@ def beam(k, c, t):
 
 @compiled
 def deck_rates(k, c, t, A, E):
-    """Return the (azimuth, elevation) rate [rad/s] at which the deck moves an earth-fixed direction.
+    """Return the rates [rad/s] at which the motion of the deck moves the deck angles of an earth-fixed direction.
 
-    A, E: deck angles of the direction at t [s], in rad. The rates are 0 where no axis compensates for them.
+    A, E: deck angles of the direction at t [s], in rad. The rates are 0 if no axis uses them (beam.rate_compensation).
     """
     compensated = c.axis[0].p.beam.rate_compensation != 0.0 or c.axis[1].p.beam.rate_compensation != 0.0
     if compensated and k.attitude.stabilised:
@@ -156,7 +171,10 @@ def deck_rates(k, c, t, A, E):
 
 @compiled
 def write_outputs(k, c, t, o):
-    """Put the counts of gated measurements and the estimate at t [s], in earth angles of the antenna, into outputs."""
+    """Write the counts of gated measurements and the estimate at t [s] to the outputs.
+
+    The estimate is in earth angles, as seen from the antenna.
+    """
     filtered = k.target.tracker
     o.gated, o.rates_gated, o.ranges_gated = filtered.gated, filtered.rates_gated, filtered.ranges_gated
     if filtered.running:

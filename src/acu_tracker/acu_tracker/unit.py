@@ -1,4 +1,9 @@
-"""Unit of the control unit: encoders, receiver and attitude in; rate command, estimate and mode out."""
+"""The unit of the antenna control unit: the compiled law with its state, the conversion of messages, and the commands.
+
+The node `acu`, the closed loop and the recomputation run this unit (pedestal_common.node.unit). In each step it
+converts the messages to the inputs of `control_unit.step`, and the outputs to messages. Between the steps it executes
+the commands of clients.
+"""
 import functools
 import math
 import typing
@@ -31,7 +36,7 @@ MODE_TOPIC, KEYHOLE_TOPIC, BLOCKAGE_TOPIC, ALARMS_TOPIC = 'acu/mode', 'acu/keyho
 DRIVE_STATE_TOPIC, INS_STATE_TOPIC, STOW_PINS_TOPIC = 'adu/state', 'ins/state', 'acu/stow_pins'
 
 FILTER_COLUMN_COUNT, MODEL_COUNT = len(topics.FILTER_UNITS), len(topics.MOTION_MODELS)
-"""Count of the numbers of an axis on acu/filter; the last MODEL_COUNT are the probabilities of the motion models."""
+"""Number of the values of an axis on acu/filter; the last MODEL_COUNT are the probabilities of the motion models."""
 
 INS_ALIGNING = topics.TOPIC_BY_NAME[INS_STATE_TOPIC].texts.index('aligning')
 """Code of the state `aligning`; an INS that has published no state, topics.NO_TEXT_CODE, counts as aligned."""
@@ -40,22 +45,25 @@ INS_ALIGNING = topics.TOPIC_BY_NAME[INS_STATE_TOPIC].texts.index('aligning')
 RECORD_DTYPE = np.dtype([('state', control_unit.STATE_DTYPE), ('constants', control_unit.CONSTANTS_DTYPE),
                          ('inputs', signals.INPUTS_DTYPE), ('outputs', signals.OUTPUTS_DTYPE), ('invalid', 'i8')],
                         align=True)
-"""Memory of the control unit; invalid: bits of signals.INVALID_INPUTS that were set since the last diagnosis."""
+"""Memory of the control unit: state, constants, inputs and outputs of the law.
+
+invalid: bits of signals.INVALID_INPUTS that were set since the last diagnosis.
+"""
 
 
 SILENCE_REFUSAL = f'no {JOINT_STATES_TOPIC}, the drive is silent'
-"""Reason of the refusal of every mode except standby while the drive is silent."""
+"""Text with which every mode except standby is refused while the drive is silent."""
 
 RESET_REQUEST_DURATION_S = 0.2
 """Time after a reset by an operator during which the reset of the drive is requested [s]."""
 
 DRIVE_SILENT_ALARM, DRIVE_FAULT_ALARM = table.ALARM_INDEX['drive silent'], table.ALARM_INDEX['drive fault']
 MOTOR_LOST_ALARMS = tuple(table.ALARM_INDEX[f'{axis} motor lost'] for axis in topics.AXES)
-"""Alarms to which adu/state, or its silence, adds detail."""
+"""Indices of the alarms for the silence of the drive, and of those whose report contains the text of adu/state."""
 
 
 class Memory(typing.NamedTuple):
-    """Memory of the law."""
+    """Memory of the law: a record (1,) of RECORD_DTYPE, and the tables that the modes follow."""
     record: np.ndarray
     tables: tables.Tables
 
@@ -67,7 +75,8 @@ _take = taking(signals.INPUT_TOPICS)
 def decode(u, stamp, inputs):
     """Convert the messages of a step into the inputs of the control unit.
 
-    An attitude stays until the next one. A rate or a range is used only with the error of the same stamp.
+    u: record of signals.INPUTS_DTYPE; stamp: of the step [ns]; inputs: record of the input topics. An attitude stays
+    until the next one comes. A rate or a range is used only if an error has the same stamp.
     """
     _take(u, inputs)
     error, rate, distance = inputs[ANGLE_ERROR_TOPIC], inputs[ANGLE_RATE_TOPIC], inputs[RANGE_TOPIC]
@@ -84,7 +93,11 @@ def decode(u, stamp, inputs):
 
 @compiled
 def encode(o, lookahead, stamp, outputs):
-    """Convert the outputs of the control unit and the counts of the look-ahead into the records of its messages."""
+    """Convert the outputs of the control unit and the counts of the look-ahead into the records of its messages.
+
+    o: record of signals.OUTPUTS_DTYPE; lookahead: record of planner.PLANNER_DTYPE; stamp: of the step [ns]; outputs:
+    record of the output topics.
+    """
     command, estimate, reference = outputs[RATE_COMMAND_TOPIC], outputs[ESTIMATE_TOPIC], outputs[REFERENCE_TOPIC]
     command.stamp = estimate.stamp = reference.stamp = outputs[FILTER_TOPIC].stamp = stamp
     for i in range(2):
@@ -107,7 +120,7 @@ def encode(o, lookahead, stamp, outputs):
 
 @compiled
 def law(memory, stamp, inputs, outputs):
-    """Run step k."""
+    """Run one step; the arguments are those of the law of a unit (pedestal_common.node.unit.Unit)."""
     m = memory.record[0]
     decode(m.inputs, stamp, inputs)
     control_unit.step(m.state, m.constants, m.inputs, m.outputs, memory.tables)
@@ -118,23 +131,27 @@ def law(memory, stamp, inputs, outputs):
 
 @compiled
 def laws(memory, stamps, inputs, outputs):
-    """Run `law` over arrays."""
+    """Run `law` for arrays of stamps, inputs and outputs."""
     for k in range(len(stamps)):
         law(memory, stamps[k], inputs[k], outputs[k])
 
 
 @functools.lru_cache(1)
 def _initial(parameters):
-    """Return the record (1,) of a control unit before its first step.
+    """Return the RECORD_DTYPE (1,) of a control unit before its first step; parameters: AcuParameters.
 
-    The cache serves successive trials with equal parameters.
+    The cache saves time in successive trials with equal parameters.
     """
     return joined(RECORD_DTYPE, state=control_unit.initial_state(parameters),
                   constants=control_unit.constants(parameters))
 
 
 class Acu(Unit):
-    """Control unit of an AcuParameters, on a ship where its graph has ship/imu/data."""
+    """The antenna control unit.
+
+    parameters  AcuParameters
+    reads       topics that the unit reads; with ship/imu/data among them the antenna stands on a ship
+    """
     NODE, LAWS = nodes.row('acu'), {Memory: (law, laws)}
     LIVE = ('tracker', 'azimuth', 'elevation')
     REQUESTS = (*(f'acu/{mode}' for mode in modes.MODES), 'acu/acknowledge', 'acu/reset_faults')
@@ -159,7 +176,7 @@ class Acu(Unit):
 
     @property
     def silent(self):
-        """True if the drive is silent. Setting it raises the alarm, because no step comes that could detect it."""
+        """True if the drive is silent. Setting it raises the alarm, because without the drive no step detects it."""
         return self._silent
 
     @silent.setter
@@ -171,7 +188,7 @@ class Acu(Unit):
             self.outputs[ALARMS_TOPIC] = self.alarms['revision']
 
     def prepare(self):
-        """Compile also the functions behind the alarm commands and the diagnosis."""
+        """Compile the law, the functions behind the alarm commands, and the diagnosis."""
         super().prepare()
         before = self.memory.record.copy()
         self.desk.prepare()
@@ -187,15 +204,15 @@ class Acu(Unit):
         self.diagnose()
 
     def configure(self, parameters):
-        """Take new values of the LIVE parameters into the constants; the state stays."""
+        """Put new values of the LIVE parameters into the constants; the state stays as it is."""
         super().configure(parameters)
         self.memory.record['constants'] = control_unit.constants(parameters)
         self._tables_valid = NEVER_DUE_NS, NO_STAMP
 
     def decode(self, topic, message):
-        """Take a program track, two or more points in earth angles, or a preset, one point in deck angles.
+        """Take a message on acu/program_track; raise ValueError for a bad message.
 
-        Raise ValueError for a bad message.
+        Two or more points are a segment of the program track in earth angles. One point is a preset in deck angles.
         """
         times, angles = rows(message)
         if len(angles) == 1:
@@ -205,7 +222,10 @@ class Acu(Unit):
             self._append(times + start, angles)
 
     def _append(self, times, angles):
-        """Append a segment to the program track. Raise ValueError."""
+        """Append a segment to the program track; raise ValueError if it is refused.
+
+        times: stamps of its rows (n,) [s]; angles: azimuth and elevation (n, 2) [rad].
+        """
         state, inputs = self.parts['state'], self.parts['inputs']
         followed = state['mode']['now'] == Mode.PROGRAM
         try:
@@ -222,7 +242,10 @@ class Acu(Unit):
         return min(super().next_due, self._tables_valid[1])
 
     def execute_due(self, stamp):
-        """Execute the scheduled commands that are due before the step of a stamp [ns], on the tables for that step."""
+        """Execute the scheduled commands that are due before the step of a stamp [ns].
+
+        The tables of the law are brought to this stamp before.
+        """
         if self.epoch != self.predictor.epoch:
             self._predict_by(Predictor(self.predictor.parameters, self.epoch))
         since, until = self._tables_valid
@@ -237,13 +260,14 @@ class Acu(Unit):
         return round(stamp * 1e9) if math.isfinite(stamp) else 0
 
     def _predict_by(self, predictor):
-        """Replace the Predictor."""
+        """Replace the Predictor and discard its predictions."""
         self.predictor, self.predicted, self._tables_valid = predictor, {}, (NEVER_DUE_NS, NO_STAMP)
 
     def update_tables(self, stamp=None):
-        """Bring the tables of the law to a stamp [ns], or to now.
+        """Bring the tables of the law to a stamp [ns]; None: the stamp of the last step.
 
-        The tables are the due piece of the program and the predictions, all shifted by the offset.
+        The tables are the piece of the program track that is due, and the predictions of satellite and sun. All are
+        shifted by the offset that an operator has commanded.
         """
         stamp = self.now if stamp is None else int(stamp)
         inputs, t = self.parts['inputs'], stamp * 1e-9
@@ -260,13 +284,13 @@ class Acu(Unit):
             for row in tables.TABLE_MODES)))
 
     def take_text(self, topic, text):
-        """Take a text topic; the state of the drive is kept for the diagnosis."""
+        """Take the text of a text topic; the text of adu/state is also kept for the diagnosis."""
         super().take_text(topic, text)
         if topic == DRIVE_STATE_TOPIC:
             self.drive_state = text
 
     def encode(self, topic, code):
-        """Return the text of a code on a text topic, or the message on acu/alarms."""
+        """Return the text that a code on a text topic stands for; for acu/alarms return the message."""
         lookahead = self.parts['state']['guidance']['lookahead']
         if topic == KEYHOLE_TOPIC:
             return announcement.keyhole(lookahead, self.parameters)
@@ -278,7 +302,7 @@ class Acu(Unit):
         return modes.MODES[code] if topic == MODE_TOPIC else super().encode(topic, code)
 
     def schedule(self):
-        """Return [(at [ns], Command)] of the parameter `commands`."""
+        """Return [(time [ns], Command)] of the parameter `commands`."""
         return schedule('commands', self.parameters.commands, ACU_COMMANDS)
 
     def execute(self, command, arguments):
@@ -316,16 +340,22 @@ class Acu(Unit):
         return reply
 
     def take_elements(self, line_1, line_2, omm):
-        """Predict from other elements: lines in which _ stands for a blank, or an OMM in JSON. Raise ValueError."""
+        """Predict the satellite from other elements; raise ValueError for invalid elements.
+
+        line_1, line_2: TLE, in which _ stands for a blank; omm: OMM in JSON.
+        """
         self._predict_by(self.predictor.with_elements(line_1.replace('_', ' '), line_2.replace('_', ' '), omm))
         self.update_tables()
 
     def admit(self, command):
-        """Raise ValueError for a command of a client that does not hold control."""
+        """Raise ValueError for a command of a client, if another client holds control."""
         self.authority.admit(command)
 
     def request(self, name):
-        """Return the Reply to a mode, acknowledge or reset_faults; a refusal states the reason."""
+        """Return the Reply to a request of a service: acu/MODE, acu/acknowledge or acu/reset_faults.
+
+        A refusal states the reason.
+        """
         mode = name.removeprefix('acu/')
         m, outputs = self.parts, self.parts['outputs']
         if mode == 'reset_faults':
@@ -343,7 +373,7 @@ class Acu(Unit):
     def _reset(self):
         """Return the Reply to a reset of the latched alarms and faults; also request the reset of a drive in fault.
 
-        A drive in an emergency stop is reset by a person at adu/reset_faults only.
+        The control unit does not reset an emergency stop of the drive: only an operator does, at adu/reset_faults.
         """
         reply = self.desk.reset()
         if self.drive_state.startswith('fault'):
@@ -353,7 +383,7 @@ class Acu(Unit):
         return reply
 
     def _refusal(self, mode, reason):
-        """Return the text of the reason why a mode is refused."""
+        """Return the text of the reason why a mode is refused, with its details; mode, reason: codes."""
         more = self.predictor.refusal_details(mode, reason, self.now * 1e-9) if mode in (Mode.TLE, Mode.SUN) else ''
         more = more or diagnosis.missing(self, diagnosis.INPUTS_OF_REASONS.get(reason, ''))
         beyond = self._beyond_limits(modes.MODES[mode]) if reason == Reason.OUTSIDE_LIMITS else ''
@@ -365,7 +395,7 @@ class Acu(Unit):
         return 'silent' if self.silent else self.drive_state
 
     def refusals(self):
-        """Return {mode: reason} of the modes that would be refused now."""
+        """Return {name of a mode: text of the reason} for the modes that would be refused now."""
         if self.silent:
             return dict.fromkeys((mode for mode in modes.MODES if mode != 'standby'), SILENCE_REFUSAL)
         m, why = self.parts, np.zeros(len(modes.MODES), int)
@@ -381,20 +411,21 @@ class Acu(Unit):
                 for mode, text in refused.items()}
 
     def _beyond_limits(self, mode):
-        """Return the details of the reason OUTSIDE_LIMITS of a mode that goes to fixed deck angles; '' for another."""
+        """Return the details of the reason OUTSIDE_LIMITS for the modes preset and stow; '' for another mode."""
         p = self.parameters
         angles = {'preset': self.parts['state']['guidance']['preset']['angle'],
                   'stow': (p.azimuth.stow, p.elevation.stow)}.get(mode)
         return '' if angles is None else f', {diagnosis.beyond_limits(p, angles)}'
 
     def requests_for(self, topic, text):
-        """Return [service of the mode] for a text on acu/mode, else []."""
+        """Return [name of the service that requests the mode] for a text on acu/mode, else []."""
         return [f'acu/{text}'] if topic == MODE_TOPIC and text in modes.MODES else []
 
     def diagnose(self):
         """Return the Diagnosis and clear the bits of the invalid inputs.
 
-        ERROR: invalid inputs since the last diagnosis. WARN: gated errors, a turn, overtravel or coasting.
+        The level is ERROR for a latched fault or invalid inputs since the last diagnosis. The level is WARN for gated
+        errors, a turn of the azimuth, a limit that holds the beam, an end of travel ahead, or coasting.
         """
         result = diagnosis.of(self)
         self.parts['invalid'] = 0
@@ -402,7 +433,11 @@ class Acu(Unit):
 
     @property
     def calls(self):
-        """Services of CALLS to call now: stop during uncommanded motion, reset after a reset by an operator."""
+        """Services of the drive that the unit calls now.
+
+        The unit calls the emergency stop during uncommanded motion, and the reset for a short time after a reset by an
+        operator.
+        """
         stop, reset = self.CALLS
         if self.parts['state']['unasked']['moves']:
             return (stop,)
@@ -421,24 +456,29 @@ class Acu(Unit):
 
     @property
     def urgent(self):
-        """Values whose change is published at once: faults, mode, silence, lock, drive, pins, alignment."""
+        """Values whose change is published at once in the diagnostics.
+
+        The values are faults, mode, silence, lock, state of the drive, pins and alignment.
+        """
         outputs, inputs = self.parts['outputs'], self.parts['inputs']
         return (control_unit.latched(self.parts['state']), outputs['mode'], outputs['reason'] == Reason.SILENCE,
                 outputs['locked'], inputs['drive'], inputs['pins'], inputs['aligning'])
 
     @staticmethod
     def idle(numbers):
-        """Return the reason why a recording does not exercise the unit: the receiver never locked, or autotrack never
-        ran; or ''."""
+        """Return the reason why a recording does not exercise the unit, or ''; numbers: recorded numbers by topic.
+
+        The reasons are a receiver that never locked, and a control unit that was never in autotrack.
+        """
         if not np.isfinite(numbers[ANGLE_ERROR_TOPIC][:, 0]).any():
             return 'the receiver never locked'
         return '' if 'autotrack' in numbers[MODE_TOPIC] else 'the ACU was never in autotrack'
 
 
 def rows(message):
-    """Return (times after the stamp (n,) [s], angles (n, 2) [rad]) of a JointTrajectory.
+    """Return (times since the stamp of the message (n,) [s], azimuth and elevation (n, 2) [rad]) of a JointTrajectory.
 
-    Raise ValueError where an axis or a position is missing.
+    Raise ValueError if an axis or a position is missing.
     """
     if not set(topics.AXES) <= set(message.joint_names):
         raise ValueError(f'joint_names {message.joint_names}: must hold {" and ".join(topics.AXES)}')

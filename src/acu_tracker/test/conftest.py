@@ -23,6 +23,9 @@ class Rig:
 
     T = 0.005
     QUICK = {'tracker.lock_count': 20}
+    LIVELY = {f'{axis}.filter.{key}': value for axis in ('azimuth', 'elevation')
+              for key, value in (('kind', 'ca'), ('ca.noise', 0.3))}
+    """A filter without lag: in its frame, constant acceleration of an azimuth is none."""
 
     @staticmethod
     def level(t):

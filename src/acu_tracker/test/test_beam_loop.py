@@ -98,7 +98,7 @@ def beam_rig(Rig):
 
 @pytest.mark.parametrize('delay, latency', [(0.0, 0.0), (0.02, 0.015)])
 def test_tracked_beam_is_on_the_target_in_the_middle_of_its_interval(beam, delay, latency):
-    rig = beam(beam.moving, initial_mode='autotrack', delay=delay, error_latency=latency)
+    rig = beam(beam.moving, initial_mode='autotrack', delay=delay, error_latency=latency, **beam.LIVELY)
     rig.run(12.0)
     assert rig.mode == 'autotrack' and not rig.invalid
     assert np.abs(rig.middle(200)).max() < 2e-6
@@ -166,7 +166,8 @@ def test_the_beam_is_held_inside_its_limits(beam):
 @pytest.mark.parametrize('age, beam_age', [(0.0025, 0.0), (0.005, 0.005), (0.012, 0.01)])
 def test_an_error_of_before_its_stamp_is_met_with_the_beam_that_stood_then(beam, age, beam_age):
     """The beam jumps at every step; the receiver measures `age` before the stamp it gives."""
-    rig = beam(lambda t: (0.5 + 0.02 * t, 0.6), **{'tracker.receiver.age': age, 'tracker.receiver.beam_age': beam_age})
+    rig = beam(lambda t: (0.5 + 0.02 * t, 0.6), **beam.LIVELY, **{'tracker.receiver.age': age,
+                                                                  'tracker.receiver.beam_age': beam_age})
     for k in range(400):
         rig.angle = np.array([0.5 + 0.01 * math.sin(2.0 * k), 0.6 - 0.01 * math.cos(3.0 * k)])
         t = k * rig.T - age

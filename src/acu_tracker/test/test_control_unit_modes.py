@@ -72,7 +72,8 @@ def test_handover_and_back_are_smooth(Rig):
 
 def test_a_known_latency_is_no_loss(Rig):
     """Errors 0.2 s late, twice coast_after: locks, and coasts and gives up as late as with prompt errors."""
-    rig = Rig(Rig.moving, error_latency=0.2, initial_mode='autotrack', **Rig.QUICK, **{'tracker.coast_time': 0.15})
+    rig = Rig(Rig.moving, error_latency=0.2, initial_mode='autotrack', **Rig.QUICK, **Rig.LIVELY,
+              **{'tracker.coast_time': 0.15})
     errors = rig.run(12.0)[:, 2:]
     assert rig.mode == 'autotrack' and rig.outputs['coasting'][0] == 0
     assert np.abs(errors[-400:]).max() < 2e-6

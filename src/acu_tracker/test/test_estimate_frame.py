@@ -1,23 +1,26 @@
-"""The tilted frame and the bridge against scipy's rotations and differences."""
+"""The frame of the filter and the bridge against scipy's rotations and differences."""
 import math
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from acu_tracker.estimation.filters import axes_filter, target_filter, unscented
+from acu_tracker.estimation.filters.measurement import AxisMeasurement, Measurement
+from acu_tracker.estimation.params import FilterParameters, UkfParameters
 from acu_tracker.geometry import estimate_frame
 from acu_tracker.geometry.deck_reference import ZERO_VECTOR
 from acu_tracker.geometry.motion import AxisMotion, Motion, line_of_sight
-from acu_tracker.geometry.vector import Vector
+from acu_tracker.geometry.vector import Vector, rotated, rotation
 from acu_tracker.program import bridge, program_track
 from acu_tracker.program.program_track import ProgramTrack
 
 
-def tilted():
+def laid():
     """A frame on the way of a target near the zenith, and the LineOfSight of that target."""
     sight = line_of_sight(Motion(AxisMotion(0.4, 0.05, 0.0), AxisMotion(1.35, 0.01, 0.0)))
     frame = np.zeros(1, estimate_frame.FRAME_DTYPE)
-    estimate_frame.tilt(frame[0], sight.u, sight.du)
+    estimate_frame.lay(frame[0], sight.u, sight.du)
     return frame[0], sight
 
 
@@ -27,7 +30,7 @@ def standing(A, E):
 
 
 def test_the_target_runs_along_the_equator():
-    frame, sight = tilted()
+    frame, sight = laid()
     np.testing.assert_allclose(frame['mat'] @ frame['mat'].T, np.eye(3), atol=1e-15)
     assert np.linalg.det(frame['mat']) == pytest.approx(1.0)
     (A, dA, _), (E, dE, _) = estimate_frame.to_frame(frame, sight)
@@ -36,20 +39,21 @@ def test_the_target_runs_along_the_equator():
 
 
 def test_there_and_back():
-    frame, sight = tilted()
+    frame, sight = laid()
     motion = Motion(AxisMotion(0.3, 0.02, 0.001), AxisMotion(-0.2, 0.01, -0.002))
     np.testing.assert_allclose(estimate_frame.to_frame(frame, estimate_frame.to_earth(frame, motion)), motion,
                                atol=1e-15)
     still = np.zeros(1, estimate_frame.FRAME_DTYPE)
     for e, n, u in ((0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.1, 0.2, 0.974)):
-        estimate_frame.tilt(still[0], Vector(e, n, u), ZERO_VECTOR)
-        assert np.isfinite(still['mat']).all()
+        estimate_frame.lay(still[0], Vector(e, n, u), ZERO_VECTOR)
+        np.testing.assert_allclose(still['mat'][0] @ still['mat'][0].T, np.eye(3), atol=2e-3)
+        assert still['mat'][0, 2, 0] == 0.0     # Azimuth grows horizontally.
     np.testing.assert_allclose(estimate_frame.to_frame(frame, sight).azimuth.angle, 0.0, atol=1e-15)
 
 
 def test_variances_turn_with_the_frame():
     """Against samples: directions scattered in the frame, their spread in earth angles."""
-    frame, _ = tilted()
+    frame, _ = laid()
     rng = np.random.default_rng(5)
     sigma = 1e-4, 3e-4
     A, E = 0.05 + sigma[0] * rng.normal(size=4000), 0.02 + sigma[1] * rng.normal(size=4000)
@@ -58,6 +62,43 @@ def test_variances_turn_with_the_frame():
     variances = estimate_frame.earth_variances(frame, standing(0.05, 0.02), standing(azimuth.mean(), elevation.mean()),
                                                sigma[0]**2, sigma[1]**2)
     np.testing.assert_allclose(variances, [azimuth.var(), elevation.var()], rtol=0.1)
+
+
+def test_a_filter_turns_with_its_frame():
+    """The direction, its rate, and the variances in earth angles are the same in both frames, but for the part of the
+    variances that a turn by 60 deg in the plane of the sky mixes; scipy turns the Cartesian covariance."""
+    before, after = laid()[0], np.zeros(1, estimate_frame.FRAME_DTYPE)[0]
+    motion = Motion(AxisMotion(0.2, 0.01, 0.0), AxisMotion(0.35, -0.02, 0.0))
+    sight = estimate_frame.to_earth(before, motion)
+    estimate_frame.lay(after, sight.u, sight.du)
+    turn = estimate_frame.from_earth(after, rotation(before['mat']))
+    np.testing.assert_allclose(np.array(turn), after['mat'].T @ before['mat'], atol=1e-15)
+
+    params = FilterParameters(kind='ca')
+    c = target_filter.constants(UkfParameters(), (params, params), 0.0)[0]
+    f = np.zeros(1, target_filter.FILTER_DTYPE)[0]
+    axis = [AxisMeasurement(m.angle, variance, math.nan, math.nan) for m, variance in zip(motion, (4e-8, 1e-8))]
+    target_filter.start(f, c, Measurement(0.0, tuple(axis), math.nan, math.nan), 0.1)
+    for i in range(2):
+        f['axis'][i]['x'][0] = motion[i]
+    axes_filter.predict(f['axis'], c['axis'], 0.0)
+    unscented.start(f['cartesian'], c['cartesian'], axes_filter.read(f['axis']), 1000.0, 1.0)
+    cartesian = f['cartesian']['p'].copy()
+    f['running'] = 1
+    target_filter.turn(f, c, turn)
+    R = np.kron(np.eye(3), np.array(turn))
+    np.testing.assert_allclose(f['cartesian']['p'], R @ cartesian @ R.T, atol=1e-12 * np.abs(cartesian).max())
+
+    axes_filter.predict(f['axis'], c['axis'], 0.0)
+    turned = axes_filter.read(f['axis'])
+    np.testing.assert_allclose(np.ravel(estimate_frame.to_earth(after, turned.motion)), np.ravel(sight), atol=1e-14)
+    # Against samples of the errors in both old axes, projected on both new axes.
+    a, b = np.random.default_rng(3).normal(size=(2, 20_000)) * [[2e-4 * math.cos(0.35)], [1e-4]]
+    across, up = (rotated(turn, v) for v in (
+        Vector(math.cos(0.2), -math.sin(0.2), 0.0),
+        Vector(-math.sin(0.35) * math.sin(0.2), -math.sin(0.35) * math.cos(0.2), math.cos(0.35))))
+    expected = np.var(a * across.x + b * up.x), np.var(a * across.z + b * up.z)
+    np.testing.assert_allclose([v.p11 for v in turned.variances], expected, rtol=0.03)
 
 
 def test_the_bridge_is_the_program_turned_to_the_target():

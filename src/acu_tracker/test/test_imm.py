@@ -12,14 +12,14 @@ from acu_tracker.estimation.params import FilterParameters
 from pedestal_common.parameters import build
 
 T, SIGMA, RATE_SIGMA = 0.01, 5e-4, 2e-3
-MODELS = {'imm.models': 'cv ca singer', 'imm.cv.noise': 1e-3, 'imm.ca.noise': 0.3, 'imm.singer.sigma': 0.1,
-          'imm.singer.alpha': 2.0, 'imm.dwell': 0.5}
+MODELS = {'imm.models': 'cv ca singer', 'imm.rungs': 1, 'imm.cv.noise': 1e-3, 'imm.ca.noise': 0.3,
+          'imm.singer.sigma': 0.1, 'imm.singer.alpha': 2.0, 'imm.dwell': 0.5}
 
 
 def filterpys(y, with_rate):
     """filterpy's bank of cv, ca and singer from the same start; cv padded to three states."""
     sources = [([[0, 1, 0], [0, 0, 0], [0, 0, 0]], [0, 1e-3, 0], 0.0),
-               ([[0, 1, 0], [0, 0, 1], [0, 0, 0]], [0, 0, 0.3], 0.1**2),
+               ([[0, 1, 0], [0, 0, 1], [0, 0, 0]], [0, 0, 0.3], 10.0 * 0.3**2),
                ([[0, 1, 0], [0, 0, 1], [0, 0, -2.0]], [0, 0, math.sqrt(4.0) * 0.1], 0.1**2)]
     filters = []
     for A, g, variance in sources:
@@ -59,7 +59,7 @@ def test_against_filterpy(with_rate):
                                    oracle.P[(0, 0, 1), (0, 1, 1)], rtol=1e-6)
         np.testing.assert_allclose(out[k]['mu'][:3], oracle.mu, rtol=1e-6, atol=1e-9)
     # The bank has used all its models on the way.
-    assert (out['mu'][:, :3].max(axis=0) > 0.5).sum() >= 2 and np.isnan(out['mu'][:, 3]).all()
+    assert (out['mu'][:, :3].max(axis=0) > 0.5).sum() >= 2 and np.isnan(out['mu'][:, 3:]).all()
 
 
 @pytest.mark.parametrize('T', [1e-4, 0.3, 20.0])

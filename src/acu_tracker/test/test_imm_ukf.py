@@ -13,7 +13,7 @@ DEG = math.pi / 180.0
 T = 0.02
 SIGMA, RANGE_SIGMA = 0.03 * DEG, 1.0
 BOTH = ('imm_ukf', 'imm_ukf')
-MANOEUVRES = {'imm.models': 'cv ca current_statistical', 'imm.dwell': 5.0, 'imm.cv.noise': 0.003 * DEG,
+MANOEUVRES = {'imm.models': 'cv ca current_statistical', 'imm.rungs': 1, 'imm.dwell': 5.0, 'imm.cv.noise': 0.003 * DEG,
               'imm.ca.noise': 0.1 * DEG, 'imm.current_statistical.a_max': 15.0 * DEG}
 """A bank for the axes that expects a manoeuvre any time, and so knows the rate worse than the Cartesian filter."""
 
@@ -41,7 +41,7 @@ class Pass:
     def put(self, kinds):
         filters = [build(FilterParameters, {'kind': kind, **MANOEUVRES}) for kind in kinds]
         self.c = tracker.constants(self.params, filters)[0]
-        tracker.transfer(self.state[0], self.p, self.c)
+        tracker.transfer(self.state[0], self.c)
 
     def now(self, stamp=None):
         return np.ravel(tracker.outlook(self.state[0], self.c, self.t[self.k - 1] if stamp is None else stamp))

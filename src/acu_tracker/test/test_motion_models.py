@@ -119,4 +119,4 @@ def test_floor_holds_beyond_a_max():
 
 
 def test_every_model_has_its_column_in_the_filter_topic():
-    assert motion_models.MODEL_NAMES == topics.MOTION_MODELS
+    assert motion_models.COLUMN_NAMES == topics.MOTION_MODELS

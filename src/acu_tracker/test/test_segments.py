@@ -59,8 +59,8 @@ def test_what_is_over_is_forgotten(segments):
 
 
 @pytest.mark.parametrize('begin, azimuth, rate, text', [
-    (10.0, 3.0, 0.1, 'turnaround too fast: azimuth 2.1 rad/s; must be at most 1 rad/s'),
-    (9.01, 0.9, -0.1, 'turnaround too fast: azimuth 20 rad/s2; must be at most 10 rad/s2')])
+    (10.0, 3.0, 0.1, 'turnaround too fast: azimuth 120.3 deg/s; must be at most 57.3 deg/s'),
+    (9.01, 0.9, -0.1, 'turnaround too fast: azimuth 1146 deg/s2; must be at most 573 deg/s2')])
 def test_too_fast_a_turnaround_is_refused_while_the_track_is_followed(segments, begin, azimuth, rate, text):
     with pytest.raises(TurnaroundError, match=text):
         segments.append(*segment(begin, 5, azimuth=azimuth, rate=rate), 2.0, True)

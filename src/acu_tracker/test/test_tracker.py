@@ -17,6 +17,7 @@ from acu_tracker.estimation.filters.measurement import (
 )
 from acu_tracker.estimation.params import FilterParameters, ReceiverModelParameters, TrackerParameters
 from acu_tracker.geometry import estimate_frame
+from acu_tracker.geometry.deck_reference import ZERO_VECTOR
 from acu_tracker.geometry.vector import Vector
 from pedestal_common.geometry import line_of_sight
 from pedestal_common.parameters import build, record
@@ -39,7 +40,7 @@ class Target:
     def put(self, **filter_params):
         params = build(FilterParameters, {'kind': 'current_statistical', **filter_params})
         self.c = tracker.constants(self.params, (params, params))[0]
-        tracker.transfer(self.state[0], self.p, self.c)
+        tracker.transfer(self.state[0], self.c)
 
     def observe(self, stamp, azimuth, elevation=0.0, azimuth_rate=NONE, elevation_rate=NONE):
         """(outcome, AxisInnovation of the azimuth)."""
@@ -181,7 +182,7 @@ def test_a_filter_no_better_than_its_measurements_locks_too(lively):
 @pytest.mark.parametrize('before', FILTER_KINDS)
 def test_filter_changes_without_a_bump(before):
     """Into every other kind and back, on a target that accelerates by as much as a constant rate still stands: angle,
-    rate and their covariance go on as they were, no error is gated, and angle and rate stay within five of the
+    rate and their covariance go on as they were, no error is gated, and angle and rate stay within six of the
     standard deviations the filter claims."""
     rng, acceleration = np.random.default_rng(4), 0.5 * DEG
     target, worst = Target(kind=before), np.zeros(2)
@@ -198,7 +199,7 @@ def test_filter_changes_without_a_bump(before):
             target.put(kind=others[k // 200 - 1])
             np.testing.assert_allclose(target.outlook(t)[:2], was[:2], rtol=1e-14)
             np.testing.assert_allclose(target.variances(), known, rtol=1e-9)
-    assert (worst < 5.0).all()
+    assert (worst < 6.0).all()
     assert target.state['gated'] == 0
 
 
@@ -240,19 +241,16 @@ def test_receiver_law():
 
 
 @pytest.mark.parametrize('elevation', [0.1, 0.7, 1.3])
-@pytest.mark.parametrize('tilted', [False, True])
-def test_noise_of_the_attitude_moves_a_direction_as_rotations_do(elevation, tilted):
-    """Oracle: scipy turns the direction by 20,000 small rotations about deck axes and the vertical; in the frame of a
-    target that climbs to the north-east it moves along the axes of that."""
-    azimuth, f = 0.3, np.zeros(1, estimate_frame.FRAME_DTYPE)[0]
-    estimate_frame.level(f)
-    u = Vector(*line_of_sight.earth_direction(azimuth, elevation))
-    if tilted:
-        estimate_frame.tilt(f, u, Vector(*np.cross(u, (1.0, -1.0, 0.2))))
+@pytest.mark.parametrize('along', [None, (1.0, -1.0, 0.2)])
+def test_noise_of_the_attitude_moves_a_direction_as_rotations_do(elevation, along):
+    """Oracle: scipy turns the direction by 20,000 small rotations about deck axes and the vertical; in the frame it
+    moves along the axes of that. The frame is laid horizontally, or along a climb to the north-east."""
+    f = np.zeros(1, estimate_frame.FRAME_DTYPE)[0]
+    u = Vector(*line_of_sight.earth_direction(0.3, elevation))
+    estimate_frame.lay(f, u, ZERO_VECTOR if along is None else Vector(*np.cross(u, along)))
     generator = np.random.default_rng(1)
     tilt, heading = 2e-4 * generator.standard_normal((2, 20_000)), 5e-4 * generator.standard_normal(20_000)
     turned = Rotation.from_rotvec(np.column_stack((*tilt, heading))).apply(u) @ f['mat']
-    measured = (math.cos(0.0 if tilted else elevation) * np.arctan2(turned[:, 0], turned[:, 1])).var(), np.arcsin(
-        turned[:, 2]).var()
-    at = (0.0, 0.0) if tilted else (azimuth, elevation)
-    assert attitude_variances(estimate_frame.verticals(f, *at), 2e-4**2, 5e-4**2) == pytest.approx(measured, rel=0.03)
+    measured = np.arctan2(turned[:, 0], turned[:, 1]).var(), np.arcsin(turned[:, 2]).var()
+    assert attitude_variances(estimate_frame.verticals(f, 0.0, 0.0), 2e-4**2, 5e-4**2) == pytest.approx(measured,
+                                                                                                      rel=0.03)

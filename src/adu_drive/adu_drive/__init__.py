@@ -4,14 +4,16 @@
     drive_state   enable, brakes and faults: the state machine of both axes
     stow_pins     pins that hold the stowed axes: their motion and their failure
     axis          one axis: sensors, speed loop, two current loops, plant, trip conditions
-    unit          unit of the drive: input messages, law, output messages
+    unit          unit of the drive: input messages, law, output messages; adu_node runs it
     timekeeper_node   node that owns the time of the drive
+    params, injected, state_file    parameters; injected faults; file for the state of the plant over a restart
+    lanes         many drives at once, computed by vector instructions, for trials
     speed_loop, disturbance_observer, bias, current_loop, pi, travel, encoder, faults    laws of the controller
     motor, thermal, brake, gear_train, friction, structure, wind                         laws of the plant
     wind_field        one wind over both axes, which depends on their angles
     gimbal            rigid bodies that turn about two axes on a moving deck
     mount             direction of the beam from the angles of the axes
-    electronic_beam, beam_unit    beam of a phased array instead of a drive, with delay and hold; its unit
+    electronic_beam, beam_unit    law and unit of a beam of a phased array, which takes the place of the drive
 
 Angles, rates and torques of the load are deck angles: azimuth clockwise from the bow seen from above
 (it turns opposite to a REP 103 yaw), elevation up from the deck. Motor quantities are on the motor shaft.
@@ -26,10 +28,11 @@ Symbols
     v_d, v_q          phase voltages in rotor coordinates [V]
     R, L, psi, p      phase resistance [ohm], inductance [H], flux linkage [Wb], pole pairs
     K_t               torque constant 1.5 p psi [Nm/A]; psi_hat, K_t_hat: values in the controller
-    K_p, K_i, K_d     gains of a PI controller; of the damping between the motors
-    w_o, d            bandwidth of the disturbance observer [rad/s]; estimated torque on a motor shaft [Nm];
-                      omega_hat, d_hat its estimates, l_1, l_2 its gains
-    J_dish            share of J that swings on k_dish [Nm/rad], c_dish [Nms/rad]
+    K_p, K_i          proportional and integral gain of a PI controller
+    K_d               gain of the damping between the motors [Nms/rad]
+    w_o, d            bandwidth of the disturbance observer [rad/s]; disturbance torque on a motor shaft [Nm]
+    omega_hat, d_hat  estimates of the disturbance observer; l_1, l_2: its gains
+    J_dish            part of J that swings on a spring k_dish [Nm/rad] and a damper c_dish [Nms/rad]
     k, c, delta       mesh stiffness [Nm/rad], damping [Nms/rad], deflection [rad], all on the load axis
     z                 LuGre bristle deflection [rad]; sigma_0, sigma_1 its stiffness and damping
     T_c, T_s, v_s     Coulomb and breakaway friction [Nm], Stribeck rate [rad/s]
@@ -37,5 +40,5 @@ Symbols
     alpha, dT         temperature coefficient of copper [1/K], rise of the winding at x = 1 [K]
     A, E              angles of the azimuth and the elevation axis [rad]
     v, V              turbulence along the mean wind, and the mean wind [m/s]
-    h                 plant sub-step 50 us; current loops 100 us, speed loop 0.5 ms
+    h                 sub-step of the plant, 50 us; the current loops have 100 us, the speed loop 0.5 ms
 """

@@ -41,7 +41,7 @@ class AduNode(Timekeeper):
     def save(self):
         """Save the plant state, and keep the reason of a failure for `diagnosed`.
 
-        Because the end of a run disables the drive, `enabled` keeps its last value from before the end.
+        Because the end of a run disables the drive, the saved `enabled` then keeps its value from before the end.
         """
         state = self.unit.plant_state()
         if self.stopping:

@@ -1,7 +1,8 @@
 """One axis: encoders, speed loop, two current loops, two motors, gear train and load.
 
-drive_unit.step calls `speed_control`, `current_control` and `plant_step` at their own periods. They work on the
-records `s` (state) and `c` (constants) of the axis, which this module builds as nested dictionaries.
+drive_unit.step calls `speed_control`, `current_control` and `plant_step` at their own periods. These functions work on
+the records s (state) and c (constants) of the axis, or m and k of one motor. This module builds both records as nested
+dictionaries from p, the AxisParameters.
 """
 import math
 
@@ -22,11 +23,15 @@ CURRENT_LOOP_PERIOD_S = SPEED_LOOP_PERIOD_S / CURRENT_LOOP_STEP_COUNT
 """Period of the current loops [s]."""
 
 SECOND_PINION_OFFSET_RAD = 0.5 * math.pi
-"""Angle by which the second pinion is mounted ahead of the first, so that their runouts do not add [rad]."""
+"""Angle by which the second pinion is mounted ahead of the first [rad], so that the runouts of both do not add."""
 
 
 def _motor_constants(m, loop, heat, per_rad, h):
-    """Return the constants of a motor; psi, K_t, R are true values, psi_hat, K_t_hat values in the controller."""
+    """Return the constants of a motor; psi, K_t, R are true values, psi_hat, K_t_hat values in the controller.
+
+    m, loop, heat: MotorParameters, CurrentLoopParameters, ThermalParameters; per_rad: counts of the motor encoder per
+    rad; h: sub-step of the plant [s].
+    """
     w = 2.0 * math.pi * loop.bandwidth
     R, psi = m.resistance * (1.0 + m.drift.resistance), m.flux_linkage * (1.0 + m.drift.flux_linkage)
     return {'p': float(m.pole_pairs), 'psi': psi, 'L': m.inductance, 'K_t': 1.5 * m.pole_pairs * psi,
@@ -44,13 +49,13 @@ def _motor_constants(m, loop, heat, per_rad, h):
 
 
 def _dish(p):
-    """Return inertia, stiffness and damping of the flexible part of the load."""
+    """Return inertia [kg m2], stiffness [Nm/rad] and damping [Nms/rad] of the dish, the flexible part of the load."""
     J_dish = p.structure.inertia_share * p.load.inertia
     return J_dish, *structure.spring_and_damper(J_dish, p.structure.frequency, p.structure.damping)
 
 
 def _uneven(p):
-    """Return the constants of effects that vary with the angles of motors and pinions."""
+    """Return the constants of runout, tooth error and cogging, which vary with the angles of pinions and motors."""
     g = p.gear_train
     return {'uneven': int(g.runout + g.tooth_error + p.motor_1.cogging + p.motor_2.cogging > 0.0), 'runout': g.runout,
             'tooth_error': g.tooth_error, 'teeth': float(g.pinion_teeth), 'per_reducer': 1.0 / g.reducer_ratio}
@@ -59,9 +64,9 @@ def _uneven(p):
 def constants(p, h, varying=False):
     """Return the constants of an axis (AxisParameters) for a plant sub-step h [s], computed once: nested dictionary.
 
-    varying: True if change_inertia sets the inertia, first before the first plant_step.
+    varying: True if the inertia of the load varies; `change_inertia` then sets it before each control period.
 
-    The laws document their constants. Names follow these rules:
+    The docstrings of the laws define their constants. The names follow these rules:
 
     per_X            1 / X; per_2N = 1 / (2 N)
     h_X, h_R_L       h / X, h R / L; h_sigma_0 = h sigma_0; sigma_1_h = sigma_1 / h; h in h_J_shaft: speed-loop period
@@ -114,7 +119,8 @@ def constants(p, h, varying=False):
 def _motor_at_rest(m, g, T, total, theta, per_rad):
     """Return the state of a motor that makes T [Nm] at standstill with its pinion on the flank, load at theta [rad].
 
-    total: part of T from the integral of the speed loop.
+    m, g: MotorParameters, GearTrainParameters; total: part of T from the integral of the speed loop [Nm]; per_rad:
+    counts of the motor encoder per rad.
     """
     i_ref = T / m.torque_constant
     i_q = (i_ref - m.drift.current_offset) / (1.0 + m.drift.current_gain)
@@ -132,12 +138,13 @@ def initial_state(p, theta, external):
 
     reading        counts of the load encoder at t_k
     external       torque on the load [Nm], constant over a control period; it includes `deck`
-    deck           part of it from the motion of the deck and of the other axis [Nm]; base and dish
-                   get it by their shares of the inertia
+    deck           part of `external` from the motion of the deck and of the other axis [Nm]; base and dish
+                   get it in proportion to their inertia
     commanded_rate, commanded_torque    command that is executed in a speed-loop period [rad/s, Nm]
-    stopping       1 if the axis was not enabled in the control period: ramp to standstill, then hold
-    ramping        1 from a stop until the rate has reached the command again, within the deceleration of the ramp
-    faults         latched fault word, see faults.AXIS_FAULTS; present: faults whose cause was there in this period
+    rate           rate reference of the speed loop [rad/s]: the commanded rate within ramp and travel
+    stopping       1 if the axis was not enabled in the control period: it ramped to standstill, or held
+    ramping        1 from a stop on, until a ramp with the deceleration `limits.deceleration` has led to the command
+    faults         latched fault word, see faults.AXIS_FAULTS; present: faults whose cause was present in this period
     late           number of successive speed-loop periods with a rate error above the limit of the following error
 
     Fields of injected faults:
@@ -210,9 +217,10 @@ def _mean_motor_speed(s, omega_1, omega_2):
 
 @inlined
 def _torque_control(s, c, omega, feed_forward):
-    """Set the torque references of both motors from s.rate, the mean speed and a torque [Nm] added to each.
+    """Set the torque references of both motors for the rate s.rate. Return True if a motor is at its limit.
 
-    Return True if a motor is at its limit. A single working motor makes the torque of both, up to its limit.
+    omega: mean motor speed [rad/s]; feed_forward: torque added to the demand of each motor [Nm]. A single working
+    motor makes the torque of both, up to its limit.
     """
     m1, m2, k1, k2 = s.motor_1, s.motor_2, c.motor_1, c.motor_2
     alone = s.faults & faults.MOTORS_LOST_BITS
@@ -250,7 +258,10 @@ def _squared_current(m, k):
 
 @inlined
 def _supervise(s, c, omega, free):
-    """Set the faults that the drive measures. free: True if the motors may turn, and so must follow."""
+    """Set the faults that the drive measures.
+
+    omega: mean motor speed [rad/s]; free: True if the motors may turn. Only a free motor can have a following error.
+    """
     m1, m2, k = s.motor_1, s.motor_2, c.faults
     s.late = faults.late(s.late, c.N * s.rate - omega, k.error) if free else 0
     s.present |= faults.measured_faults(
@@ -264,7 +275,11 @@ def _supervise(s, c, omega, free):
 
 @inlined
 def _remove_torque(s, omega, free):
-    """Remove the torque. Once the brakes hold, keep the integrals, which the motors need when the brakes open."""
+    """Remove the torque of both motors.
+
+    free: True while no brake holds the motors; the integrals are then cleared. Behind closed brakes the integrals
+    stay, because the motors need them when the brakes open. omega: mean motor speed [rad/s].
+    """
     s.motor_1.torque_ref = s.motor_2.torque_ref = s.motor_1.i_ref = s.motor_2.i_ref = 0.0
     s.motor_1.inhibited = s.motor_2.inhibited = s.stopping = s.ramping = 1
     s.rate, s.bias, s.omega_hat = 0.0, 0.0, omega
@@ -274,9 +289,12 @@ def _remove_torque(s, omega, free):
 
 @inlined
 def speed_control(s, c, rate, torque, enable, powered, free):
-    """Run one speed-loop period: load rate [rad/s] and feed-forward load torque [Nm] to the current references.
+    """Run one speed-loop period: compute the current references of both motors from a command.
 
-    enable: follow, else stop and hold; powered: the motors may make torque; free: no brake holds the motors.
+    rate, torque   commanded rate [rad/s] and feed-forward torque [Nm] of the load
+    enable         1 to follow the command, 0 to stop and hold
+    powered        True if the motors may make torque
+    free           True if no brake holds the motors
     """
     m1, m2, k1, k2 = s.motor_1, s.motor_2, c.motor_1, c.motor_2
     _read_motor_sensors(m1, k1)
@@ -294,7 +312,7 @@ def speed_control(s, c, rate, torque, enable, powered, free):
     feed_forward = 0.0
     if enable:
         wanted = min(max(rate, -c.rate_max), c.rate_max)
-        if s.ramping:       # The commands continued while the drive stopped: reach the command within the ramp.
+        if s.ramping:       # The command may have changed during the stop: approach it by a ramp.
             ramped = s.rate + min(max(wanted - s.rate, -c.ramp), c.ramp)
             s.ramping = ramped != wanted
             wanted = ramped
@@ -339,10 +357,10 @@ def begin_period(s, c, grip):
 
 @inlined
 def current_control(m, k):
-    """Run one current-loop period of one motor: current reference to phase voltages.
+    """Run one current-loop period of one motor: compute the phase voltages from the current reference.
 
-    Without torque the inverter is off, whatever a current sensor measures: there is no current, and the open terminals
-    show the back-EMF. The diodes that empty the inductance within a millisecond are not modelled.
+    The inverter of an inhibited motor is off. Its current is then 0, even if the current sensor has an offset, and its
+    open terminals show the back-EMF. The model omits the diodes, which empty the inductance within a millisecond.
     """
     v_d, v_q, sum_d, sum_q, limited = current_loop.voltages(
         k.gain * m.i_d, k.gain * m.i_q + k.offset, m.i_ref, k.p * m.measured, m.sum_d, m.sum_q, k.K_p, k.K_iT, k.L,
@@ -357,7 +375,10 @@ def current_control(m, k):
 
 @compiled
 def change_inertia(s, c, J):
-    """Set the inertia J [kg m2] of a varying load; the flexible part keeps its share and its spring."""
+    """Set the inertia J [kg m2] of a varying load, base and dish.
+
+    The share of the base in the inertia and the spring of the dish stay constant.
+    """
     J_base = c.base_share * J
     s.h_J, s.q_B = c.h / J_base, 1.0 / (1.0 + c.h * c.B / J_base)
     if c.flexible:
@@ -368,8 +389,8 @@ def change_inertia(s, c, J):
 def plant_step(s, c, external):
     """Advance the plant by a sub-step h under an external load torque [Nm], which includes s.deck.
 
-    Semi-implicit Euler: new currents give the speeds, new speeds the angles. Implicit in R, viscous friction and
-    bristle.
+    Semi-implicit Euler: the new currents give the speeds, and the new speeds give the angles. The step is implicit in
+    the phase resistance R, the viscous friction and the bristle deflection.
     """
     m1, m2, k1, k2 = s.motor_1, s.motor_2, c.motor_1, c.motor_2
     m1.i_d, m1.i_q = motor.currents(m1.i_d, m1.i_q, m1.v_d, m1.v_q, k1.p * m1.omega, k1.L, k1.psi, k1.h_L, m1.q_R)
@@ -411,7 +432,7 @@ def plant_step(s, c, external):
 
 @compiled
 def read(s, c, y):
-    """Write the present outputs of the axis: values of its sensors and controllers, and the true load."""
+    """Write the present outputs y of the axis: values of its sensors and controllers, and the true load."""
     m1, m2, k1, k2 = s.motor_1, s.motor_2, c.motor_1, c.motor_2
     s.reading = _load_counts(s, c)
     y.position = c.rad * s.reading

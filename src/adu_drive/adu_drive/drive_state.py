@@ -2,10 +2,12 @@
 
     enabled -> stopping -> engaging brakes -> disabled -> releasing brakes -> enabled
 
-The drive may be enabled after a request, without a latched fault or emergency stop, and with the stow pins out. To
-disable, it stops under control, applies the brakes while the motors still hold, and then removes the torque. After
-that the stow pins may move. Overcurrent, and a stop that takes too long, remove the torque and apply the brakes at
-once.
+A request enables the drive if no fault and no emergency stop is latched and the stow pins are out. To become disabled,
+the drive stops under control, applies the brakes while the motors still hold, and then removes the torque. The stow
+pins may move only in the phase `disabled`. Overcurrent, and a stop that takes too long, remove the torque and apply
+the brakes at once.
+
+Arguments: s and c are the state and the constants of the drive (records of drive_unit, which calls this module).
 """
 import math
 
@@ -39,7 +41,8 @@ PHASE_CODE_OFFSET = STATE_TEXTS.index(PHASES[PHASE_STOPPING]) - PHASE_STOPPING
 FAULT_BIT, EMERGENCY_STOP_BIT = 16, 32
 AZIMUTH_FAULTS_SHIFT = 6
 ELEVATION_FAULTS_SHIFT = AZIMUTH_FAULTS_SHIFT + len(faults.AXIS_FAULTS)
-"""Bits of the other codes of adu/state: faults present, emergency stop, fault words of both axes."""
+"""Bits of a code of adu/state from len(STATE_TEXTS) on: a fault is latched; an emergency stop is latched; first bits
+of the fault words of azimuth and elevation."""
 
 STANDSTILL_RATE_RAD_S = 1e-3
 """Load rate below which an axis counts as standing [rad/s]."""
@@ -62,7 +65,8 @@ def condition(s):
     """Return the code of adu/state. It changes with every change of `state_text`.
 
     Codes 0 to 3 are topics.ENABLED_STATES: bit 0 and bit 1 stand for an azimuth and an elevation with one motor.
-    Higher codes below len(STATE_TEXTS) are phases or the emergency stop; the others hold the fault words of both axes.
+    Higher codes below len(STATE_TEXTS) are phases or the emergency stop. Codes from len(STATE_TEXTS) on hold the fault
+    words of both axes.
     """
     if tripped(s):
         return (FAULT_BIT | (EMERGENCY_STOP_BIT if s.emergency else 0)
@@ -78,7 +82,7 @@ def condition(s):
 
 
 def state_text(condition):
-    """Return the text of a code: 'enabled', with any lost motor, or why the drive does not follow commands."""
+    """Return the text of a code of adu/state: 'enabled' with any lost motor, or the reason why the drive is not."""
     if condition < len(STATE_TEXTS):
         return STATE_TEXTS[condition]
     tripped = [f'{axis} {kind}' for axis, shift in (('azimuth', AZIMUTH_FAULTS_SHIFT),
@@ -89,7 +93,7 @@ def state_text(condition):
 
 @compiled
 def is_moving(axis, c):
-    """Return True if an axis turns, according to its motor encoders."""
+    """Return True if an axis turns by its motor encoders. axis, c: state and constants of the axis."""
     return abs(axis.motor_1.measured + axis.motor_2.measured) * c.per_2N > STANDSTILL_RATE_RAD_S
 
 
@@ -118,7 +122,7 @@ def _next(s, c):
 
 @compiled
 def _advance_pins(s, c, wanted):
-    """Advance the stow pins, which move while the drive is off, by a period. wanted: code of acu/stow_pins."""
+    """Advance the stow pins by a period. They move while the drive is disabled. wanted: code of acu/stow_pins."""
     az, el, k = s.azimuth, s.elevation, c.pins
     stow_pins.command_pins(s.pins, k, wanted, math.nan if is_moving(az, c.azimuth) else c.azimuth.rad * az.reading,
                            math.nan if is_moving(el, c.elevation) else c.elevation.rad * el.reading)
@@ -145,8 +149,8 @@ def advance(s, c, pins):
 def request(s, c, what):
     """Execute a request between two periods. Return REPLY_ACCEPTED or the code of a refusal.
 
-    The request takes effect in the next period. Faults and emergency stop can be reset while both axes stand and no
-    cause is present. A reset enables the drive again if it was enabled before.
+    what: a code of REQUEST_CODES. The request takes effect in the next period. Faults and emergency stop can be reset
+    while both axes stand and no cause is present. A reset enables the drive again if it was enabled before.
     """
     if what == REQUEST_DISABLE:
         s.wanted = 0

@@ -1,6 +1,7 @@
 """Antenna drive unit: two axes over one control period T, from commands at t_k to encoders at t_k+1.
 
-The sub-steps run in one compiled call: speed loop 0.5 ms, current loops 100 us, plant 50 us.
+The sub-steps run in one compiled call: speed loop 0.5 ms, current loops 100 us, plant 50 us. The unit of the node
+`adu` (adu_drive.unit) calls `step`. Arguments: s state, c constants, u inputs, y outputs, all records of this module.
 """
 import math
 
@@ -15,14 +16,15 @@ from pedestal_common.compiled import compiled, inlined
 COMMAND_RING_SIZE = 256
 """Number of commands in the ring of the transport delay.
 
-It is more than 2 MAX_TRANSPORT_DELAY_S / shortest period: a configured delay and an injected delay.
+It exceeds the 200 commands of a configured and an injected delay, each of MAX_TRANSPORT_DELAY_S, at the
+shortest period of 1 ms.
 """
 
 INITIAL_AGE_PERIODS = 1 << 40
-"""Initial number of periods since the last motion of the brakes."""
+"""Initial number of periods since the last change of the brakes: longer ago than any time of a brake or a delay."""
 
 MAX_PLAUSIBLE_INPUT = 1e6
-"""Largest valid input (rad/s, Nm, rad/s2); an input beyond it, infinite or NaN is invalid."""
+"""Largest valid input [rad/s, Nm, rad/s2]. An input beyond it, infinite or NaN is invalid."""
 
 _AXIS_INPUTS_DTYPE = np.dtype([('rate', 'f8'), ('torque', 'f8')], align=True)
 
@@ -33,8 +35,8 @@ INPUTS_DTYPE = np.dtype([('azimuth', _AXIS_INPUTS_DTYPE), ('elevation', _AXIS_IN
 
 azimuth, elevation              rate command [rad/s], feed-forward torque of both motors on the load axis [Nm]
 base_acceleration, base_rate    angular acceleration [rad/s2] and rate [rad/s] of the deck, FLU
-enable                          1: follow, 0: controlled stop, without the transport delay
-pins                            code of acu/stow_pins
+enable                          1: follow the command; 0: controlled stop, which begins without the transport delay
+pins                            code of acu/stow_pins: command to the stow pins
 """
 
 _AXIS_OUTPUTS_DTYPE = np.dtype([
@@ -57,7 +59,7 @@ motor_position, motor_velocity, motor_torque    values of motors 1 and 2 on the 
 bias              T_b [Nm]
 torque_limited, voltage_limited                 1 if the limit was active in the period
 end_stop          1 if the end of travel reduced the rate command in the period
-stopping          1 if the axis was not enabled in the period: ramp to standstill, then hold
+stopping          1 if the axis was not enabled in the period: it ramped to standstill, or held
 faults            latched fault word, see faults.AXIS_FAULTS
 thermal_load      thermal load of motors 1 and 2; 1: steady state at rated torque
 load_position, load_velocity                    true angle [rad] and rate [rad/s] of the beam (of the dish, if the
@@ -87,7 +89,7 @@ def _record(values):
 
 
 def _constants(params, substeps):
-    """Return the record (1,) of `constants`, with a dtype object of its own."""
+    """Return the record (1,) of `constants`; each call makes a new dtype object."""
     h = axis.CURRENT_LOOP_PERIOD_S / substeps
     bodies = gimbal.constants(params)
     return _record({'azimuth': axis.constants(params.azimuth, h, bodies['rigid']),
@@ -103,14 +105,17 @@ def _constants(params, substeps):
 
 
 def _initial_state(params):
-    """Return the record (1,) of `initial_state`, with a dtype object of its own.
+    """Return the record (1,) of `initial_state`; each call makes a new dtype object.
 
-    rate, torque, enable   ring of the commands
+    rate, torque, enable   ring of the commands: rates [rad/s], feed-forward torques [Nm], inputs `enable`
     k                      number of the period
+    last_rate              rates of the loads in the previous period [rad/s]
     tick                   speed-loop period whose command is in force
     late_ticks             injected delay in speed-loop periods
-    age, brake_age         periods since the last change of the phase and of the brakes
-    applied                1 while the brakes are commanded on
+    age, brake_age         periods since the last change of the phase and of the command to the brakes
+    applied                1 while the brakes are commanded on; braked: 1 while they grip
+
+    phase, wanted, emergency, following, pins: see OUTPUTS_DTYPE and stow_pins.
     """
     axes, enabled = {}, params.initially_enabled and not (params.stow_pins and params.pins.initially_in)
     of_field = wind_field.initial_torques(params.wind.field, params.initial_azimuth, params.initial_elevation)
@@ -128,11 +133,14 @@ def _initial_state(params):
 
 CONSTANTS_DTYPE = _constants(AduParameters(), 2).dtype
 STATE_DTYPE = _initial_state(AduParameters()).dtype
-"""Dtype object of all state records. Because numba compares an equal copy of it in each call (3 us), one is shared."""
+"""Dtype object that all state records share.
+
+A record with an equal copy would cost 3 us in each call, because numba then compares the copy field by field.
+"""
 
 
 def constants(params: AduParameters, substeps: int = 2) -> np.ndarray:
-    """Return the hoisted constants, record (1,). substeps: plant sub-steps per current-loop period (2: h = 50 us)."""
+    """Return the constants, record (1,). substeps: number of plant sub-steps in a current-loop period (2: 50 us)."""
     return _constants(params, substeps).view(CONSTANTS_DTYPE)
 
 
@@ -143,7 +151,7 @@ def initial_state(params: AduParameters) -> np.ndarray:
 
 @compiled
 def _plausible(x):
-    """Return True if an input is valid; NaN is not."""
+    """Return True if an input x is valid, as MAX_PLAUSIBLE_INPUT states; NaN is invalid."""
     return abs(x) <= MAX_PLAUSIBLE_INPUT
 
 
@@ -151,8 +159,11 @@ def _plausible(x):
 def inertial_torques(azimuth, J_azimuth, J_elevation, x, y, z):
     """Return the torques [Nm] on azimuth and elevation for a deck acceleration (x, y, z) [rad/s2] about its FLU axes.
 
-    The torque of the lagging load is -J (n . acceleration) about the axis n of growing angle. Azimuth grows clockwise,
-    n = (0, 0, -1). Elevation lifts the beam (cos A, -sin A, 0) towards +z, n = (-sin A, -cos A, 0).
+    azimuth: angle A of the axis [rad]; J_azimuth, J_elevation: inertia of the loads [kg m2].
+
+    Relative to the deck, the inertia of a load makes the torque -J (n . acceleration). n is the unit vector about
+    which the angle of the axis grows by the right-hand rule. Azimuth grows clockwise: n = (0, 0, -1). Elevation lifts
+    the beam (cos A, -sin A, 0) towards +z: n = (-sin A, -cos A, 0).
     """
     return J_azimuth * z, J_elevation * (x * math.sin(azimuth) + y * math.cos(azimuth))
 
@@ -161,8 +172,9 @@ def inertial_torques(azimuth, J_azimuth, J_elevation, x, y, z):
 def _apply_rigid_body_torques(s, c, w, w_dot):
     """Set the inertia of azimuth and the torques of the turning bodies on both axes, constant over the period.
 
-    The coupling uses the acceleration of the other axis in the previous period. This loop is stable, because
-    M_AE^2 < M_AA M_EE.
+    w, w_dot (3,): rate [rad/s] and angular acceleration [rad/s2] of the deck, FLU. Other symbols: see gimbal.py.
+    The coupling of an axis uses the acceleration of the other axis in the previous period. The loop of both couplings
+    is stable, because M_AE^2 < M_AA M_EE.
     """
     az, el = s.azimuth, s.elevation
     M_AA, M_AE = gimbal.inertia(c.bodies, el.theta)
@@ -197,7 +209,7 @@ def _external(s, c, u):
 
 @compiled
 def _receive(s, u, disturbance_valid):
-    """Put the command of step k into the ring. Return True if it is valid."""
+    """Put the command of step k into the ring. Return True if the command and the disturbance are valid."""
     slot = s.k % COMMAND_RING_SIZE
     valid = (disturbance_valid and _plausible(u.azimuth.rate) and _plausible(u.azimuth.torque)
              and _plausible(u.elevation.rate) and _plausible(u.elevation.torque))
@@ -251,9 +263,10 @@ def _begin_period(s, c, u, y):
 
 @compiled
 def _apply_command(s, c, u, j):
-    """Take the command of speed-loop period j out of the ring. `following` is 1 if it enables the drive."""
-    s.tick = max(s.tick, s.k * c.speed_ticks + j - c.delay_ticks - s.late_ticks)    # a growing delay repeats a command
-    slot = (s.tick // c.speed_ticks) % COMMAND_RING_SIZE     # An empty slot, before the first command, has rate 0.
+    """Take the command of speed-loop period j out of the ring. s.following is then 1 if it enables the drive."""
+    # While an injected delay begins, `max` repeats the last command. Before the first command, a slot has rate 0.
+    s.tick = max(s.tick, s.k * c.speed_ticks + j - c.delay_ticks - s.late_ticks)
+    slot = (s.tick // c.speed_ticks) % COMMAND_RING_SIZE
     s.following = s.enable[slot] if s.phase == drive_state.PHASE_ENABLED and u.enable == 1 else 0
     az, el = s.azimuth, s.elevation
     az.commanded_rate, az.commanded_torque = s.rate[slot, 0], s.torque[slot, 0]
@@ -269,7 +282,10 @@ def _speed_control(s, a, c):
 
 @compiled
 def between_speed_periods(s, c, substeps):
-    """Run current loops and plant of one axis, or of lanes of axes, from one speed-loop period to the next."""
+    """Run current loops and plant of one axis, or of lanes of axes, from one speed-loop period to the next.
+
+    s, c: state and constants of the axis; substeps: plant sub-steps per current-loop period.
+    """
     axes = range(count(s))
     for _ in range(axis.CURRENT_LOOP_STEP_COUNT):
         for i in axes:
@@ -284,8 +300,8 @@ def between_speed_periods(s, c, substeps):
 def step(s, c, u, y):
     """Advance one control period from t_k to t_k+1. s and y are written.
 
-    Arguments are records STATE_DTYPE, CONSTANTS_DTYPE, INPUTS_DTYPE, OUTPUTS_DTYPE, or lanes.Lanes of them. All lanes
-    have the period and sub-steps of the first lane.
+    s, c, u, y: records STATE_DTYPE, CONSTANTS_DTYPE, INPUTS_DTYPE, OUTPUTS_DTYPE, or lanes.Lanes of them for many
+    drives at once. All lanes have the period and the number of sub-steps of the first lane.
     """
     drives = range(count(s))
     for i in drives:

@@ -1,4 +1,7 @@
-"""Injected faults of the drive and its plant: their effects on the records of the drive."""
+"""Injected faults of the drive and its plant: their effects on the record and the messages of a drive.
+
+Argument m is the record of a drive (unit.RECORD_DTYPE), s the state of one axis.
+"""
 import numpy as np
 
 from adu_drive import axis
@@ -10,15 +13,15 @@ DRIVE_MESSAGE_FAULT_CODES = message_faults.codes('adu')
 Fault = codes([fault.name for fault in table.INJECTED_FAULTS['adu']])
 
 STUCK_BRAKE_CONDITIONS = axis.BRAKE_STUCK_ON, axis.BRAKE_STUCK_OFF
-"""Conditions of a stuck brake, in the order of the options of fault brake_stuck."""
+"""Conditions of a stuck brake, in the order of the choices of the fault `brake_stuck`."""
 
 DRIVE_INJECTED_DTYPE = np.dtype([('bias', 'f8', (2,)), ('message_fault', message_faults.MESSAGE_FAULT_DTYPE)],
                                 align=True)
 """Active faults of messages.
 
 bias             bias of the rates in joint_states [rad/s]
-message_fault    fault of joint_states and, for a frozen drive, of adu/motor_states; its drop is 1 while commands are
-                 lost
+message_fault    fault of joint_states and, for a frozen drive, of adu/motor_states; its field `drop` is 1 while
+                 commands are lost
 """
 
 JOINT_STATES_TOPIC, MOTOR_STATES_TOPIC = 'joint_states', 'adu/motor_states'
@@ -34,7 +37,7 @@ def _clear_faults(s):
 
 @compiled
 def _apply_fault(m, fault, values):
-    """Apply a fault to the record of the drive (unit.RECORD_DTYPE).
+    """Apply a fault to the record of the drive.
 
     values: the arguments of the fault in the order of its row of table.INJECTED_FAULTS. The first argument is the
     axis, except for faults of the whole drive, such as `delay`.
@@ -80,10 +83,10 @@ def apply_due_faults(m, stamp):
 
 @compiled
 def corrupt_messages(e, stamp, outputs):
-    """Apply the active message faults to the messages of a step.
+    """Apply the active message faults e (DRIVE_INJECTED_DTYPE) to the messages of a step at a stamp [ns].
 
-    The last argument of message_faults.numbers is the place of the first number among those that a frozen drive
-    repeats.
+    A frozen drive repeats 18 stored numbers. The last argument of message_faults.numbers is the index of the first
+    one.
     """
     joints, motors = outputs[JOINT_STATES_TOPIC], outputs[MOTOR_STATES_TOPIC]
     for i in range(2):

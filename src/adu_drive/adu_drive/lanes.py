@@ -1,18 +1,21 @@
-"""Lanes: the laws of the drive on many drives at once, from the same source.
+"""Lanes: many drives at once, computed by vector instructions from the source of the laws of one drive.
 
-A record of 8-byte numbers becomes rows of a flat array: word r of the record in lane i is at r LANE_COUNT + i (a
-structure of arrays). For a record (theta, omega) the array holds theta of all lanes, then omega of all lanes, and
-`s.omega` of lane i is its word LANE_COUNT + i.
+Trials run their drives on lanes. The records of LANE_COUNT drives, of 8-byte numbers (words) each, become one flat
+array, a structure of arrays. Word r of the record of lane i has the index r LANE_COUNT + i. For a record (theta,
+omega) the array holds theta of all lanes, then omega of all lanes, and `s.omega` of lane i is its word LANE_COUNT + i.
 
-A law on the attributes of a record, `s.omega += c.h * a`, compiles for one Lane without changes. Inlined into a loop
-over the lanes, it becomes vector instructions of LLVM, which give the bits of the scalar code. A function for records
-and for Lanes loops by
+A law that uses the attributes of a record, such as `s.omega += c.h * a`, also compiles for one Lane. If the law is
+inlined into a loop over the lanes, LLVM makes vector instructions of it. Their results equal those of the scalar code
+to the last bit. A function for records and for Lanes loops by
 
     for i in range(count(s)):
         law(at(s, i), at(c, i))
 
-For a single record, count is 1 and at returns the record. Lanes exist in compiled code only, as pointers into the
-array that `view` was given; this array must outlive them.
+For a single record, `count` is 1 and `at` returns the record. Lanes exist in compiled code only, as pointers into the
+flat array. The flat array must exist as long as its Lanes.
+
+The private functions below are the hooks by which numba types and compiles these operations: `_type_..` and `generic`
+return the type of a result, the others generate its code.
 """
 import hashlib
 import operator
@@ -33,7 +36,7 @@ from numba.extending import (
 )
 
 LANE_COUNT = 32
-"""Number of lanes of an array. With 16 lanes LLVM does not vectorise; 64 lanes exceed the first-level cache."""
+"""Number of lanes of a flat array. With 16 lanes LLVM does not vectorise; 64 lanes exceed the first-level cache."""
 
 WORD_BYTES = 8
 """Size of each number [bytes]."""
@@ -42,7 +45,8 @@ WORD_BYTES = 8
 class _LanePointer(types.Type):
     """Pointer to the first word of a value of type `what` in one lane.
 
-    known: ((attribute, number), ...) that are equal in all lanes and constants of the compiled code.
+    known: ((attribute, number), ...) of attributes with this number in all lanes; compiled code takes the number as a
+    constant.
     """
     dtype = types.float64
 
@@ -226,8 +230,8 @@ def _set_item(context, builder, signature, args):
 def view(dtype, known=()):
     """Return a function for compiled code that gives the Lanes of records of this type in a flat array of `to_lanes`.
 
-    known: {attribute: number} of flags, at any depth of the record, with this number in every lane. Code that these
-    flags switch off is not compiled.
+    dtype: of one record; known: {attribute: number} of flags, at any depth of the record, with this number in every
+    lane. Code that these flags switch off is not compiled.
     """
     lanes = Lanes(numba.from_dtype(dtype), tuple(sorted(dict(known).items())))
 

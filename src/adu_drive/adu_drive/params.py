@@ -1,7 +1,7 @@
-"""Parameters of the drive.
+"""Parameters of the drive: AduNodeParameters of `adu_node`, BeamParameters of `beam_steering_node`.
 
-Source of the motor data: paper 000, table 1, line values halved to phase values. The other defaults are assumptions of
-this project for a pedestal with these motors.
+The motor data are those of paper 000, table 1, whose line values are halved to phase values. The other defaults are
+assumptions of this project for a pedestal with these motors.
 """
 import dataclasses
 import math
@@ -36,8 +36,12 @@ def whole_speed_periods(name, value):
 
 
 def mesh_inertia(motor, ratio, load):
-    """Return the inertia [kg m2] that swings in a mesh, at the load: a motor in series with half of the load on the
-    gears; inertias in kg m2."""
+    """Return the inertia [kg m2] that swings on the stiffness of one mesh, referred to the load axis.
+
+    motor: inertia of the motor on its shaft [kg m2]; ratio: turns of the motor per turn of the axis; load: inertia of
+    the load on the gears [kg m2]. The mesh lies between one motor and half of the load, because the axis has two
+    motors.
+    """
     return 1.0 / (1.0 / (motor * ratio**2) + 2.0 / load)
 
 
@@ -299,7 +303,10 @@ class AxisParameters(Parameters):
             self._check_mesh(motor)
 
     def _check_mesh(self, motor):
-        """Raise ParameterError if a mesh is unstable in the simulation, semi-implicit Euler: 2 h c + h^2 k > 4 M."""
+        """Raise ParameterError if a mesh is unstable in the semi-implicit Euler steps of the plant.
+
+        A mesh is unstable for 2 h c + h^2 k > 4 M with h = PLANT_PERIOD_S, damping c, stiffness k, M of mesh_inertia.
+        """
         g, h = self.gear_train, PLANT_PERIOD_S
         inertia = 4.0 * mesh_inertia(motor.inertia, g.ratio, (1.0 - self.structure.inertia_share) * self.load.inertia)
         for name, part, other, unit in (('damping', 2.0 * h, 0.0, 'Nms/rad'),
@@ -313,7 +320,10 @@ class AxisParameters(Parameters):
 
 @dataclasses.dataclass(frozen=True)
 class GustParameters(Parameters):
-    """Gusts: step and sine add a torque to the mean, davenport and von_karman multiply it by (1 + v / V)^2."""
+    """Gusts: step and sine add a torque to the mean torque; davenport and von_karman are spectra of the wind speed.
+
+    A spectrum multiplies the mean torque by (1 + v / V)^2. v: turbulence; V: speed of the mean wind [m/s].
+    """
     kind: str = choice('none', ('none', 'step', 'sine', 'davenport', 'von_karman'), 'gust in addition to '
                        'the mean torque')
     azimuth: float = parameter(0.0, -1e5, 1e5, 'Nm', 'step, sine: amplitude on azimuth')
@@ -493,5 +503,5 @@ class BeamParameters(RunParameters):
         if abs(periods - round(periods)) > 1e-6:
             raise ParameterError(f'transport_delay = {self.transport_delay:g} s: must be a multiple of the period '
                                  f'{self.period:g} s')
-        from adu_drive.array import electronic_beam  # imports numba, which only the array needs
+        from adu_drive.array import electronic_beam  # imported here because only the array needs numba
         electronic_beam.check_delay(self.period, self.transport_delay)

@@ -9,10 +9,10 @@ from pedestal_common.parameters import ParameterError
 
 
 class PlantState(typing.NamedTuple):
-    """Load angles, turns included [rad].
+    """State of the plant that a restart keeps.
 
-    enabled: True if the drive followed commands, or releases its brakes to do so; pinned: True if a stow pin was not
-    out.
+    azimuth, elevation: load angles, whole turns included [rad]; enabled: True if the drive followed commands, or was
+    about to follow them; pinned: True if a stow pin was not out.
     """
     azimuth: float
     elevation: float
@@ -21,7 +21,7 @@ class PlantState(typing.NamedTuple):
 
 
 def read(path):
-    """Return the PlantState in a file, None without a file. Raises ParameterError for invalid content."""
+    """Return the PlantState in a file, or None if there is no file. Raises ParameterError for invalid content."""
     try:
         values = json.loads(pathlib.Path(path).read_text())
         state = PlantState(float(values['azimuth']), float(values['elevation']), values['enabled'] is True,
@@ -37,7 +37,7 @@ def read(path):
 
 
 def write(path, state):
-    """Replace a file by one with a PlantState, in one operation. Raises OSError."""
+    """Replace a file by one with a PlantState, in one operation. Raises OSError if the disk refuses it."""
     new = f'{path}.new'
     with open(new, 'w') as file:
         json.dump(state._asdict(), file)

@@ -1,11 +1,13 @@
 """Stow pins: one per axis, pushed into a hole of the turning part while the brakes hold the axis.
 
-    n    position of a pin in periods of travel: 0 out, N in
-    t    number of periods for which the pin has been moving
+    n    position of a pin in control periods of travel: 0 out, c.travel in
+    t    number of control periods for which the pin has been moving
 
-The pins go in after both axes stand within the window about their holes. From then until both pins are out the drive
-is off: the drive stops, the brakes grip, then the pins move. A pin that does not reach its position in time has
-failed, which is a fault of its axis. A reset of the faults retries the motion.
+A command to move the pins in waits until both axes stand within the window about their holes. The drive then stops,
+the brakes grip, and the pins move in. The drive stays off until both pins are out again. A pin that does not reach its
+position in time has failed, which is a fault of its axis. A reset of the faults retries the motion.
+
+Arguments: s and c are the state and the constants of the pins, i is the axis (0 azimuth, 1 elevation).
 """
 import math
 
@@ -83,6 +85,7 @@ def command_pins(s, c, wanted, azimuth, elevation):
 
 @compiled
 def _set_command(s, place):
+    """Set the commanded position of both pins. A new command restarts the time of the motion."""
     if place != s.ordered:
         s.ordered, s.t[0], s.t[1] = place, 0, 0
 

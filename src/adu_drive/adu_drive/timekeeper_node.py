@@ -1,6 +1,7 @@
 """Node that owns the time of the drive: clock, steps and pacing.
 
-Its units are one drive, or one for each beam of an array.
+It is the base of `adu_node`, whose unit is one drive, and of `beam_steering_node`, with a unit for each beam. A port
+(unit_node.Port, in `self.ports`) connects one unit to its topics.
 """
 import time
 
@@ -14,7 +15,7 @@ Because the queue of a subscriber holds 5000 messages (Fast DDS), a slow recorde
 """
 
 MAX_WAIT_S = 0.1
-"""Longest wait between two readings of the clock, which may be stepped [s]."""
+"""Longest wait between two readings of the UTC clock [s]. A step of that clock is noticed within this time."""
 
 MIN_RECEIVE_FRACTION = 0.25
 """Smallest share of a period for receiving messages in realtime, also for a drive that is late for its next step."""
@@ -23,7 +24,8 @@ MIN_RECEIVE_FRACTION = 0.25
 class Timekeeper(unit_node.UnitNode):
     """Node that makes the steps. Step k uses the messages of step k - 1 and publishes the state at t_k.
 
-    In lockstep, step k begins when step k - 1 has been answered; in realtime at k T after the epoch (UTC).
+    In lockstep, step k begins when all nodes have answered step k - 1. In realtime, step k begins k periods after the
+    start time, the epoch (UTC).
 
     missed_steps    steps that were not made in their period, because the node was late
     lost_steps      missed steps, and steps without the command of the previous step
@@ -31,7 +33,7 @@ class Timekeeper(unit_node.UnitNode):
     """
 
     PRECEDENCE = 1
-    """Precedence over other nodes, whose searches and predictions may take longer than a step."""
+    """Priority above that of the other nodes, whose searches and predictions may take longer than a step."""
 
     def __init__(self, module):
         super().__init__(module, serves_beams=True)
@@ -43,12 +45,13 @@ class Timekeeper(unit_node.UnitNode):
         self.last_step = round(p.duration / p.period) if p.duration > 0.0 else None
         self.stopping = False
         self._count_from_first_step()
+        # {topic: age of its data at the step [s]} of the inputs of all units
         latencies = {port.named(name): latency for port in self.ports
                      for name, latency in port.unit.latencies.items()}
         self.commands = [port.named(port.unit.COMMAND) for port in self.ports]
         if self.graph.lockstep:
             self.follow(self.unit.trigger, latencies)
-            # The timer calls `start` once, after the executor of the node runs.
+            # The timer calls `start` once, as soon as the executor of the node runs.
             self.timer = self.every(0.001, self.start)
         else:
             self.wait, self.guarded_step = 0.0, self._guarded(self.make_due_step)
@@ -58,6 +61,7 @@ class Timekeeper(unit_node.UnitNode):
                         self.reader(name, unit_node.decoding(decoder), self._newest_receiver(name))
 
     def _count_from_first_step(self):
+        """Reset the numbers of steps, and the newest messages and stamps of commands."""
         self.k, self.made = -1, 0
         self.lost_steps = self.missed_steps = self.late_ticks = 0
         self.newest, self.command_stamps = {}, {}
@@ -78,14 +82,19 @@ class Timekeeper(unit_node.UnitNode):
         return f'the start time, in {max(self.epoch(now) - now, 0) / NS_PER_SECOND:.1f} s'
 
     def start(self):
-        """Make step 0 of lockstep, once the graph is complete."""
+        """Begin step 0 of lockstep, when the graph is complete. `answer` makes the step."""
         self.timer.cancel()
         self.await_graph()
         self.steps.take(self.unit.trigger, 0, (0, ()))
 
     def answer(self, stamp, values):
-        """Make step k of lockstep, with the stamp k T [ns]; the next step begins at once."""
-        if self.k == self.last_step:
+        """Make the next step of lockstep; called when all nodes have answered the previous step, whose number is
+        self.k.
+
+        stamp: stamp of the new step [ns]; values: {topic: message} of the previous step. The step after the new one is
+        announced to `self.steps`, which waits for the answers to the new step and then calls this method again.
+        """
+        if self.k == self.last_step:     # all nodes have answered the last step
             self.end()
             return
         if self.k == 0:
@@ -95,7 +104,10 @@ class Timekeeper(unit_node.UnitNode):
         self.steps.take(self.unit.trigger, stamp + self.period_ns, (stamp + self.period_ns, ()))
 
     def _make(self, stamp, values):
-        """Make the step of a stamp [ns] with the messages of the previous step."""
+        """Make the step number self.k with the messages of the previous step.
+
+        stamp: stamp of the step [ns]; values: {topic: message}.
+        """
         for port in self.ports:
             port.step(stamp, values)
         self.begin_step(stamp)
@@ -109,9 +121,9 @@ class Timekeeper(unit_node.UnitNode):
     def spin(self, executor):
         """Receive messages until the next step of realtime, then make it.
 
-        This avoids a timer of rclpy. At each reset EventsExecutor (rclpy 7.1.6) queues all due timers again, also
-        timers that are in its queue. The queue of a drive too slow for its steps would grow without limit, and
-        messages would wait for minutes.
+        This avoids a timer of rclpy. At each reset of a timer, EventsExecutor (rclpy 7.1.6) queues all due timers
+        again, also those that its queue already holds. In a drive too slow for its steps, the queue would grow without
+        limit, and messages would wait for minutes.
         """
         if self.graph.lockstep:
             super().spin(executor)
@@ -135,17 +147,18 @@ class Timekeeper(unit_node.UnitNode):
         self.wait = min(max(wait, min_wait), MAX_WAIT_S)
 
     def _make_realtime_step(self, k, stamp, now):
-        """Make step k of a stamp [ns] at the time now of the monotonic clock [ns].
+        """Make step k. stamp: stamp of the step [ns]; now: time of the monotonic clock [ns].
 
-        Earlier steps that were not made are not published; they count as missed and lost.
+        Skipped earlier steps are not published. They count as missed and as lost.
         """
-        before = stamp - self.period_ns
+        previous_stamp = stamp - self.period_ns
         if self.made:
             periods = (now - self.last_step_time) / self.period_ns
             missed = max(round(periods) - 1, 0)
             self.missed_steps += missed
             self.late_ticks += periods > 1.5
-            self.lost_steps += missed + any(before > stamp for stamp in self.command_stamps.values())
+            self.lost_steps += missed + any(command_stamp < previous_stamp
+                                            for command_stamp in self.command_stamps.values())
         else:
             self.begun = now
         self.k, self.last_step_time = k, now
@@ -163,7 +176,10 @@ class Timekeeper(unit_node.UnitNode):
         return take
 
     def draining(self):
-        """Return True at the end of a realtime run, until the axes have stopped and the brakes hold."""
+        """Return True at the end of a realtime run, until the axes have stopped and the brakes hold.
+
+        The first call disables the drive.
+        """
         if self.graph.lockstep or self.failure or not self.made:
             return False
         if not self.stopping:
@@ -173,22 +189,24 @@ class Timekeeper(unit_node.UnitNode):
         return not all(port.unit.rests for port in self.ports)
 
     def end(self):
-        """End lockstep after the answer to the last step, with the result of the run.
+        """End lockstep after the answers to the last step, with the result of the run.
 
-        The wall-clock time counts from the first answer, when all nodes had discovered each other.
+        The wall-clock time begins with the answers to step 0. Before these answers the nodes still discover each
+        other.
         """
         self.result = self._outcome(self.k - 1)
         self.await_acknowledged()
         self.finished = True
 
     def close(self):
-        """End the node; in realtime the result has the numbers of made, lost and missed steps."""
+        """End the node; in realtime, first keep the result of the run, see `_outcome`."""
         if not self.graph.lockstep:
             self.result = self._outcome(self.made)
         super().close()
 
     def _outcome(self, made):
-        """Return the result of the run after a number of made steps."""
+        """Return the result of the run: {name: value}. made: number of steps made in the wall-clock time, from which
+        the realtime factor follows."""
         wall = max(time.monotonic_ns() - self.begun, 1) * 1e-9
         return {'steps': self.k, 'wall_s': wall, 'realtime_factor': made * self.parameters.period / wall,
                 'lost_steps': int(self.lost_steps), 'missed_steps': int(self.missed_steps),

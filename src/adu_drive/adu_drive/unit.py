@@ -1,4 +1,8 @@
-"""Unit of the drive: rate commands and the motion of the ship in, encoders and motors out, enable and faults."""
+"""Unit of the drive: its step between the messages of the graph, without ROS. `adu_node` runs it.
+
+Inputs are rate commands and the motion of the ship. Outputs are encoders, motor states, and the state with its faults.
+The functions name their arguments so: m a record RECORD_DTYPE; link, u and y its parts `link`, `inputs`, `outputs`.
+"""
 import dataclasses
 import functools
 import math
@@ -22,81 +26,86 @@ JOINT_STATES_TOPIC, MOTOR_STATES_TOPIC, DRIVE_TRUTH_TOPIC = 'joint_states', 'adu
 DRIVE_STATE_TOPIC, PIN_STATES_TOPIC, PIN_COMMAND_TOPIC = 'adu/state', 'adu/stow_pins', 'acu/stow_pins'
 
 INVALID_INPUT_TOPICS = ('', RATE_COMMAND_TOPIC, SHIP_TRUTH_TOPIC)
-"""Topics that can hold an invalid input, by the number in `invalid` of LINK_DTYPE."""
+"""Topics that can hold an invalid input; `invalid` of LINK_DTYPE is an index of this tuple."""
 INVALID_COMMAND, INVALID_TRUTH = 1, 2
-"""Numbers of these topics; 0: none."""
+"""Indices of these topics; index 0: no invalid input."""
 
 LINK_DTYPE = np.dtype([('stamp', 'i8'), ('command_stamp', 'i8'), ('truth_stamp', 'i8'), ('deck_rate', 'f8', (3,)),
                        ('timeout', 'i8'), ('period', 'i8'), ('stale', 'i8'), ('invalid', 'i8')])
 """State of the link to other nodes.
 
 stamp, command_stamp    stamps of the last step and of the last command [ns]
-truth_stamp, deck_rate  stamp [ns] and rate (FLU) [rad/s] of the last truth with a finite rate
+truth_stamp, deck_rate  stamp [ns] and deck rate (FLU) [rad/s] of the last message of ship/truth with a finite rate
 timeout, period         age at which a command is stale [ns]; period T [ns]
 stale                   1 while the command is stale
-invalid                 index of INVALID_INPUT_TOPICS since the last diagnosis
+invalid                 index of INVALID_INPUT_TOPICS: topic with an invalid input since the last diagnosis
 """
 
 MAX_CATCH_UP_NS = 2_000_000_000
-"""Longest time for which missed steps are made later; axes without commands stop within it [ns]."""
+"""Longest time of missed steps that the drive makes later [ns]. Axes without commands stop within this time."""
 
 RECORD_DTYPE = np.dtype([('state', drive_unit.STATE_DTYPE), ('constants', drive_unit.CONSTANTS_DTYPE),
                          ('inputs', drive_unit.INPUTS_DTYPE), ('outputs', drive_unit.OUTPUTS_DTYPE),
                          ('link', LINK_DTYPE), ('schedule', schedule.SCHEDULE_DTYPE),
                          ('injected', injected.DRIVE_INJECTED_DTYPE)], align=True)
+"""All data of a drive: records of drive_unit, link to other nodes, scheduled and active injected faults."""
 
 
 class Memory(typing.NamedTuple):
-    """Memory of the drive."""
+    """Memory of the drive; record: (1,) of RECORD_DTYPE."""
     record: np.ndarray
 
 
 @compiled
-def deck_acceleration(u, m, ship):
-    """Set rate and angular acceleration of the deck [rad/s2, FLU] from two successive truths and their stamps."""
-    w, last = ship.twist_angular, m.truth_stamp
+def deck_acceleration(u, link, ship):
+    """Set rate [rad/s] and angular acceleration [rad/s2] of the deck, FLU, in the inputs u of the drive.
+
+    The acceleration is the difference of two successive messages of ship/truth, divided by that of their stamps.
+    """
+    w, last = ship.twist_angular, link.truth_stamp
     if last != NO_STAMP and ship.stamp > last:
         for i in range(3):
-            u.base_acceleration[i] = (w[i] - m.deck_rate[i]) / ((ship.stamp - last) * 1e-9)
+            u.base_acceleration[i] = (w[i] - link.deck_rate[i]) / ((ship.stamp - last) * 1e-9)
     if math.isfinite(w[0]) and math.isfinite(w[1]) and math.isfinite(w[2]) and ship.stamp != last:
-        m.truth_stamp = ship.stamp
+        link.truth_stamp = ship.stamp
         for i in range(3):
-            m.deck_rate[i] = u.base_rate[i] = w[i]
+            link.deck_rate[i] = u.base_rate[i] = w[i]
 
 
 @compiled
-def supervise(u, m):
+def supervise(u, link):
     """Stop the axes if the command is stale at the stamp of the last step."""
-    m.stale = m.command_stamp == NO_STAMP or m.stamp - m.command_stamp > m.timeout
-    u.enable = 0 if m.stale else 1
+    link.stale = link.command_stamp == NO_STAMP or link.stamp - link.command_stamp > link.timeout
+    u.enable = 0 if link.stale else 1
 
 
 @compiled
-def decode(u, m, dropped, command, ship):
-    """Write the records of the messages into the inputs of the drive, at the stamp of the last step.
+def decode(u, link, dropped, command, ship):
+    """Write the messages of the last step into the inputs u of the drive.
 
-    dropped: 1 if the command is lost by an injected fault.
+    dropped: 1 if an injected fault removes the command; command, ship: records of acu/rate_command and ship/truth,
+    with stamp NO_STAMP if the step had no such message.
     """
     if command.stamp != NO_STAMP and dropped == 0:
-        m.command_stamp = command.stamp
+        link.command_stamp = command.stamp
         u.azimuth.rate, u.elevation.rate = command.velocity[0], command.velocity[1]
         u.azimuth.torque, u.elevation.torque = command.effort[0], command.effort[1]
-    supervise(u, m)
+    supervise(u, link)
     if ship.stamp != NO_STAMP:
-        deck_acceleration(u, m, ship)
+        deck_acceleration(u, link, ship)
 
 
 @compiled
-def record_invalid_topic(u, m):
-    """Store the topic with the invalid input."""
+def record_invalid_topic(u, link):
+    """Store the topic of an invalid input: ship/truth if the deck acceleration is invalid, else the command."""
     deck = u.base_acceleration
     valid = max(abs(deck[0]), abs(deck[1]), abs(deck[2])) <= drive_unit.MAX_PLAUSIBLE_INPUT
-    m.invalid = INVALID_COMMAND if valid else INVALID_TRUTH
+    link.invalid = INVALID_COMMAND if valid else INVALID_TRUTH
 
 
 @compiled
 def encode(y, stamp, outputs):
-    """Write the outputs of the drive into the records of its messages."""
+    """Write the outputs y of the drive into the records of its messages, with a stamp [ns]."""
     joints, truth, motors = outputs[JOINT_STATES_TOPIC], outputs[DRIVE_TRUTH_TOPIC], outputs[MOTOR_STATES_TOPIC]
     joints.stamp = truth.stamp = motors.stamp = outputs[CLOCK_TOPIC].stamp = stamp
     for i in range(2):
@@ -112,7 +121,7 @@ def encode(y, stamp, outputs):
 
 @compiled
 def receive(m, stamp, inputs):
-    """Take the messages of step k - 1. Return False in the first step, which has none."""
+    """Take the messages of step k - 1. Return False in the first step, which has none. stamp: t_k [ns]."""
     if m.link.stamp == NO_STAMP:
         m.state.k = stamp // m.link.period
         return False
@@ -123,7 +132,7 @@ def receive(m, stamp, inputs):
 
 @compiled
 def report(m, stamp, moved, outputs):
-    """Write the messages of the drive at t_k. moved: False in the first step."""
+    """Write the messages of the drive at t_k. moved: result of `receive`, False in the first step."""
     if moved and m.outputs.invalid_command:
         record_invalid_topic(m.inputs, m.link)
     m.link.stamp = stamp
@@ -132,9 +141,9 @@ def report(m, stamp, moved, outputs):
 
 @compiled
 def advance_missed_steps(m, stamp):
-    """Advance by the steps that a late node in realtime missed before a stamp [ns], at most by MAX_CATCH_UP_NS.
+    """Make the steps that a late node in realtime missed before a stamp [ns], at most those of MAX_CATCH_UP_NS.
 
-    Because a real antenna continues meanwhile, these steps use the last command until it is stale.
+    Because a real antenna moves on while its simulation is late, these steps use the last command until it is stale.
     """
     missed = (min(stamp - m.link.stamp, MAX_CATCH_UP_NS) // m.link.period - 1) if m.link.stamp != NO_STAMP else 0
     for _ in range(missed):
@@ -166,9 +175,10 @@ def laws(memory, stamps, inputs, outputs):
 
 
 LANE_FLAGS = {'uneven': 0, 'toothless': 0, 'stuck': 0, 'exact': 1}
-"""Flags of RECORD_DTYPE in drives on lanes: even gears and motors, whole pinions, encoders without errors.
+"""Flags of RECORD_DTYPE that a drive needs on lanes (lanes.py): its law then contains no sine.
 
-Other values need sines, which have no vector instructions.
+These drives have gears and motors without unevenness, whole pinions, and encoders without errors. The processor has no
+vector instruction for a sine.
 """
 
 DRIVE_LANES = lanes.view(RECORD_DTYPE, LANE_FLAGS)
@@ -177,7 +187,10 @@ DRIVE_LANES = lanes.view(RECORD_DTYPE, LANE_FLAGS)
 
 @compiled
 def law_of_lanes(drives, stamp, inputs, outputs):
-    """Apply `law` to the first len(inputs) of DRIVE_LANES, which fit (Adu.fits_lanes) and are at the same step."""
+    """Apply `law` to the first len(inputs) drives of DRIVE_LANES.
+
+    Each drive fits lanes (Adu.fits_lanes), and all drives are at the same step.
+    """
     moved = False
     for i in range(len(inputs)):
         m = lanes.at(drives, i)
@@ -226,7 +239,7 @@ class Adu(Simulated):
 
     @property
     def rests(self):
-        """True if the brakes hold the axes without torque."""
+        """True if the brakes hold the axes and the motors make no torque."""
         return bool(self.parts['outputs']['phase'] == drive_state.PHASE_DISABLED)
 
     def resume(self, state):
@@ -269,7 +282,7 @@ class Adu(Simulated):
         return Reply(granted, f'{refusal}drive is {self.condition}')
 
     def requests_for(self, topic, text):
-        """Return the services that lead to a text of adu/state."""
+        """Return the services that bring the drive to a text of adu/state, in the order of their calls."""
         o = self.parts['outputs']
         tripped, stopped = 'fault' in text, 'emergency stop' in text
         latched = o['emergency'] or self.tripped
@@ -321,5 +334,5 @@ class Adu(Simulated):
     @staticmethod
     def idle(numbers):
         """Return the reason why a recording does not exercise the drive, '' if it does."""
-        rates = numbers[RATE_COMMAND_TOPIC][:, 2:4]     # After the two positions of a JointState.
+        rates = numbers[RATE_COMMAND_TOPIC][:, 2:4]     # The rates stand after the two positions.
         return '' if (rates != 0.0).any() else 'no rate was ever commanded'

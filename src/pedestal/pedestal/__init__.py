@@ -2,7 +2,7 @@
 
 >>> import pedestal
 >>> scenario = pedestal.load('leo_pass', duration=6.0)
->>> run = pedestal.run(scenario.changed({'acu.azimuth.filter.kind': 'imm'}))
+>>> run = pedestal.run(scenario.changed({'acu.azimuth.filter.kind': 'ca'}))
 >>> joints = run['joint_states']
 >>> joints['azimuth.position'].shape, joints.units['azimuth.position']    # 6 s in steps of 5 ms
 ((1201,), 'rad')

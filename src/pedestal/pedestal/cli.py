@@ -1,7 +1,7 @@
-"""Command line `pedestal`.
+"""Command line `pedestal`: the parser of the arguments, and the call of the verb that the user names.
 
-A verb is a module in `verbs`. Its docstring is the help, `add_arguments(parser)` adds its arguments, and
-`main(options)` does the work and returns the exit code.
+A verb, such as `run`, is a module in `verbs`. The docstring of the module is the help of the verb. Its function
+`add_arguments(parser)` adds the arguments, and its function `main(options)` does the work and returns the exit code.
 """
 from pedestal import stop  # first, because a signal during the imports below must end the process with its message
 
@@ -38,12 +38,17 @@ def module_of(verb: str) -> types.ModuleType:
 
 
 def main(args: Sequence[str] | None = None) -> int:
-    """Run a verb.
+    """Run a verb; without any argument print the help.
 
     Return its exit code: 0; 1 with a line on stderr for an error; 2 for a wrong command line; 130 after a stop.
     """
-    options = _parser().parse_args(args)
-    options.command = shlex.join(('pedestal', *(sys.argv[1:] if args is None else args)))
+    given = sys.argv[1:] if args is None else args
+    parser = _parser()
+    if not given:
+        parser.print_help()
+        return 0
+    options = parser.parse_args(given)
+    options.command = shlex.join(('pedestal', *given))
     stop.on_stop(signal.default_int_handler)     # from here on a signal raises KeyboardInterrupt
     json_on_stdout = getattr(options, 'json', None) == STDOUT_PATH
     try:
@@ -52,7 +57,8 @@ def main(args: Sequence[str] | None = None) -> int:
         sys.stdout.flush()
         return code
     except BrokenPipeError:
-        # The reader of the pipe, such as `head`, has closed it. This avoids a second error at the exit of Python.
+        # The reader of the pipe, such as `head`, has closed it. From here on the output goes to the null device. This
+        # avoids a second error when Python writes its buffers at its exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
     except (ParameterError, ValueError, RuntimeError, OSError) as error:
@@ -66,7 +72,7 @@ def main(args: Sequence[str] | None = None) -> int:
 class Parser(argparse.ArgumentParser):
     """Parser of options whose values may be any negative number.
 
-    argparse takes -1 and -0.5 for values, but -1e-2 and -33.9,18.4,10 for unknown options.
+    The parser of argparse reads -1 and -0.5 as values, but -1e-2 and -33.9,18.4,10 as unknown options.
     """
 
     def parse_known_args(self, args=None, namespace=None):  # type: ignore[no-untyped-def,override]

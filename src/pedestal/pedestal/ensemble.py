@@ -1,4 +1,4 @@
-"""Trials: many runs of a scenario, with the results as arrays."""
+"""`pedestal.trials` of the Python library: many runs of a scenario with varied parameters, and their results."""
 from __future__ import annotations
 
 import pathlib
@@ -20,11 +20,13 @@ def trials(scenario: Scenario, runs: int = 100, vary: Mapping[str, str] | None =
     runs      number of trials
     vary      {'node.key': distribution}: uniform(low, high), normal(mean, sigma) or choice(a, b, ...); an x after the
               distribution multiplies the value of the scenario by the drawn number
-    sobol     True to draw the points of a Sobol sequence instead of independent points
+    sobol     True to take the drawn numbers from a Sobol sequence, whose points fill the ranges evenly, instead of
+              independent random numbers
     workers   number of processes, None for one per core
-    folder    place of the table; a repeated call with the same folder continues a stopped one
+    folder    folder in which the table of the trials is kept; a second call with the same folder continues a stopped
+              call. None: the table is not kept
 
-    Raises ValueError with one line before the first trial.
+    Raises ValueError for a wrong argument, before the first trial.
 
     >>> scenario = pedestal.load('leo_pass', duration=4.0)
     >>> made = pedestal.trials(scenario, 3, {'adu.azimuth.load.inertia': 'normal(1, 0.1)x'}, workers=1)
@@ -40,7 +42,7 @@ def trials(scenario: Scenario, runs: int = 100, vary: Mapping[str, str] | None =
 
 
 class Trials(Mapping[str, np.ndarray]):
-    """Finished trials: made[result] is the array (runs,) of a result, NaN for a trial without a value of it."""
+    """Finished trials as a mapping {name of a result: its values (runs,)}, NaN for a trial without this result."""
 
     def __init__(self, plan: plans.Plan, table: tables.Table) -> None:
         self._plan, self._table = plan, table
@@ -63,7 +65,10 @@ class Trials(Mapping[str, np.ndarray]):
 
     @property
     def parameters(self) -> dict[str, np.ndarray]:
-        """Varied parameters {'node.key': values (runs,)}; texts are numbered in order of their first trial."""
+        """Varied parameters {'node.key': values (runs,)}.
+
+        A parameter with texts has the numbers 0, 1, ... of its texts, in the order of their first trial.
+        """
         return {name: self._table.column(name) for name in self._table.varied}
 
     @property
@@ -83,7 +88,9 @@ class Trials(Mapping[str, np.ndarray]):
                 *statistics.of_sensitivity(case, self._table)]
 
     def worst(self, by: str = 'pointing_rms_deg', count: int = 10) -> list[str]:
-        """Return the commands that repeat the worst trials in the graph, ranked by a result, the worst first.
+        """Return the `pedestal run` commands that repeat the worst trials with separate nodes, the worst first.
+
+        by: name of the result that ranks the trials; count: largest number of commands.
 
         >>> pedestal.trials(pedestal.load('leo_pass', duration=4.0, seed=7), 1, workers=1).worst()
         ['pedestal run leo_pass --seed 7 --duration 4.0']
@@ -92,11 +99,13 @@ class Trials(Mapping[str, np.ndarray]):
         return [self._plan.command(place) for place in places]
 
     def against(self, other: Trials, by: str = 'pointing_rms_deg') -> str:
-        """Return a sentence that compares a result of these and other trials, pair by pair.
+        """Return a sentence that compares a result of these trials with that of other trials.
 
-        Raises ValueError for different seeds.
+        by: name of the result. Trial i of both has the same seed, so the comparison is made in pairs. Raises
+        ValueError for different seeds.
         """
         if not np.array_equal(self.seeds, other.seeds):
             raise ValueError('the trials have different seeds and cannot be paired')
         name, other_name = comparison.names(self._plan, other._plan)
-        return comparison.sentence(comparison.Sides(name, other_name, self._table, other._table), by)
+        return comparison.unchanged(self._plan, other._plan) or comparison.sentence(
+            comparison.Sides(name, other_name, self._table, other._table), by)

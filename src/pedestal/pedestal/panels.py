@@ -1,4 +1,4 @@
-"""Figures of the report, drawn on axes of the caller."""
+"""Figures of the report that `Run.plot` of the Python library draws on matplotlib axes of the caller."""
 from __future__ import annotations
 
 import functools
@@ -13,7 +13,11 @@ if typing.TYPE_CHECKING:
 
 
 class Panel(typing.NamedTuple):
-    """A figure: draw(axes, RunData); needs: required parts of the RunData; polar: True for polar axes."""
+    """A figure.
+
+    draw: function(axes, RunData). needs: names of the required parts of RunData. polar: True if the figure needs polar
+    axes.
+    """
     draw: Callable[[Axes, run_data.RunData], None]
     needs: tuple[str, ...]
     polar: bool = False

@@ -1,4 +1,7 @@
-"""Runs: the messages of every topic as named arrays, from memory or from a recording."""
+"""Runs of the Python library: `pedestal.run` runs a scenario in memory, `pedestal.read_bag` reads a recording.
+
+Both return a Run, which gives the messages of every topic as named arrays, the results and the figures.
+"""
 from __future__ import annotations
 
 import functools
@@ -70,7 +73,13 @@ class Run:
         return tuple(name for name in self._source.topics if name not in ('diagnostics', 'acu/program_track'))
 
     def __getitem__(self, topic: str) -> Table:
-        """Return the Table of a topic. Raises KeyError for a missing topic."""
+        """Return the Table of a topic. Raises KeyError for a missing topic.
+
+        >>> scenario = pedestal.load('leo_pass', {'acu.commands': '0.5 standby'}, duration=1.0)
+        >>> replies = pedestal.run(scenario)['acu/command_result']
+        >>> replies['name'].tolist(), replies['values'].tolist()
+        (['standby'], ['granted=true; reply=mode is standby'])
+        """
         if topic not in self.topics:
             raise KeyError(f'{topic!r} is not in {self.name}; there are {", ".join(self.topics)}')
         arrays = {name: np.asarray(values) for name, values in self._source.table(topic).items()}
@@ -79,12 +88,14 @@ class Run:
 
     @functools.cached_property
     def tracking(self) -> tracking.Tracking:
-        """Run and truth at the steps of the drive, from which all results are computed."""
+        """Measured and true values at the steps of the drive, from which all results are computed."""
         return tracking.read(self._source)
 
     @property
     def pointing(self) -> Table:
-        """True pointing error at the steps of the drive: cross_elevation and elevation of the target off the beam.
+        """True pointing error at the steps of the drive: target minus beam, in cross-elevation and in elevation.
+
+        range: distance to the target.
 
         >>> pedestal.run(pedestal.load('leo_pass', duration=1.0)).pointing
         Table(t [s], cross_elevation [rad], elevation [rad], range [m])
@@ -132,8 +143,8 @@ class Run:
 def run(scenario: Scenario, beam: str = '') -> Run:
     """Run a scenario in memory. beam: name of a beam of several, '' for the first.
 
-    Equal scenarios give equal numbers, and the numbers of the lockstep recording of `pedestal run`. Raises ValueError
-    for a name that is none of the scenario's beams.
+    Two runs of equal scenarios give equal numbers. The lockstep recording of `pedestal run` has the same numbers.
+    Raises ValueError for an unknown beam.
 
     >>> first, second = (pedestal.run(pedestal.load('leo_pass', duration=1.0, seed=2)) for _ in range(2))
     >>> bool((first['joint_states']['azimuth.position'] == second['joint_states']['azimuth.position']).all())

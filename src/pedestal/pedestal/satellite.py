@@ -18,11 +18,11 @@ STATION_PARAMETERS = ('latitude_deg', 'longitude_deg', 'height')
 
 
 def tle_changes(path: str | pathlib.Path, name: str, when: datetime.datetime) -> tuple[list[str], str]:
-    """Return (texts 'node.key=value' of a file of TLEs or OMMs, for the target and for mode tle; remark). Raises
-    TargetError.
+    """Return (texts 'node.key=value', remark) for the satellite of a file of TLEs or OMMs. Raises TargetError.
 
-    name: of the satellite, '' if the file holds one; when: datetime, UTC, to which the elements of a history are the
-    nearest.
+    TLE, OMM: formats of orbital elements, two-line elements and orbit mean-elements message. The texts set the
+    elements of the target and those of mode tle. name: of the satellite, '' if the file holds only one; when: time
+    (datetime, UTC). If the file holds several sets of elements of the satellite, the set nearest to this time is used.
     """
     chosen = elements.read(path, name, when)
     return [f'{node}.{key}={json.dumps(text)}' for node in ('tracking_receiver.target.leo_pass', 'acu.prediction')
@@ -73,8 +73,10 @@ class PassSelection:
                 print(f'pass {n}: {_extent(p)}; a run of it needs --duration: --pass UTC --duration S')
 
     def choose(self, which: str, duration: float | None = None) -> tuple[list[str], float, str]:
-        """Return (texts 'node.key=value', duration [s], line) of the pass that `which` names, from rise to set, or for
-        a duration [s] unless that is None. Raises TargetError."""
+        """Return (texts 'node.key=value', duration [s], line that describes the pass) of one pass. Raises TargetError.
+
+        which: value of --pass. duration [s]: length of the run, None for the time from rise to set.
+        """
         p = passes.chosen_pass(self.satellite, self.station, which, self.now)
         start, where = p.start.replace(microsecond=0), f'satellite {self.satellite.number} over {place(self.station)}'
         if p.duration > passes.MAX_RUN_S:
@@ -93,27 +95,29 @@ class PassSelection:
 
 
 def _azimuth(degrees: float) -> str:
+    """Return an azimuth [deg] as a text, '-' for NaN."""
     return '-' if math.isnan(degrees) else f'{round(degrees) % 360} deg'
 
 
 def _utc(when: datetime.datetime | None) -> str:
+    """Return a time (UTC) as a text, '-' for None."""
     return f'{when:%Y-%m-%d %H:%M:%S}' if when else '-'
 
 
 def _times(p: passes.Pass) -> tuple[str, str]:
-    """Return the texts of top and set, with their dates for a pass that is longer than a run."""
+    """Return the times of highest elevation and of the set as texts, with dates for a pass longer than a run."""
     long = p.duration > passes.MAX_RUN_S
     return (_utc(p.top), _utc(p.set)) if long else (f'{p.top:%H:%M:%S}', f'{p.set:%H:%M:%S}')
 
 
 def _ending(p: passes.Pass) -> str:
-    """Return the text of azimuth at the set and duration."""
+    """Return the azimuth at the set and the duration of the pass as a text."""
     length = f'{p.duration:.0f} s' if math.isfinite(p.duration) else 'never sets' if p.set is None else 'longer'
     return f'{_azimuth(p.set_azimuth)}, {length}{", under way" if p.under_way else ""}'
 
 
 def _extent(p: passes.Pass) -> str:
-    """Return the text of rise and set of a pass that is longer than a run."""
+    """Return rise and set of a pass that is longer than a run, as a text."""
     if p.rise is None and p.set is None:
         return 'above the horizon throughout, the satellite never sets'
     rise, down = (f'{_utc(when)} UTC' if when else '' for when in (p.rise, p.set))

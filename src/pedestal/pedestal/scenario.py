@@ -1,4 +1,4 @@
-"""Scenarios with their parameters."""
+"""Scenarios of the Python library: `pedestal.load` returns a Scenario, whose parameters can be read and changed."""
 from __future__ import annotations
 
 import dataclasses
@@ -73,8 +73,8 @@ class Scenario:
                 seed: int | None = None) -> Scenario:
         """Return this scenario with further changes; the original is not modified.
 
-        >>> pedestal.load('leo_pass').changed({'acu.azimuth.filter.kind': 'imm'}, seed=2)['acu.azimuth.filter.kind']
-        'imm'
+        >>> pedestal.load('leo_pass').changed({'acu.azimuth.filter.kind': 'ca'}, seed=2)['acu.azimuth.filter.kind']
+        'ca'
         """
         return Scenario(self.source, {**self.changes, **(changes or {})},
                         self.given_duration if duration is None else duration,

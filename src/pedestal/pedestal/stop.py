@@ -1,7 +1,8 @@
 """Stop of `pedestal` by Ctrl-C, SIGTERM or SIGHUP.
 
 The command line imports this module first, because the import of the rest takes half a second. A signal during that
-import ends the process at once, with the usual message. A program that imports the command line keeps its handlers.
+import ends the process at once, with the usual message. Another program that imports this module keeps its own
+handlers of the signals.
 """
 import os
 import signal
@@ -10,6 +11,7 @@ import types
 from collections.abc import Callable
 
 STOP_MESSAGE, STOP_EXIT_CODE = 'pedestal: stopped', 130
+"""Message on stderr and exit code of a stopped process; 130 is 128 + number of SIGINT, the convention of shells."""
 
 
 def on_stop(handler: Callable[[int, types.FrameType | None], object]) -> None:

@@ -1,4 +1,4 @@
-"""Output of the verbs: progress and tables of results on a terminal, rows as JSON."""
+"""Output of the verbs of the command line: progress bars and tables on a terminal, and rows of results as JSON."""
 import contextlib
 import functools
 import json
@@ -16,30 +16,33 @@ EXIT_CODES = {
     EXIT_WRONG_COMMAND: 'the command line has a wrong argument',
     EXIT_DISTURBED: 'a realtime run ended early, or its drive lost more than 1 % of its steps (steps in the 5 s after '
                     'a node died are not counted)',
-    EXIT_FAILED_RUN: 'the drive tripped, a command of the scenario was refused, or a target was to be tracked and '
-                     'never was; the verdict above the table states which',
+    EXIT_FAILED_RUN: 'the drive tripped, a command of the scenario was refused, or the antenna never tracked a '
+                     'target that it should have tracked; the verdict above the table states which',
     EXIT_STOPPED: 'the run was stopped, for example by Ctrl-C'}
-"""{exit code of `pedestal run`: meaning}. Codes 1, 3 and 130 take precedence over 4."""
+"""{exit code of `pedestal run`: its meaning}. The codes 1, 3 and 130 take precedence over 4."""
 
 STDOUT_PATH = pathlib.Path('/dev/stdout')
-"""Path that --json without a file, or with -, selects."""
+"""Path of the option --json without a file name, or with the file name -."""
 
 MAX_NAME_COLUMNS, MAX_CELL_COLUMNS, MIN_SENTENCE_COLUMNS = 44, 24, 40
-"""Widths of a list: largest width of the names, of the other cells, and smallest width of the sentences [columns].
+"""Widths in a list of show_list [characters].
 
-A longer cell moves the rest of its row. On a terminal too narrow for the sentences, they are printed below the cells.
+They are the largest width of the names, the largest width of the other cells, and the smallest width of the sentences.
+A longer cell moves the rest of its row to the right. On a narrower terminal, the sentences are printed below the
+cells.
 """
 
 MIN_TABLE_COLUMNS = 150
-"""Smallest width of a table of results on any terminal, so that a row stays one line [columns]."""
+"""Smallest width of a table of results on any terminal, so that a row stays one line [characters]."""
 
 
 @contextlib.contextmanager
 def _bar(columns, advance, description, total=None, **fields):
-    """Yield a function that calls advance(bar, task, ...) on a terminal and does nothing in a pipe.
+    """Yield a function of the progress: on a terminal it calls advance(bar, task, ...), in a pipe it does nothing.
 
-    columns: function of the module rich.progress that returns the columns of the bar; description, total, fields: of
-    the only task of the bar.
+    columns                      columns(module rich.progress) -> columns of the progress bar
+    advance                      advance(bar, task, ...) shows the new progress
+    description, total, fields   properties of the only task of the bar
     """
     if not sys.stderr.isatty():
         yield lambda *_: None
@@ -50,7 +53,10 @@ def _bar(columns, advance, description, total=None, **fields):
 
 
 def progress_of_run(duration):
-    """Return a context with progress(seconds of the run), a bar on a terminal, nothing in a pipe; duration [s]."""
+    """Return a context with a function progress(time of the run [s]): a bar on a terminal, nothing in a pipe.
+
+    duration: length of the run [s].
+    """
     def columns(rich):
         return (rich.TextColumn('{task.description}'), rich.BarColumn(),
                 rich.TextColumn('{task.completed:.0f} / {task.total:.0f} s'), rich.TimeElapsedColumn())
@@ -61,7 +67,10 @@ def progress_of_run(duration):
 
 
 def progress_of_share():
-    """Return a context with progress(fraction done, text of the next item), a bar on a terminal, nothing in a pipe."""
+    """Return a context with a function progress(share of the work that is done [-], text of the next item).
+
+    It shows a bar on a terminal, and nothing in a pipe.
+    """
     def columns(rich):
         return rich.BarColumn(), rich.TextColumn('{task.description}'), rich.TimeElapsedColumn()
 
@@ -71,7 +80,10 @@ def progress_of_share():
 
 
 def progress_of_trials():
-    """Return a context with progress(trials done, all trials), a bar with rate and time left on a terminal."""
+    """Return a context with a function progress(number of trials done, number of all trials).
+
+    It shows a bar with the rate of the trials and the remaining time on a terminal, and nothing in a pipe.
+    """
     def columns(rich):
         return (rich.BarColumn(), rich.MofNCompleteColumn(), rich.TextColumn('trials, {task.fields[rate]}'),
                 rich.TimeElapsedColumn(), rich.TextColumn('left'), rich.TimeRemainingColumn())
@@ -97,13 +109,16 @@ def check_json(path):
 
 
 def write_json(path, content):
-    """Write content as JSON to the path of --json; do nothing for None."""
+    """Write content as JSON to the path of --json; do nothing if the path is None."""
     if path:
         path.write_text(json.dumps(content, indent=1) + '\n')
 
 
 def show_list(rows):
-    """Print rows of texts in columns; a terminal wraps the last column to its width, in a pipe a row is a line."""
+    """Print rows of texts in columns; the last text of a row is a sentence.
+
+    On a terminal the sentence is wrapped to the width of the terminal. In a pipe a row is one line.
+    """
     rows = list(rows)
     widths = [min(max(len(row[i]) for row in rows), MAX_CELL_COLUMNS if i else MAX_NAME_COLUMNS)
               for i in range(len(rows[0]) - 1)]
@@ -125,16 +140,18 @@ def show_list(rows):
 
 
 def exit_codes():
-    """Return the lines of EXIT_CODES for a help text."""
+    """Return EXIT_CODES as the lines of a help text."""
     return '\n'.join(textwrap.fill(f'{code}: {meaning}.', 100, initial_indent='  ', subsequent_indent='      ')
                      for code, meaning in EXIT_CODES.items())
 
 
 def show_results(title, columns, results, whole, marks=()):
-    """Print a table of metrics.
+    """Print the table of the results of a run.
 
-    columns: heads, '' for a single column; results: {metric: (value, unit)} of each column; whole: {metric: (value,
-    unit)} of the run; marks: {metric: why the value is suspect} of each column.
+    columns   texts of the heads, one for each beam; '' for a single column
+    results   [{name: (value, unit)}] of each column
+    whole     {name: (value, unit)} of the results of the run as a whole
+    marks     [{name: note on a value that is not as expected}] of each column
     """
     from rich.console import Console
     from rich.table import Table
@@ -162,14 +179,14 @@ def show_results(title, columns, results, whole, marks=()):
 
 
 def measured(value):
-    """Return a number of a run as text: four digits, all digits of a large count."""
+    """Return a result of a run as text: four digits, but all digits of a large whole number."""
     if not math.isfinite(value):
         return 'not measured'
     return f'{value:,.0f}' if abs(value) >= 1e4 and value == int(value) else number(value)
 
 
 def add_all(parser, what='all results; default: the eight most important ones'):
-    """Add the option --all to the parser of a verb that prints results. what: its help."""
+    """Add the option --all to the parser of a verb that prints results; what: help text of the option."""
     parser.add_argument('--all', action='store_true', help=what)
 
 
@@ -179,22 +196,22 @@ def add_explain(parser):
 
 
 def explain(table, names):
-    """Print the definitions of the results in names; table: rows with name and sentence, such as results.RESULTS."""
+    """Print the definitions of the results in names; table: rows with `name` and `sentence`, as results.RESULTS."""
     show_list((row.name, row.sentence) for row in table if row.name in names)
 
 
 def number(value):
-    """Return a number of a study's row as text, '-' for None."""
+    """Return a number in a row of a study as text, '-' for None."""
     return '-' if value is None else f'{value:.4g}'
 
 
 def interval(row):
-    """Return the interval of a study's row as text, '' for a row of one run."""
+    """Return the confidence interval in a row of a study as text, '' for a row of one run."""
     return f'{number(row["ci_low"])} to {number(row["ci_high"])}' if 'runs' in row else ''
 
 
 def show_study(title, rows, missed):
-    """Print the table of a study's rows; missed(row) -> True if the row misses its target."""
+    """Print the rows of a study as a table; missed: function that returns True for a row that misses its target."""
     from rich.box import SIMPLE_HEAD
     from rich.console import Console
     from rich.table import Table
@@ -209,10 +226,10 @@ def show_study(title, rows, missed):
 
 
 def show_trials(title, rows, metrics=None):
-    """Print the statistics of each result over the trials: rows of trials.statistics, with its `coverage`.
+    """Print the statistics of results over trials as a table.
 
-    metrics: names of the printed results in their order, of which the first also has the rows of its comparison; None
-    for all rows.
+    rows: rows of trials.statistics and trials.comparison; metrics: names of the printed results in their order, None
+    for all rows. The rows of a comparison are printed for the first of these results only.
     """
     from rich.box import SIMPLE_HEAD
     from rich.console import Console
@@ -246,7 +263,10 @@ def show_trials(title, rows, metrics=None):
 
 
 def show_tried(key, unit, tried):
-    """Print the values of a search, with the mean of the result at each: solve.Tried in order."""
+    """Print the values that a search has tried as a table, with the mean of the result at each.
+
+    key, unit: parameter 'node.key' of the search and its unit; tried: [solve.Tried] by rising value.
+    """
     from rich.box import SIMPLE_HEAD
     from rich.console import Console
     from rich.table import Table

@@ -4,10 +4,11 @@ import shlex
 
 import pytest
 
+from adu_drive import drive_state
 from pedestal_analysis.results import results
 from pedestal_analysis.tuning import antenna_from_data_sheet, loops
-from pedestal_analysis.tuning.data_sheet_format import DataSheet
-from pedestal_bringup.loop import memory_recording
+from pedestal_analysis.tuning.data_sheet_format import TEMPLATE_SCENARIOS, DataSheet
+from pedestal_bringup.loop import closed_loop, memory_recording
 from pedestal_bringup.scenario import scenario
 from pedestal_common.parameters import as_dict
 
@@ -78,7 +79,7 @@ def test_what_ships_is_made_by_the_commands_in_its_head(pedestal, tmp_path, name
 @pytest.mark.parametrize('arguments, expected', [
     (('--mirror', '400'), 'mirror = 400 m: must be 0.1 to 40'),
     (('--mode', '0.5'), 'mode = 0.5 Hz: must be 1 to 200'),
-    (('--like', 'leo_pas'), "like = 'leo_pas': must be one of leo_pass, uav_flyby, ship_pass"),
+    (('--like', 'leo_pas'), "like = 'leo_pas': must be one of leo_pass, geo_station, uav_flyby, ship_pass, ship_uav"),
     (('--motor-torque', '0.2'), 'adu.azimuth: motor_1.resistance = 128.706 ohm: must be 0.01 to 100'),
     (('--motor-torque', '1', '--inertia-azimuth', '40000'), 'adu.azimuth: the motors cannot move the axis'),
 ])
@@ -114,6 +115,44 @@ def test_an_assumed_structure_is_announced(pedestal, tmp_path):
         _, output, _ = pedestal('new', f'{name}.yaml', '--mirror', '9', *options)
         assert (expected in output.splitlines()) == assumed
         assert (f'# {expected}' in (tmp_path / f'{name}.yaml').read_text()) == assumed
+
+
+def test_signal_and_wind_follow_from_the_mirror(pedestal, tmp_path):
+    """A mirror of twice the diameter collects four times the power, 6.02 dB; --cn0 takes precedence."""
+    for name, options, level in (('double', ('--mirror', '4.8'), 52.42), ('given', ('--mirror', '4.8', '--cn0', '48'),
+                                                                          48.0)):
+        code, output, _ = pedestal('new', f'{name}.yaml', *options)
+        made = scenario.load(tmp_path / f'{name}.yaml')
+        assert code == 0 and made.node_parameters('adu').wind.field.diameter == 4.8
+        assert made.node_parameters('tracking_receiver').receiver.cn0_dbhz == level
+        assumed = 'no --cn0: 52.4 dB-Hz at 500 km, that of leo_pass for the area of the mirror, is taken'
+        assert (assumed in output) == (name == 'double')
+
+
+STATION = ('--mirror', '4.5', '--frequency', '8.2', '--inertia-azimuth', '900', '--inertia-elevation', '700',
+           '--ratio-azimuth', '300', '--ratio-elevation', '300')
+"""A dish of 4.5 m for X band."""
+
+
+@pytest.mark.parametrize('like', TEMPLATE_SCENARIOS)
+def test_an_antenna_tracks_the_target_of_each_scenario(pedestal, tmp_path, like):
+    assert pedestal('new', 'my.yaml', '--like', like, *STATION)[0] == 0
+    chosen = scenario.load(tmp_path / 'my.yaml')
+    found = results.measured(results.of_bag(memory_recording.record(chosen)))
+    beamwidth = math.degrees(chosen.node_parameters('tracking_receiver').antenna.beamwidth)
+    assert found['tracked_percent'][0] > 90.0 and found['loss_s'][0] == 0.0
+    assert found['pointing_rms_deg'][0] < 0.05 * beamwidth
+
+
+@pytest.mark.parametrize('share', ('0', '0.5'))
+def test_a_start_in_strong_wind_trips_no_drive(pedestal, tmp_path, share):
+    """Rigid and flexible, the first second in up to 55 m/s, and a minute at 25 m/s."""
+    assert pedestal('new', 'my.yaml', '--mode-share', share, *STATION)[0] == 0
+    for speed, seed, duration in ((51, 1, 1.0), (53, 2, 1.0), (55, 3, 1.0), (25, 2, 60.0)):
+        chosen = scenario.load(tmp_path / 'my.yaml', [f'adu.wind.field.speed={speed}', f'adu.wind.field.seed={seed}'],
+                               seed=seed, duration=duration)
+        run = closed_loop.Loop(chosen).run()
+        assert {drive_state.state_text(int(code)) for code in run['adu/state']} == {'enabled'}
 
 
 def test_no_file_is_overwritten(pedestal, tmp_path):

@@ -115,7 +115,7 @@ def test_true_rates_seen_from_a_sailing_ship():
 
 
 def test_names_are_those_of_the_models_and_axes():
-    assert topics.MOTION_MODELS == motion_models.MODEL_NAMES
+    assert topics.MOTION_MODELS == motion_models.COLUMN_NAMES
     told = {f'{axis}_{name}' for axis in topics.AXES for name in (*consistency.FILTER_NUMBERS, *topics.MOTION_MODELS)}
     assert told | {f'{axis}_innovation_sigma' for axis in topics.AXES} == set(topics.TOPIC_BY_NAME['acu/filter'].names)
 

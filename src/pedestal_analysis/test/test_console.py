@@ -6,6 +6,7 @@ import sys
 
 import pytest
 
+from pedestal import cli
 from pedestal_analysis import console
 
 ROWS = [('leo', '1', 'a satellite pass around its culmination, ashore, as seen by an observer at the station'),
@@ -33,6 +34,13 @@ def test_on_a_narrow_terminal_each_cell_goes_below_the_name(capsys, monkeypatch)
         'short                        1']
 
 
+def test_the_bare_command_prints_its_help(capsys):
+    assert cli.main([]) == 0
+    said = capsys.readouterr()
+    assert said.out.startswith('usage: pedestal') and all(f'\n    {verb}' in said.out for verb in cli.VERBS)
+    assert said.err == ''
+
+
 def test_a_closed_pipe_is_no_error():
     """`pedestal scenarios | head` closes the pipe; the verb prints no error."""
     reader, writer = os.pipe()
@@ -50,8 +58,8 @@ def test_in_a_pipe_a_row_is_a_line(capsys):
     assert [line.index(row[1] or row[2]) for line, row in zip(lines, ROWS)][0] == len(ROWS[1][0]) + 2
 
 
-@pytest.mark.parametrize('command', [['scenarios'], ['study'], ['parameters', 'scenario'], ['parameters', 'recorder'],
-                                     ['parameters', 'adu']])
+@pytest.mark.parametrize('command', [[], ['scenarios'], ['study'], ['parameters', 'scenario'],
+                                     ['parameters', 'recorder'], ['parameters', 'adu']])
 def test_a_verb_that_computes_nothing_imports_no_compiler(command):
     """Nor ROS: each takes longer than the verb itself."""
     code = ('import sys; from pedestal import cli; assert cli.main(sys.argv[1:]) == 0; '

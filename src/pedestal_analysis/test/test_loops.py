@@ -1,8 +1,11 @@
 """`pedestal tune --loops`: the design against the drive as it comes, margins measured on the plant, refusals."""
+import dataclasses
 import math
+import re
 
 import pytest
 
+from acu_tracker.estimation.params import FilterParameters
 from pedestal_analysis.results import results
 from pedestal_analysis.tuning import loops
 from pedestal_bringup.loop import memory_recording
@@ -29,7 +32,24 @@ def test_the_plant_that_comes_with_the_product_gets_the_gains_it_has(pedestal, t
         new, old = (getattr(each.node_parameters('acu'), axis) for each in (chosen, before))
         assert new.feedforward.bandwidth == pytest.approx(old.feedforward.bandwidth, rel=0.1)
         assert new.feedforward.inertia == pytest.approx(old.feedforward.inertia, rel=0.005)
-    assert all(line.count('(>= ') == 2 for line in output.splitlines() if ' speed ' in line or ' position ' in line)
+    rows = [line for line in output.splitlines() if re.match(r'\w+ (speed|position) +[\d.]+ Hz', line)]
+    assert len(rows) == 4 and all(line.count('(>= ') == 2 for line in rows)
+
+
+def test_a_loop_slower_than_required_and_one_without_a_gain_margin_are_named(pedestal):
+    """The speed loop of leo_pass crosses below 28 Hz. The soft gear needs a slower position loop for its margins.
+    30 Hz is above an eighth of the speed loop. The current loops never reach -180 deg."""
+    slower = r'azimuth {} loop: {} Hz required, [\d.]+ Hz reached: {}'
+    for options, loop, wanted, reason in (
+            ((), 'speed', '28', 'the gains are those of a rigid axis'),
+            (('--param', SOFT[0], '--param', SOFT[1]), 'position', '3.5', 'a faster loop does not hold the required'),
+            (('--position-bandwidth', '30', '--speed-bandwidth', '28'), 'position', '30',
+             'a position loop has at most 1/8')):
+        code, output, _ = pedestal('tune', 'leo_pass', '--loops', '--axis', 'azimuth', '--output',
+                                   f'{loop}{wanted}.yaml', *options)
+        assert code == 0 and re.search(slower.format(loop, wanted, reason), output)
+        assert 'no gain margin of azimuth current: the open loop does not reach -180 deg' in output
+        assert 'beyond' not in output
 
 
 def test_a_soft_gear_makes_the_loop_slower_until_it_holds_its_margins():
@@ -109,6 +129,21 @@ def test_the_shaper_of_a_flexible_dish_leaves_no_swing():
             if gains['jerk'] * k * dt > a:
                 after.append(x + a / w**2)
         assert max(map(abs, after)) < swing * a / w**2
+
+
+def test_a_flexible_dish_gets_the_models_that_do_not_follow_its_swing():
+    """Noise 1 deg / (1.6 sqrt(2 C/N0)); the bandwidth (q / r)^(1/3) of the last model is below 2 pi f / 7, that of the
+    next above it. A rigid dish keeps all models."""
+    noise = loops.receiver_noise(math.radians(1.0), 1.6, 46.4)
+    assert math.degrees(noise) == pytest.approx(1.0 / (1.6 * math.sqrt(2.0 * 10**4.64)))
+    axis, bank = loops.Loops('leo_pass').plants['azimuth'].axis, FilterParameters().imm
+    assert loops.filter_gains(loops.Plant('azimuth', axis, noise=noise)) == {}
+    for frequency in (2.0, 4.0, 8.0):
+        structure = dataclasses.replace(axis.structure, inertia_share=0.4, frequency=frequency)
+        flexible = loops.Plant('azimuth', dataclasses.replace(axis, structure=structure), noise=noise)
+        rungs = loops.filter_gains(flexible)['filter.imm.rungs']
+        last, following = ((bank.ca.noise * bank.rung_ratio**k / noise)**(1.0 / 3.0) for k in (rungs - 1, rungs))
+        assert last <= 2.0 * math.pi * frequency / 7.0 < following and 1 < rungs < bank.rungs
 
 
 def test_the_design_is_that_of_a_rigid_drive():

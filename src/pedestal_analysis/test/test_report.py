@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from pedestal import cli
-from pedestal_analysis.report import figures, filter_figures, run_data, run_figures
+from pedestal_analysis.report import figures, filter_figures, print_pdf, run_data, run_figures
 from pedestal_analysis.report.page import write as write_report
 from pedestal_analysis.results import consistency, results, tracking
 from pedestal_common.graph import topics
-from pedestal_common.wire import messages
+from pedestal_common.wire import commands, messages
 from pedestal_recording import bag as bags
 from pedestal_recording.writer import Writer
 
@@ -58,7 +58,8 @@ def step(k, rng, locked=True, effort=True):
     point.velocities[:] = 0.1 + 0.01 * noise[0], 0.01 * noise[1]
     told = messages.template('acu/filter')
     told.position[:] = [value for nu in noise for value in (
-        nu, math.nan, (nu / NOISE)**2, 0.1 * NOISE, 0.02 * NOISE, 0.0, NOISE, 0.3, 0.3, math.nan, 0.4)]
+        nu, math.nan, (nu / NOISE)**2, 0.1 * NOISE, 0.02 * NOISE, 0.0, NOISE, 0.3, 0.3, math.nan, 0.4,
+        *[math.nan] * (len(topics.MOTION_MODELS) - 4))]
     made = {'joint_states': joints, 'adu/truth': truth, 'acu/filter': told, 'adu/motor_states': motors,
             'target/truth': target, 'tracking_receiver/angle_error': error, 'acu/estimate': estimate}
     return {name: stamped(message, k) for name, message in made.items()}
@@ -67,6 +68,26 @@ def step(k, rng, locked=True, effort=True):
 def status(k, node, level, text):
     return stamped(messages.DiagnosticArray(header=messages.header(''), status=[messages.DiagnosticStatus(
         level=level, name=node, message=text, hardware_id='pedestal', values=[])]), k)
+
+
+def events_of(k):
+    """[(topic, message)] of step k: commands with their senders, an injected fault and the alarm that it causes."""
+    replied = {100: ('acu/command_result', 'track', 'Ada', {}, True, 'mode is track'),
+               101: ('acu/command_result', 'preset', 'scenario', {'azimuth': '9'}, False, 'refused: outside limits'),
+               400: ('adu/injected', 'motor_loss', 'Ada', {'axis': 'azimuth', 'duration': '1.5'}, True, 'injected')}
+    values = {'state': 'unacknowledged', 'priority': 'high', 'detail': 'azimuth motor 1', 'raised_s': '2.050'}
+    alarm = messages.DiagnosticStatus(
+        level=2, name='motor_fault', message='a motor is off', hardware_id='acu',
+        values=[messages.KeyValue(key=key, value=value) for key, value in values.items()])
+    changes = {410: [alarm], 710: []}
+    made = []
+    if k in replied:
+        topic, verb, who, arguments, granted, text = replied[k]
+        made.append((topic, commands.reply_message(commands.Command(verb, who, '1', arguments),
+                                                   commands.Reply(granted, text))))
+    if k in changes:
+        made.append(('acu/alarms', messages.DiagnosticArray(header=messages.header(''), status=changes[k])))
+    return made
 
 
 def make_bag(path, names=ASHORE, steps=STEPS, locked=True, skip=(), effort=True, **metadata):
@@ -89,6 +110,8 @@ def make_bag(path, names=ASHORE, steps=STEPS, locked=True, skip=(), effort=True,
         clock = messages.Clock(clock=messages.Time(sec=0, nanosec=0))
         messages.put_stamp(clock.clock, k * T)
         put('clock', k, clock)
+        for name, message in events_of(k):
+            put(name, k, message)
         for name, message in step(k, rng, locked, effort).items():
             if k not in skip:
                 put(name, k, message, late=(k % 2) * 1_000_000)
@@ -154,10 +177,9 @@ def test_every_figure_and_section_is_there(page):
     page, folder = page
     keys = [spec.key for spec in (*run_figures.FIGURES, *filter_figures.FIGURES)]
     assert page.drawn == keys
-    assert {'results', 'figures', 'filter', 'diagnostics', *keys} <= set(page.ids)
+    assert {'parameters', 'events', 'results', 'figures', 'filter', 'diagnostics', *keys} <= set(page.ids)
     assert page.open == []
-    for number in (7, 8, 9, 10, 11):
-        assert f'figure {number} of the paper' in page.text
+    assert 'of the paper' not in page.text
     assert sorted(path.name for path in folder.glob('*.png')) == sorted(f'{key}.png' for key in (*keys, 'overview'))
     for path in folder.glob('*.png'):
         assert path.read_bytes()[:8] == b'\x89PNG\r\n\x1a\n'
@@ -216,6 +238,86 @@ def test_the_page_says_when_where_what_and_through_which_beam(page, tmp_path):
     assert re.fullmatch(r'\d\d\.\d deg at 2019-12-09 16:\d\d:\d\d UTC, [0-9.]+ s', leo.rows['highest'][0])
     flyby = page_of(REFERENCES / 'uav_flyby', output=tmp_path / 'uav.html')
     assert flyby.rows['target'][0].startswith('straight flight at 15 m/s') and 'station' not in flyby.rows
+    for number in (7, 8, 9, 10, 11):
+        text = f'(figure {number} of the paper)'
+        assert text in flyby.text and text not in leo.text
+    assert leo.rows['acu.tracker.lock_count'] == ['20', '100', '']
+    assert 'acu.period' not in leo.rows
+    assert leo.text.index('tracked 64.8 % of 4 s, first lock at 1.315 s') < leo.text.index('target')
+    assert re.fullmatch(r'file of \d{4}-\d\d-\d\d .* UTC; a lockstep recording states no date',
+                        leo.rows['date of the run'][0])
+
+
+STORY = (*ASHORE, 'acu/command_result', 'adu/injected', 'acu/alarms')
+
+
+@pytest.fixture(scope='module')
+def story(tmp_path_factory):
+    return make_bag(tmp_path_factory.mktemp('story') / 'story', STORY)
+
+
+def test_the_events_are_a_table_with_senders_reasons_and_durations(story, tmp_path):
+    rows = page_of(story, output=tmp_path / 'story.html').rows
+    found = [rows[str(number)] for number in range(1, 7)]
+    assert found == [
+        ['0.00', '0.25', 'mode', 'acu', 'program'],
+        ['0.25', 'to the end', 'mode', 'acu', 'autotrack'],
+        ['0.50', '', 'command', 'Ada', 'acu: track'],
+        ['0.51', '', 'refused', 'scenario', 'acu: preset azimuth=9: refused: outside limits'],
+        ['2.00', '1.50', 'injected fault', 'Ada', 'adu: motor_loss axis=azimuth duration=1.5'],
+        ['2.05', '1.50', 'alarm', 'acu', 'motor_fault, high: a motor is off (azimuth motor 1)']]
+    assert '7' not in rows
+
+
+def test_the_events_are_marked_on_every_curve_over_time(story):
+    recording = run_data.read(bags.read(story))
+    for spec in run_figures.FIGURES:
+        with figures.matplotlib.rc_context(figures.MATPLOTLIB_STYLE):
+            figure = spec.draw(recording)
+            before = {axes: (axes.get_xlim(), len(axes.lines)) for axes in figure.axes}
+            if spec.timed:
+                figures.mark(figure, recording.events)
+        for axes in figure.axes:
+            (low, high), lines = before[axes]
+            inside = [event for event in recording.events if low < event.t < high]
+            assert len(axes.lines) - lines == (len(inside) if spec.timed else 0)
+            assert axes.get_xlim() == (low, high)
+    assert [text for text, _, _ in figures._labels(list(enumerate(recording.events, start=1)), 0.1)] == [
+        '1', '2', '3-4', '5-6']
+
+
+def test_a_fast_slew_is_no_chord_in_the_sky_plot():
+    t = np.arange(0.0, 600.0, 0.005)
+    azimuth = np.clip(2.0 * t, 0.0, 3.0) + 0.001 * t
+    at = run_figures._along(np.column_stack((azimuth, np.full(t.size, 0.2))))
+    assert at.size <= run_figures.SKY_POINTS and (at[0], at[-1]) == (0, t.size - 1)
+    assert np.diff(azimuth[at]).max() < math.radians(1.0)
+    assert np.diff(t[at]).max() < 1.0
+
+
+def test_the_frame_is_that_of_the_tracking_and_not_of_the_slew(whole):
+    recording = run_data.read(bags.read(whole))
+    recording.run.beam_earth[:40, 0] -= 2.0
+    recording.raw_angles[:40, 0] -= 2.0
+    with figures.matplotlib.rc_context(figures.MATPLOTLIB_STYLE):
+        axes = run_figures.angle(recording).axes[0]
+    low, high = axes.get_ylim()
+    assert high - low < 40.0
+    assert any('off scale outside the evaluated part' in text.get_text() for text in axes.texts)
+
+
+@pytest.mark.skipif(not any(map(shutil.which, print_pdf.BROWSERS)), reason='no browser is installed')
+def test_the_report_as_pdf_with_its_author(story, tmp_path, capsys):
+    assert cli.main(['report', str(story), '--output', str(tmp_path / 'r.html'), '--author', 'A. <B>', '--pdf']) == 0
+    assert capsys.readouterr().out.split() == [str(tmp_path / 'r.html'), str(tmp_path / 'r.pdf')]
+    assert (tmp_path / 'r.pdf').read_bytes().startswith(b'%PDF')
+    assert Page((tmp_path / 'r.html').read_text()).rows['author'] == ['A. <B>']
+
+
+def test_a_pdf_without_a_browser_is_refused_with_the_cure(story, tmp_path, monkeypatch, capsys):
+    monkeypatch.setenv('PATH', str(tmp_path))
+    assert cli.main(['report', str(story), '--output', str(tmp_path / 'r.html'), '--pdf']) == 1
+    assert 'apt install chromium' in capsys.readouterr().err and not (tmp_path / 'r.html').exists()
 
 
 def test_the_filter_is_judged(page, whole):

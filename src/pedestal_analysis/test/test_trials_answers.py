@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from pedestal_analysis.trials import comparison, solve, statistics
+from pedestal_analysis.trials import comparison, plan, solve, statistics
 from pedestal_analysis.trials.table import Table
 from pedestal_bringup.scenario import scenario
 
@@ -34,6 +34,20 @@ def test_the_best_of_three_sides_comes_first(pedestal, tmp_path):
         'trials.csv', 'side_slow.csv', 'side_ca.csv'}
     page = (tmp_path / 'trials' / 'uav_flyby' / 'trials.html').read_text()
     assert f'{named[order[0]]} is ' in page and 'in 3 of 3 trials' in page
+
+
+def test_sides_with_the_same_parameters_are_named_so(pedestal):
+    """One sentence for a pair of sides: imm and program are the values that uav_flyby has anyway."""
+    code, said, errors = pedestal('trials', 'uav_flyby', '--runs', 2, '--duration', 3, '--workers', 1,
+                                  '--against-param', f'{KIND}=imm')
+    assert (code, errors) == (0, '')
+    assert said.splitlines()[0] == f'Both sides have the same parameters: {KIND}=imm changes nothing.'
+    plans = [plan.plan('uav_flyby', 2, ['adu.azimuth.load.inertia=normal(1, 0.1)x'], overrides)
+             for overrides in ((), (f'{KIND}=ca',), (f'{KIND}=ca', 'acu.initial_mode=program'))]
+    assert comparison.unchanged(plans[0], plans[0]) == 'Both sides have the same parameters.'
+    assert comparison.unchanged(plans[0], plans[1]) == ''
+    assert comparison.unchanged(plans[1], plans[2]) == (
+        'Both sides have the same parameters: acu.initial_mode=program changes nothing.')
 
 
 def test_a_trial_without_the_result_does_not_meet_a_requirement(tmp_path):

@@ -71,6 +71,25 @@ def test_the_pointing_in_preset_leaves_the_way_out():
     assert last == pytest.approx(0.5, abs=1e-3)
 
 
+ENCODER_ZERO = 0.002
+"""Zero error of the azimuth encoder [rad], by which the antenna points beside every commanded direction."""
+
+
+@pytest.mark.parametrize('mode, elevation, commands', [
+    ('slave', 0.6, '0.5 slave azimuth=0.1 elevation=0.6 holds=60; 4 slave azimuth=0.3 elevation=0.6 azimuth_rate=0.01 '
+                   'moves=60 holds=60'),
+    ('sun', np.radians(9.2), '0.5 sun')])
+def test_the_pointing_in_slave_and_sun_is_off_by_the_error_of_the_encoder(mode, elevation, commands):
+    """The slews to the first and the second direction are left out; the second direction moves."""
+    _, values = measured('leo_pass', (
+        'scenario.program.source=none', 'acu.initial_mode=standby', f'acu.commands={commands}',
+        'tracking_receiver.target.leo_pass.start_time=2019-12-10T14:15:25',
+        f'adu.azimuth.encoder.error.zero={ENCODER_ZERO}'), 9.0)
+    expected = np.degrees(ENCODER_ZERO) * np.cos(elevation)
+    assert values[f'{mode}_pointing_max_deg'] == pytest.approx(expected, rel=0.05)
+    assert values[f'{mode}_pointing_rms_deg'] == pytest.approx(expected / np.sqrt(2.0), rel=0.05)
+
+
 def test_step_track_has_its_own_pointing():
     _, values = measured('steptrack_geo', (), 12.0)
     assert 0.0 < values['steptrack_pointing_rms_deg'] < values['steptrack_pointing_max_deg'] < 1.0

@@ -1,6 +1,8 @@
-"""Launch file of the nodes of a scenario: ros2 launch pedestal_bringup pedestal.launch.py scenario:=uav_flyby
+"""Launch file that starts the nodes of a scenario on a ROS 2 machine, for example
 
-`ros2 launch pedestal_bringup pedestal.launch.py --show-args` lists its arguments. The launch ends with the drive.
+    ros2 launch pedestal_bringup pedestal.launch.py scenario:=uav_flyby
+
+`ros2 launch pedestal_bringup pedestal.launch.py --show-args` lists the arguments. The launch ends when the drive ends.
 """
 import sys
 
@@ -24,7 +26,8 @@ from pedestal_common.graph import nodes
 
 
 def operator(context, scenario):
-    """Return the process that sends the program track, in the namespace of the nodes."""
+    """Return the process that sends the program track, in the namespace of the nodes. context: of the launch;
+    scenario: path of the scenario file."""
     namespace = context.launch_configurations.get('ros_namespace', '')
     remapped = ['--ros-args', '-r', f'__ns:=/{namespace.strip("/")}'] if namespace else []
     return [ExecuteProcess(cmd=[sys.executable, '-m', 'pedestal_bringup.graph.send_program', str(scenario), *remapped],
@@ -32,7 +35,8 @@ def operator(context, scenario):
 
 
 def start(context):
-    """Return the nodes of the scenario with the parameters that `pedestal run` would give them."""
+    """Return the nodes of the scenario, with the parameters that `pedestal run` would give them, the sender of the
+    program track, and the servers. context: of the launch."""
     given = {argument.name: LaunchConfiguration(argument.name).perform(context)
              for argument in launch_arguments.ARGUMENTS}
     chosen = launch_arguments.load_scenario(given)

@@ -116,7 +116,7 @@ def test_the_lines_of_a_launch_are_those_of_a_run(tmp_path, monkeypatch):
                                        + ''.join(f'{k};1,5;0;{k}\n{k};1,5;0;{k}\n' for k in range(21)))
     (tmp_path / 'mine.yaml').write_text(
         'acu: {ros__parameters: {azimuth.limits.high: 6.2832}}\n'
-        'ship_motion: {ros__parameters: {ship: {motion: recorded, recorded.path: ship.csv, heading_deg: 0}}}\n'
+        'ship_motion: {ros__parameters: {ship: {motion: recorded, recorded.path: ship.csv}}}\n'
         'tracking_receiver: {ros__parameters: {target: {kind: track_file, track_file.path: a.csv}}}\n')
     asked = given(scenario='ship_pass', params_file='mine.yaml', duration='5')
     limit, ship, target, *_ = launch_arguments.prepare(asked, launch_arguments.load_scenario(asked))[0]

@@ -6,10 +6,11 @@ from pedestal_common.compiled import compiled
 
 @compiled
 def fhan(x1, x2, r, h0):
-    """Return the time-optimal acceleration u within +-r that brings x1'' = u to rest at x1 = 0 (Han 2009).
+    """Return the acceleration u, between -r and r, that brings x1'' = u to rest at x1 = 0 in the shortest time.
 
-    x1: error; x2: its rate; h0: time [s]. Close to rest, within what u = r reaches in h0, the law is linear, which
-    avoids chattering. d, a0, y, a are the names of Han's formula.
+    x1: error, in any unit; x2: its rate [unit/s]; r: largest acceleration [unit/s2]; h0: time [s] that sets the size
+    of a linear zone. In this zone, which u = r crosses within h0, u is a linear function of x1 and x2. This avoids
+    chattering. The formula, with the names d, a0, y and a, is that of Han (2009).
     """
     d = r * h0 * h0
     a0 = h0 * x2

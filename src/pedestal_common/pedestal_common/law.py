@@ -1,8 +1,9 @@
-"""Compiler of laws: a law that other laws call is only translated to LLVM's intermediate code; a law that Python calls
-becomes one piece of machine code with all the laws that it calls.
+"""Compiler of the laws, which the decorator `compiled` uses in place of numba's own dispatcher.
 
-Numba makes machine code and a wrapper for Python of each function, and optimises the function again in each of its
-callers. Of 500 laws Python calls ten, so that doubles the time of compilation.
+A law that only other laws call is translated to LLVM's intermediate code, and no more. A law that Python calls becomes
+an executable: machine code of this law with all the laws that it calls. Numba itself makes machine code and a wrapper
+for Python of each function, and optimises the function again in each of its callers. Because Python calls only ten of
+500 laws, this would double the time of compilation.
 """
 import functools
 import hashlib
@@ -27,7 +28,8 @@ from pedestal_common import law_cache
 
 
 class _Translation(JITCodeLibrary):
-    """Code of a Law for args, as numba translated it, to be linked with that of the laws it calls."""
+    """Translation: LLVM code of one Law for arguments of the types `args`, not yet linked with the laws that it calls.
+    """
 
     def __init__(self, codegen, law, args):
         super().__init__(codegen, law.py_func.__qualname__)
@@ -35,21 +37,21 @@ class _Translation(JITCodeLibrary):
 
     @property
     def calls(self):
-        """Translations of the laws that it calls."""
+        """Translations of the laws that this law calls."""
         return [library for library in self._linking_libraries if isinstance(library, _Translation)]
 
     @property
     def code(self):
-        """Its module, without the laws that it calls."""
+        """LLVM module of this law, without the laws that it calls."""
         return self._final_module
 
     def add_llvm_module(self, ll_module):
-        """Add a module without the passes over each function, because the whole is optimised when it is made
-        executable."""
+        """Add an LLVM module. Numba would also optimise each function here. This is left out, because the whole
+        executable is optimised later."""
         self._final_module.link_in(ll_module)
 
     def finalize(self):
-        """Complete the code with numba's own functions."""
+        """Complete the code of this law with the functions of numba's libraries that it calls."""
         for library in self._linking_libraries:
             if not isinstance(library, _Translation) and library is not rtsys.library:
                 self._final_module.link_in(library._get_module_for_linking(), preserve=True)
@@ -58,14 +60,14 @@ class _Translation(JITCodeLibrary):
         self._finalized = True
 
     def _get_module_for_linking(self):
-        """Return its module with all the laws that it calls."""
+        """Return one LLVM module of this law with all the laws that it calls."""
         if self._shared_module is None:
             parts = [self]
-            for part in parts:      # grows in the loop
+            for part in parts:      # the list grows in the loop
                 parts += [called for called in part.calls if called not in parts]
             modules = [part.code.clone() for part in parts]
             modules.append(rtsys.library._get_module_for_linking().clone())
-            while len(modules) > 1:     # in pairs, because the time of a link grows with both modules
+            while len(modules) > 1:     # linked in pairs, because the time of a link grows with the size of both
                 for one, other in zip(modules[::2], modules[1::2]):
                     one.link_in(other)
                 modules = modules[::2]
@@ -75,16 +77,22 @@ class _Translation(JITCodeLibrary):
 
 
 def _relink(module, before, after):
-    """Change the linkage of the functions that have the linkage `before`. With weak_odr one of equal functions is
-    kept; with linkonce_odr a function that has been inlined everywhere is dropped."""
+    """Give the linkage `after` to the functions of an LLVM module that have the linkage `before`.
+
+    With weak_odr the linker keeps one of several equal functions. With linkonce_odr it also drops a function that has
+    been inlined everywhere.
+    """
     for function in module.functions:
         if not function.is_declaration and function.linkage == before:
             function.linkage = after
 
 
 class _Compiler(compiler.Compiler):
-    """Numba's compiler, with the same symbol for a law in every process, so that one process finds the translation of
-    another. Numba's own symbols number the laws and the types of records in the order of their use."""
+    """Numba's compiler, which gives a law the same symbol (name in the machine code) in every process.
+
+    A process can therefore use the translation that another process has cached. Numba's own symbols number the laws
+    and the types of records in the order of their use, which differs from process to process.
+    """
 
     def __init__(self, *arguments):
         super().__init__(*arguments)
@@ -99,17 +107,24 @@ class _Compiler(compiler.Compiler):
 
 
 def _symbol(name, types, *, abi_tags=(), uid=None):
-    """Return the symbol of a law; uid contains its types."""
+    """Return the symbol of a law. uid: number that stands for the types of its arguments."""
     return default_mangler(name, (), uid=uid)
 
 
 def _has_name(qualname):
-    """Return True if a module has the law by this name; a law that a function makes has none."""
+    """Return True if a law can be imported by its qualified name. A law that is made inside a function cannot: its
+    name contains '<locals>'."""
     return '<' not in qualname
 
 
 class _Kept(NamedTuple):
-    """Cached translation: its code as bitcode, and [(module, name, types)] of the laws that it calls."""
+    """Cached form of a translation.
+
+    args     types of the arguments of the law
+    code     its LLVM module as bitcode
+    calls    [(module, name, types of the arguments)] of the laws that it calls
+    fndesc, environment, signature    fields of numba's CompileResult
+    """
     args: tuple
     code: bytes
     calls: list
@@ -119,19 +134,19 @@ class _Kept(NamedTuple):
 
 
 class _Translated(law_cache.Contents):
-    """Format of a cached translation."""
+    """Conversion of a translation to its cached form (_Kept) and back."""
 
     def get_filename_base(self, fullname, abiflags):
-        """Return the name of the file, which is beside the executable."""
+        """Return the base of the name of the file, which is in the same folder as that of the executable."""
         return f'{super().get_filename_base(fullname, abiflags)}.ir'
 
     def check_cachable(self, cres):
-        """Return True if another process would find the law, and the laws that it calls, by their names."""
+        """Return True if another process can find the law, and the laws that it calls, by their names."""
         return super().check_cachable(cres) and all(
             _has_name(part.law.py_func.__qualname__) for part in (cres.library, *cres.library.calls))
 
     def reduce(self, cres):
-        """Return a form of a CompileResult that can be pickled."""
+        """Return the _Kept of numba's CompileResult, which can be pickled."""
         cres.fndesc.typemap = cres.fndesc.calltypes = None
         laws = [(part.law.py_func, part.args) for part in cres.library.calls]
         calls = [(function.__module__, function.__qualname__, args) for function, args in laws]
@@ -139,7 +154,7 @@ class _Translated(law_cache.Contents):
                      cres.signature)
 
     def rebuild(self, target_context, payload):
-        """Return the CompileResult of a result of `reduce`."""
+        """Return the CompileResult of a _Kept, the result of `reduce`."""
         fndesc = payload.fndesc
         library = _Translation(target_context.codegen(), _named(fndesc.modname, fndesc.qualname), payload.args)
         library._final_module = parse_bitcode(payload.code)
@@ -153,16 +168,18 @@ class _Translated(law_cache.Contents):
 
 
 class _Translations(law_cache.Cache):
+    """Cached translations of one law, one for each set of argument types."""
     _impl_class = _Translated
 
 
 def _named(module, name):
-    """Return the Law of this name in a module."""
+    """Return the Law with a qualified name in a module."""
     return functools.reduce(getattr, name.split('.'), importlib.import_module(module))
 
 
 class _LawType(types.Dispatcher):
-    """Type of a Law that compiled code names: a constant without its value, which could not be cached."""
+    """Numba's type of a Law in compiled code. There a Law is a constant without a value, because code with the value
+    could not be cached."""
 
 
 register_model(_LawType)(OpaqueModel)
@@ -174,13 +191,15 @@ def _law_constant(context, builder, law_type, law):
 
 
 class Law(CPUDispatcher):
-    """Compiled law: numba's dispatcher, of which every overload is translated, and made executable when Python calls
-    it. Both are cached."""
+    """Compiled law: a numba dispatcher, which translates the law once for each set of argument types (overload).
+
+    An overload becomes an executable only when Python calls it. Translations and executables are cached.
+    """
 
     def __init__(self, *arguments, **keywords):
         super().__init__(*arguments, **keywords)
         self._type = _LawType(self)
-        self.typingctx._globals.pop(weakref.ref(self))     # the type that numba gave it
+        self.typingctx._globals.pop(weakref.ref(self))     # remove the type that numba gave to the law
         self.typingctx.insert_global(self, self._type)
         self._translated, self._translations = {}, NullCache()
 
@@ -189,12 +208,12 @@ class Law(CPUDispatcher):
         return self._type
 
     def enable_caching(self):
-        """Cache the compiled law where there is a folder for it."""
+        """Cache the compiled law if the law cache has a folder for it."""
         if law_cache.folder(self.py_func) is not None:
             self._cache, self._translations = law_cache.Cache(self.py_func), _Translations(self.py_func)
 
     def get_call_template(self, args, kws):
-        """Return the template of a call from compiled code, for which the law need not be executable."""
+        """Return numba's template of a call from another law. Such a call needs the translation only."""
         signature, args = self._compiler.fold_argument_types(args, kws)
         self.translation(tuple(args))
         name = self.py_func.__name__
@@ -202,12 +221,12 @@ class Law(CPUDispatcher):
         return template, signature, args, {}
 
     def get_overload(self, sig):
-        """Return the library of a signature, for the target."""
+        """Return the translation for a signature, by which numba finds the implementation of a call from a law."""
         args, _ = sigutils.normalize_signature(sig)
         return self._translated[tuple(args)].library
 
     def compile(self, sig):
-        """Return the entry point for these types, for a call from Python."""
+        """Return the entry point of the executable for a signature, for a call from Python."""
         args, _ = sigutils.normalize_signature(sig)
         with global_compiler_lock:
             if args not in self.overloads:
@@ -220,7 +239,7 @@ class Law(CPUDispatcher):
             return self.overloads[args].entry_point
 
     def translation(self, args):
-        """Return the translation for arguments of these types, for calls from other laws."""
+        """Return the CompileResult of the translation for arguments of these types, for calls from other laws."""
         if args not in self._translated:
             made = self._translations.load_overload(args, self.targetctx)
             if made is None:
@@ -231,6 +250,7 @@ class Law(CPUDispatcher):
         return self._translated[args]
 
     def _translate(self, args):
+        """Return the CompileResult of a new translation for arguments of these types."""
         flags = compiler.Flags()
         self.targetdescr.options.parse_as_flags(flags, self.targetoptions)
         flags.no_compile = flags.no_cpython_wrapper = flags.no_cfunc_wrapper = True
@@ -242,7 +262,8 @@ class Law(CPUDispatcher):
 
 
 def _executable(law):
-    """Return a translated law as a CompileResult with an entry point, of a library with all the laws that it calls."""
+    """Return the CompileResult of an executable, which contains all the laws that a law calls. law: CompileResult of
+    its translation."""
     context = law.target_context
     context.refresh()
     library = context.codegen().create_library(law.fndesc.qualname)
@@ -257,10 +278,10 @@ def _executable(law):
 
 
 def by_type(function, law_of):
-    """Let compiled code call a function that is the Law law_of(type of its first argument); None: the call does
-    nothing.
+    """Let compiled code call `function`, which stands for a Law that depends on the type of its first argument.
 
-    numba.extending.overload would make an executable of each law.
+    law_of(type of the first argument) returns the Law, or None if the call does nothing. Numba's own function
+    `overload` is not used, because it would make an executable of each of these laws.
     """
     @type_callable(function)
     def type_call(context):

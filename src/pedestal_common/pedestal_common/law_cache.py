@@ -1,7 +1,8 @@
-"""Law cache: a folder named after all sources of the product, which all checkouts with these sources share.
+"""Law cache: folders of compiled laws, one for each package, from which `compiled` loads the laws.
 
-Numba's own cache does not notice a change of a called function in another file (numba documentation, "Notes on
-Caching").
+The name of a folder contains a digest of the sources on which the laws of the package depend. Changed code therefore
+gets a new folder, and all checkouts with the same sources share one. Numba's own cache does not notice a change of a
+called function in another file (numba documentation, "Notes on Caching").
 """
 import ast
 import contextlib
@@ -22,21 +23,25 @@ from numba.core.runtime import rtsys
 from numba.misc.appdirs import user_cache_dir
 
 COLUMN_PACKAGES = ('ship_motion_sim', 'tracking_receiver_sim', 'acu_tracker', 'adu_drive')
+"""Packages of the nodes that have laws. Such a package is called a column: its laws call only laws of the same package
+and of pedestal_common."""
+
 UPPER_PACKAGES = ('pedestal_bringup', 'pedestal_analysis', 'pedestal_studies')
-"""Packages with laws above the columns; a law may call those of the packages before its own."""
+"""Packages above the columns; their laws may also call the laws of the columns, and of the packages that stand earlier
+in this tuple."""
 
 MAX_CACHE_AGE_DAYS = 7.0
-"""Age after which an unused law cache is deleted [days]."""
+"""Time without use after which a folder or file of the cache is deleted [days]."""
 _ROOT = pathlib.Path(getattr(numba.config, 'CACHE_DIR', '') or user_cache_dir()) / 'pedestal'
 if not _ROOT.is_absolute():
-    # Without a home, as in a container, '~' is not expanded.
+    # Without a home folder, as in a container, '~' is not expanded.
     _ROOT = pathlib.Path(tempfile.gettempdir()) / f'pedestal-{os.getuid()}'
 
 
 def digest(packages) -> str:
-    """Return a digest of the code of packages, without docstrings and comments, and of the compiler's version.
+    """Return a digest of the code of packages, without docstrings and comments, and of numba's version.
 
-    Because parsing all sources takes 0.4 s, the digest is kept in a file that is named after their bytes.
+    Because parsing all sources takes 0.4 s, the digest is stored in a file whose name is a digest of their bytes.
     """
     sources = list(_sources(packages))
     kept = _ROOT / f'digest-{_sha(sources)}'
@@ -62,6 +67,7 @@ def _sources(packages):
 
 
 def _sha(named):
+    """Return a digest of [(name, bytes)] and of numba's version."""
     sha = hashlib.sha256(numba.__version__.encode())
     for name, content in named:
         sha.update(f'{name} {len(content)}\n'.encode() + content)
@@ -85,7 +91,12 @@ def _is_text(statement):
 
 @functools.cache
 def _folder_of(package) -> str | None:
-    """Return the cache of one package's laws, named after its own sources and all that it may call."""
+    """Return the folder of the laws of a package, None if it cannot be written.
+
+    The folder is named after the sources of the package, and of all packages whose laws its laws may call. Folders and
+    files of the cache that were not used for MAX_CACHE_AGE_DAYS are deleted.
+    """
+    # The laws of a package that is in neither tuple, such as a test, may call the laws of all packages in them.
     below = () if package == 'pedestal_common' or package in COLUMN_PACKAGES else (
         *COLUMN_PACKAGES, *(UPPER_PACKAGES[:UPPER_PACKAGES.index(package)] if package in UPPER_PACKAGES
                             else UPPER_PACKAGES))
@@ -102,34 +113,38 @@ def _folder_of(package) -> str | None:
 
 
 def folder(thing) -> str | None:
-    """Return the cache of the package of a law or a type; None without one."""
+    """Return the folder for the package of a law or a class; None if the folder cannot be written."""
     return _folder_of(thing.__module__.partition('.')[0])
 
 
 @contextlib.contextmanager
 def locked_file(path):
-    """Hold the lock of a file, for which other processes wait."""
+    """Hold the lock of a file, as a context; other processes wait for the lock."""
     with path.open('w') as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         yield
 
 
 class _Place(UserProvidedCacheLocator):
-    """Place of a law in the cache. Its folder is named after its module, not after the path of its file, so a checkout
-    finds the laws that another checkout of the same sources has compiled. The place contains neither a line number nor
-    the bytes of the file, because an edited docstring changes both; the folder of the package stands for the code."""
+    """Place of a law in the cache, in the form that numba expects.
+
+    Its folder is named after the module, not after the path of the file. A checkout therefore finds the laws that
+    another checkout of the same sources has compiled. The place contains neither a line number nor the bytes of the
+    file, because an edited docstring changes both. The name of the package's folder already identifies the code.
+    """
 
     def __init__(self, law, file):
         super().__init__(law, file)
         self._cache_path = os.path.join(folder(law), law.__module__)
+        # The qualified name of a law that is made inside a function contains '<locals>'.
         self._code = law.__code__ if '<' in law.__qualname__ else None
 
     def get_source_stamp(self):
-        """Return nothing in the place of the bytes of the file, for numba."""
+        """Return None, in place of numba's stamp of the source file."""
 
     def get_disambiguator(self):
-        """Return a text that distinguishes laws of one name, because laws that one function makes may have different
-        code."""
+        """Return a text that distinguishes laws of the same name. Laws that are made inside one function have one
+        name, and may have different code."""
         if self._code is None:
             return '0'
         constants = [value for value in self._code.co_consts if not inspect.iscode(value)]
@@ -142,17 +157,19 @@ class _Place(UserProvidedCacheLocator):
 
 
 class Contents(CompileResultCacheImpl):
-    """Cached form of a law; overridden where that is no executable."""
+    """Conversion of a compiled law to the form that is saved, and back; overridden for laws that are kept as LLVM code
+    without machine code (law._Translated)."""
     _locator_classes = [_Place]
 
 
 class Cache(FunctionCache):
-    """Cache of a law, with a lock for saving. Numba reads the index, chooses a name, writes the index and then the
-    code. Without the lock, two processes that save one law for two signatures at once may lose an entry, or store the
-    code of the other under it.
+    """Cache of a law, with a lock for saving and a faster loading than numba's cache.
 
-    To load a law, numba prepares its compiler, which takes a third of a second and all of scipy.linalg. Here loading
-    initialises the NRT runtime only; the compiler is initialised at the first compilation.
+    To save code, numba reads the index, chooses the name of a file, writes the index and then the code. Without the
+    lock, two processes that save one law for two signatures at once may lose an entry, or mix up the two codes.
+
+    To load a law, numba first prepares its compiler, which takes a third of a second and imports all of scipy.linalg.
+    This class initialises only numba's run-time library (NRT). The compiler is prepared at the first compilation.
     """
     _impl_class = Contents
 

@@ -1,6 +1,6 @@
-"""Parameters as frozen dataclasses: one declaration gives default, unit, range and description.
+"""Parameters of the nodes as frozen dataclasses: one declaration gives default, unit, range and description.
 
-The ROS side (declare, refuse, read) is in shell.py. No ROS here.
+node/shell.py declares these parameters in ROS and refuses wrong values. No ROS here.
 """
 import dataclasses
 import difflib
@@ -21,15 +21,15 @@ def parameter(default: float, low: float, high: float, unit: str, doc: str,
               grid: tuple[float, float, int] | None = None) -> typing.Any:
     """Declare a number (float or int, as annotated) between low and high inclusive.
 
-    grid: (lowest value, highest value, number of values), spaced evenly in the logarithm, of the values at which
-    `pedestal tune` begins its search for the best value; None: the parameter is not tuned.
+    grid: (lowest value, highest value, number of values) of the values at which `pedestal tune` begins its search for
+    the best value. The values are spaced evenly in the logarithm. None: the parameter is not tuned.
     """
     return dataclasses.field(default=default, metadata={'low': low, 'high': high, 'unit': unit, 'doc': doc,
                                                         'grid': grid})
 
 
 def choice(default: str, options: Iterable[str], doc: str) -> typing.Any:
-    """Declare a string out of options."""
+    """Declare a string that must be one of the options."""
     return dataclasses.field(default=default, metadata={'options': tuple(options), 'doc': doc})
 
 
@@ -65,7 +65,10 @@ class Parameters:
 
     def check_graph(self, beams: int, lockstep: bool) -> None:
         """Raise ParameterError where parameters do not fit the graph; overridden where there are such parameters.
-        beams: as in nodes.links; lockstep: True if the pacing of the graph is lockstep."""
+
+        beams: number of beams of an electronic array, 0 for a drive with motors; lockstep: True if the pacing of the
+        graph is lockstep.
+        """
 
 
 _P = typing.TypeVar('_P', bound=Parameters)
@@ -73,8 +76,8 @@ _F = typing.TypeVar('_F', bound=Callable)
 
 
 def _cached(function: _F) -> _F:
-    """Return functools.cache of a function with its own type, because mypy takes the class of a dataclass for
-    unhashable."""
+    """Return functools.cache of a function, with the type of that function for mypy. The type of functools.cache would
+    refuse the class of a dataclass as an argument, which mypy takes for unhashable."""
     return typing.cast(_F, functools.cache(function))
 
 
@@ -86,6 +89,7 @@ class RosParameters(Parameters):
 
 
 _ROS_PREFIX = 'qos_overrides.'
+"""Beginning of the names of further parameters that rclpy gives every node."""
 
 
 def without_ros(values: Mapping[str, typing.Any]) -> dict[str, typing.Any]:
@@ -105,7 +109,8 @@ def _check_field(field: dataclasses.Field, name: str, value: typing.Any) -> None
         if field.type is int and not isinstance(value, int):
             raise ParameterError(f'{name} = {value!r}: must be a whole number')
         if not (math.isfinite(value) and meta['low'] <= value <= meta['high']):
-            raise ParameterError(f'{name} = {value:g} {meta["unit"]}: must be {meta["low"]:g} to {meta["high"]:g}')
+            given = f'{value:g} {meta["unit"]}'.rstrip()
+            raise ParameterError(f'{name} = {given}: must be {meta["low"]:g} to {meta["high"]:g}')
     elif 'options' in meta and value not in meta['options']:
         raise ParameterError(f'{name} = {value!r}: must be one of {", ".join(meta["options"])}')
     elif field.type is bool and not isinstance(value, bool):
@@ -122,7 +127,7 @@ def _group_type(field: dataclasses.Field) -> type[Parameters]:
 
 
 def flatten(cls: type[Parameters], prefix: str = '') -> Iterator[tuple[str, dataclasses.Field]]:
-    """Yield (dotted name, field) of every leaf of a parameter dataclass, with the fields of its groups."""
+    """Yield (dotted name, field) of every parameter of a dataclass, including those in its groups."""
     for field in dataclasses.fields(cls):
         name = prefix + field.name
         if field.metadata.get('group'):
@@ -144,7 +149,7 @@ def defaults(cls: type[Parameters]) -> dict[str, typing.Any]:
 
 @_cached
 def _readers(cls: type[Parameters]) -> list[tuple[str, Callable[[Parameters], typing.Any]]]:
-    """Return [(dotted name, function that reads it from an instance)] of every leaf of a parameter dataclass."""
+    """Return [(dotted name, function that reads the value from an instance)] of every parameter of a dataclass."""
     return [(name, operator.attrgetter(name)) for name, _ in flatten(cls)]
 
 
@@ -160,7 +165,8 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
 
 
 def build(cls: type[_P], values: Mapping[str, typing.Any], prefix: str = '') -> _P:
-    """Return an instance of {dotted name: value}, every name beginning with `prefix`; other fields keep their default.
+    """Return an instance with values {dotted name: value}. Every name begins with `prefix`. Other fields keep their
+    default.
 
     Raises ParameterError for an unknown name (with the nearest known name) or a refused value.
     """
@@ -207,8 +213,11 @@ def _replace(instance: _P, values: Mapping[str, typing.Any], prefix: str) -> _P:
 
 @_cached
 def record_type(cls: type[Parameters]) -> np.dtype:
-    """Return the numpy record of a parameter dataclass: float -> f8, int and bool -> i8, a choice -> i8 (its index
-    among the options), a group -> nested record; other texts are left out."""
+    """Return the type of the numpy record of a parameter dataclass.
+
+    A float becomes f8, an int or a bool i8, a choice i8 (its index among the options), and a group a nested record.
+    Other texts are left out.
+    """
     fields: list[tuple[str, str | np.dtype]] = []
     hints = typing.get_type_hints(cls)
     for field in dataclasses.fields(cls):
@@ -235,7 +244,7 @@ def _record_values(instance: Parameters, cls: type[Parameters]) -> tuple:
 
 
 def record(instance: Parameters, cls: type[Parameters] | None = None) -> np.ndarray:
-    """Return an instance as a record array of shape (1,), the form of the compiled steps.
+    """Return an instance as a record array of shape (1,), the form in which compiled laws read parameters.
 
     cls: base class of the instance, whose fields alone are in the record; None: all fields of the instance.
     """

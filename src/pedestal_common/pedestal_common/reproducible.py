@@ -1,9 +1,11 @@
-"""Array arithmetic with the same bits on every processor: elementary functions of the C library, products and
-solutions of small matrices in one order.
+"""Array arithmetic with the same bits on every processor.
 
-With AVX-512 numpy's own sin or ** end in other digits, and with another BLAS its matrix products do. A run would then
-not give the same bytes on another machine. These functions are slow, because they are used once, before the first
-step.
+The elementary functions are those of the C library. Matrix products and solutions have their operations in a fixed
+order.
+
+The last digits of numpy's own sin and ** depend on the processor (AVX-512), and those of its matrix products on the
+BLAS library. A run would then not give the same bytes on another machine. The functions of this module are slow, and
+are therefore called only once, before the first step.
 """
 import math
 
@@ -24,8 +26,10 @@ def geomspace(first, last, n):
 
 
 def solution(A, b) -> list:
-    """Return x of A x = b, A (n, n) real or complex, b (n,): Gauss's elimination with the largest pivot of each
-    column."""
+    """Return the solution x of A x = b, by Gauss's elimination with the largest pivot of each column.
+
+    A: (n, n), real or complex; b: (n,).
+    """
     rows = [[*row, right] for row, right in zip(np.asarray(A).tolist(), np.asarray(b).tolist())]
     for i in range(len(rows)):
         pivot = max(range(i, len(rows)), key=lambda k: abs(rows[k][i]))

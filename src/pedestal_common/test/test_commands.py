@@ -53,7 +53,7 @@ def test_values_are_checked_by_the_table():
 @pytest.mark.parametrize(('text', 'said'), (
     ('pont azimuth=1', "unknown command 'pont'; did you mean 'point'?"),
     ('point', 'point: azimuth is missing; must be -3 to 3 rad'),
-    ('point azimuth=4', 'point: azimuth = 4 rad: must be -3 to 3'),
+    ('point azimuth=4', 'point: azimuth = 4 rad: must be -3 to 3 (229.2 deg: must be -171.9 to 171.9)'),
     ('point azimuth=nan', 'point: azimuth = nan rad: must be -3 to 3'),
     ('point azimuth=north', 'point: azimuth = north rad: must be -3 to 3'),
     ('point azimuth=1 height=2', "point: unknown argument 'height'; there are azimuth, speed"),

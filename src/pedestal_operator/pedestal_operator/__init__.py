@@ -1,5 +1,6 @@
-"""Operation of the antenna: a console, single commands, the page, and servers for other programs.
+"""Operation of the antenna by persons and by other programs: a console, single commands, the page in a browser, and
+servers for other programs.
 
-These programs use the topics of the graph only. They subscribe to its state (`remote_node`), and publish commands on
+All of these use the topics of the graph only. They subscribe to its state (`remote_node`), and publish commands on
 acu/command and NODE/inject.
 """

@@ -1,4 +1,7 @@
-"""Last messages of an antenna, from a running graph or a recording."""
+"""Common interface to the last messages of an antenna, for the programs of the operator.
+
+The antenna is a running graph (remote_node.Remote), or a recording (pedestal_analysis.reprocess.replay_page).
+"""
 import abc
 import math
 
@@ -11,8 +14,8 @@ MAX_MESSAGE_AGE_S = 2.5
 class Antenna(abc.ABC):
     """Reader of the last messages of an antenna.
 
-    beam      prefix of the nodes of the beam
-    numbers   {topic: numbers of its last message}
+    beam      prefix of the nodes of one beam, such as 'beam_2/'; '' without several beams
+    numbers   {topic: numbers of its last message, in the order of `layouts.columns`}
     texts     {topic: its last text}
     status    {node: its last DiagnosticStatus}
     alarms    list of the DiagnosticStatus on acu/alarms
@@ -41,7 +44,7 @@ class Antenna(abc.ABC):
         return {pair.key: pair.value for pair in status.values} if status else {}
 
     def name_of(self, node) -> str:
-        """Return the name under which a node publishes its diagnostics."""
+        """Return the name under which a node publishes its diagnostics: with the beam, for a node of a beam."""
         return self.beam + node if nodes.row(node).of_beam else node
 
     def angles(self, topic):
@@ -53,6 +56,7 @@ class Antenna(abc.ABC):
         return self._degrees('joint_states', 2)
 
     def _degrees(self, topic, first):
+        """Return two numbers of a topic from index `first` on, in degrees, NaN if stale."""
         if not self.present(topic):
             return math.nan, math.nan
         azimuth, elevation = self.numbers[topic][first:first + 2]

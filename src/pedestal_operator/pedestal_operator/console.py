@@ -1,4 +1,4 @@
-"""`pedestal operate`: state of the antenna on a terminal, and keys for modes and rates."""
+"""Console of the operator on a terminal (`pedestal operate`): state of the antenna, and keys for modes and jogs."""
 import contextlib
 import math
 import os
@@ -20,7 +20,7 @@ from pedestal_operator.requests import JOG_REPEAT_PERIOD_S
 KEY_HOLD_S = 0.35
 """Time after the last press of a key during which the key counts as held [s].
 
-Keyboards repeat about 30 times a second after a pause.
+A held key is repeated about 30 times a second after a pause.
 """
 
 JOG_RATES_DEG_S = (0.1, 0.5, 1.0, 2.0, 5.0)
@@ -74,7 +74,12 @@ def keyboard():
 
 
 class Console:
-    """Keys and screen of the console. last_reply: text of the last reply."""
+    """Keys and screen of the console. session: a remote_node.RemoteSession.
+
+    rate           selected jog rate [deg/s]
+    last_reply     text of the last reply, or of the last refusal without a request
+    finished       True after a key of QUIT_KEYS
+    """
 
     def __init__(self, session):
         self._remote = session.remote
@@ -95,7 +100,7 @@ class Console:
         elif key in ARROW_DIRECTIONS:
             is_held = ARROW_DIRECTIONS[key] == self._jog and now - self._press_time < KEY_HOLD_S
             self._jog, self._press_time = ARROW_DIRECTIONS[key], now
-            # A new press jogs at once.
+            # A key that was not held before jogs at once.
             self._last_jog_time = self._last_jog_time if is_held else 0.0
         elif key in ('+', '-'):
             place = JOG_RATES_DEG_S.index(self.rate) + (1 if key == '+' else -1)

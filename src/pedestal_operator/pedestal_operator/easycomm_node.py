@@ -1,4 +1,4 @@
-"""ROS node that serves the EasyComm protocol over TCP and a serial device.
+"""ROS node that serves the rotator protocol EasyComm over TCP and a serial device, for programs that track satellites.
 
 In the folder rotator, easycomm.py reads the lines and controller.py turns them into commands.
 
@@ -99,7 +99,8 @@ class EasycommNode(ServerNode):
         client.queue_answer(easycomm.answer(request, angles, self._status(client, angles), 0, SERVER_VERSION))
 
     def _point(self, client, angles, now):
-        """Return the pending request of a set-point, (azimuth, elevation) [deg], None for an angle that is kept."""
+        """Return the pending request of a set-point. angles: (azimuth, elevation) [deg]; an angle that is None keeps
+        its last value."""
         try:
             last = None if client.refused else self.controller.pointing.set_point(now)
             before = client.set_point or last or self.controller.pointing.earth_angles()
@@ -121,6 +122,7 @@ class EasycommNode(ServerNode):
         return angles
 
     def _status(self, client, angles):
+        """Return the status number in the answer to GS."""
         if client.refused or angles is None:
             return easycomm.STATUS_ERROR
         moving = any(abs(rate) > 0.01 for rate in self.rates())

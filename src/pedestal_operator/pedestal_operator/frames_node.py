@@ -1,4 +1,4 @@
-"""ROS node for RViz: the model of the pedestal on `robot_description`, its frames on `tf`.
+"""ROS node for the viewer RViz: it publishes the model of the pedestal on `robot_description`, and its frames on `tf`.
 
 In the folder viewers, frames.py computes the frames, and the folder files holds the model.
 

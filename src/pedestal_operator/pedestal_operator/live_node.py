@@ -1,4 +1,4 @@
-"""ROS node for Foxglove and Lichtblick: the messages of the graph, byte by byte, over a WebSocket.
+"""ROS node that serves the messages of the graph, byte by byte, to the viewers Foxglove and Lichtblick by WebSocket.
 
 In the folder viewers, on_demand.py subscribes to the topics that a viewer shows.
 
@@ -49,7 +49,8 @@ def sdk():
 
 
 class Outlet:
-    """A channel of CDR messages of a type. last: (bytes, send time [ns]) of the last message, None before."""
+    """Channel of the Foxglove server with CDR messages of one type. last: (bytes, send time [ns]) of the last message,
+    None before the first."""
 
     def __init__(self, name, type_name):
         foxglove = sdk()

@@ -15,6 +15,7 @@ import socket
 import sys
 import time
 
+from rcl_interfaces.msg import ParameterType
 from rcl_interfaces.srv import GetParameters
 
 from pedestal_common import parameters
@@ -28,7 +29,7 @@ from pedestal_operator.page.page_server import PageServer
 from pedestal_operator.remote_node import Remote
 
 STATE_PERIOD_S, POLL_PERIOD_S, SLOW_STATE_PERIOD_S = 0.05, 0.01, 1.0
-"""Periods of the states sent to pages, of the check for their commands, and of the slow part of the state [s]."""
+"""Periods of the state sent to the pages, of the check for their commands, and of the slow part of the state [s]."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -36,13 +37,14 @@ class PageParameters(parameters.Parameters):
     """Parameters of the page server."""
     address: str = parameters.text('127.0.0.1', 'address of the server')
     port: int = parameters.parameter(8080, 0, 65535, '', 'TCP port; 0: a free port, which the node prints')
-    names: str = parameters.text('', 'further names of the server in addresses of browsers, separated by commas')
+    names: str = parameters.text('', 'further host names of the server in a browser, separated by commas')
     clients: int = parameters.parameter(32, 1, 256, '', 'largest number of open pages')
 
 
 class PageNode(Remote):
     """Client of the graph for all pages; a command carries the name of the user of its page."""
     awaits = 'pages'
+    """What the node waits for, in the line that it logs when it is ready (Shell.awaits)."""
 
     def __init__(self):
         super().__init__('operator_page', 'page', parameters_type=PageParameters)
@@ -77,9 +79,10 @@ class PageNode(Remote):
         """Time in UTC [s]."""
         return self.clock()[1] * 1e-9
 
-    def _request_for(self, who, verb, arguments):
-        self.who = who
-        return self.request(verb, arguments)
+    def _request_for(self, client, command, arguments):
+        """Send a command in the name of the user of a page, and return the number of the request."""
+        self.who = client
+        return self.request(command, arguments)
 
     def _take_reply(self, status):
         """Keep the reply to a request of a page, and log the replies to all clients."""
@@ -108,7 +111,7 @@ class PageNode(Remote):
         now = time.monotonic()
         while not self._server.requests.empty():
             self._pages.take(self._server.requests.get_nowait(), now)
-        self._pages.look(now)
+        self._pages.look(now)     # forwards replies, and ends the jogs of silent pages
 
     def _send_state(self):
         """Send the newest state, if a page is open."""
@@ -135,7 +138,7 @@ class PageNode(Remote):
                               'sky': page_state.sky(self, self._upcoming_passes.look(self))})
 
     def _request_parameters(self, node, names):
-        """Request the parameters of a node at its start and at each restart."""
+        """Request parameters of a node when it appears, and again after each time in which it was silent."""
         client, future = self._parameter_requests.get(node) or (None, None)
         if not self.present(node):
             self._parameter_requests[node] = client, None
@@ -148,7 +151,9 @@ class PageNode(Remote):
 
     def _take_parameters(self, names, response):
         for name, value in zip(names, response.values):
-            content = {2: value.integer_value, 3: value.double_value, 4: value.string_value}.get(value.type)
+            content = {ParameterType.PARAMETER_INTEGER: value.integer_value,
+                       ParameterType.PARAMETER_DOUBLE: value.double_value,
+                       ParameterType.PARAMETER_STRING: value.string_value}.get(value.type)
             if content is not None:
                 self.configuration[name] = content
 

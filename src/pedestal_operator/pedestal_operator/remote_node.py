@@ -1,4 +1,7 @@
-"""Node outside the graph that receives the state of the antenna, sends commands, and waits for replies."""
+"""ROS node of a client, outside the graph: it receives the state of the antenna, sends commands and receives replies.
+
+The page, the console, the single commands of `pedestal` and the rotator protocols use it.
+"""
 import getpass
 import math
 import os
@@ -46,8 +49,8 @@ class Remote(Shell, Antenna):
     """Client of a graph.
 
     who       name of the person or program in the next commands
-    node      node that receives the commands
-    numbers   {topic: numbers of its last message in the order of `records`}
+    node      row of nodes.NODES of the node that receives the commands
+    numbers   {topic: numbers of its last message in the order of `layouts.columns`}
     texts     {topic: its last text}
     status    {node: its last DiagnosticStatus}
     alarms    list of the DiagnosticStatus on acu/alarms
@@ -125,7 +128,7 @@ class Remote(Shell, Antenna):
 
 
 class Query:
-    """Numeric parameters of a node. values: [number], None before the reply of the node."""
+    """Request for numeric parameters of a node. values: [number], None before the reply of the node."""
 
     def __init__(self, client, names):
         self._client, self._request = client, GetParameters.Request(names=names)
@@ -145,7 +148,7 @@ class Query:
 
 
 class RemoteSession:
-    """A Remote with its executor, as a context. make() -> the Remote; arguments: of ROS 2."""
+    """A Remote with its executor, as a context. make() returns the Remote; arguments: arguments for ROS 2."""
 
     def __init__(self, make, arguments=()):
         self._make, self._arguments = make, arguments
@@ -167,7 +170,8 @@ class RemoteSession:
         self._executor.spin_once(timeout_sec=seconds)
 
     def until(self, condition, seconds):
-        """Return the value of a condition as soon as it is true, or its last value after some seconds."""
+        """Receive messages until condition() is true, for some seconds at most. Return the last value of
+        condition()."""
         deadline = time.monotonic() + seconds
         while not (value := condition()) and time.monotonic() < deadline:
             self.spin(0.05)
@@ -195,9 +199,10 @@ class RemoteSession:
         return reply
 
     def hold_jog(self, verb, arguments, seconds) -> Reply:
-        """Repeat a jog for some seconds, then stop the axes; also after a stop of this program. Return the last Reply.
+        """Repeat a jog for some seconds, then stop the axes. Return the last Reply.
 
-        If the antenna has left the mode, its new mode stays.
+        The axes are also stopped if this program is stopped. If the antenna has left the mode of the jog meanwhile,
+        its new mode stays.
         """
         end = time.monotonic() + seconds
         try:

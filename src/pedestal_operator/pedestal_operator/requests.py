@@ -1,17 +1,20 @@
-"""Requests to a node and their replies. No ROS here."""
+"""Requests of this program to a node, and the replies of the node, matched by the numbers of the requests. No ROS
+here.
+"""
 import itertools
 
 from pedestal_common.wire.commands import Command
 
 JOG_REPEAT_PERIOD_S = 0.2
-"""Period of the repetition of a jog [s], less than half of the jog timeout of the control unit."""
+"""Period at which a jog is repeated [s], less than half of the jog timeout of the control unit."""
 
 MAX_KEPT_REQUESTS = 1000
 """Largest number of requests kept, because some replies are never read."""
 
 
 class Requests:
-    """Numbers of requests, and their replies. prefix: start of the numbers, unique to this program."""
+    """Requests without a reply, and replies that have not been read. prefix: start of the numbers of the requests,
+    unique to this program."""
 
     def __init__(self, prefix):
         self._numbers = (f'{prefix}-{count}' for count in itertools.count(1))
@@ -35,7 +38,7 @@ class Requests:
         return self._pending[number]
 
     def take(self, command, reply):
-        """Keep the Reply to a Command of these requests."""
+        """Keep a Reply if its Command is one of these requests."""
         pending = self._pending.get(command.number)
         if pending and pending.who == command.who:
             self._replies[command.number] = reply

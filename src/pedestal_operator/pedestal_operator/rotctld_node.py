@@ -1,4 +1,4 @@
-"""ROS node that serves the rotctld protocol over TCP to clients of Hamlib and to gpredict.
+"""ROS node that serves the rotator protocol of rotctld over TCP to gpredict and to other clients of Hamlib.
 
 In the folder rotator, rotctld.py reads the lines and controller.py turns them into commands.
 
@@ -32,13 +32,14 @@ ANTENNA_COMMAND_BY_NAME = {'park': 'stow', 'reset': 'acu/reset_faults'}
 class RotctldParameters(ServerParameters):
     """Parameters of the rotctld server."""
     port: int = tcp_port(4533)
-    read_only: bool = parameters.flag(False, 'refusal of all commands that move the antenna')
+    read_only: bool = parameters.flag(False, 'refusal of all commands that move or stop the antenna')
     raw_azimuth: bool = parameters.flag(False, 'azimuth in answers over the whole travel, not modulo 360 deg')
     jog_rate: float = parameters.parameter(5.0, 0.01, 60.0, 'deg/s', 'rate of `move` at 100 %')
 
 
 class RotctldClient(Client):
-    """line, request, pending: line without an answer, its rotctld.Request, and its controller.PendingRequest."""
+    """A connected program. line: the line that waits for its answer; request, pending: its rotctld.Request and its
+    controller.PendingRequest."""
     line = request = pending = None
 
 
@@ -49,8 +50,10 @@ class RotctldNode(ServerNode):
         super().__init__('rotctld', RotctldParameters, rotctld.MAX_LINE_BYTES, RotctldClient)
 
     def serve(self, client, now):
-        """Answer the lines in order; a command of the antenna is answered after the reply of the control unit."""
-        client.end_line(rotctld.is_complete)    # gpredict for Windows sends no line end.
+        """Answer the lines in order. A line that commands the antenna is answered after the reply of the control unit.
+        """
+        # A complete command without a line end counts as a line, because gpredict for Windows sends no line end.
+        client.end_line(rotctld.is_complete)
         while client.pending or client.lines:
             if client.pending:
                 outcome = client.pending.look(self, now)
@@ -62,7 +65,10 @@ class RotctldNode(ServerNode):
                 self._begin(client, client.lines.popleft(), now)
 
     def _begin(self, client, line, now):
-        """Answer a line, or begin its request. line: None if it was longer than rotctld.MAX_LINE_BYTES."""
+        """Answer a line, or begin its request. line: None if it was longer than rotctld.MAX_LINE_BYTES.
+
+        A line for which rotctld.read returns None gets no answer.
+        """
         request = rotctld.Request('', error=RESULT_INVALID) if line is None else rotctld.read(line)
         if request is None:
             return
@@ -71,7 +77,7 @@ class RotctldNode(ServerNode):
             self._answer(client, request.error, rotctld.ERROR_REASONS[request.error] if line is not None else
                          f'more than {rotctld.MAX_LINE_BYTES} bytes')
         elif request.name == 'quit':
-            client.gone = ''
+            client.gone = ''     # ended without an error
             client.lines.clear()
         elif request.name in rotctld.SET_COMMANDS:
             self._move(client, request, now)
@@ -90,6 +96,7 @@ class RotctldNode(ServerNode):
             self.refuse(client, client.request.name, client.line, reason)
 
     def _move(self, client, request, now):
+        """Begin a request that moves or stops the antenna, or refuse it if the server is read only."""
         if self.parameters.read_only:
             self._answer(client, RESULT_REJECTED, 'this server is read only (parameter read_only)')
             return

@@ -1,4 +1,4 @@
-"""Derived state of the antenna for the operator: values, their age, alarms, and the commands that would be refused.
+"""State of the antenna for the operator, derived from the last messages: values, alarms, refused commands.
 
 The page, the console, `pedestal status` and its JSON show these results and derive nothing themselves. All functions
 take an antenna.Antenna. A level is '' (normal), 'warn' or 'bad'.
@@ -24,7 +24,7 @@ REFUSAL_PREFIX = 'refused '
 """Start of a key in the diagnostics of the control unit, before the name of a mode."""
 
 ACU_STATUS_KEYS = ('mode', 'reason', 'fallback', 'control', 'drive', 'faults', 'locked', 'coasting', 'keyhole')
-"""Keys in the diagnostics of the control unit."""
+"""Keys in the diagnostics of the control unit that `rows` shows."""
 
 GRAPH_NODES = ('acu', 'adu', 'tracking_receiver', 'ins', 'ship_motion')
 """Nodes of an antenna whose silence the operator must see."""
@@ -44,7 +44,7 @@ ALARM_KEYS = ('state', 'priority', 'annunciated', 'first_out', 'cause', 'action'
 
 
 class Row(typing.NamedTuple):
-    """An item: group, name, number or text (None if not received), unit."""
+    """An item of the state. value: a number or a text, None if it was not received."""
     group: str
     name: str
     value: object
@@ -64,7 +64,7 @@ class Row(typing.NamedTuple):
 
 
 class Shown(typing.NamedTuple):
-    """A text for the operator and its level."""
+    """A text for the operator. level: '' (normal), 'warn' or 'bad'."""
     text: str
     level: str = ''
 
@@ -101,7 +101,7 @@ def node_reports(antenna) -> list:
 def header(antenna) -> dict:
     """Return {item: Shown} of mode, reason, drive, control, fallback and link.
 
-    A silent control unit has no mode: the last one is part of the reason, with its age.
+    The mode of a silent control unit is unknown. The reason then states the last mode and its age.
     """
     acu, link = antenna.diagnostics_of('acu'), _link(antenna)
     if acu:
@@ -117,7 +117,8 @@ def header(antenna) -> dict:
 
 
 def _drive(antenna, acu):
-    """Return the Shown state of the drive, by the control unit, which notices a silence first."""
+    """Return the Shown state of the drive. acu: diagnostics of the control unit. Their text comes first, because the
+    control unit notices a silence of the drive first."""
     text = acu.get('drive') or (antenna.texts.get('adu/state') if antenna.present(antenna.name_of('adu')) else None)
     if not text:
         return Shown('unknown', 'bad')
@@ -130,7 +131,7 @@ def _drive(antenna, acu):
 
 
 def _link(antenna):
-    """Return the Shown link to the graph: live, or the first silent node."""
+    """Return the Shown state of the link to the graph: live, or the first silent node."""
     if not antenna.present(antenna.name_of('acu')):
         return Shown('no ACU', 'bad')
     if is_drive_silent(antenna):

@@ -1,3 +1,3 @@
 """Recordings: rosbag2 directories with MCAP files, and programs that write, read, verify, recover and export them.
 
-The package depends on pedestal_common only. Its recorder node alone needs ROS."""
+The package depends on pedestal_common only. Of its modules, only the recorder node needs ROS."""

@@ -1,4 +1,7 @@
-"""Reading of a bag: a rosbag2 directory with its MCAP files, or one file. No ROS here."""
+"""Reading of a bag, the recording of a run: a rosbag2 directory with its MCAP files, or one MCAP file.
+
+The report, the verification, the export and the recomputation read bags by this module. It works without ROS.
+"""
 import contextlib
 import copy
 import functools
@@ -29,30 +32,36 @@ MAX_SEARCHED_DIAGNOSTICS = 100
 """Number of messages at the end of a bag in which the last diagnostics of a node are searched."""
 
 MAX_CHANNELS = 2000
-"""Largest number of channels of a file."""
+"""Largest number of channels of a file; a channel is the record of a topic in an MCAP file."""
 
 MAX_SHOWN_FOREIGN_MESSAGES = 3
 """Largest number of foreign messages of a topic whose time and size are shown."""
 
 INDEX_BLOCK_ROWS = 65_536
-"""Number of rows of a block of the index."""
+"""Largest number of rows that are added to the index, or taken from it, at once."""
 
 INDEX_FIELDS = [(name, 'i8') for name in ('channel', 'sequence', 'log', 'publish', 'stamp', 'foreign', 'chunk',
                                               'start', 'stop')]
+"""Names and types of the fields of Bag.index."""
 _UNREADABLE, _OTHER_PUBLISHER = 1, 2
+"""Values of the field `foreign` for a foreign message: its reason. The value 0 means a message of the graph."""
 _DECLARED = (Opcode.HEADER, Opcode.SCHEMA, Opcode.CHANNEL, Opcode.STATISTICS, Opcode.METADATA)
+"""Kinds of records outside chunks that hold no messages and are read."""
 Content = typing.TypeVar('Content')
+"""Type of the values in a dictionary {topic or node: value}."""
 MetadataRecords = Mapping[str, Mapping[str, str]]
 """Metadata records of a bag, {name: {text: text}}."""
 
 _NUMBERED = re.compile(r'(.+)_(\d+)\.mcap')
+"""Pattern of the file name NAME_0.mcap, NAME_1.mcap and so on of a bag."""
 
 
 def read(path: str | pathlib.Path, beam: str | None = None) -> 'Bag':
-    """Return the Bag in a directory or an .mcap file. beam: view of one beam, '' for the first, None for all beams.
+    """Return the Bag in a directory or an .mcap file.
 
-    The log has a warning for each topic with foreign messages. Raises BagError if the bag is missing, empty, damaged
-    or foreign, or has no such beam.
+    beam: name of the beam of an array to which the Bag is reduced (Bag.view), '' for the first; None for all beams.
+    Logs a warning for each topic with foreign messages. Raises BagError if the bag is missing, empty, damaged or no
+    ROS 2 recording, or has no such beam.
     """
     bag = load(path)
     for line in bag.foreign:
@@ -77,9 +86,9 @@ def chosen_topics(bag: 'Bag', names: Iterable[str]) -> list[str]:
 
 
 def load(path: str | pathlib.Path) -> 'Bag':
-    """Return the readable part of the Bag in a directory or an .mcap file.
+    """Return the Bag in a directory or an .mcap file, up to its first damage.
 
-    `damage` is a line with place and reason of its early end, '' for a whole bag. Raises BagError if nothing is
+    Its `damage` states place and reason of the early end, '' for a whole bag. Raises BagError if nothing is
     readable.
     """
     opened = [McapFile(file) for file in locate(path)]
@@ -120,7 +129,7 @@ def locate(path: str | pathlib.Path) -> list[pathlib.Path]:
 
 
 def _described(path: pathlib.Path) -> dict[str, typing.Any]:
-    """Return the content of the metadata.yaml of a bag, {} without a readable one."""
+    """Return the content of metadata.yaml in the directory of a bag, {} if the file is missing or unreadable."""
     try:
         return dict(plain_yaml.read(path / 'metadata.yaml')['rosbag2_bagfile_information'])
     except (OSError, yaml.YAMLError, UnicodeDecodeError, KeyError, TypeError, ValueError):
@@ -128,7 +137,7 @@ def _described(path: pathlib.Path) -> dict[str, typing.Any]:
 
 
 def compressed_messages(path: pathlib.Path, name: str | None) -> BagError:
-    """Return the BagError for messages that are compressed one by one in a format."""
+    """Return the BagError for a bag whose messages are compressed one by one; name: format of the compression."""
     folder = path.parent if (path.parent / 'metadata.yaml').is_file() else path
     return BagError(f"{path}: its messages are compressed one by one ({name}); `ros2 bag convert -i {folder} -o "
                     "plain.yaml` decompresses them, with plain.yaml = 'output_bags: [{uri: plain, storage_id: mcap, "
@@ -136,21 +145,21 @@ def compressed_messages(path: pathlib.Path, name: str | None) -> BagError:
 
 
 def start(metadata_records: MetadataRecords) -> int:
-    """Return time 0 of the scenario in the stamps of a bag [ns], UTC in realtime, from its metadata records."""
+    """Return the stamp of time 0 of the scenario [ns], from the metadata records of a bag: UTC in realtime, else 0."""
     return _nanoseconds(metadata_records.get('pedestal', {}).get('start')) or 0
 
 
 def planned_end(metadata_records: MetadataRecords) -> int | None:
     """Return the planned end of a run, a stamp [ns], from the metadata records of its bag; None if unknown."""
     planned = _nanoseconds(metadata_records.get('pedestal', {}).get('planned_end_ns'))
-    if planned is None:  # older recordings have the parameter only
+    if planned is None:  # an older recording has only the parameter `duration` of the recorder
         with contextlib.suppress(KeyError, TypeError, ValueError, OverflowError, yaml.YAMLError):
             planned = round(plain_yaml.parse(metadata_records['parameters']['recorder'])['duration'] * 1e9) or None
     return None if planned is None else start(metadata_records) + planned
 
 
 def _nanoseconds(text: str | None) -> int | None:
-    """Return a text of the metadata as a time [ns], None if it is none."""
+    """Return a text of the metadata as a time [ns], None if the text is no time."""
     return int(text) if text and text.isdecimal() and len(text) < 20 else None
 
 
@@ -160,18 +169,26 @@ def foreign_encoding(file: pathlib.Path, channel: Channel) -> BagError:
 
 
 class Bag:
-    """A recording.
+    """A recording: an index of all its messages, and the methods that read them.
 
     files, file        paths of its MCAP files in their order; the first of them
     topics             {name without the leading '/': type}
-    metadata_records   {name: {text: text}} of the first file
-    index              record array (n,) in the order of the files, one row per message: channel (its number plus
-                       65536 times the number of its file), sequence, log, publish, stamp [ns] (of its header; its log
-                       time without a header), foreign (0), chunk, start, stop (place of its bytes)
-    statistics         {name: count} in the summaries, None if a file has none
+    metadata_records   {name: {text: text}}, each from the first file that holds it
+    index              record array (n,) with one row for each message of the graph, in the order of the files
+    statistics         {topic: number of messages} that the summaries of the files state, None if a file has no summary
     breaks             lines about files without a summary before the last file: their recorder was killed
-    damage             broken or early ended file, with place and reason, ''
-    beam               prefix of the beam of a view, ''
+    damage             line about a broken or early ended file, with place and reason; '' for a whole bag
+    beam               prefix of the topic names of the only beam in a view, '' outside a view
+
+    Fields of a row of the index:
+    channel            number of the channel in its file, plus 65536 times the number of the file
+    sequence           sequence number of the message, counted by the recorder from 1 for each topic and file
+    log                log time [ns]: the stamp, or the time of the drive where the recorder could not accept the stamp
+    publish            publish time [ns]: in lockstep the stamp of the step, in realtime the wall time of the publisher
+    stamp              stamp in the header of the message [ns], its log time for a type without header
+    foreign            0 in `index`; the reason of a foreign message in the rows of `recorded`
+    chunk              number of the chunk that holds the message; -1 - number of the file, outside a chunk
+    start, stop        its CDR bytes are at [start, stop) of the unpacked chunk, or of the file
     """
 
     def __init__(self, path: pathlib.Path, opened: list[McapFile]) -> None:
@@ -212,9 +229,9 @@ class Bag:
         self.index = self._recorded[self._recorded.foreign == 0]
 
     def _mark_other_publishers(self) -> None:
-        """Mark the messages that the recorder numbers 0, because another publisher than that of the graph sent them.
+        """Mark the messages with the sequence number 0 as foreign: the recorder gives it to foreign publishers.
 
-        A topic without any number was written by another tool.
+        Other tools write the number 0 for all messages. Therefore a topic without any other number stays unmarked.
         """
         rows = self._recorded
         if 'pacing' in self.metadata:
@@ -240,7 +257,10 @@ class Bag:
                 raise EOFError(f'broken record at byte {start}: {error}') from None
 
     def _walk(self, number: int, data: bytes, offset: int, chunk: int) -> Iterator[np.ndarray]:
-        """Yield blocks of the index for the messages in the records `data`, which begin at an offset of the file."""
+        """Yield blocks of the index for the messages in records, given as bytes `data` of the file with a number.
+
+        offset: place of the bytes in the file, 0 for an unpacked chunk; chunk: value of that field of the index.
+        """
         unpack, base, at = MESSAGE_HEAD.unpack_from, number << 16, 0
         rows: list[tuple[int, ...]] = []
         add, file = rows.append, self._opened[number]
@@ -262,7 +282,10 @@ class Bag:
             yield self._block(file, rows, data, offset)
 
     def _block(self, file: McapFile, rows: list[tuple[int, ...]], data: bytes, offset: int) -> np.ndarray:
-        """Return rows as a block of the index; a row with a header takes its stamp."""
+        """Return rows of the index as an array, with the stamp from the header of each message that has one.
+
+        data: the bytes that hold the messages; offset: see _walk.
+        """
         file.count(len(rows))
         block = np.array(rows, INDEX_FIELDS)
         unknown = set(np.unique(block['channel']).tolist()) - set(self._channels)
@@ -280,8 +303,7 @@ class Bag:
         return block
 
     def _judge(self, block: np.ndarray, data: bytes) -> None:
-        """Mark the unreadable messages of a block of the index, and count the messages that are compressed one by one.
-        """
+        """Mark unreadable messages of a block of the index as foreign; count the messages compressed one by one."""
         for channel in np.unique(block['channel']).tolist():
             rows = np.flatnonzero(block['channel'] == channel)
             start, stop = block['start'][rows], block['stop'][rows]
@@ -295,6 +317,10 @@ class Bag:
                 block['foreign'][rows[~self._judges[channel].mask(data, start, stop)]] = _UNREADABLE
 
     def _declare(self, number: int, opcode: int, content: bytes) -> None:
+        """Note the schema, channel, metadata or statistics in a record of the file with a number.
+
+        Raises BagError for a channel that is not CDR, ValueError for an invalid record.
+        """
         record, base = mcap_file.parsed(opcode, content), number << 16
         if opcode == Opcode.SCHEMA:
             self._schemas[base | record.id] = record.name
@@ -319,7 +345,7 @@ class Bag:
                     self._counts[name] = self._counts.get(name, 0) + count
 
     def _bytes(self, chunk: int, start: int, stop: int) -> bytes:
-        """Return the bytes of a message from the place in its row of the index."""
+        """Return the CDR bytes of a message from the fields chunk, start and stop of its row of the index."""
         if chunk < 0:
             return self._opened[-1 - chunk].read(start, stop)
         if chunk not in self._cache:
@@ -346,12 +372,12 @@ class Bag:
 
     @property
     def start(self) -> int:
-        """Time 0 of the scenario in the stamps [ns]: UTC in realtime, else 0."""
+        """Stamp of time 0 of the scenario [ns]: UTC in realtime, else 0."""
         return start(self.metadata_records)
 
     @property
     def end(self) -> float:
-        """Log time of the last message since the start [s]."""
+        """Log time of the last message, minus the start [s]."""
         return float(self.index.log.max() - self.start) / 1e9
 
     @property
@@ -361,11 +387,11 @@ class Bag:
 
     @property
     def graph(self) -> dict[str, nodes.Link]:
-        """Links {name: Link} of the recorded graph."""
+        """Topics of the recorded graph, {name: nodes.Link} with type, rate, publishers and subscribers."""
         return nodes.links(self.beams)
 
     def view(self, beam: str = '') -> 'Bag':
-        """Return the Bag of one of several beams, '' for the first.
+        """Return this Bag reduced to one of the beams of an array, by the name of the beam; '' for the first beam.
 
         It has the topics of the beam under their plain names, and the topics that all beams share. A Bag of one beam
         is its own view. Raises BagError for a missing beam.
@@ -451,6 +477,7 @@ class Bag:
         return lines
 
     def _foreign_line(self, name: str, rows: np.recarray, reason: int) -> str:
+        """Return the line on the foreign messages of a topic that have one reason; rows: their rows of the index."""
         shown = ', '.join(f'{(row.log - self.start) / 1e9:.6f} s ({row.stop - row.start} bytes)'
                           for row in rows[:MAX_SHOWN_FOREIGN_MESSAGES])
         more = f' and {rows.size - MAX_SHOWN_FOREIGN_MESSAGES} more' if rows.size > MAX_SHOWN_FOREIGN_MESSAGES else ''
@@ -472,7 +499,7 @@ class Bag:
         return {}
 
     def raw(self, topic: str | None = None) -> Iterator[tuple[str, int, int, bytes]]:
-        """Yield (topic, log time, publish time [ns], CDR bytes) in the order of the file."""
+        """Yield (topic, log time, publish time [ns], CDR bytes) of the messages of a topic, None for all topics."""
         return self.take(self.index if topic is None else self.rows(topic))
 
     def take(self, rows: np.ndarray) -> Iterator[tuple[str, int, int, bytes]]:
@@ -483,7 +510,7 @@ class Bag:
                 yield names[channel], log, publish, take(*place)
 
     def messages(self, topic: str | None = None) -> Iterator[tuple[str, int, int, typing.Any]]:
-        """Yield (topic, log time, publish time [ns], message) in the order of the file.
+        """Yield (topic, log time, publish time [ns], message object) of the messages of a topic, None for all topics.
 
         Raises BagError for bytes that are no message of the type.
         """

@@ -1,8 +1,9 @@
-"""Messages of one topic as columns: numpy reads the numbers of many CDR messages at once.
+"""Messages of one topic as columns: each number of a message becomes an array over all messages. `Bag.table` uses it.
 
-Messages of equal shape have their numbers at equal places. The definition of the type gives these places for the first
-message. All messages with equal bytes outside the numbers form one array of bytes, and a column is a slice of the
-array. The remaining messages (other names, other lengths) are read the same way.
+CDR is the byte format of ROS 2 messages. Two messages have the same shape if they have the same length and the same
+bytes outside their numbers, such as names. Their numbers then stand at the same places. The definition of the type
+gives these places for the first message. All messages of its shape form one array of bytes, and a column is a slice of
+this array. The messages of the other shapes follow, one shape after another.
 """
 import numpy as np
 
@@ -14,14 +15,20 @@ MAX_MESSAGE_SHAPES = 100
 """Largest number of shapes of one length that are read as arrays; further messages are read one by one."""
 
 CELL_LIMITS = 4_000_000, 4
-"""Largest number of cells in the columns: a base, and the number of bytes of messages for each further cell.
+"""Limit of the cells of a table, columns times messages: a base, and the bytes of messages that allow one more cell.
 
-This avoids a table as wide as it is long, from messages that each name other columns.
+This avoids a huge table from a file whose messages each name other columns.
 """
+
+STATUS_TEXTS = ('name', 'hardware_id', 'message')
+"""Fields of a DiagnosticStatus that are texts."""
 
 
 def stamps(data, type_name, log):
-    """Return header stamps [ns] (n,) of messages; log times for a type without header, or with a message too short."""
+    """Return the stamps (n,) [ns] in the headers of messages; data: list of their CDR bytes, log: log times (n,) [ns].
+
+    Return the log times for a type without header, or if a message is too short for a header.
+    """
     log = np.asarray(log, np.int64)
     if type_name not in STAMPED_TYPES or not len(data) or min(map(len, data)) < 12:
         return log.copy()
@@ -30,19 +37,22 @@ def stamps(data, type_name, log):
 
 
 def table(data, type_name, log, start=0, as_sent=False):
-    """Return the columns of CDR messages of one type with their log times [ns].
+    """Return the columns {name: array (n,)} of the messages of one type.
 
-    `t` [s] is the header stamp after start [ns], or the log time for a type without header. Each number is an array:
+    data: list of their CDR bytes; log: their log times (n,) [ns].
+    The column `t` [s] is the stamp of the header minus start [ns]; for a type without header, it is the log time minus
+    start. The names of the other columns depend on the type:
     JointState     azimuth.position, azimuth.velocity, azimuth.effort, elevation.position, ...
     JointTrajectory  the first point: azimuth.position, azimuth.velocity, azimuth.acceleration, ...
     Vector3Stamped x, y, z
     Odometry       position.x, orientation.w, twist.linear.x, twist.angular.z, ...
     Imu            orientation.w, angular_velocity.x, linear_acceleration.z, orientation_variance.z, ...
     String         data (a list of texts)
+    DiagnosticStatus  level, and lists of texts: name, hardware_id, message, values (values_text)
     others         the path of the field
-    Covariances and header are omitted; a DiagnosticArray has `t` only. A missing number is NaN in its row. A number
-    that its message marks as no data (layouts.NO_DATA_MARKS) is NaN too, except if as_sent. Raises ValueError for
-    bytes that are no message of the type.
+    Covariances and header are omitted; a DiagnosticArray has `t` only. A number that a message does not hold is NaN in
+    its row. A number that its message marks as no data (layouts.NO_DATA_MARKS) is NaN too, except with as_sent=True.
+    Raises ValueError for bytes that are no message of the type.
     """
     out = {'t': (stamps(data, type_name, log) - start) / 1e9}
     if type_name == 'std_msgs/msg/String':
@@ -54,11 +64,25 @@ def table(data, type_name, log, start=0, as_sent=False):
             rows = np.flatnonzero(lengths == length)
             block = np.frombuffer(b''.join([data[row] for row in rows]), np.uint8).reshape(rows.size, length)
             _fill(out, block, rows, type_name, len(data), most, as_sent)
+    if type_name == 'diagnostic_msgs/msg/DiagnosticStatus':
+        texts = [cdr.Places(message, type_name).texts for message in data]
+        out.update({name: [of[name] for of in texts] for name in STATUS_TEXTS})
+        out['values'] = [values_text((of[path], of[f'{path[:-3]}value']) for path in of if path.endswith('].key'))
+                         for of in texts]
     return out
 
 
+def values_text(pairs):
+    """Return the (key, value) pairs of a DiagnosticStatus as one text, 'key=value; key=value'."""
+    return '; '.join(f'{key}={value}' for key, value in pairs)
+
+
 def _fill(out, block, rows, type_name, count, most, as_sent):
-    """Put the numbers of messages of one length (m, length) into rows of the columns, of `most` cells at most."""
+    """Put the numbers of messages of one length into the columns `out`.
+
+    block (m, length): their bytes; rows (m,): their rows in the columns; count: number of all rows; most: largest
+    number of cells in `out`.
+    """
     shapes = 0
     while rows.size:
         walk = cdr.Places(block[0].tobytes(), type_name)
@@ -84,14 +108,14 @@ def _fill(out, block, rows, type_name, count, most, as_sent):
 
 
 def _numbers(block, start, dtype):
-    """Return the numbers (m,) at a start in messages of one length (m, length)."""
+    """Return the numbers (m,) of a dtype that begin at the byte `start` of each message in `block` (m, length)."""
     return np.ascontiguousarray(block[:, start:start + int(dtype[2:])]).view(dtype)[:, 0]
 
 
 def alike(data, type_name, template, names):
-    """Return a mask (n,) of the messages that equal a template (CDR bytes) except for stamp and the named columns.
+    """Return a mask (n,), True for each message that equals a template (CDR bytes) outside stamp and named columns.
 
-    The padding that DDS adds at the end of a message does not count.
+    names: the columns that may differ. The padding that DDS adds at the end of a message does not count.
     """
     walk = cdr.Places(template, type_name)
     fixed = [np.arange(start, stop) for start, stop in walk.fixed]

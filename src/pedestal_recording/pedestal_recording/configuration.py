@@ -1,6 +1,7 @@
-"""Origin of a bag for its metadata: scenario, parameters of all nodes, versions and git revision, as text.
+"""Origin of a bag: scenario, parameters of all nodes, versions and git revision, as texts.
 
-The texts do not depend on the path, the host or the wall clock, so equal runs give equal bytes.
+The recorder stores these texts in the metadata of the bag. They do not depend on the path, the host or the wall clock,
+so equal runs give equal bytes.
 """
 import contextlib
 import importlib.metadata
@@ -19,7 +20,7 @@ GIT_TIMEOUT_S = 5.0
 """Longest duration of a git command [s]."""
 
 OMITTED_PARAMETERS = ('bag', 'scenario_yaml', 'parameters_yaml')
-"""Parameters of the recorder outside the recorded configuration: the destination, and the configuration itself."""
+"""Parameters of the recorder that the recorded configuration omits: the destination, and the configuration itself."""
 
 
 def _git(*arguments):
@@ -54,7 +55,7 @@ def versions():
 
 
 def recorder_parameters(scenario):
-    """Return the parameters {name: text} of the recorder that describe a scenario.Scenario."""
+    """Return the parameters {name: text} of the recorder node that hold the configuration of a scenario.Scenario."""
     values = {node: parameters.as_dict(scenario.node_parameters(node))
               for node in scenario.nodes if node != 'operator'}
     values['recorder'] = {key: value for key, value in values['recorder'].items() if key not in OMITTED_PARAMETERS}
@@ -62,7 +63,10 @@ def recorder_parameters(scenario):
 
 
 def records(scenario_yaml, parameters_yaml):
-    """Return the metadata records {name: {text: text}} of the texts of recorder_parameters, none for an empty text."""
+    """Return the metadata records {name: {text: text}} of a bag, from the texts of recorder_parameters.
+
+    An empty text gives no record.
+    """
     content = {}
     if scenario_yaml:
         content['scenario'] = {'yaml': scenario_yaml}
@@ -73,7 +77,7 @@ def records(scenario_yaml, parameters_yaml):
 
 
 def line(bag):
-    """Return one line on the origin of a bag.Bag."""
+    """Return one line on the origin of a bag.Bag, 'made by: scenario ...', for the reports."""
     run = bag.metadata
     parts = ['unknown, the bag holds no configuration']
     if bag.configuration['scenario']:

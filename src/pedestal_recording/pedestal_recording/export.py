@@ -1,7 +1,8 @@
-"""`pedestal export`: a recording as one table per topic, for MATLAB, pandas and other readers of CSV or Parquet.
+"""`pedestal export`: write a recording as one table per topic, for MATLAB, pandas and other readers of CSV or Parquet.
 
-A row is a message, a column one of its numbers (columns.table), after its stamp in seconds and in integer nanoseconds.
-A trajectory of several points has one row per point, and a diagnostics message one row per status.
+A row is one message. The first two columns are its stamp in seconds and in integer nanoseconds. Each further column is
+one number of the message (columns.table). Two kinds of topics have more rows: a trajectory of several points has one
+row per point, and a diagnostics message has one row per status.
 """
 import contextlib
 import csv
@@ -13,17 +14,21 @@ import numpy as np
 from pedestal_common.graph import layouts, nodes
 from pedestal_common.wire import messages
 from pedestal_recording import bag as bags
+from pedestal_recording import columns
 
 TIME_COLUMN, STAMP_COLUMN = 't [s]', 'stamp [ns]'
 
 
 def export(path, file_format='csv', output=None, names=(), overwrite=False):
-    """Write the topics of a bag as tables. Yield (file, rows, columns), or (None, reason, name) of an omitted topic.
+    """Write the topics of the bag at a path as tables, and yield one tuple per topic.
+
+    The tuple is (file, number of rows, number of columns), or (None, reason, name) for a topic that is omitted.
 
     file_format   'csv' or 'parquet'
     names         topics to write, each of a known type; when empty, all topics except those of unknown type
-    output        folder, by default `export` in the bag (beside a bare .mcap); a file is `acu.rate_command.csv` etc.
-    overwrite     True to replace files
+    output        folder of the tables, by default `export` in the bag (beside a bare .mcap). The table of the topic
+                  acu/rate_command is `acu.rate_command.csv`.
+    overwrite     True to replace existing files
 
     Raises bag.BagError, ValueError if Parquet cannot be written, or FileExistsError before the first write.
     """
@@ -52,7 +57,7 @@ def export(path, file_format='csv', output=None, names=(), overwrite=False):
 
 @contextlib.contextmanager
 def atomic_file(file):
-    """Yield the path of a temporary file that becomes `file` when it is whole, and is removed after an error."""
+    """Yield the path of a temporary file, which becomes `file` at the end, or is removed after an error."""
     part = file.with_name(file.name + '.part')
     try:
         yield part
@@ -76,6 +81,7 @@ def table(bag, name):
 
 
 def _times(stamps):
+    """Return the first two columns of a table, from the stamps (n,) [ns]."""
     return {TIME_COLUMN: stamps / 1e9, STAMP_COLUMN: stamps}
 
 
@@ -86,8 +92,10 @@ def _header(name, type_name, column):
 
 
 def _has_tracks(bag, name):
-    """Return True if a message has more or fewer than one point. Of the messages of equal
-    length in bytes, one is read."""
+    """Return True if a trajectory message of the topic has more or fewer than one point.
+
+    Because the number of points determines the length in bytes, one message of each length is read.
+    """
     of_length = {len(data): data for _, _, _, data in bag.raw(name)}
     try:
         return any(len(messages.deserialize(data, bag.topics[name]).points) != 1 for data in of_length.values())
@@ -96,7 +104,10 @@ def _has_tracks(bag, name):
 
 
 def _tracks(bag, name, stamps):
-    """Return the table of trajectories of several points: a row is a point, with its time after the stamp."""
+    """Return the table of a topic of trajectories of several points. A row is a point, with its time after the stamp.
+
+    stamps: stamp of each message (n,) [ns].
+    """
     type_name = bag.topics[name]
     points = []
     for stamp, (_, _, _, message) in zip(stamps.tolist(), bag.messages(name)):
@@ -112,17 +123,25 @@ def _tracks(bag, name, stamps):
 
 
 def _diagnostics(bag, name, stamps):
-    """Return the table of diagnostics: a row is a status with its values as one text, 'key=value; key=value'."""
+    """Return the table of a diagnostics topic. A row is a status, with its values as one text 'key=value; key=value'.
+
+    stamps: stamp of each message (n,) [ns].
+    """
     statuses = [(stamp, status) for stamp, (_, _, _, message) in zip(stamps.tolist(), bag.messages(name))
                 for status in message.status]
     return {**_times(np.array([stamp for stamp, _ in statuses], np.int64)),
             'level': np.array([status.level for _, status in statuses], np.int64),
             'name': [status.name for _, status in statuses], 'message': [status.message for _, status in statuses],
-            'values': ['; '.join(f'{value.key}={value.value}' for value in status.values) for _, status in statuses]}
+            'values': [columns.values_text((value.key, value.value) for value in status.values)
+                       for _, status in statuses]}
 
 
 def _write_csv(file, content, _description):
-    """Write numbers as the shortest text of the same float, NaN as NaN, and texts with quotes where needed."""
+    """Write a table {header: values} as CSV.
+
+    A number is the shortest text that reads back as the same float. A missing number is NaN. Texts have quotes where
+    needed.
+    """
     with open(file, 'w', newline='', encoding='utf-8') as stream:
         writer = csv.writer(stream, lineterminator='\n')
         writer.writerow(content)
@@ -130,12 +149,14 @@ def _write_csv(file, content, _description):
 
 
 def _texts(values):
+    """Return a column of a table as a list of cells for CSV; texts and whole numbers stay unchanged."""
     if isinstance(values, list) or values.dtype.kind == 'i':
         return values
     return ['NaN' if value != value else repr(value) for value in values.tolist()]
 
 
 def _parquet_writer():
+    """Return the function write(file, table, {text: text} for the metadata) for Parquet. Raises ValueError."""
     try:
         import pyarrow
         import pyarrow.parquet

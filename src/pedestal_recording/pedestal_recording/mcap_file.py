@@ -1,7 +1,11 @@
-"""Records of one MCAP file: their places in the file, and the unpacked records of a chunk.
+"""Reading of one MCAP file, the file of a recording. `bag`, `recover` and `writer` read their files by this module.
 
-A few bytes of a compressed chunk can stand for gigabytes of zeros, or for millions of empty messages. Therefore the
-length of the file limits time and memory (MAX_CHUNK_BYTES, UNPACKED_LIMITS, MESSAGE_LIMITS).
+An MCAP file is a series of records. A record is its opcode (1 byte, the kind of the record), the length of its content
+(8 bytes) and its content. A channel is the record of a topic, and a schema is the record of a message type. A chunk is
+a record that holds further records, compressed or not.
+
+A few bytes of a compressed chunk can stand for gigabytes of zeros, or for millions of empty messages. Therefore
+MAX_CHUNK_BYTES, UNPACKED_LIMITS and MESSAGE_LIMITS limit time and memory, in proportion to the length of the file.
 """
 import fcntl
 import io
@@ -19,19 +23,21 @@ from mcap.writer import MCAP0_MAGIC as MAGIC
 from pedestal_common.text_files import files
 
 MAX_CHUNK_BYTES = 32_000_000
-"""Largest size of a chunk, packed or unpacked [bytes]."""
+"""Largest size of a chunk, compressed or unpacked [bytes]."""
 
 UNPACKED_LIMITS = 32_000_000, 200
-"""Largest size of all unpacked chunks [bytes]: a base, and an addition for each byte of the file."""
+"""Largest size of all unpacked chunks of a file [bytes]: a base, and an addition for each byte of the file."""
 
 MESSAGE_LIMITS = 500_000, 0.25
-"""Largest number of messages: a base, and an addition for each byte of the file."""
+"""Largest number of messages in a file: a base, and an addition for each byte of the file."""
 
 MESSAGE_HEAD = struct.Struct('<xQHIQQ')
-"""Head of a message record after its opcode: length, channel, sequence number, log time and publish time."""
+"""Head of a message record: opcode (skipped), length of the content, number of the channel, sequence number, log time
+and publish time [ns]. The CDR bytes of the message follow."""
 
 SQLITE_MAGIC = b'SQLite format 3'
 ZSTD_MAGIC = b'\x28\xb5\x2f\xfd'
+"""First bytes of an SQLite file, and of data in the compression zstd."""
 
 COMPRESSED_MAGIC = {
     ZSTD_MAGIC: ('zstd', 'zstd -dc'), b'\x1f\x8b': ('gzip', 'gunzip -c'), b'\xfd7zXZ': ('xz', 'xz -dc'),
@@ -39,15 +45,18 @@ COMPRESSED_MAGIC = {
 """{first bytes of a compressed file: (its format, the command that writes its content to the standard output)}."""
 
 _RECORD = struct.Struct('<BQ')
+"""Opcode of a record, and length of its content [bytes]. The content begins after these 9 bytes."""
 _WINDOW = 1_000_000
+"""Number of bytes that one access reads from the disk. It is also the largest size of a piece of McapFile.pieces."""
 _READ = {Opcode.HEADER: records.Header.read, Opcode.SCHEMA: records.Schema.read, Opcode.CHANNEL: records.Channel.read,
          Opcode.METADATA: records.Metadata.read, Opcode.STATISTICS: records.Statistics.read,
          Opcode.CHUNK: records.Chunk.read, Opcode.FOOTER: records.Footer.read,
          Opcode.MESSAGE_INDEX: records.MessageIndex.read}
+"""{kind of record: function of the mcap library that reads its content}."""
 
 
 class BagError(ValueError):
-    """A bag cannot be written or read; one line with the file and the problem."""
+    """Error of a bag that cannot be written or read. Its text is one line with the file and the problem."""
 
 
 def reason(error):
@@ -56,7 +65,10 @@ def reason(error):
 
 
 def frame(data, at):
-    """Return (opcode, end of its content) of the record at a place in bytes. Raises ValueError if none is there."""
+    """Return (opcode, stop) of the record that begins at the position `at` in bytes; stop: its end.
+
+    Raises ValueError if no whole record begins there.
+    """
     if at + 9 > len(data):
         raise ValueError('the file ends')
     opcode, length = _RECORD.unpack_from(data, at)
@@ -68,14 +80,15 @@ def frame(data, at):
 
 
 def parsed(opcode, content):
-    """Return the record of the mcap library from its content (bytes); None for a kind that is not read here."""
+    """Return a record as an object of mcap.records, from its content (bytes); None for a kind not read here."""
     return _READ[opcode](ReadDataStream(io.BytesIO(content))) if opcode in _READ else None
 
 
 def unpacked(chunk) -> bytes:
-    """Return the records in a records.Chunk.
+    """Return the records in a records.Chunk as bytes, decompressed.
 
-    Raises ValueError if the chunk is longer than MAX_CHUNK_BYTES or than it claims, or if its checksum is wrong.
+    Raises ValueError for a chunk above MAX_CHUNK_BYTES, in an unknown compression, of another length than its header
+    states, or with a wrong checksum.
     """
     size = chunk.uncompressed_size
     if max(size, len(chunk.data)) > MAX_CHUNK_BYTES:
@@ -94,7 +107,10 @@ def unpacked(chunk) -> bytes:
 
 
 def _zstd(data, size):
-    """Decompress a frame; one of another length is refused before memory is allocated for it."""
+    """Return the decompressed bytes of a zstd frame, b'' if the frame states another length than `size`.
+
+    This avoids memory for a frame of a false length.
+    """
     if not size or zstandard.frame_content_size(data) not in (-1, size):
         return b''
     return zstandard.ZstdDecompressor().decompress(data, max_output_size=size)
@@ -102,12 +118,16 @@ def _zstd(data, size):
 
 _UNPACK = {'': lambda data, size: data, 'zstd': _zstd,
            'lz4': lambda data, size: lz4.frame.LZ4FrameDecompressor().decompress(data, max_length=size + 1)}
+"""{name of a compression: function(compressed bytes, size of the unpacked bytes) -> unpacked bytes}."""
 
 
 class McapFile:
-    """An open MCAP file, read in pieces. size: its length [bytes]; locked: True if this process writes it.
+    """An open MCAP file, which is read in pieces.
 
-    Raises BagError if the file is missing, empty, foreign or not regular, or while its recorder still writes it.
+    size     length of the file [bytes]
+    locked   True if this process itself writes the file and holds its lock. Otherwise a lock on the file is an error.
+
+    Raises BagError if the file is missing, empty, not regular or not MCAP, or while its recorder still writes it.
     """
 
     def __init__(self, path, locked=False):
@@ -135,6 +155,7 @@ class McapFile:
         self._messages = 0
 
     def _check_lock(self):
+        """Raise BagError if another process holds the lock of the file, because it writes the file."""
         try:
             fcntl.flock(self._stream, fcntl.LOCK_SH | fcntl.LOCK_NB)
             fcntl.flock(self._stream, fcntl.LOCK_UN)
@@ -144,7 +165,7 @@ class McapFile:
             pass
 
     def read(self, start, stop) -> bytes:
-        """Return the bytes [start, stop) of the file, fewer at its end."""
+        """Return the bytes at [start, stop) of the file, fewer at its end."""
         if stop - start > _WINDOW:
             return os.pread(self._stream.fileno(), stop - start, start)
         if start < self._start or stop > self._start + len(self._window):
@@ -152,9 +173,10 @@ class McapFile:
         return self._window[start - self._start:stop - self._start]
 
     def pieces(self):
-        """Yield (opcode, start, stop) of the records up to the footer, neighbouring messages as one piece.
+        """Yield (opcode, start, stop) of each record up to the footer, at the bytes [start, stop) of the file.
 
-        Raises EOFError with place and reason if the file ends early.
+        Neighbouring messages outside chunks come as one piece. Raises EOFError with place and reason if the file ends
+        early.
         """
         messages = None
         try:
@@ -173,6 +195,7 @@ class McapFile:
             raise
 
     def _frames(self):
+        """Yield (opcode, start, stop) of each record up to the footer. Raises EOFError if the file ends early."""
         at, opcode = len(MAGIC), None
         while opcode != Opcode.FOOTER:
             if at + 9 > self.size:
@@ -189,9 +212,10 @@ class McapFile:
             raise EOFError(f'the file does not end with its footer at byte {at}')
 
     def chunk(self, start, stop, again=False) -> bytes:
-        """Return the records in the chunk record at [start, stop); again: True if it was unpacked before.
+        """Return the records in the chunk at [start, stop) of the file as bytes, decompressed.
 
-        Raises ValueError if unpacking fails, or if the chunks of the file unpack to more than UNPACKED_LIMITS.
+        again: True if the chunk was unpacked before, and so does not count again for UNPACKED_LIMITS. Raises
+        ValueError if unpacking fails, or if the chunks of the file unpack to more than UNPACKED_LIMITS.
         """
         if stop - start > 2 * MAX_CHUNK_BYTES:
             raise ValueError(f'a chunk of {stop - start} bytes, must be at most {MAX_CHUNK_BYTES}')
@@ -201,13 +225,13 @@ class McapFile:
         return unpacked(chunk)
 
     def spend(self, chunk):
-        """Count the bytes that a records.Chunk claims to hold. Raises ValueError above UNPACKED_LIMITS."""
+        """Count the unpacked size that a records.Chunk states. Raises ValueError above UNPACKED_LIMITS."""
         self._left -= chunk.uncompressed_size
         if self._left < 0:
             raise ValueError(f'its chunks unpack to more than {UNPACKED_LIMITS[1]} times its length')
 
     def count(self, messages):
-        """Count messages that are read. Raises ValueError above MESSAGE_LIMITS."""
+        """Add to the number of messages read from the file. Raises ValueError above MESSAGE_LIMITS."""
         self._messages += messages
         if self._messages > MESSAGE_LIMITS[0] + MESSAGE_LIMITS[1] * self.size:
             raise ValueError(f'more than {self._messages - messages} messages in {self.size} bytes')

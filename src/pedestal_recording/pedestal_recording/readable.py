@@ -1,7 +1,11 @@
-"""Readable messages of a topic: CDR bytes of its type with a valid stamp.
+"""Check of recorded messages. A readable message holds the CDR bytes of the type of its topic, with a valid stamp.
 
-A message of another program on a topic of the graph is foreign. Most messages of a topic differ in their numbers only,
-so numpy compares the bytes outside the numbers with those of a readable message. The other messages are deserialized.
+CDR is the byte format of ROS 2 messages. The recorder and the reader of bags use this check: an unreadable message on
+a topic of the graph is foreign, because another program published it.
+
+To deserialize each message would be slow. Most messages of a topic differ in their numbers only. Therefore numpy
+compares the bytes outside the numbers (the shape) with those of a message known as readable. Only a message of a new
+shape is deserialized.
 """
 import numpy as np
 
@@ -16,8 +20,11 @@ MAX_SHAPES = 20
 
 
 class Readable:
-    """Judge of the messages of one topic of a type. ours: True in a recording of the graph, whose messages also carry
-    the joints of the topic."""
+    """Check of the messages of one topic, whose ROS type is type_name.
+
+    ours: True in a recording of this graph. There a message of a topic of every step must also hold at least one of
+    the columns of its topic, such as `azimuth.position`.
+    """
 
     def __init__(self, topic, type_name, ours):
         row = topics.TOPIC_BY_NAME.get(nodes.plain(topic))
@@ -27,7 +34,7 @@ class Readable:
             self._columns = frozenset(column.name for column in layouts.columns(row.name))
 
     def mask(self, data, start, stop):
-        """Return a mask (n,) of the readable messages at the places start, stop (n,) of bytes."""
+        """Return a mask (n,), True for each readable message. Message k is at bytes [start[k], stop[k]) of data."""
         content, readable = np.frombuffer(data, np.uint8), np.zeros(len(start), bool)
         for length in np.unique(stop - start).tolist():
             rows = np.flatnonzero(stop - start == length)
@@ -43,7 +50,11 @@ class Readable:
 
     @staticmethod
     def _alike(content, start, rows, shape, readable):
-        """Mark the rows that have a shape as readable, and return the remaining rows."""
+        """Set the mask `readable` at the rows whose messages have a shape (see _added). Return the remaining rows.
+
+        content: all bytes as an array; start (n,): begin of each message; rows: places in start, of messages of one
+        length.
+        """
         if shape is None or not rows.size:
             return rows
         places, wanted = shape
@@ -52,7 +63,10 @@ class Readable:
         return rows[~same]
 
     def _added(self, message):
-        """Return the shape of a readable message, None if others are not compared with it."""
+        """Note the shape of a readable message, and return it: (places of the bytes outside its numbers, these bytes).
+
+        Return None if no message is compared with it: see MAX_SHAPED_BYTES and MAX_SHAPES.
+        """
         shapes = self._shapes.setdefault(len(message), [])
         if len(message) > MAX_SHAPED_BYTES or len(shapes) >= MAX_SHAPES or self._type not in layouts.LAYOUTS:
             return None

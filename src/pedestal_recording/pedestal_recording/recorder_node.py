@@ -1,6 +1,6 @@
-"""ROS node that records every topic of the graph in a bag, byte by byte, and reports each lost message.
+"""Recorder: the ROS node that records every topic of the graph in a bag, byte by byte, and reports each lost message.
 
-This module receives the messages; writer.py writes them.
+This module receives the messages, step_order.py puts them in order, and writer.py writes them.
 
 The module imports `entry` before anything else, so that a signal during the other imports ends the process cleanly.
 """
@@ -35,20 +35,22 @@ from pedestal_recording.step_order import OrderError, StepOrder
 from pedestal_recording.writer import Writer
 
 QUIET_TIME_S = 0.5
-"""Time without a message after which the recorder ends [s]."""
+"""Time without a message after which the recorder ends, once the run has ended [s]."""
 
 MAX_DRAIN_S = 4.0
-"""Longest wait for messages at the end [s].
+"""Longest wait for late messages after the end of the run [s].
 
-The recorder waits for all of this time if it received messages, but none of a topic that is published every step.
-Fast DDS resends the messages that a subscriber missed during discovery with the next heartbeat, by default every 3 s.
+The recorder waits this long if it received messages, but still none of one of the topics that are published every
+step. Such messages can come late: Fast DDS resends the messages that a subscriber missed during discovery with its
+next heartbeat, by default every 3 s.
 """
 
 LAST_OPENED_TOPIC = 'diagnostics'
-"""Topic that the recorder opens last, when the executor serves all other topics.
+"""Topic to which the recorder subscribes last, when the executor already serves all other topics.
 
-Every node publishes this topic, and in lockstep waits for its subscriber before the first step. This avoids messages
-that wait when the executor starts, which it would take in another order than that of their arrival.
+Every node publishes this topic, and in lockstep waits for its subscriber before the first step. Because the recorder
+subscribes to it last, no message waits when the executor starts. The executor would take waiting messages in another
+order than that of their arrival.
 """
 
 MAX_STAMP_DISTANCE_NS = 3600 * NS_PER_SECOND
@@ -56,8 +58,11 @@ MAX_STAMP_DISTANCE_NS = 3600 * NS_PER_SECOND
 
 
 class TopicPublishers:
-    """Publishers of a nodes.Link that a node records, distinguished by the gate of the nodes of the graph.
+    """Publishers of one topic in realtime: the graph's publisher, and foreign publishers if there are any.
 
+    A PublisherGate distinguishes them, as in the other nodes of the graph.
+
+    node: the RecorderNode; link: nodes.Link of the topic
     lost: number of messages of the graph's publisher that are missing, by its sequence numbers
     """
 
@@ -68,14 +73,15 @@ class TopicPublishers:
         self._polled, self._foreign = None, False
 
     def several(self, now):
-        """Return True if more than one publisher sends at a time [ns]."""
+        """Return True if more than one publisher was active shortly before a time of the steady clock [ns]."""
         return self._gate.streams.several(now)
 
     def take(self, data, info):
-        """Return False for a message of another publisher than that of the graph.
+        """Return True for a message of the graph, False for a message of a foreign publisher; data: CDR bytes.
 
-        This needs a publisher of the graph that sends and is distinguished from the others, and a foreign publisher
-        that the graph names. A doubtful message counts as a message of the graph.
+        A message is foreign if the gate rejects it as a message of another publisher, and two more conditions hold.
+        The graph's publisher is distinguished from the others, and has sent within CONFIRMED_TAKEOVER_NS. ROS names a
+        foreign publisher of the topic. In doubt, a message counts as a message of the graph.
         """
         now, utc = self._node.clock()
         taken = self._gate.take(data, info['publication_sequence_number'], info['source_timestamp'], now, utc)
@@ -88,10 +94,12 @@ class TopicPublishers:
                     and self._named(now))
 
     def _count(self):
+        """Return the number of foreign publishers that ROS names, None where it is unknown."""
         names = subscriptions.foreign_publishers(self._node, self._link, self._link.name)
         return None if names is None else len(names)
 
     def _named(self, now):
+        """Return True if ROS names a foreign publisher, by a check every PUBLISHER_POLL_NS at most; now [ns]."""
         if self._polled is None or now - self._polled >= PUBLISHER_POLL_NS:
             names = subscriptions.foreign_publishers(self._node, self._link, self._link.name) or ()
             self._polled = now
@@ -100,9 +108,19 @@ class TopicPublishers:
 
 
 class RecorderNode(shell.Shell):
-    """Recorder of the graph, in lockstep in the order of steps (StepOrder), in realtime in the order of arrival.
+    """Recorder of the graph. It writes in the order of steps (StepOrder) in lockstep, of arrival in realtime.
 
-    In realtime the publish time is the wall time of the publisher.
+    In realtime the publish time of a message is the wall time of the publisher, and the log time is its stamp.
+
+    _bag, _order     Writer of the bag; StepOrder for lockstep
+    _end             planned end of the run, since its start [ns]; None without a limit
+    _stamp           newest time of the drive [ns]
+    _heard           {topic: TopicPublishers} in realtime
+    _lost            {topic: number of lost messages}
+    _without_stamp   number of messages without a valid stamp
+    _received        number of received messages of each recorded topic
+    _last_arrival    (steady time [s], number of received messages) at the last arrival, after the end of the run
+    _error           reason why the node ends early, or None
     """
 
     def __init__(self):
@@ -112,7 +130,7 @@ class RecorderNode(shell.Shell):
             raise parameters.ParameterError("graph.nodes = '': must name the nodes of the graph in lockstep")
         beams, flags = self.graph.beams, [flag for flag in topics.TOPIC_FLAGS if getattr(self.parameters, flag)]
         recorded = nodes.recorded(names, flags, beams) if names else list(self.links.values())
-        if self.graph.lockstep:  # a command has no place between two steps; its reply has, and repeats the command
+        if self.graph.lockstep:  # a command belongs to no step; its reply does, and repeats the command
             recorded = [link for link in recorded if link.rate != 'command']
         self._end = round(self.parameters.duration * NS_PER_SECOND) or None
         self._bag = Writer(self.parameters.bag, recorded, {
@@ -141,7 +159,9 @@ class RecorderNode(shell.Shell):
             self.every(1.0, lambda: self._write(self._bag.flush))
 
     def _record(self, index, topic):
-        """Subscribe to a topic. The history keeps all messages in lockstep, and those of several seconds in realtime.
+        """Subscribe to a topic, by its index and nodes.Link.
+
+        The queue of the subscription keeps all messages in lockstep, and those of several seconds in realtime.
         """
         take = self._receiver(index, topic)
         if self.graph.lockstep:
@@ -154,11 +174,13 @@ class RecorderNode(shell.Shell):
             subscriptions.subscribe(self, topic, topic.name, take, 'recorded')
 
     def _record_last(self):
+        """Subscribe to LAST_OPENED_TOPIC, once the executor runs."""
         self._opening.cancel()
         for index, topic in self._last:
             self._record(index, topic)
 
     def _receiver(self, index, topic):
+        """Return the function take(CDR bytes, message info of rclpy) that checks, counts and writes each message."""
         put = self._into_step(index, topic) if self.graph.lockstep else self._on_arrival(index, topic)
         count = self._lockstep_counter(index, topic) if self.graph.lockstep else self._realtime_counter(index, topic)
         checked = len(topic.writers) == 1 and (self.graph.lockstep or topic.rate != 'once')
@@ -176,9 +198,10 @@ class RecorderNode(shell.Shell):
         return take
 
     def _lockstep_counter(self, index, topic):
-        """Return a check of lockstep: the numbers of the only publisher rise by 1, on a step topic from 1 on.
+        """Return the function count(data, info) that checks the sequence numbers of a topic in lockstep.
 
-        The check returns False for a foreign message: see subscriptions.LockstepSubscriber.
+        The numbers of the graph's publisher rise by 1, and begin at 1 on a topic of every step. A gap counts as lost
+        messages and ends the run. The function returns False for a foreign message (subscriptions.LockstepSubscriber).
         """
         numbers = subscriptions.SoleNumbers(self, topic, topic.name,
                                             first=1 if topic.rate == 'step' and self.graph.members else None)
@@ -193,7 +216,7 @@ class RecorderNode(shell.Shell):
                     self._lost[topic.name] += number - numbers.next
                     self._bag.skip(index, number - numbers.next)
                     self._fail(self._losses())
-                elif number != 1:
+                elif number != 1:  # a publisher that begins again counts from 1
                     self._fail(f'{topic.name} has more than one publisher: another graph runs on ROS_DOMAIN_ID '
                                f'{self.context.get_domain_id()}; set a free one')
             numbers.note(number)
@@ -201,7 +224,10 @@ class RecorderNode(shell.Shell):
         return count
 
     def _realtime_counter(self, index, topic):
-        """Return a counter of the messages missing in realtime, which returns False for another publisher."""
+        """Return the function count(data, info) that counts the missing messages of a topic in realtime.
+
+        The function returns False for a message of a foreign publisher.
+        """
         publishers = self._heard[topic.name] = TopicPublishers(self, topic)
 
         def count(data, info):
@@ -214,10 +240,14 @@ class RecorderNode(shell.Shell):
         return count
 
     def _losses(self):
+        """Return a text on the lost messages of each topic."""
         return 'lost ' + ', '.join(f'{count} of {name}' for name, count in self._lost.items())
 
     def _fail(self, reason):
-        """End with a reason. Because rclpy prints a traceback for an exception in a callback, none is raised."""
+        """End the node with a reason.
+
+        Because rclpy prints a traceback for an exception in a callback, this function raises none.
+        """
         self._error = self._error or reason
         self.finished = True
 
@@ -238,6 +268,7 @@ class RecorderNode(shell.Shell):
             return ''
 
     def _into_step(self, index, topic):
+        """Return the function put(data, info) that passes a message of a topic to the StepOrder in lockstep."""
         order, stamp_in, slot = self._order, self._stamp_in, self._order.slot(topic.name)
 
         def put(data, _):
@@ -270,8 +301,10 @@ class RecorderNode(shell.Shell):
     def _log_time(self, stamp):
         """Return the log time of a message [ns]: its stamp, or the time of the drive.
 
-        The time of the drive replaces a stamp that is missing, in the future, or MAX_STAMP_DISTANCE_NS away from it.
-        The program track has the stamp of the start, and arrives some seconds before the start.
+        The time of the drive replaces a stamp that is missing, that lies in the future, or that is more than
+        MAX_STAMP_DISTANCE_NS away from it. A stamp lies in the future if it is later than now by more than
+        `graph.future`. Before the start of the run, the start takes the place of now. This avoids a wrong log time of
+        the program track, which has the stamp of the start and arrives some seconds before it.
         """
         if stamp is not None:
             now = self._stamp or stamp
@@ -282,6 +315,7 @@ class RecorderNode(shell.Shell):
         return self._stamp
 
     def _on_arrival(self, index, topic):
+        """Return the function put(data, info) that writes a message of a topic at its arrival in realtime."""
         write, stamp_in, log_time = self._bag.write, self._stamp_in, self._log_time
         clock = PublisherGate(lambda data: (messages.stamp_of(data),) * 2, round(self.graph.future * NS_PER_SECOND))
 
@@ -304,7 +338,7 @@ class RecorderNode(shell.Shell):
         return {'clock': put_clock, 'diagnostics': put_diagnostics}.get(topic.name, put)
 
     def _tick(self, stamp):
-        """Take a new time of the drive [ns]."""
+        """Take a new time of the drive [ns], None for a rejected message; end the node at the planned end."""
         if stamp is None:
             return
         if self.graph.lockstep and stamp // NS_PER_SECOND > self._stamp // NS_PER_SECOND:
@@ -321,6 +355,7 @@ class RecorderNode(shell.Shell):
             self._fail(str(error))
 
     def _diagnosis(self):
+        """Return the Diagnosis of the recorder: level, message, and counts."""
         level, message = LEVEL_OK, 'recording'
         if self._without_stamp or self._order.unplaced:
             level, message = LEVEL_WARN, 'recording; some messages have no valid stamp or no place in a step'
@@ -335,9 +370,9 @@ class RecorderNode(shell.Shell):
             ('out of order', str(self._order.unplaced))])
 
     def draining(self):
-        """Return True while messages may still arrive.
+        """Return True while the recorder waits for late messages after the end of the run.
 
-        This ends when all steps are written, after QUIET_TIME_S without a message, or after MAX_DRAIN_S.
+        The wait ends when all steps are written, after QUIET_TIME_S without a message, or after MAX_DRAIN_S.
         """
         now = time.monotonic()
         if self._error is not None:
@@ -353,7 +388,10 @@ class RecorderNode(shell.Shell):
         return now < self._drain_end and (incomplete or now < self._last_arrival[0] + QUIET_TIME_S)
 
     def close(self):
-        """Write the waiting steps and finish the bag. The result of the node has its messages, losses and SHA-256."""
+        """Write the waiting steps and finish the bag. `result` states its path, messages, losses, size and SHA-256.
+
+        Raises GraphError if an error ended the node, or if messages were lost in lockstep.
+        """
         self._write(self._order.finish)
         self._write(self._bag.close)
         self.result = {'bag': str(self._bag.path), 'messages': self._bag.messages, 'lost': self._lost.total(),

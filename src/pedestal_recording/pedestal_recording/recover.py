@@ -1,8 +1,9 @@
-"""Recovery: a readable bag from a damaged bag (killed recorder, full disk, cut or corrupted file).
+"""`pedestal recover`: write the readable messages of a damaged bag to a new bag.
 
-Each file is read through mmap, chunk after chunk. The messages of each chunk with a correct checksum are written to
-the new bag. Memory is needed for one chunk and the index, independent of the size of the recording. A bag of several
-files becomes a bag of one file.
+The recorder of the bag was killed, its disk was full, or its file was cut or corrupted. Each file is read through
+mmap, chunk after chunk; a chunk is a compressed group of messages with a checksum. The messages of each chunk with a
+correct checksum are written to the new bag. Memory is needed for one chunk and the index, not for the whole recording.
+A bag of several files becomes a bag of one file.
 """
 import collections
 import dataclasses
@@ -32,22 +33,34 @@ from pedestal_recording.mcap_file import (
 from pedestal_recording.writer import BagFile
 
 _COPIED_OPCODES = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.METADATA, Opcode.CHUNK)
+"""Kinds of records that are copied to the new bag."""
 _END_OPCODES = (Opcode.DATA_END, Opcode.FOOTER)
+"""Kinds of records that end the messages of a file."""
 _COMPRESSION = re.compile(rb'\x04\x00\x00\x00zstd|\x03\x00\x00\x00lz4')
+"""Length and name of the compression in a chunk record. The search for intact chunks looks for these bytes."""
 _BEFORE_COMPRESSION = 9 + 8 + 8 + 8 + 4
-"""Length of a chunk record before the name of its compression [bytes]."""
+"""Length of a chunk record before the name of its compression [bytes].
+
+It consists of opcode and length, first and last log time, unpacked size, checksum, and length of the name.
+"""
 
 _UNUSABLE = 0
 """Value in place of an opcode, for bytes that are no readable record."""
 
 _LENGTH = struct.Struct('<Q')
+"""Length of the compressed data in a chunk record [bytes]."""
 _FOOTER = 9 + 20 + len(MAGIC)
+"""Length of the footer record and the last bytes of a whole file [bytes]."""
 
 
 @dataclasses.dataclass
 class Gap:
-    """Unusable bytes [start, stop) of a file, the reason, and the log times before and after them [ns], None without a
-    message. file: its name, '' in a bag of one file."""
+    """Unusable bytes [start, stop) of a file.
+
+    problem         reason why the bytes are unusable
+    before, after   log times of the last message before and the first message after the bytes [ns], or None
+    file            name of the file, '' in a bag of one file
+    """
     start: int
     stop: int
     problem: str
@@ -56,7 +69,7 @@ class Gap:
     file: str = ''
 
     def line(self, start=0):
-        """Return the gap as text, with times after start [ns]."""
+        """Return the gap as text, with its times relative to the stamp `start` [ns]."""
         return (f'bytes {self.start} to {self.stop}{self.file and f" of {self.file}"} unused ({self.problem})'
                 + (f', after {(self.before - start) / 1e9:.6f} s' if self.before is not None else '')
                 + (f', before {(self.after - start) / 1e9:.6f} s' if self.after is not None else ''))
@@ -64,15 +77,15 @@ class Gap:
 
 @dataclasses.dataclass
 class Recovered:
-    """Recovered messages in the new bag at `path`, and the missing ones.
+    """Result of `recover`: the recovered messages in the new bag at `path`, and the missing messages.
 
-    counts        {topic: messages}
-    first, last   log times [ns]
+    counts        {topic: number of recovered messages}
+    first, last   log times of the first and the last recovered message [ns]
     ended         True if the recorder came to its end
-    planned_end   of the run [ns], None if unknown
-    start         time 0 of the scenario in the stamps [ns]
-    gaps          [Gap]
-    lost          {topic: messages missing in the middle, by the sequence numbers of the recorder}
+    planned_end   stamp of the planned end of the run [ns], None if unknown
+    start         stamp of time 0 of the scenario [ns]
+    gaps          [Gap], the unusable bytes
+    lost          {topic: number of messages missing before the last one, by the sequence numbers of the recorder}
     """
     path: pathlib.Path
     counts: dict
@@ -86,7 +99,7 @@ class Recovered:
 
     @property
     def unused(self):
-        """Unusable bytes of the file."""
+        """Number of unusable bytes of all files."""
         return sum(gap.stop - gap.start for gap in self.gaps)
 
     def lines(self):
@@ -111,10 +124,11 @@ class Recovered:
 
 
 def recover(path, output=None) -> Recovered:
-    """Write the readable messages of a bag as a new bag, by default beside it with '-recovered' after its name.
+    """Write the readable messages of the bag at a path to a new bag. The old bag stays unchanged.
 
-    Raises BagError if nothing is readable, the bag is being written, or the new bag cannot be written. Then no part of
-    the new bag remains. The old bag is only read.
+    output: directory of the new bag, by default beside the old bag, with '-recovered' after its name.
+    Raises BagError if nothing is readable, if the old bag is being written, or if the new bag cannot be written. After
+    an error, no part of the new bag remains.
     """
     files = [McapFile(file) for file in bags.locate(path)]
     if output is None:
@@ -150,7 +164,10 @@ def _record_begins(data, position):
 
 
 def _read(file, opcode, data, start, stop):
-    """Return the record at [start, stop), for a chunk its records as bytes; None for a kind that is not kept."""
+    """Return the record at [start, stop) of data as an object of mcap.records, for a chunk its unpacked bytes.
+
+    Return None for a kind of record that is not copied.
+    """
     if opcode not in _COPIED_OPCODES:
         return None
     record = parsed(opcode, data[start + 9:stop])
@@ -161,7 +178,7 @@ def _read(file, opcode, data, start, stop):
 
 
 def _next_chunk(file, data, start):
-    """Return the start of the next chunk with a correct checksum, the end of the data if there is none."""
+    """Return the position of the first chunk with a correct checksum from `start` on; the end of data without one."""
     for name in _COMPRESSION.finditer(data, start):
         at = name.start() - _BEFORE_COMPRESSION
         try:
@@ -176,11 +193,11 @@ def _next_chunk(file, data, start):
 
 
 def _pieces(file, data):
-    """Yield (opcode, start, stop, record) of the records of the data section, (_UNUSABLE, start, stop, reason) of
-    unusable bytes.
+    """Yield (opcode, start, stop, record) of each record before the summary of a file (McapFile; data: its bytes).
 
-    If the length of a broken record leads to another record, continue with that record. Otherwise search the next
-    intact chunk, from the end of the last good record on.
+    Unusable bytes give (_UNUSABLE, start, stop, reason) instead. After a broken record whose stated length leads to
+    the begin of another record, the reading continues there. Otherwise it continues at the next intact chunk after
+    the last good record.
     """
     start = last_good_end = len(MAGIC)
     while start < len(data):
@@ -203,7 +220,10 @@ def _pieces(file, data):
 
 
 def _summary(file, data):
-    """Yield schemas and channels of the summary, if any, because the chunk that declares them may be broken."""
+    """Yield the schemas and channels that the summary at the end of a file repeats; none in a file without a summary.
+
+    This avoids the loss of messages whose schema and channel stand in a broken chunk.
+    """
     footer = len(data) - _FOOTER
     if footer < len(MAGIC) or data[footer] != Opcode.FOOTER or data[-len(MAGIC):] != MAGIC:
         return
@@ -220,15 +240,21 @@ def _summary(file, data):
 class _Salvage:
     """Writer of the messages of damaged files to a new BagFile, and counter of the unusable bytes.
 
-    several                True if a gap must name its file
-    _schemas, _channels    {number in the file: number in the bag}
+    "File" means a file of the damaged bag, and "bag" the new bag.
+
+    several                True if the damaged bag has several files, so a gap must name its file
+    _schemas, _channels    {number of a schema or channel in the current file: its number in the bag}
     _names                 {channel of the bag: topic}
-    _counts                {topic: messages added}
-    _first, _last          log times of the added messages [ns]
-    _sequence, _before     {channel of the bag: sequence number of its last message; the same of the files before}
+    _declared              {content of a schema or channel: its number in the bag}
+    _counts                {topic: number of added messages}
+    _lost                  {channel of the bag: number of messages lost in gaps}
+    _first, _last          smallest and largest log time of the added messages [ns]
+    _sequence              {channel of the bag: sequence number of its last message}
+    _before                _sequence as it was before the current file
     _offsets               {channel of the bag: addition to the sequence numbers of the current file}
     _compressed            number of messages that are compressed one by one
     _unsure                channels of the bag without a message since the last gap
+    _ended                 True if the last file comes to its regular end
     """
 
     def __init__(self, bag, several):
@@ -244,7 +270,7 @@ class _Salvage:
         self._ended = False
 
     def add_file(self, file, data):
-        """Take all messages from the bytes of a McapFile."""
+        """Add all readable messages of a McapFile to the bag; data: the bytes of the file."""
         self._file = file
         self._schemas, self._channels, self._before, self._offsets = {}, {}, dict(self._sequence), {}
         try:
@@ -252,7 +278,7 @@ class _Salvage:
                 self._declare(record)
         except BagError:
             raise
-        except Exception:  # a decoder may raise anything on broken bytes; the file itself repeats the declarations
+        except Exception:  # a decoder may raise anything on broken bytes; the file itself declares all again
             pass
         for opcode, start, stop, record in _pieces(file, data):
             try:
@@ -263,9 +289,9 @@ class _Salvage:
                 self._skip(start, stop, str(error))
 
     def _take(self, opcode, record, message):
-        """Add an item of _pieces to the bag; message: bytes of a message outside chunks.
+        """Add a record of _pieces to the bag. Raises ValueError for unusable bytes.
 
-        Raises ValueError for unusable bytes.
+        message: bytes of a message record outside chunks, b'' for any other record.
         """
         if opcode == _UNUSABLE:
             raise ValueError(record)
@@ -296,7 +322,7 @@ class _Salvage:
             self._counts.setdefault(self._names[channel], 0)
 
     def _once(self, add, *content):
-        """Return the number of a schema or channel in the new bag, and add it at its first occurrence.
+        """Return the number of a schema or channel in the new bag; call add(*content) at its first occurrence.
 
         Because each file of a bag repeats the schemas and channels, this avoids a second copy.
         """
@@ -306,7 +332,7 @@ class _Salvage:
         return self._declared[key]
 
     def _skip(self, start, stop, problem):
-        """Note unusable bytes as a new Gap, or as a part of the Gap that ends at `start`."""
+        """Note the unusable bytes [start, stop) as a new Gap, or as a part of the Gap that ends at `start`."""
         file = self._file.path.name if self._several else ''
         if self._gaps and self._gaps[-1].stop == start and self._gaps[-1].file == file:
             self._gaps[-1].stop = stop
@@ -315,7 +341,10 @@ class _Salvage:
         self._unsure = set(self._channels.values())
 
     def _add_messages(self, raw):
-        """Add the messages of a chunk (bytes). Raises ValueError, and adds none, if a message has no known channel."""
+        """Add the messages in records, given as bytes (of a chunk, or of one message).
+
+        Raises ValueError, and adds none of the messages, if a message has no known channel or an invalid head.
+        """
         first = last = None
         number = at = 0
         while at < len(raw):
@@ -347,10 +376,11 @@ class _Salvage:
         self._last = last if self._last is None else max(self._last, last)
 
     def _add(self, channel, sequence, log, publish, data):
-        """Add a message. The recorder numbers from 1 in each file, so the first number after a gap gives its size.
+        """Add a message to a channel of the bag. log, publish: times [ns]; data: CDR bytes.
 
-        A tool that splits a recording continues the numbers of the file before. The number 0 marks a message of
-        another publisher than that of the graph.
+        The recorder numbers the messages of each topic from 1 in each file. The sequence number of the first message
+        after a gap therefore gives the number of lost messages. A tool that splits a recording continues the numbers
+        of the file before. The number 0 marks a message of a foreign publisher.
         """
         if sequence:
             before = self._before.get(channel, 0)

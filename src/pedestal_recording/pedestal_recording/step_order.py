@@ -1,6 +1,7 @@
-"""Order of the messages in a lockstep recording: step after step, within a step as in the table of topics.
+"""Order of the messages in a lockstep recording: step after step, and within a step as in the table of topics.
 
-The order of arrival depends on the load of the machine, the order of steps does not. So equal runs give equal files.
+The recorder node passes each message to a StepOrder, which writes them in this order. The order of arrival depends on
+the load of the machine, the order of steps does not. So equal runs give equal files.
 """
 import heapq
 
@@ -8,25 +9,33 @@ from pedestal_common.graph.steps import NS_PER_SECOND
 from pedestal_common.graph.topics import EVENT_RATES
 
 MAX_WAITING_STEPS = 10_000
-"""Largest number of steps that wait for an incomplete step."""
+"""Largest number of steps whose messages wait because an earlier step is incomplete."""
 
 
 class OrderError(ValueError):
-    """More than MAX_WAITING_STEPS steps wait for an incomplete step; one line with its stamp and missing messages."""
+    """Error of more than MAX_WAITING_STEPS steps that wait for an incomplete step.
+
+    Its text is one line with the stamp of the incomplete step and its missing messages.
+    """
 
 
 class StepOrder:
     """Collector of the messages of each step. A step is written when it is complete and all earlier steps are written.
 
-    topics     recorded rows of topics.TOPICS
+    topics     recorded topics, as rows of topics.TOPICS
     nodes      names of the nodes in the graph
-    write      called in canonical order: write(index of the topic, log time, publish time [ns], bytes), with the stamp
-               of the step as both times
+    write      function write(index of the topic, log time, publish time [ns], CDR bytes). Its calls are in the order
+               of steps, with the stamp of the step as both times.
     written    stamp of the last written step [ns], -1 before the first
-    unplaced   number of messages without a place in an unwritten step (doubled, late, without stamp)
+    unplaced   number of messages without a place in an unwritten step: doubled, late or without stamp
 
-    A step is complete with one message of every step topic. At every whole second it also needs the diagnostics of
-    every node of the graph. The first step needs the `once` topics. An unplaced message follows the next step.
+    A step is complete with one message of every topic of the rate `step`. At every whole second it also needs the
+    diagnostics of every node of the graph. The first step also needs the topics of the rate `once`. An unplaced
+    message is written after the next written step.
+
+    A slot is the place of one message in a step, numbered from 1: one slot for each topic, and for the diagnostics one
+    slot for each node. A bucket is the list of the messages of one step: item 0 is the number of missing messages of
+    step topics, and item k is the message in slot k, or None.
     """
 
     def __init__(self, topics, nodes, write):
@@ -60,12 +69,11 @@ class StepOrder:
         return len(self._buckets)
 
     def slot(self, name, node=None):
-        """Return the slot number of a topic, for a topic with several publishers of one node; None if not recorded.
-        """
+        """Return the slot of a topic, None if it is not recorded. node: the publisher, for the diagnostics only."""
         return self._slot_of.get((name, node))
 
     def take(self, slot, stamp, data):
-        """Take a message of a slot: its stamp [ns] and bytes. Raises OrderError if too many steps wait."""
+        """Take a message by its slot, its stamp [ns] and its CDR bytes. Raises OrderError if too many steps wait."""
         bucket = self._buckets.get(stamp)
         if bucket is None:
             if stamp <= self.written:
@@ -84,18 +92,20 @@ class StepOrder:
             self._advance()
 
     def take_change(self, index, data):
-        """Take the bytes of a message of a `change` topic, by the index of the topic.
+        """Take the CDR bytes of a message of a topic of EVENT_RATES, by the index of the topic.
 
-        The message belongs to the step after the last step that its publisher has answered.
+        The message belongs to the step after the last step that its publisher has answered. A node answers a step by
+        the first of its step topics.
         """
         self._changes[index].append((self._last_answer[self._answer_slot[index]], data))
 
     def take_unplaced(self, index, data):
-        """Take the bytes of a message without a place in a step, by the index of its topic."""
+        """Take the CDR bytes of a message without a place in a step, by the index of its topic."""
         self.unplaced += 1
         self._unplaced.append((index, data))
 
     def _open(self, stamp):
+        """Add a bucket for the step with a stamp [ns], and return it. Raises OrderError if too many steps wait."""
         if len(self._stamps) >= MAX_WAITING_STEPS:
             first = self._stamps[0]
             raise OrderError(f'step {first / NS_PER_SECOND:.6f} s still waits for {", ".join(self.missing(first))} '
@@ -105,7 +115,7 @@ class StepOrder:
         return bucket
 
     def _missing_slots(self, stamp):
-        """Return the empty slots that keep the step incomplete."""
+        """Return the empty slots that keep the step with a stamp [ns] incomplete."""
         bucket = self._buckets[stamp]
         needed = self._needed['step'] if bucket[0] else []
         if self.written < 0:
@@ -120,10 +130,12 @@ class StepOrder:
         return [f'{topic.name} of {node}' if node else topic.name for _, topic, node in slots]
 
     def _advance(self):
+        """Write the earliest waiting steps as long as they are complete."""
         while self._stamps and not self._buckets[self._stamps[0]][0] and not self._missing_slots(self._stamps[0]):
             self._write_first_step()
 
     def _write_first_step(self):
+        """Write the messages of the earliest waiting step, whether it is complete or not."""
         stamp = heapq.heappop(self._stamps)
         bucket = self._buckets.pop(stamp)
         write = self._write
@@ -138,6 +150,7 @@ class StepOrder:
         self._put_unplaced()
 
     def _put_unplaced(self):
+        """Write the messages without a place in a step, with the stamp of the last written step."""
         unplaced, self._unplaced = self._unplaced, []
         for index, data in unplaced:
             self._write(index, max(self.written, 0), max(self.written, 0), data)

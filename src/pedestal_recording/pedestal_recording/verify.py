@@ -1,6 +1,8 @@
-"""Verification of a recording: each step of each topic is there once, in order; counts and sequence numbers agree.
+"""`pedestal verify`: check that a recording is complete.
 
-The report also states whether the run came to its planned end. The recording of an aborted run may be complete.
+Each topic of the rate `step` must have one message for each step of the drive, in order. The message counts and the
+sequence numbers must agree. The report also states whether the run came to its planned end. The recording of an
+aborted run may be complete up to its end.
 """
 import collections
 import dataclasses
@@ -16,7 +18,10 @@ from pedestal_common.wire import messages
 from pedestal_recording import configuration
 
 MAX_LATENCY_NS = 1_000_000_000
-"""Largest time between the end of a topic and the last step, for messages still in transit [ns]."""
+"""Largest time between the last message of a topic and the last step [ns].
+
+The missing messages of this time are no problem: they were still in transit at the end of the recording.
+"""
 
 MAX_SHOWN_GAPS = 10
 """Largest number of gaps of a topic that the report lists."""
@@ -24,7 +29,7 @@ MAX_SHOWN_GAPS = 10
 
 @dataclasses.dataclass
 class TopicCheck:
-    """Result for one topic: count, first and last stamp [s] (NaN without messages), problems as texts."""
+    """Result for one topic: number of messages, first and last stamp [s] (NaN without messages), problems as texts."""
     name: str
     count: int
     first: float
@@ -37,13 +42,14 @@ class Report:
     """Result of `verify`.
 
     topics            [TopicCheck]
-    foreign           lines about the foreign messages, which are left out
-    cut               begin of a recording that holds a part of its run only [s], None for a recording from the start
-    problems          of the whole bag, texts
-    steps, period     number of steps of the run, and their period [s], NaN with fewer than two steps
+    foreign           lines about the foreign messages, which the check leaves out
+    cut               time at which a recording of only a part of its run begins [s]; None if it begins with its run
+    problems          texts about the bag as a whole
+    steps, period     number of steps of the run; their period [s], NaN with fewer than two steps
     made              origin of the bag, one line
-    end, planned_end  times of the last step and of the planned last step [ns]; None if unknown
-    lost              (steps of the drive without their command, all its steps) from its last diagnostics, None without
+    end               time of the last step [ns]
+    planned_end       time of the planned last step [ns], None if unknown
+    lost              (number of lost steps, number of all steps) in the last diagnostics of the drive, None if unknown
     """
     path: str
     topics: list
@@ -59,7 +65,7 @@ class Report:
 
     @property
     def complete(self):
-        """True without a problem up to the end of the recording."""
+        """True if the recording has no problem up to its end."""
         return not self.problems and not any(check.problems for check in self.topics)
 
     @property
@@ -74,7 +80,7 @@ class Report:
 
     @property
     def ending(self):
-        """End of an aborted run, one line; '' for a run that came to its planned end or has none."""
+        """One line about the end of an aborted run; '' if the run came to its planned end or has no planned end."""
         if self.aborted and self.cut is not None:
             return (f'part of a run: {self.cut:.6f} s to {self.end / 1e9:.6f} s; planned end '
                     f'{self.planned_end / 1e9:.6f} s')
@@ -114,7 +120,7 @@ class Report:
 
 
 class _Grid(typing.NamedTuple):
-    """First and last step of a run and their period [ns]; period 0 with fewer than two steps."""
+    """Times of the steps of a run: first and last step, and period [ns]; period 0 with fewer than two steps."""
     first: int
     last: int
     period: int
@@ -125,12 +131,16 @@ class _Grid(typing.NamedTuple):
         return (self.last - self.first) // self.period + 1 if self.period else 0
 
     def at(self, stamp):
-        """Return the first step at or after a stamp [ns], a number or an array."""
+        """Return the time of the first step at or after a stamp [ns], a number or an array."""
         return self.first - (self.first - stamp) // self.period * self.period
 
 
 def verify(bag) -> Report:
-    """Check a bag.Bag. The steps are the stamps of joint_states, else of the first step topic with messages."""
+    """Return the Report on a bag.Bag.
+
+    The stamps of joint_states define the steps. In a bag without them, the first topic of the rate `step` that has
+    messages defines the steps.
+    """
     rows = {name: bag.rows(name) for name in bag.topics}
     stamps = {name: row.stamp - bag.start for name, row in rows.items()}
     graph, planned = bag.graph, bag.planned_end
@@ -165,14 +175,15 @@ def verify(bag) -> Report:
 
 
 def count(text):
-    """Return a value of the diagnostics as a whole number, None if it is none."""
+    """Return a text of the diagnostics as a whole number, None if the text is no whole number."""
     return int(text) if text.isdecimal() and len(text) < 20 else None
 
 
 def steps_before(bag):
-    """Return the number of steps before the first step of a bag.Bag that holds a part of its run only.
+    """Return the number of steps that a bag.Bag of only a part of its run misses before its first step, else 0.
 
-    The messages of all topics of the steps begin with the same number then. The recorder counts from 1.
+    The recorder counts the messages of each topic from 1. In a part of a run, the sequence numbers of all topics of
+    the rate `step` therefore begin with an equal number above 1.
     """
     graph = bag.graph
     numbers = [bag.recorded(name).sequence for name in bag.topics
@@ -182,9 +193,10 @@ def steps_before(bag):
 
 
 def _problems(bag, rows, name, stamp, grid, cut):
-    """Return the problems of a topic, from its rows of the index (n,) and its stamps (n,) [ns] since the start.
+    """Return the problems of a topic `name` as texts.
 
-    cut: True in a recording that begins during its run. The messages before its begin are unknown.
+    rows: its rows of the index (n,); stamp: its stamps (n,) since the start [ns]; grid: _Grid of the run.
+    cut: True if the recording begins during its run. The number of messages before its begin is then unknown.
     """
     topic, ours = bag.graph.get(name), 'pacing' in bag.metadata
     rate = topic.rate if topic else ''
@@ -196,7 +208,8 @@ def _problems(bag, rows, name, stamp, grid, cut):
         problems += _steps(stamp, 'adu' in topic.writers, grid)
         if ours and not np.array_equal(rows.stamp, rows.log):
             problems.append(f'{np.sum(rows.stamp != rows.log)} messages with a log time that differs from their stamp')
-    elif rate == 'once' and not (not cut) <= stamp.size <= len(bag.files):  # each recorder receives a latched message
+    # The `once` topics are latched, so a restarted recorder receives their message again, in its own file.
+    elif rate == 'once' and not (not cut) <= stamp.size <= len(bag.files):
         problems.append(f'{stamp.size} messages, must be 1')
     elif rate == 'second' and bag.metadata.get('pacing') == 'lockstep' and grid.period:
         problems += _seconds(bag, name, stamp, grid)
@@ -208,13 +221,13 @@ def _problems(bag, rows, name, stamp, grid, cut):
 
 
 def _differences(claimed, counts):
-    """Return the differences between claimed and actual counts {topic: messages} as text."""
+    """Return the differences between stated and actual counts {topic: number of messages} as text."""
     return ', '.join(f'{claimed.get(name, 0)} of {name} instead of {counts.get(name, 0)}'
                      for name in dict.fromkeys((*claimed, *counts)) if claimed.get(name, 0) != counts.get(name, 0))
 
 
 def _grid(stamps):
-    """Return the _Grid of the stamps {topic: (n,) [ns]} of the step topics."""
+    """Return the _Grid of a run from the stamps {topic: (n,) [ns]} of its topics of the rate `step`."""
     if not stamps:
         return _Grid(0, 0, 0)
     steps = np.unique(next((stamp for name, stamp in stamps.items() if nodes.plain(name) == 'joint_states'),
@@ -224,21 +237,24 @@ def _grid(stamps):
 
 
 def _order(stamp):
-    """Return the problem of stamps that go back, [] without any."""
+    """Return [text about the stamps (n,) [ns] that go back], [] if none does."""
     back = np.flatnonzero(np.diff(stamp) < 0)
     return [f'{back.size} stamps go back, the first from {stamp[back[0]] / 1e9:.6f} '
             f'to {stamp[back[0] + 1] / 1e9:.6f} s'] if back.size else []
 
 
 def _missing(numbers, count):
-    """Return [(first, last)] of the gaps in ascending whole numbers (n,) that should include 0 to count - 1."""
+    """Return the gaps [(first, last)] in ascending whole numbers (n,), which should contain each of 0 to count - 1."""
     bounds = np.concatenate(([-1], numbers[(numbers >= 0) & (numbers < count)], [count]))
     gaps = np.flatnonzero(np.diff(bounds) > 1)
     return list(zip((bounds[gaps] + 1).tolist(), (bounds[gaps + 1] - 1).tolist()))
 
 
 def _steps(stamp, of_drive, grid):
-    """Return the problems of missing or doubled steps, and of other stamps. of_drive: published by the drive."""
+    """Return texts about missing steps, doubled steps and stamps (n,) [ns] between two steps.
+
+    of_drive: True for a topic of the drive, whose messages are never in transit (MAX_LATENCY_NS).
+    """
     if not stamp.size:
         return ['no message']
     problems = []
@@ -266,7 +282,10 @@ def _steps(stamp, of_drive, grid):
 
 
 def _seconds(bag, name, stamp, grid):
-    """Return the missing diagnostics as problems: each node with a topic in the bag publishes at each whole second."""
+    """Return texts about missing diagnostics: each node with a topic in the bag publishes them at each whole second.
+
+    name: topic of the diagnostics; stamp: its stamps (n,) [ns].
+    """
     first, last = -(-grid.first // NS_PER_SECOND), grid.last // NS_PER_SECOND
     count = max(last - first + (grid.at(last * NS_PER_SECOND) <= grid.last), 0)
     stamps_of = collections.defaultdict(list)
@@ -292,9 +311,9 @@ def _seconds(bag, name, stamp, grid):
 
 
 def _unrecorded_steps(of_steps, start, grid):
-    """Return the gaps between two files: a recorder was killed, and another recorder was started later.
+    """Return texts about the gaps between two files: a recorder was killed, and another recorder was started later.
 
-    of_steps: rows of the index of each step topic.
+    of_steps: rows of the index, for each topic of the rate `step`; start: stamp of time 0 [ns].
     """
     none = np.zeros(0, np.int64)
     number = np.concatenate([none, *(row.channel >> 16 for row in of_steps)])
@@ -305,9 +324,10 @@ def _unrecorded_steps(of_steps, start, grid):
 
 
 def _numbering(rows, cut):
-    """Return the problems of the sequence numbers of a topic, from its rows of the index.
+    """Return texts about lost messages and doubled or descending sequence numbers of a topic; rows: of the index.
 
-    The recorder counts from 1 in each file, with a gap for each lost message; 0 marks a message of another publisher.
+    The recorder counts from 1 in each file, and leaves out a number for each lost message. The number 0 marks a
+    message of a foreign publisher. cut: True in a recording of a part of its run, which begins with a higher number.
     A tool that splits a recording continues the numbers of the file before.
     """
     lost = back = 0
@@ -325,7 +345,10 @@ def _numbering(rows, cut):
 
 
 def _metadata_file(bag, counts):
-    """Return the differences between metadata.yaml and the files."""
+    """Return texts about the differences between metadata.yaml and the files.
+
+    counts: {topic: number of messages} in the files.
+    """
     file = bag.path / 'metadata.yaml'
     try:
         information = plain_yaml.read(file)['rosbag2_bagfile_information']

@@ -1,11 +1,18 @@
-"""Writing of a bag: a rosbag2 directory (metadata.yaml version 9) with an MCAP file. No ROS here.
+"""Writing of a bag, the recording of a run: a rosbag2 directory (metadata.yaml version 9) with an MCAP file.
 
-The Writer of the mcap library makes the records. This module adds four properties. A chunk ends by log time. The file
-stays whole on a full disk. The file is locked while it is written. All schemas and channels also stand before the
-first chunk, so a broken chunk does not lose them. The file does not depend on its path, the host or the wall clock, so
-equal messages give equal bytes.
+The recorder node, `pedestal recover` and the recomputation write bags by this module. It works without ROS.
 
-A recorder of a realtime run that died may be started again. It continues in a new file of the bag, NAME_1.mcap and so
+The Writer of the mcap library makes the records of the file. This module adds four properties:
+
+    chunks        A chunk (a group of messages) ends after one second of log time, so a crash loses one second at most.
+    full disk     The file stays readable if the disk is full.
+    lock          The file is locked while it is written.
+    declarations  All schemas (message types) and channels (topics) also stand before the first chunk. A broken chunk
+                  therefore does not lose them.
+
+The file does not depend on its path, the host or the wall clock, so equal messages give equal bytes.
+
+A recorder that died in a realtime run may be started again. It continues in a new file of the bag, NAME_1.mcap and so
 on, until a file reaches the planned end of the run.
 """
 import collections
@@ -31,19 +38,24 @@ from pedestal_recording.mcap_file import BagError, McapFile, parsed, reason
 TARGET_CHUNK_BYTES = 1_000_000
 TARGET_CHUNK_SPAN_NS = 1_000_000_000
 TARGET_CHUNK_MESSAGES = 100_000
-"""Size [bytes], log time [ns] and messages after which a chunk ends. A crash loses one second at most."""
+"""Size [bytes], span of log times [ns] and number of messages after which a chunk ends."""
 
 COMMON_METADATA_KEYS = ('scenario', 'pacing', 'seed', 'planned_end_ns')
 """Keys of the metadata with equal values in all files of a bag."""
 
 _INFINITE = {'sec': 9223372036, 'nsec': 854775807}
+"""Duration by which rosbag2 states that a quality of service has no limit."""
 
 _PAIR, _INDEX = struct.Struct('<QQ'), struct.Struct('<HI')
-"""First and last log time of a chunk; channel and size of a message index, whose entries are pairs."""
+"""_PAIR: first and last log time of a chunk [ns]; an entry of a message index has the size of such a pair.
+
+_INDEX: begin of a message index, with the number of a channel and the size of all entries [bytes]. A message index
+lists the messages of one channel in a chunk.
+"""
 
 
 def _qos(rate):
-    """Return the offered_qos_profiles of a topic of a rate."""
+    """Return the field offered_qos_profiles of rosbag2 for a topic, from its rate in the table of topics."""
     depth, latched = topics.QOS_BY_RATE[rate].lockstep, topics.QOS_BY_RATE[rate].latched
     return [{'history': 'keep_last' if depth else 'keep_all', 'depth': depth, 'reliability': 'reliable',
              'durability': 'transient_local' if latched else 'volatile',
@@ -52,9 +64,9 @@ def _qos(rate):
 
 
 class _Disk:
-    """Stream below the Writer of the library. Bytes since the last flush reach the file as a whole or not at all.
+    """Output stream of the Writer of the mcap library. The bytes between two flushes reach the file all or not at all.
 
-    size: number of bytes that the file already has; they are not written again.
+    stream: the open file; size: number of bytes at its beginning that are already written, and not written again.
     """
 
     def __init__(self, path, stream, size=0):
@@ -85,11 +97,15 @@ class _Disk:
 
 
 class BagFile:
-    """A bag that is being written. path: its directory; file: its MCAP file.
+    """A bag that is being written.
 
-    directory: must not exist; earlier: files of the bag before this file.
-    Raises BagError with the name of the file if the disk does not take a chunk. The earlier chunks stay readable. All
-    later messages are dropped, so a bag has no gap.
+    path        absolute path of its directory
+    file        path of its MCAP file that is being written
+    directory   path of the bag; must not exist, unless the bag has earlier files
+    earlier     MCAP files of the bag before this file
+
+    Raises BagError with the name of the file if the disk is full. The earlier chunks then stay readable. All later
+    messages are dropped, so a bag has no gap.
     """
 
     def __init__(self, directory, earlier=()):
@@ -110,32 +126,37 @@ class BagFile:
         self._start(_Disk(self.file, stream))
 
     def _start(self, disk):
+        """Begin a new file by a new Writer of the mcap library on a _Disk."""
         self._disk = disk
         self._mcap = writer.Writer(disk, chunk_size=sys.maxsize)  # flush() alone ends a chunk
         self._mcap.start('ros2', 'pedestal')
 
     def add_schema(self, name, encoding, data):
-        """Declare a message type by its name and its definition (text as bytes) in an encoding. Return its number."""
+        """Add a message type: its name, and its definition (bytes of a text) in an encoding such as 'ros2msg'.
+
+        Return the number of the schema.
+        """
         number = self._mcap.register_schema(name, encoding, data)
         return self._declared(records.Schema(id=number, name=name, encoding=encoding, data=data))
 
     def add_channel(self, topic, schema, metadata):
-        """Declare a topic of CDR messages by its name with '/', the number of its schema and {text: text}.
+        """Add a topic: its name with '/', the number of the schema of its type, and metadata {text: text}.
 
-        Return its number.
+        Return the number of the channel. Its messages are CDR, the byte format of ROS 2.
         """
         number = self._mcap.register_channel(topic, 'cdr', schema, metadata)
         return self._declared(records.Channel(id=number, topic=topic, message_encoding='cdr', schema_id=schema,
                                               metadata=metadata))
 
     def _declared(self, record):
+        """Write a schema or channel before the first chunk too, and return its number."""
         builder = RecordBuilder()
         record.write(builder)
         self._disk.write(builder.end())
         return record.id
 
     def add_metadata(self, name, content):
-        """Add a metadata record {text: text}; the record `pedestal` is also custom_data of metadata.yaml."""
+        """Add a metadata record: its name and {text: text}. close() repeats the record `pedestal` in metadata.yaml."""
         self._mcap.add_metadata(name, content)
 
     def add_message(self, channel, sequence, log_time, publish_time, data):
@@ -153,7 +174,7 @@ class BagFile:
         self._mcap.add_message(channel, log_time, data, publish_time, sequence)
 
     def flush(self):
-        """End the chunk. After the return all added messages are in the file."""
+        """End the chunk, which writes all added messages to the file. Raises BagError if the disk is full."""
         added, self._in_chunk, self._chunk_size = self._in_chunk, 0, 0
         if self._full:
             return
@@ -166,13 +187,13 @@ class BagFile:
 
     @property
     def messages(self):
-        """Number of messages added and not dropped."""
+        """Number of added messages, without those dropped on a full disk."""
         return self._in_file + self._in_chunk
 
     def close(self):
-        """Write the last chunk, the summary and metadata.yaml. On a full disk, write the part that fits.
+        """Write the last chunk, the summary and metadata.yaml.
 
-        Raises BagError on a full disk.
+        On a full disk, write the part that fits, and raise BagError.
         """
         with contextlib.closing(self._disk.stream):
             try:
@@ -185,7 +206,11 @@ class BagFile:
                 self._write_metadata_file()
 
     def _truncate_after_disk_full(self):
-        """Give the content of the file to a new Writer of the library, because a Writer cannot take back a chunk."""
+        """Replace the Writer of the library by a new Writer that counts only the chunks in the file.
+
+        Because a Writer cannot take back a chunk, its summary would list the chunk that the disk did not take. The new
+        Writer receives the content of the file again, and _Disk skips the bytes that are already written.
+        """
         self._start(_Disk(self.file, self._disk.stream, self._disk.end))
         with open(self.file, 'rb') as stream, contextlib.suppress(EndOfFile):
             for record in StreamReader(stream, emit_chunks=True).records:
@@ -237,9 +262,10 @@ class BagFile:
 
 
 class _Content:
-    """Content of an MCAP file of the recorder, also of a killed one, without its messages.
+    """Summary of an MCAP file of the recorder, which need not be whole: its recorder may have been killed.
 
-    path; metadata: {record: {text: text}}; first, last: log times [ns], 0 without a message.
+    path: the file; metadata: {record: {text: text}}; first, last: log times of its first and last message [ns], 0
+    without a message; total: number of messages.
     """
 
     def __init__(self, path):
@@ -258,6 +284,7 @@ class _Content:
         self.first, self.last, self.total = min(times, default=0), max(times, default=0), self._counts.total()
 
     def _declare(self, record):
+        """Note a record of metadata, a schema or a channel."""
         if isinstance(record, records.Metadata):
             self.metadata[record.name] = record.metadata
         elif isinstance(record, records.Schema):
@@ -272,13 +299,14 @@ class _Content:
 
 
 def _times(contents):
-    """Return the time span of some _Contents in the form of metadata.yaml."""
+    """Return the duration and the start of some files (_Contents) as fields of metadata.yaml."""
     known = [content for content in contents if content.total] or contents[:1]
     start, end = min(content.first for content in known), max(content.last for content in known)
     return {'duration': {'nanoseconds': end - start}, 'starting_time': {'nanoseconds_since_epoch': start}}
 
 
 def _profiles(channel):
+    """Return the quality of service that a records.Channel states (offered_qos_profiles), [] if unreadable."""
     try:
         return plain_yaml.parse(channel.metadata.get('offered_qos_profiles', ''), aliases=True) or []
     except yaml.YAMLError:
@@ -286,9 +314,10 @@ def _profiles(channel):
 
 
 def _earlier_files(directory, metadata):
-    """Return the files of an unfinished bag to continue: of a realtime run with this metadata; [] without a bag.
+    """Return the files of an unfinished bag in a directory, which a restarted recorder may continue; [] without a bag.
 
-    Raises BagError for any other bag, and while its recorder still writes it.
+    The bag must be of a realtime run with equal values of COMMON_METADATA_KEYS. Raises BagError for any other bag,
+    and while its recorder still writes it.
     """
     path = pathlib.Path(directory)
     if metadata.get('pacing') != 'realtime' or not any(path.glob('*.mcap')):
@@ -316,10 +345,10 @@ def _earlier_files(directory, metadata):
 
 
 class Writer(BagFile):
-    """A bag of topics of the graph, with messages numbered from 1.
+    """A bag of topics of the graph that is being written. The messages of each topic are numbered from 1.
 
-    directory   must not exist, or must be a bag to continue (see this module)
-    rows        rows of topics.TOPICS, or nodes.Links; a message names its topic by the index in them
+    directory   path of the bag: must not exist, or must hold an unfinished bag to continue (_earlier_files)
+    rows        topics of the bag, as rows of topics.TOPICS or as nodes.Links; the methods take the index of a row
     metadata    {text: text} of the run, for the metadata record `pedestal`
     more        {name: {text: text}} of further metadata records
 
@@ -339,7 +368,7 @@ class Writer(BagFile):
         self.flush()
 
     def write(self, topic, log_time, publish_time, data):
-        """Add a message: index of its topic, times [ns], CDR bytes."""
+        """Add a message: index of its topic, log time and publish time [ns], CDR bytes."""
         self._sequences[topic] = sequence = self._sequences[topic] + 1
         self.add_message(self._channels[topic], sequence & 0xffffffff, log_time, publish_time, data)
 

@@ -10,7 +10,7 @@ from rosbags.highlevel import AnyReader
 
 from pedestal import cli
 from pedestal_common.graph import topics
-from pedestal_common.wire import messages
+from pedestal_common.wire import commands, messages
 from pedestal_recording.writer import Writer
 
 T = 5_000_000
@@ -47,6 +47,10 @@ def run():
             messages.KeyValue(key='locked', value='1'), messages.KeyValue(key='gain', value='0.5')])
         for level, name in ((0, 'acu'), (2, 'adu'))])
     rows.append(('diagnostics', 0, array))
+    for k, text in enumerate(TEXTS):
+        reply = commands.Reply(k % 2 == 0, text)
+        rows.append(('acu/command_result', k * T, commands.reply_message(commands.Command(
+            'preset', 'Ada, "tower"', str(k), {'azimuth': str(k)}), reply)))
     return rows
 
 
@@ -102,6 +106,10 @@ def tabulated(name, message):
                  **{f'twist.angular.{k} [rad/s]': getattr(w, k) for k in 'xyz'}}]
     if name == 'acu/mode':
         return [{'data': message.data}]
+    if name == 'acu/command_result':
+        return [{'level': message.level, 'name': message.name, 'hardware_id': message.hardware_id,
+                 'message': message.message,
+                 'values': '; '.join(f'{pair.key}={pair.value}' for pair in message.values)}]
     return [{'level': status.level, 'name': status.name, 'message': status.message,
              'values': '; '.join(f'{pair.key}={pair.value}' for pair in status.values)} for status in message.status]
 

@@ -1,10 +1,12 @@
 """Studies: the compiled closed loop measured against the claims of papers and against our own targets.
 
-A study is a module of one of STUDY_FOLDERS. The first line of its docstring describes the study. `run(progress)`
-returns its rigs.rows.Result and may call progress(fraction done, text of the next part). A study of many runs has a
-default number DEFAULT_RUNS and is `run(progress, runs=DEFAULT_RUNS, pool=None)`, where pool is a monte_carlo.Pool.
-Without a pool the runs are made in this process. `rigs` holds the parts that several studies use. `pedestal run
-SCENARIO --param ...` runs a case that is a scenario with parameters through the nodes.
+`pedestal study NAME` runs a study. A study is a module of one of STUDY_FOLDERS. The first line of its docstring
+describes the study. Its function `run(progress)` returns a rigs.rows.Result and may call progress(fraction done, text
+of the next part). In a study of many runs the function is `run(progress, runs=DEFAULT_RUNS, pool=None)`, where pool is
+a monte_carlo.Pool. Without a pool the runs are made in this process. `rigs` holds the parts that several studies use.
+
+A case is one configuration that a study measures, such as a filter on a motion. If a case is a scenario with changed
+parameters, `pedestal run SCENARIO --param ...` runs it with separate nodes.
 """
 import ast
 import importlib
@@ -12,8 +14,8 @@ import pathlib
 
 STUDY_FOLDERS = 'papers', 'system'
 """Folders that hold one study in each module."""
-_STUDY_FILES = {file.stem.replace('_', '-'): file for room in STUDY_FOLDERS
-                for file in pathlib.Path(__file__).with_name(room).glob('[a-z]*.py')}
+_STUDY_FILES = {file.stem.replace('_', '-'): file for folder in STUDY_FOLDERS
+                for file in pathlib.Path(__file__).with_name(folder).glob('[a-z]*.py')}
 STUDY_NAMES = tuple(sorted(_STUDY_FILES))
 
 
@@ -23,9 +25,9 @@ def study(name):
 
 
 def descriptions():
-    """Return {name of a study: its first line}, read from the files.
+    """Return {name of a study: first line of its docstring}.
 
-    The import of all studies would take two seconds.
+    Because the import of all studies would take two seconds, the lines are read from the files.
     """
     docstrings = {name: ast.get_docstring(ast.parse(_STUDY_FILES[name].read_text())) for name in STUDY_NAMES}
     return {name: text.partition('\n')[0] for name, text in docstrings.items()}

@@ -1,10 +1,14 @@
-"""Studies of your own plant, `pedestal study servo|backlash|bode --scenario FILE`: both axes of a scenario, ashore.
+"""Studies of your own plant: `pedestal study servo|backlash|bode --scenario FILE` measures both axes of a scenario.
 
-  bode      the loops by pedestal_analysis/tuning/frequency_response.py, each axis by itself
-  servo     a step of STEP_SIZE_RAD, a sine of SINE_AMPLITUDE_RAD at SINE_FREQUENCY_HZ, and a step of wind torque of
-            GUST_TORQUE_SHARE of the torque limit of both motors; measured on the true angle of the dish, in still air
-  backlash  the standstill after that step, and the error of that sine at its reversals, with the bias of the
-            scenario and without bias
+The antenna stands ashore and in still air. The plant is the drive with motors, gears and load.
+
+  bode      frequency response of the current, speed and position loops, each axis by itself; measured by
+            pedestal_analysis/tuning/frequency_response.py
+  servo     response to a step of STEP_SIZE_RAD, to a sine of SINE_AMPLITUDE_RAD at SINE_FREQUENCY_HZ, and to a gust.
+            The gust is a step of wind torque: GUST_TORQUE_SHARE times the largest torque of both motors on the load.
+            The response is the true angle of the dish
+  backlash  motion of the dish at rest after the step, and its error at the reversals of the sine; both with the bias
+            torque of the scenario and without bias torque
 """
 import math
 
@@ -21,26 +25,27 @@ from pedestal_studies.rigs.rows import Result
 from pedestal_studies.system import bode
 
 STEP_SIZE_RAD, SINE_AMPLITUDE_RAD, SINE_FREQUENCY_HZ, GUST_TORQUE_SHARE = 0.02, 0.02, 0.1, 0.2
-"""Size of the step [rad]; amplitude [rad] and frequency [Hz] of the sine; wind torque over both torque limits [-]."""
+"""Size of the step [rad]; amplitude [rad] and frequency [Hz] of the sine; torque of the gust over the largest torque
+of both motors [-]."""
 
 RUN_DURATION_S, START_ANGLES_RAD, SETTLING_BAND, SINE_PERIODS = 10.0, (0.0, 0.6), 0.02, 3
-"""Duration of the step and gust runs [s]; initial angles of the axes [rad]; band of the settling time [-]; periods
-of the sine, of which the first is not evaluated."""
+"""Duration of the step and gust runs [s]; initial angles of azimuth and elevation [rad]. Half-width of the band of the
+settling time over the size of the step [-]; periods of the sine, of which the first is not evaluated."""
 
 GUST_START_S, STANDSTILL_START_S = 4.0, 5.0
 """Start of the gust; start of the evaluated standstill after the step [s]."""
 
 BIAS_PARAMETERS = {'': {}, '/bias-off': {f'adu.{name}.bias.schedule': 'off' for name in AXES}}
-"""{suffix of a case: parameters}: with the bias of the scenario, and without bias."""
+"""{suffix of a case: parameters}: with the bias torque of the scenario, and without bias torque."""
 
 REST_PARAMETERS = {**loops.STILL_AIR_PARAMETERS, 'scenario.program.source': 'none', 'acu.initial_mode': 'preset',
                    **{f'adu.initial_{name}': start for name, start in zip(AXES, START_ANGLES_RAD)},
                    **{f'acu.{name}.preset': start for name, start in zip(AXES, START_ANGLES_RAD)}}
-"""Parameters of axes at rest."""
+"""Parameters with which both axes hold START_ANGLES_RAD."""
 
 STEP_PARAMETERS = {**REST_PARAMETERS, **{f'acu.{name}.preset': start + STEP_SIZE_RAD
                                          for name, start in zip(AXES, START_ANGLES_RAD)}}
-"""Parameters of a step of both axes."""
+"""Parameters with which both axes make the step at the start of the run."""
 
 SINE_PARAMETERS = {**loops.STILL_AIR_PARAMETERS, 'acu.tracker.handover': False, 'scenario.program.time_offset': 0.0,
                    'scenario.program.interval': 0.02, 'tracking_receiver.target.kind': 'sine',
@@ -48,7 +53,7 @@ SINE_PARAMETERS = {**loops.STILL_AIR_PARAMETERS, 'acu.tracker.handover': False, 
                    **{f'adu.initial_{name}': start for name, start in zip(AXES, START_ANGLES_RAD)},
                    **{f'tracking_receiver.target.angle.{name}': start for name, start in zip(AXES, START_ANGLES_RAD)},
                    **{f'tracking_receiver.target.angle.{name}_amplitude': SINE_AMPLITUDE_RAD for name in AXES}}
-"""Parameters of a sine of both axes."""
+"""Parameters with which both axes follow the sine, a program track."""
 
 
 def bode_study(source, progress):
@@ -68,7 +73,8 @@ def bode_study(source, progress):
                   for name, colour in zip(AXES, (FILTERED_COLOUR, TRUTH_COLOUR))}
         return lambda: bode.bode_figure(f'{loop} loops of {plant.name}', curves, None)
 
-    return Result(bode.rows(responses), {loop: drawn(loop) for loop in ('speed', 'position')})
+    return Result(bode.rows(responses), {loop: drawn(loop) for loop in ('speed', 'position')},
+                  bode.without_gain_margin(responses))
 
 
 def servo_study(source, progress):
@@ -80,63 +86,65 @@ def servo_study(source, progress):
             'gust': ({**REST_PARAMETERS, 'adu.wind.gust.kind': 'step', 'adu.wind.gust.start': GUST_START_S,
                       **{f'adu.wind.gust.{name}': value for name, value in torque.items()}}, RUN_DURATION_S),
             'sine': (SINE_PARAMETERS, SINE_PERIODS / SINE_FREQUENCY_HZ)}
-    flown = {}
+    records = {}
     for i, (name, (changes, duration)) in enumerate(runs.items()):
         progress(i / len(runs), name)
-        flown[name] = Case(name, source, changes, duration).run()
+        records[name] = Case(name, source, changes, duration).run()
     return Result([row(f'{plant.name}/{name}', metric, value, unit) for i, name in enumerate(AXES)
-                   for metric, value, unit in _metrics(flown, i, torque[name])],
-                  {name: lambda name=name: _figure(name, flown[name]) for name in runs})
+                   for metric, value, unit in _metrics(records, i, torque[name])],
+                  {name: lambda name=name: _figure(name, records[name]) for name in runs})
 
 
 def backlash_study(source, progress):
     """Return the Result of the study backlash for a scenario, a name or a path. Raises LoopError, ScenarioError."""
-    plant, flown = loops.Loops(source), {}
+    plant, records = loops.Loops(source), {}
     runs = {(kind, end): Case(kind, source, {**changes, **bias}, duration) for end, bias in BIAS_PARAMETERS.items()
             for kind, changes, duration in (('standstill', STEP_PARAMETERS, RUN_DURATION_S),
                                             ('sine', SINE_PARAMETERS, SINE_PERIODS / SINE_FREQUENCY_HZ))}
     for done, (key, case) in enumerate(runs.items()):
         progress(done / len(runs), ''.join(key))
-        flown[key] = case.run()
+        records[key] = case.run()
     rows = []
     for i, name in enumerate(AXES):
         lash = plant.plants[name].axis.gear_train.lash
         rows.append(row(f'{plant.name}/{name}', 'lash_rad', lash, 'rad'))
         reversal_errors = {}
         for end in BIAS_PARAMETERS:
-            _, angle = _standstill(flown['standstill', end], i)
-            _, residual = _reversals(flown['sine', end], i)
+            _, angle = _standstill(records['standstill', end], i)
+            _, residual = _reversals(records['sine', end], i)
             reversal_errors[end] = metrics.peak(residual)
             rows += [row(f'{plant.name}/{name}{end}', 'standstill_peak_to_peak_rad', np.ptp(angle), 'rad'),
                      row(f'{plant.name}/{name}{end}', 'reversal_error_rad', reversal_errors[end], 'rad')]
         rows.append(row(f'{plant.name}/{name}', 'reversal_ratio_off_to_on',
                         reversal_errors['/bias-off'] / reversal_errors[''], '-'))
-    return Result(rows, {kind: lambda kind=kind, motion_of=motion_of: _bias_figure(kind, motion_of, flown)
+    return Result(rows, {kind: lambda kind=kind, motion_of=motion_of: _bias_figure(kind, motion_of, records)
                          for kind, motion_of in (('standstill', _standstill), ('sine', _reversals))})
 
 
 def _standstill(run, i):
-    """Return (times [s], angle without its mean [rad]) of an axis at rest."""
+    """Return (times [s], angle minus its mean [rad]) of axis i at rest; i: index in AXES, here and below."""
     stands = run.t >= STANDSTILL_START_S
     angle = _angle(run, i)[stands]
     return run.t[stands], angle - np.mean(angle)
 
 
 def _reversals(run, i):
-    """Return (times [s], error without its fundamental [rad]) of an axis over the whole periods after the first."""
+    """Return (times [s], error [rad] without the part at the sine frequency) over whole periods after the first."""
     steady = metrics.whole_periods(run.t, 1.0 / SINE_FREQUENCY_HZ, 1.0 / SINE_FREQUENCY_HZ)
     return run.t[steady], metrics.residual(run.t[steady], _sine_error(run, i)[steady], 1.0 / SINE_FREQUENCY_HZ)
 
 
-def _bias_figure(kind, motion_of, flown):
-    """Draw the remaining motion of both axes, with the bias of the scenario and without bias; motion_of: `_standstill`
-    or `_reversals`."""
+def _bias_figure(kind, motion_of, records):
+    """Draw the remaining motion of both axes, with the bias torque of the scenario and without bias torque.
+
+    kind: title of the panels. motion_of: `_standstill` or `_reversals`.
+    """
     figure, axes = new_panels(2, height=4.6, sharex=True,
                               y=f'{"error" if kind == "sine" else "angle"} [\N{MICRO SIGN}rad]')
     for i, (panel, name) in enumerate(zip(axes[:, 0], AXES)):
         for end, colour, label in (('/bias-off', TRUTH_COLOUR, 'without bias'),
                                    ('', FILTERED_COLOUR, 'as the scenario is')):
-            t, remaining = motion_of(flown[kind, end], i)
+            t, remaining = motion_of(records[kind, end], i)
             panel.plot(t, 1e6 * remaining, color=colour, label=label)
         panel.set_title(f'{kind}, {name}')
     return drawing.legend(figure)
@@ -152,9 +160,9 @@ def _sine_error(run, i):
     return SINE_AMPLITUDE_RAD * np.sin(2.0 * math.pi * SINE_FREQUENCY_HZ * run.t) - _angle(run, i)
 
 
-def _metrics(flown, i, torque):
-    """Return [(metric, value, unit)] of an axis."""
-    step, gust, sine = (flown[name] for name in ('step', 'gust', 'sine'))
+def _metrics(records, i, torque):
+    """Return [(metric, value, unit)] of axis i; records: {name: Run}; torque: of the gust [Nm]."""
+    step, gust, sine = (records[name] for name in ('step', 'gust', 'sine'))
     after, settled = _angle(gust, i)[gust.t >= GUST_START_S], sine.t >= 1.0 / SINE_FREQUENCY_HZ
     return [('step_overshoot_percent', metrics.overshoot_percent(_angle(step, i), STEP_SIZE_RAD), '%'),
             ('step_settling_2percent_s', metrics.settling_time(step.t, _angle(step, i), STEP_SIZE_RAD, SETTLING_BAND),

@@ -120,7 +120,7 @@ def result():
 
 
 def test_no_row_misses_its_target_but_those_that_are_said_to(result):
-    """The default bank follows a twentieth of the acceleration of these reversals: docs/filters.md."""
+    """Through the product, with 40 ms of latency, the default bank is not three times as good as kalman-cv."""
     named = {(row['case'], row['metric']): row for row in result.rows}
     assert len(named) == len(result.rows)
     for axis in study.REVERSAL_S_BY_AXIS:

@@ -1,16 +1,42 @@
 """The study target-filters: its cases, its rows, and one of its targets."""
-import numpy as np
+import math
+import operator
 
+import numpy as np
+import pytest
+
+from pedestal_studies.rigs import hard_targets
 from pedestal_studies.system import target_filters as study
 
 
 def test_the_default_is_a_scenario_without_a_filter_and_tuned_is_one_of_one_model():
     for target, (_, parameters) in study.TARGET_SCENARIOS.items():
         assert study.CASES[f'{target}/default'].parameters == parameters
-        acu = study.CASES[f'{target}/tuned'].loaded().node_parameters('acu')
-        for axis, noise in zip((acu.azimuth, acu.elevation), study.TUNED_FILTERS[target][1:]):
-            assert axis.filter.kind == study.TUNED_FILTERS[target][0] and getattr(axis.filter,
-                                                                                  axis.filter.kind).noise == noise
+        acu = study.loaded(study.CASES[f'{target}/tuned']).node_parameters('acu')
+        given = study.TUNED_FILTERS[target.partition('-ship')[0]]
+        assert {key: operator.attrgetter(key)(acu) for key in given} == given
+        assert acu.azimuth.filter.kind in ('cv', 'ca', 'singer')
+
+
+def test_tables_of_hard_targets_have_the_accelerations_of_their_texts(tmp_path):
+    """Differences of the written tables: the S motion reverses at 11 deg/s2, a jet turns at 6 g, and so on."""
+    largest = {}
+    for name in hard_targets.HARD_TARGETS:
+        hard_targets.write(tmp_path / 'table.csv', name, 60.0)
+        t, azimuth, elevation = np.loadtxt(tmp_path / 'table.csv', delimiter=',', skiprows=1).T
+        assert t[-1] == 60.0 and np.ptp(np.diff(t)) < 1e-9 and (elevation > 2.0).all()
+        largest[name] = np.abs(np.diff(azimuth, 2)[2:-2]).max() * hard_targets.STEP_RATE_HZ**2
+    assert largest['s_motion'] == pytest.approx(11.0, rel=0.01)
+    # 0.5 g at 120 m across the line of sight.
+    assert largest['quadcopter'] == pytest.approx(math.degrees(0.5 * 9.81 / 115.0), rel=0.1)
+    assert 0.02 < largest['launch_vehicle'] < 0.2 < largest['helicopter'] < 1.0 < largest['stunt_plane'] < 5.0
+    assert 5.0 < largest['jet'] < 15.0
+
+
+@pytest.mark.parametrize('place', ['', '-ship'])
+def test_a_target_that_reverses_stays_in_autotrack(place):
+    default, tuned = (study.batch((f's-motion{place}/{name}', 0, 2)) for name in ('default', 'tuned'))
+    assert np.all(default < study.MAX_POINTING_RATIO * tuned)
 
 
 def test_rows_of_every_case():

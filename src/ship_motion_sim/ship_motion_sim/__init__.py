@@ -1,10 +1,11 @@
-"""Motion of a ship on a seaway, measurements of its IMU and outputs of its INS.
+"""Motion of a ship on a seaway, measurements of its IMU and outputs of its INS: the nodes ship_motion and ins.
 
+ship_unit, ins_unit units of both nodes, which call the functions below
 recording           recorded motion as piecewise polynomials, instead of waves
 motion.truth        time -> truth of the ship (stateless: the same seed and time give the same bits in any order)
-imu.step            truth -> specific force and angular rate by REP 145
+imu.step            truth -> specific force and angular rate by REP 145, the convention of ROS for IMU messages
 strapdown.step      increments of angle and velocity -> attitude and velocity in a computed frame
-ins.step            stamp of an IMU message -> attitude and deck rate of an INS with stated errors and latency
+ins.step            stamp of an IMU message -> attitude and deck rate of an INS with parametrised errors and latency
 aligning_ins.step   stamp and data of an IMU message -> attitude and deck rate of an INS that aligns and navigates
 
 Frames
@@ -27,7 +28,7 @@ Symbols
     U               speed through the water along the mean heading                  [m/s]
     w, dw           angular velocity of the deck against the earth, FLU, and its derivative  [rad/s, rad/s2]
     f               specific force, FLU: at rest +g along z                         [m/s2]
-    n'              the strapdown computer's frame for ENU, rotated by w_c
+    n'              frame that the INS computes as its estimate of ENU; an alignment rotates it by w_c
     w_ie, w_c       rotation of the earth; rate at which an alignment rotates n'    [rad/s]
     mat_ed          rotation deck -> earth; quaternions are x, y, z, w and rotate the same way
 """

@@ -1,4 +1,4 @@
-"""A strapdown IMU at the origin of the deck: specific force and angular rate by REP 145.
+"""A strapdown IMU at the origin of the deck: specific force and angular rate by REP 145. The unit of the ship uses it.
 
     inputs['t'], inputs['dt'] = time, step [s]; step(state, constants, ship, inputs, truth, outputs, normals)
 
@@ -88,10 +88,13 @@ def inertial_rate(truth, earth_rate):
 
 @compiled
 def specific_force(truth, earth_rate, gravity):
-    """Return the specific force mat_ed^T (a + 2 w_ie x v - g), FLU [m/s2]; earth_rate (3,) = w_ie in ENU.
+    """Return the specific force mat_ed^T (a + 2 w_ie x v - g), FLU [m/s2].
 
-    The earth is the rotating tangent plane of the truth, with g constant along -z: gravity does not turn with the
-    position of the ship (v/R = 1e-6 rad/s at 7 m/s). For the same reason `inertial_rate` has no transport rate.
+    a, v: acceleration [m/s2] and velocity [m/s] of the truth, ENU; earth_rate (3,): w_ie, ENU [rad/s]; gravity [m/s2].
+
+    The earth is a rotating plane, the tangent plane of the truth, in which g is constant along -z. The model omits
+    that the vertical turns as the ship moves over the round earth (transport rate, 1e-6 rad/s at 7 m/s).
+    `inertial_rate` omits it too.
     """
     a, v, e = truth.acceleration, truth.velocity, earth_rate
     return to_deck(truth.mat_ed,
@@ -102,8 +105,10 @@ def specific_force(truth, earth_rate, gravity):
 
 @compiled
 def mean_rates(s, c, ship, t, dt, rate, force):
-    """Fill rate (3,) [rad/s] and force (3,) [m/s2] with their means over [t - dt, t] [s]; ship: record of
-    motion.CONSTANTS_DTYPE."""
+    """Fill rate (3,) [rad/s] and force (3,) [m/s2] with the means of the true rates over [t - dt, t] [s].
+
+    s, c: records STATE_DTYPE, CONSTANTS_DTYPE; ship: record of motion.CONSTANTS_DTYPE.
+    """
     for i in range(3):
         rate[i] = force[i] = 0.0
     for node in range(3):
@@ -121,10 +126,11 @@ def mean_rates(s, c, ship, t, dt, rate, force):
 
 @compiled
 def add_sensor_errors(errors, dt, values, normals, first, remainder):
-    """Add the errors of three gyros or accelerometers to their true rates (3,), measured over dt [s].
+    """Add the errors of three gyros or accelerometers to the true values (3,), measured over dt [s].
 
-    White noise is given as a density, so a sample has the noise density / sqrt(dt). The normals are used from index
-    `first` on. remainder (3,): part of the increment that quantisation cut off, kept for the next sample.
+    errors: record SENSOR_ERRORS_DTYPE. White noise is given as a density, so a sample has the noise density /
+    sqrt(dt). The normals are used from index `first` on. remainder (3,): part of the increment that quantisation cut
+    off, kept for the next sample.
     """
     x, y, z = values[0], values[1], values[2]
     per_sample = 1.0 / math.sqrt(dt)

@@ -1,4 +1,4 @@
-"""Effects of the faults that can be injected into IMU and INS."""
+"""Injected faults of IMU and INS: their effects on the records and messages of both units."""
 import numpy as np
 
 from pedestal_common.compiled import compiled

@@ -1,6 +1,7 @@
 """The unit of the INS: from IMU data to attitude, deck rate and the state of the alignment.
 
-Method `model` has the true attitude with stated errors and publishes no state; the other methods align by themselves.
+The INS of the method `model` is the true attitude with parametrised errors; it publishes no ins/state. The INS of
+every other method aligns itself.
 """
 import math
 import typing
@@ -21,8 +22,11 @@ INS_STATE_TOPIC, INS_ERROR_TOPIC = 'ins/state', 'ins/error'
 
 
 def _record_of(state, constants):
-    """Return the dtype of the record of an INS. error_published: 1 if the INS publishes ins/error; row: index of the
-    noise of the next step; worst: highest status since the last diagnosis."""
+    """Return the dtype of the record of an INS, from the dtypes of its state and constants.
+
+    error_published: 1 if the INS publishes ins/error; row: row of the noise `normals` for the next step; worst:
+    highest status since the last diagnosis.
+    """
     return np.dtype([('state', state), ('constants', constants), ('inputs', ins.INPUTS_DTYPE),
                      ('outputs', ins.OUTPUTS_DTYPE), ('error_published', 'i8'), ('row', 'i8'), ('worst', 'i8'),
                      ('schedule', schedule.SCHEDULE_DTYPE), ('injected', injected.INS_INJECTED_DTYPE)], align=True)
@@ -33,20 +37,26 @@ ALIGNING_RECORD_DTYPE = _record_of(aligning_ins.STATE_DTYPE, aligning_ins.CONSTA
 
 
 class ModelMemory(typing.NamedTuple):
-    """All data of the INS of method `model`. normals: noise of the next steps."""
+    """All data of the INS of method `model`.
+
+    record: (1,) of MODEL_RECORD_DTYPE; normals: (steps, INS_NORMALS_PER_STEP), noise of the next steps.
+    """
     record: np.ndarray
     normals: np.ndarray
 
 
 class AligningMemory(typing.NamedTuple):
-    """All data of an aligning INS. This separate type avoids the compilation of its law in a run with the model."""
+    """All data of an aligning INS, with fields as those of ModelMemory.
+
+    Because the types differ, a run with the method `model` does not compile the law of an aligning INS.
+    """
     record: np.ndarray
     normals: np.ndarray
 
 
 @compiled
 def decode(u, raw):
-    """Set the inputs of the INS from the record of an IMU message."""
+    """Set the inputs u of the INS from the record raw of an IMU message."""
     u.stamp_ns = raw.stamp
     for i in range(3):
         u.angular_velocity[i], u.linear_acceleration[i] = raw.angular_velocity[i], raw.linear_acceleration[i]
@@ -54,7 +64,7 @@ def decode(u, raw):
 
 @compiled
 def encode(o, error_published, outputs):
-    """Set the records of the messages from the outputs of the INS; error_published: 1 if it publishes ins/error."""
+    """Set the records of the messages from the outputs o of the INS; error_published: 1 if it publishes ins/error."""
     data, changes = outputs[ATTITUDE_TOPIC], outputs[INS_ERROR_TOPIC]
     data.stamp = o.stamp_ns if o.due == 1 else NO_STAMP
     for i in range(4):
@@ -147,8 +157,10 @@ class Ins(Simulated):
         return self.memory._replace(normals=self._noise.standard_normal((steps, ins.INS_NORMALS_PER_STEP)))
 
     def diagnose(self):
-        """Return ERROR with the worst status since the last diagnosis, or WARN while the INS aligns; values: its
-        estimated 1 sigmas."""
+        """Return the Diagnosis, with the estimated 1 sigmas of the INS among its values.
+
+        The level is ERROR after a status other than OK since the last diagnosis, and WARN while the INS aligns.
+        """
         outputs, status = self.parts['outputs'], int(self.parts['worst'])
         self.parts['worst'] = 0
         stage, sigma, p = int(outputs['stage']), outputs['variance']**0.5, self.parameters

@@ -22,18 +22,19 @@ RECORD_DTYPE = np.dtype([('ship', motion.CONSTANTS_DTYPE), ('truth', motion.OUTP
                          ('imu_inputs', imu.INPUTS_DTYPE), ('imu_outputs', imu.OUTPUTS_DTYPE),
                          ('last', 'i8'), ('row', 'i8'), ('schedule', schedule.SCHEDULE_DTYPE),
                          ('injected', injected.IMU_INJECTED_DTYPE)], align=True)
-"""Record of the unit. last: stamp of the last step [ns]; row: index of the noise of the next step."""
+"""Record of the unit. last: stamp of the last step [ns]; row: row of the noise `normals` for the next step."""
 
 
 class Memory(typing.NamedTuple):
-    """All data of the ship. normals: noise of the next steps."""
+    """All data of the ship. record: (1,) of RECORD_DTYPE; normals: (steps, IMU_NORMALS_PER_STEP), noise of the next
+    steps."""
     record: np.ndarray
     normals: np.ndarray
 
 
 @compiled
 def encode(truth, imu_outputs, stamp, outputs):
-    """Set the records of the messages from the truth of the ship and the outputs of its IMU."""
+    """Set the records of the messages at a stamp [ns] from the truth of the ship and the outputs of its IMU."""
     pose, raw = outputs[SHIP_TRUTH_TOPIC], outputs[IMU_RAW_TOPIC]
     pose.stamp = raw.stamp = stamp
     raw.orientation[3], raw.orientation_variance[0] = 1.0, -1.0     # REP 145: no orientation
@@ -94,7 +95,10 @@ class ShipMotion(Simulated):
         return ship['pieces'] > 0 and self.parts['last'] * 1e-9 > ship['breaks'][ship['pieces'] - 1]
 
     def diagnose(self):
-        """Return ERROR if truth or IMU is not valid, WARN past the end of a recorded motion; values: roll, pitch."""
+        """Return the Diagnosis, with roll and pitch as its values.
+
+    The level is ERROR if truth or IMU is not valid, and WARN past the end of a recorded motion.
+    """
         truth = self.parts['truth']
         values = [(f'{name}_deg', f'{np.degrees(truth[name]):.3f}') for name in ('roll', 'pitch')]
         for status, texts in ((truth['status'], motion.MOTION_STATUS_TEXTS),

@@ -1,17 +1,22 @@
-"""Strapdown integration in a computed ENU frame n': attitude and velocity from increments, at a fixed position.
+"""Strapdown integration of the INS: attitude and velocity from the increments of the IMU, at a fixed position.
+
+The result is in the frame n', which the INS computes as its estimate of ENU (east, north, up).
 
     step(state, angle, force, dt, earth_rate, command, gravity)
 
-    C' = C [w_ib x] - [(w_ie + w_c) x] C
-    v' = C f - (2 w_ie + w_c) x v - g u
+    dC/dt = C [w_ib x] - [(w_ie + w_c) x] C
+    dv/dt = C f - (2 w_ie + w_c) x v - g u
 
-    C               rotation deck -> n'
-    f, g, u         specific force, gravity, upward unit vector
-    w_ib, w_ie      rates of the deck and of the earth against inertial space
+    C               rotation deck -> n'; [w x]: matrix of the cross product with w
+    v               velocity in n' [m/s]
+    f, g, u         specific force [m/s2], gravity [m/s2], upward unit vector
+    w_ib, w_ie      rates of the deck and of the earth against inertial space [rad/s]
+    w_c             rate at which an alignment rotates n', and with it the components of the velocity [rad/s]
 
-w_c is the rate at which an alignment rotates n', and the components of the velocity with it. The position is fixed, so
-there is no transport rate, as in the tangent plane of the truth (see imu.specific_force). Coning and sculling use the
-previous increment, as in Savage 1998, "Strapdown Inertial Navigation Integration Algorithm Design".
+Because the position is fixed, ENU does not turn with the motion of the ship over the earth (no transport rate). The
+truth has the same simplification (imu.specific_force). Coning and sculling correct an interval for the turning of the
+rotation axis and of the force within it. They use the previous increment, as in Savage 1998, "Strapdown Inertial
+Navigation Integration Algorithm Design".
 """
 import math
 
@@ -23,10 +28,10 @@ from pedestal_common.geometry.quaternion import product
 
 STATE_DTYPE = np.dtype([
     ('quaternion', 'f8', (4,)),         # x, y, z, w, deck -> n'
-    ('mat', 'f8', (3, 3)),              # the same as a matrix
+    ('mat', 'f8', (3, 3)),              # matrix of this rotation
     ('velocity', 'f8', (3,)),           # in n' [m/s]
-    ('last_angle', 'f8', (3,)),         # previous increments, for coning and sculling
-    ('last_force', 'f8', (3,)),
+    ('last_angle', 'f8', (3,)),         # increments of the previous interval [rad], for coning and sculling
+    ('last_force', 'f8', (3,)),         # [m/s]
 ], align=True)
 
 
@@ -42,7 +47,7 @@ def from_rotvec(x, y, z):
 
 @compiled
 def set_attitude(s, qx, qy, qz, qw):
-    """Set the attitude of a STATE_DTYPE record to a quaternion, scaled to length 1."""
+    """Set the attitude of a STATE_DTYPE record s to the quaternion (qx, qy, qz, qw), scaled to length 1."""
     scale = 1.0 / math.sqrt(qx * qx + qy * qy + qz * qz + qw * qw)
     q = s.quaternion
     q[0], q[1], q[2], q[3] = scale * qx, scale * qy, scale * qz, scale * qw
@@ -60,9 +65,9 @@ def coning(a, b):
 def sculling(a, f, last_a, last_f):
     """Return the velocity increment [m/s] in the deck axes at the start of an interval.
 
-    a [rad], f [m/s], each (3,): increments of angle and force in the interval; last_a, last_f: those of
-    the previous interval. For steady rates the result is f + a x f / 2 + a x (a x f) / 6. Under quick sway the last
-    term changes the vertical acceleration by 1 ug.
+    a [rad], f [m/s], each (3,): increments of angle and force in the interval; last_a, last_f: increments of the
+    previous interval. For steady rates the result is f + a x f / 2 + a x (a x f) / 6. Under quick sway the term
+    a x (a x f) / 6 changes the vertical acceleration by 1 ug.
     """
     rx, ry, rz = cross(a[0], a[1], a[2], f[0], f[1], f[2])
     ux, uy, uz = cross(a[0], a[1], a[2], rx, ry, rz)
@@ -77,12 +82,12 @@ def step(s, angle, force, dt, earth_rate, command, gravity):
     """Integrate one IMU interval of dt [s]; s: record of STATE_DTYPE.
 
     angle, force (3,): integrals of w_ib and f over the interval, FLU [rad, m/s]; earth_rate, command (3,): w_ie, w_c
-    in n'.
+    in n' [rad/s]; gravity: g [m/s2].
     """
     v, q = s.velocity, s.quaternion
     dx, dy, dz = sculling(angle, force, s.last_angle, s.last_force)
     gx, gy, gz = to_earth(s.mat, dx, dy, dz)
-    # tx, ty, tz: rotation of n' in the interval, negative.
+    # tx, ty, tz: minus the rotation of n' in the interval [rad].
     tx, ty, tz = (-dt * (earth_rate[0] + command[0]), -dt * (earth_rate[1] + command[1]),
                   -dt * (earth_rate[2] + command[2]))
     hx, hy, hz = cross(0.5 * tx, 0.5 * ty, 0.5 * tz, gx, gy, gz)        # rotation of n' within the interval

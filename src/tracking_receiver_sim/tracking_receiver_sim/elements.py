@@ -1,6 +1,7 @@
-"""Orbital elements of many satellites in one file: TLE, and CCSDS OMM (502.0-B) as KVN, XML, JSON or CSV.
+"""Reader of files of orbital elements: TLE, and CCSDS OMM (502.0-B) as KVN (KEYWORD = value), XML, JSON or CSV.
 
-The content of a file decides its format. A file may hold a history: several sets of elements of one satellite.
+`read` returns the elements of one satellite for the verbs of the command line. A file may hold many satellites. It may
+also hold a history: several sets of elements of one satellite. The content of a file decides its format.
 """
 import datetime
 import json
@@ -22,10 +23,11 @@ FORMAT_PROBE_BYTES = 4096
 MAX_SATELLITES = 300_000
 """Largest number of satellites in a file, several times the number of catalogued ones."""
 MAX_COMPARED_NAMES = 40_000
-"""Largest number of names compared with an unknown one for a hint, more than the number of catalogued satellites."""
+"""Largest number of names that an error compares with an unknown name: more than the catalogued satellites."""
 MAX_XML_DEPTH, MAX_VALUE_CHARS = 100, 200
 """Largest depth of nested XML elements, and the number of characters to which a value is cut."""
 PARSE_CHUNK_BYTES = 1 << 20
+"""Number of bytes of XML that are parsed at once."""
 FIRST_SATELLITE_YEAR = 57
 """Smallest two-digit year of a TLE that lies in the 20th century: the first satellite flew in 1957."""
 TLE_EPOCH_COLUMNS = slice(18, 32)
@@ -33,16 +35,25 @@ TLE_EPOCH_COLUMNS = slice(18, 32)
 
 
 class Elements(typing.NamedTuple):
-    """Elements of a satellite. values: {parameter line_1, line_2 or omm: text}; remark: choice from a history, and
-    values that were missing; '' without one."""
+    """Elements of a satellite.
+
+    values: {field of LeoPassParameters (line_1, line_2, omm): text}; remark: the set that was chosen from a history,
+    and values that were missing; '' if there is nothing to remark.
+    """
     name: str
     values: dict
     remark: str = ''
 
 
 class Satellite(typing.NamedTuple):
-    """A satellite of a file. line: first line in the file; number: catalogue number; designator: international
-    designator; lines: those of its TLE, None for an OMM; fields: {keyword: text} of an OMM."""
+    """One set of elements of a satellite in a file.
+
+        line        first line in the file
+        number      catalogue number
+        designator  international designator
+        lines       both lines of its TLE, None for an OMM
+        fields      {keyword: text} of an OMM, empty for a TLE
+    """
     line: int
     name: str
     number: str
@@ -52,7 +63,7 @@ class Satellite(typing.NamedTuple):
 
     @property
     def identity(self):
-        """Catalogue number, or what stands for it."""
+        """Catalogue number; without one the international designator, or else the name."""
         return self.number or self.designator or self.name
 
     def is_named(self, name):
@@ -62,10 +73,11 @@ class Satellite(typing.NamedTuple):
 
 
 def read(path, name='', when=None) -> Elements:
-    """Return the Elements of a satellite in a file, see the module. Raises TargetError.
+    """Return the Elements of a satellite in a file. Raises TargetError.
 
     name: name, catalogue number or international designator; it may be empty for a file of one satellite. when:
-    datetime, UTC; of a history the elements nearest to it are taken, without it the last ones.
+    datetime, UTC. From a history the function takes the elements whose epoch is nearest to `when`, or the latest ones
+    if `when` is None.
     """
     try:
         with csv_table.stream(path) as stream:
@@ -158,7 +170,7 @@ def _reader(beginning):
 
 def _tles(path):
     """Yield the satellites of a file of TLEs, with or without a line of the name before each."""
-    # first, before: (line number, text) of the line above and of the one above that; a name stands in `before`.
+    # first: (line number, text) of the line before; before: that of the line before `first`, which may hold a name.
     before, first = (0, ''), (0, '')
     for number, text in lines.read(path):
         text = text.strip()
@@ -170,7 +182,7 @@ def _tles(path):
 
 
 def _number(text):
-    """Return the catalogue number in a TLE, whose first digit may be a letter (Alpha-5)."""
+    """Return the catalogue number of a text in a TLE or OMM. Its first digit may be a letter (notation Alpha-5)."""
     try:
         return omm.catalogue_number(text)
     except ValueError:
@@ -209,6 +221,7 @@ def _kvn(path):
 
 
 def _csv(path):
+    """Yield the satellites of a CSV file with a row for each OMM."""
     with csv_table.opened(path) as reader:
         csv_table.require(reader, ('EPOCH', 'NORAD_CAT_ID'))
         for row in reader:
@@ -220,7 +233,7 @@ def _json(path):
     """Yield the satellites of a JSON array of objects, or of one object, decoded one by one."""
     text = csv_table.text(path)
     decoder, between = json.JSONDecoder(parse_int=str, parse_float=str), re.compile(r'[\s,\[\]]*')
-    # at: place in the text; line: its line number; counted: place up to which line ends are counted.
+    # at: index in the text; line: its line number; counted: index up to which line ends are counted in `line`.
     at, line, counted = between.match(text).end(), 1, 0
     while at < len(text):
         line, counted = line + text.count('\n', counted, at), at
@@ -246,10 +259,12 @@ def _xml(path):
     satellites, open_elements, texts = [], [], {}
 
     def doctype(*_):
+        """Raise TableError for a document type declaration."""
         raise lines.wrong(path, parser.CurrentLineNumber, parser.CurrentColumnNumber + 1,
                           'a document type declaration: an OMM has none')
 
     def start(name, _attributes):
+        """Begin an element; a segment begins a new satellite. Raises TableError if it is nested too deeply."""
         if len(open_elements) >= MAX_XML_DEPTH:
             raise csv_table.TableError(f'{path}: line {parser.CurrentLineNumber}: must be at most {MAX_XML_DEPTH} '
                                        'nested elements')
@@ -260,10 +275,12 @@ def _xml(path):
             texts['line'] = parser.CurrentLineNumber
 
     def text(data):
+        """Add a part of the text of a keyword."""
         if open_elements and open_elements[-1] in omm.KEYWORDS:
             texts[open_elements[-1]] = (texts.get(open_elements[-1], '') + data)[:MAX_VALUE_CHARS]
 
     def end(_name):
+        """End an element; the end of a segment completes its satellite."""
         if open_elements.pop() == 'segment':
             line = texts.pop('line', 1)
             satellites.append(_omm(line, {keyword: value.strip() for keyword, value in texts.items()}))
@@ -282,7 +299,7 @@ def _xml(path):
     except expat.ExpatError as error:
         raise lines.wrong(path, error.lineno, error.offset + 1, 'not well-formed XML: '
                           f'{expat.ErrorString(error.code)}') from None
-    except (LookupError, ValueError) as error:  # of an encoding that the file declares
+    except (LookupError, ValueError) as error:  # The file may declare an unknown encoding.
         if isinstance(error, csv_table.TableError):
             raise
         raise lines.wrong(path, 1, 1, f'not well-formed XML: {error}') from None

@@ -7,9 +7,12 @@ from pedestal_common.geometry.line_of_sight import offset_rates, to_deck
 def error_rate(i, position, velocity, target):
     """Return (d dX/dt, d dE/dt) [rad/s] of a TargetState off the beam; i: record of receiver.INPUTS_DTYPE.
 
-    position (3,): antenna, ENU [m]; velocity (3,): antenna, FLU [m/s]. The rate is exact. In the deck frame the target
-    is at r = M^T (p - position), and dr/dt = M^T v - velocity - w x r. p, v: position and velocity of the target, ENU;
-    M: mat_ed; w: rate of the deck.
+    position, velocity (3,): position of the antenna, ENU [m], and its velocity, FLU [m/s]. The rate is exact. In the
+    deck frame the target is at r = M^T (p - position), and its derivative is dr/dt = M^T v - velocity - w x r.
+
+        p, v    position and velocity of the target, ENU [m, m/s]
+        M       mat_ed, rotation deck -> earth
+        w       rate of the deck, FLU [rad/s]
     """
     (e, n, u), (v_e, v_n, v_u) = target.position, target.velocity
     x, y, z = r = to_deck(i.mat_ed, e - position[0], n - position[1], u - position[2])

@@ -1,4 +1,4 @@
-"""Effects of the faults that can be injected into the receiver."""
+"""Injected faults of the receiver: their effects on the constants and the messages of its unit."""
 import numpy as np
 
 from pedestal_common.codes import codes
@@ -11,13 +11,18 @@ MESSAGE_FAULT_CODES = message_faults.codes('tracking_receiver')
 Fault = codes([fault.name for fault in table.INJECTED_FAULTS['tracking_receiver']])
 
 SLOPE_BOTH, SLOPE_CROSS_ELEVATION, SLOPE_ELEVATION = range(3)
-"""Options of the fault wrong_slope."""
+"""Choices of the fault wrong_slope."""
 
 INJECTED_DTYPE = np.dtype([('power', 'f8'), ('cos_phi', 'f8'), ('sin_phi', 'f8'), ('latency_ns', 'i8'),
                            ('clock_ns', 'i8'), ('bias', 'f8', (2,)),
                            ('message_fault', message_faults.MESSAGE_FAULT_DTYPE)], align=True)
-"""Record of the faults. power ... latency_ns: values of receiver.CONSTANTS_DTYPE without a fault; clock_ns: offset of
-the stamps; bias: offset of the errors [rad]; message_fault: faults of the published results."""
+"""Record of the faults.
+
+    power, cos_phi, sin_phi, latency_ns     values of receiver.CONSTANTS_DTYPE without a fault
+    clock_ns                                offset of the stamps
+    bias                                    offset of the errors [rad]
+    message_fault                           faults of the published results
+"""
 
 ANGLE_ERROR_TOPIC, ANGLE_RATE_TOPIC = 'tracking_receiver/angle_error', 'tracking_receiver/angle_rate'
 RANGE_TOPIC = 'tracking_receiver/range'
@@ -33,7 +38,7 @@ def initial(constants) -> np.ndarray:
 
 @compiled
 def _clear_faults(c, e):
-    """Restore the constants and results of the receiver to those without a fault."""
+    """Restore the constants c of the receiver, and clear the faults in the record e of INJECTED_DTYPE."""
     c.power, c.cos_phi, c.sin_phi, c.latency_ns = e.power, e.cos_phi, e.sin_phi, e.latency_ns
     c.sign[0] = c.sign[1] = 1.0
     e.clock_ns = 0
@@ -43,8 +48,10 @@ def _clear_faults(c, e):
 
 @compiled
 def _apply_fault(c, e, fault, values):
-    """Apply a fault to the constants and results of the receiver; values: its arguments, in the order of
-    injection/table.py."""
+    """Apply a fault to the constants c of the receiver and to the record e of INJECTED_DTYPE.
+
+    values: arguments of the fault, in the order of injection/table.py.
+    """
     message_faults.apply(e.message_fault, MESSAGE_FAULT_CODES, fault, values)
     if fault == Fault.DELAY:
         c.latency_ns += round(values[0] * NS_PER_SECOND)

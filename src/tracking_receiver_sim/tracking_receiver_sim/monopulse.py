@@ -1,10 +1,13 @@
 """Monopulse channels: the voltages that a target off the beam axis causes.
 
 Sum and differences have separate illuminations, as a multimode feed gives them: a cosine taper for the sum, one period
-of a sine across the aperture for a difference. Both far fields are closed forms with the right sign in every sidelobe.
-They are separable in the two axes: sum = S(x) S(e), cross-elevation difference = D(x) S(e), elevation difference =
-S(x) D(e). D/S is k_m v near the axis (5 % more at 0.33 beamwidths), and D peaks at 0.71. The sense reverses past the
-first null of the sum at 1.26. A false stable null lies at 1.68, in the first sidelobe (-23 dB).
+of a sine across the aperture for a difference. Both far fields S and D are closed forms with the right sign in every
+sidelobe. They are separable in the two axes: sum = S(x) S(e), cross-elevation difference = D(x) S(e), elevation
+difference = S(x) D(e).
+
+v is the offset of the target from the beam axis, in beamwidths. D / S is k_m v near the axis (5 % more at v = 0.33),
+and D has its peak at v = 0.71. Past the first null of the sum, at v = 1.26, the error changes its sign. A false stable
+null lies at v = 1.68, in the first sidelobe (-23 dB).
 """
 import math
 
@@ -13,7 +16,10 @@ import numpy as np
 from pedestal_common.compiled import compiled
 
 U_PER_BEAMWIDTH = 2.0 * 1.8676215105779688
-"""Value of u = pi D/lambda sin(theta) per half-power beamwidth of the cosine taper."""
+"""Value of u = pi D / lambda sin(theta) per half-power beamwidth of the cosine taper.
+
+D: diameter [m]; lambda: wavelength [m]; theta: angle off the axis [rad].
+"""
 
 
 @compiled
@@ -43,7 +49,8 @@ def difference_pattern(v, k_m):
 def channels(v_x, v_e, k_m, cos_beta, sin_beta):
     """Return the (sum, difference X, difference E) voltages of a unit carrier, v_x and v_e beamwidths off the axis.
 
-    Cross-coupling rotates the error axes by beta, so that each difference also contains a part of the other error.
+    k_m: slope [-]; cos_beta, sin_beta: of the cross-coupling angle beta, which rotates the error axes. Each difference
+    then also contains a part of the other error.
     """
     S_x, S_e = sum_pattern(v_x), sum_pattern(v_e)
     x, e = difference_pattern(v_x, k_m) * S_e, S_x * difference_pattern(v_e, k_m)
@@ -52,9 +59,9 @@ def channels(v_x, v_e, k_m, cos_beta, sin_beta):
 
 @compiled
 def detect(d_real, d_imag, s_real, s_imag, cos_phi, sin_phi, d_noise_real, d_noise_imag):
-    """Return Re(d conj(s)) of a difference voltage d after the phase error phi and the noise of the channel.
+    """Return Re(d conj(s)) of a difference voltage d, after the phase error phi and the noise of its channel.
 
-    The voltages have unit noise power.
+    s: sum voltage, noise included. The voltages are scaled to the noise power 1.
     """
     return ((d_real * cos_phi - d_imag * sin_phi + d_noise_real) * s_real
             + (d_real * sin_phi + d_imag * cos_phi + d_noise_imag) * s_imag)

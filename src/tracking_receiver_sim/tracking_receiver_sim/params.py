@@ -1,4 +1,4 @@
-"""Parameters of targets and tracking receiver: default, range, unit, meaning."""
+"""Parameters of the target, the path and the tracking receiver: TrackingReceiverNodeParameters of the node."""
 import dataclasses
 import math
 
@@ -20,7 +20,7 @@ BEAM_MOVING, BEAM_HELD = range(len(BEAM_MOTIONS))
 
 @dataclasses.dataclass(frozen=True)
 class LeoPassParameters(Parameters):
-    """A satellite pass by SGP4."""
+    """A satellite pass, computed from orbital elements by the model SGP4."""
     line_1: str = text('1 25544U 98067A   19343.69339541  .00001764  00000-0  38792-4 0  9991',
                        'first line of the TLE')
     line_2: str = text('2 25544  51.6439 211.2001 0007417  17.6667  85.6398 15.50103472202482',
@@ -61,7 +61,7 @@ class TrackFileParameters(Parameters):
 
 @dataclasses.dataclass(frozen=True)
 class FlybyParameters(Parameters):
-    """A straight, level, uniform pass with growing azimuth. The defaults are the UAV of paper 000."""
+    """A straight, level pass at constant speed, with growing azimuth. The defaults are the UAV of paper 000."""
     closest_distance: float = parameter(500.0, 0.0, 1e6, 'm', 'closest distance over ground')
     height: float = parameter(100.0, -1000.0, 1e6, 'm', 'height above the station')
     speed: float = parameter(15.0, 0.0, 8000.0, 'm/s', 'ground speed')
@@ -112,7 +112,7 @@ class AntennaParameters(Parameters):
 
 @dataclasses.dataclass(frozen=True)
 class RateParameters(Parameters):
-    """Rate of the angle error, an independent measurement: tachometer of the antenna and receiver together."""
+    """Measured rate of the angle error, independent of the measured error: tachometer of the antenna and receiver."""
     measured: bool = flag(False, 'measurement of the rate of the angle error, published on angle_rate')
     sigma: float = parameter(1.745e-3, 1e-9, 10.0, 'rad/s', '1-sigma of the rate of each axis, tachometer and '
                              'receiver together')

@@ -1,16 +1,19 @@
 """The monopulse tracking receiver: position of the target, samples of the channels, published results.
 
-One `step` per drive step. Between the previous step and this one the true error runs in a straight line. Along it the
-receiver takes `samples_per_step` samples of sum and difference voltages, the last one at the stamp. If the beam is
-held (an electronic beam jumps at the steps), the line begins at the offset of the previous target from the present
-beam. Each sample is converted to an angle error by Re(d conj(s)) over the smoothed sum power (AGC), limited to the
-full scale of the detector, then smoothed.
+The unit calls `step` once per drive step. From the previous step to this one, the true error is taken as a straight
+line. Along the line the receiver takes `samples_per_step` samples of sum and difference voltages, the last one at the
+stamp. An electronic beam is held between two steps and jumps at a step. With a held beam the line begins at the offset
+of the previous target position from the present beam.
 
-If the parameters select them, each result also holds the rate of the error at the stamp and the range, with white
-noise.
+A sample becomes an angle error by Re(d conj(s)) divided by the smoothed sum power (automatic gain control, AGC). d and
+s are the voltages of difference and sum. The error is limited to the full scale of the detector, then smoothed. If the
+parameters select them, each result also holds the rate of the error at the stamp and the range, with white noise.
 
-Voltages are scaled so that the noise of one channel has unit power in one sample: the carrier power on axis is
-C/N0 tau. The noise floor is a known constant of the receiver, which subtracts 1 from the measured sum power.
+Voltages are scaled so that the noise of one channel has the power 1 in one sample. The carrier power on axis is then
+C/N0 tau, with the time tau of a sample. The receiver knows the noise power and subtracts 1 from the measured sum
+power.
+
+Arguments: s state, c constants, i inputs, o outputs (records of this module).
 """
 import math
 from collections import namedtuple
@@ -41,7 +44,7 @@ NORMALS_PER_SAMPLE = 6
 RESULT_RING_SIZE = 512
 """Largest number of results that wait for the latency to pass."""
 MIN_POWER_OVER_NOISE = 0.01
-"""Least carrier power over noise power in one sample that the C/N0 estimate reports (-20 dB)."""
+"""Smallest ratio of carrier power to noise power in one sample that the C/N0 estimate reports (-20 dB)."""
 
 Result = namedtuple('Result', 'error cn0_dbhz rates range')
 """Published result of one step: error and rates (cross-elevation, elevation) [rad, rad/s], C/N0 [dB-Hz], range [m];
@@ -63,13 +66,14 @@ STATE_DTYPE = np.dtype([
                        align=True)
 """State of the receiver.
 
-    agc_power, level_power  sum power over noise power, smoothed for the gain and for the C/N0
-    ring_...            result that waits for the latency to pass, see Result
+    agc_power, level_power  sum power / noise power, smoothed for the gain and for the C/N0
+    smooth_...          smoothers of both errors
+    ring_...            ring of the results whose latency has not passed, see Result
     scintillation       state of scintillation.wander
-    error_known         1 if cross_elevation, elevation hold the true error at stamp_ns [rad], direction the target in
-                        FLU [m]
-    timer_ns            time past a lock level
-    written, released   number of results put into and released from the ring since the start
+    error_known         1 if cross_elevation, elevation hold the true error at stamp_ns [rad], and direction the vector
+                        to the target in FLU [m]
+    timer_ns            time for which the level has been past the level that changes the lock
+    written, released   numbers of results put into and taken out of the ring since the start
     antenna             position of the antenna against the station, ENU [m]
     antenna_velocity    velocity of the antenna, FLU [m/s]
 """
@@ -92,11 +96,13 @@ CONSTANTS_DTYPE = np.dtype([
 """Constants of the receiver.
 
     slope               true k_m
-    angle_scale         theta3 over the k_m that the receiver assumes
+    angle_scale         theta3 / k_m with the k_m that the receiver assumes [rad]
     sign                1 or -1, of each difference channel
     boresight           null of the differences off the beam, cross-elevation and elevation [rad]
     first_..._normal    index of the first normal of the measured rate and range, and of the scintillation
-    power, acquire_power, lose_power    carrier power over noise power in one sample
+    power, acquire_power, lose_power    carrier power / noise power in one sample: at the reference range, and at the
+                        levels that change the lock
+    agc_gain, level_gain    share of the way to its input that a filter moves in a sample
     range_variance      variance of the range [m2], in single precision
 """
 
@@ -106,7 +112,7 @@ INPUTS_DTYPE = np.dtype([('stamp_ns', 'i8'), ('valid', 'i8'), ('azimuth', 'f8'),
                          ('twist_linear', 'f8', 3), ('twist_angular', 'f8', 3)], align=True)
 """Inputs of a step.
 
-    valid                           1 if the beam is known and fresh
+    valid                           1 if the direction of the beam is known
     azimuth, elevation, .._rate     true beam on the deck [rad], [rad/s]
     mat_ed                          true attitude deck -> earth
     position                        base_link against the station, ENU [m]
@@ -118,10 +124,22 @@ OUTPUTS_DTYPE = np.dtype([
     ('locked', 'i8'), ('status', 'i8'), ('rate', 'f8', 2), ('range', 'f8'),
     ('true_cross_elevation', 'f8'), ('true_elevation', 'f8'),
     ('target_valid', 'i8'), ('target_position', 'f8', 3), ('target_velocity', 'f8', 3)], align=True)
-"""Outputs of a step. due: 1 if a result comes out in this step. The result consists of stamp_ns (of its measurement),
-errors [rad], C/N0, locked, rate of the errors [rad/s] and range [m], rounded to the single precision of its topic.
-Errors, rate and range are NaN while not locked, rate and range also if not measured. The rest belongs to this step:
-status (index into STATUS_TEXT_BY_CODE), true error [rad], target ENU [m, m/s], NaN if not known."""
+"""Outputs of a step.
+
+    due                             1 if a result comes out in this step
+
+The result, measured at stamp_ns; its numbers are NaN while not locked, except C/N0:
+
+    cross_elevation, elevation      errors [rad]
+    cn0_dbhz, locked                C/N0 [dB-Hz]; 1 while locked
+    rate, range                     rates of the errors [rad/s] and range [m], NaN if not measured; the range has the
+                                    single precision of its topic
+
+Values at the stamp of this step, NaN if not known:
+
+    status                          index into STATUS_TEXT_BY_CODE
+    true_..., target_...            true error [rad]; target, ENU [m, m/s]
+"""
 
 
 def constants(params, period, built) -> np.ndarray:
@@ -199,8 +217,8 @@ def angle_noise(params, cn0_dbhz, period):
 def age(params, period):
     """Return the mean age [s] of an error at its stamp if the beam is held between two steps, otherwise 0.
 
-    With a moving beam, the mean over a step differs from the error at the stamp by no more than the change of the
-    error within the step. params: TrackingReceiverParameters; period: drive step [s].
+    A moving beam needs no age. There the mean over a step differs from the error at the stamp at most by the change of
+    the error within the step. params: TrackingReceiverParameters; period: drive step [s].
     """
     receiver = params.receiver
     if BEAM_MOTIONS.index(receiver.beam) != BEAM_HELD:
@@ -212,8 +230,8 @@ def age(params, period):
 def beam_age(params, period):
     """Return the mean time [s] from the stamp of the measured beam to the stamp of an error.
 
-    Because a held beam is published at the end of its step, only older steps in the smoothing count. 0 for a moving
-    beam. params: TrackingReceiverParameters; period: drive step [s].
+    Because a held beam is published at the end of its step, only older steps in the smoothing count. The result is 0
+    for a moving beam. params: TrackingReceiverParameters; period: drive step [s].
     """
     receiver = params.receiver
     if BEAM_MOTIONS.index(receiver.beam) != BEAM_HELD:
@@ -222,6 +240,7 @@ def beam_age(params, period):
 
 
 def _hertz(cn0_dbhz):
+    """Return a C/N0 [Hz] given in dB-Hz."""
     return 10.0**(0.1 * cn0_dbhz)
 
 
@@ -248,7 +267,7 @@ def place_antenna(s, c, i):
 
 @compiled
 def apparent_state(s, c, true):
-    """Return the apparent TargetState of a true one, ENU of the station: with refraction and delay of light."""
+    """Return the apparent TargetState of a true one, both ENU of the station, with refraction and delay of light."""
     if c.path.refractivity == 0.0 and c.path.light_time == 0:
         return true
     e, n, u = true.position
@@ -258,8 +277,10 @@ def apparent_state(s, c, true):
 
 @compiled
 def carrier_amplitude(c, e, n, u, hidden):
-    """Return the sum voltage on axis from a target at an ENU vector [m] of the antenna; 0 below the horizon mask or
-    hidden."""
+    """Return the sum voltage on axis [-] from a target at a vector (e, n, u) from the antenna, ENU [m].
+
+    The voltage is 0 below the horizon mask. hidden: True if a blockage hides the target; the voltage is then 0 too.
+    """
     _, elevation = earth_angles(e, n, u)
     if hidden or not elevation >= c.horizon_mask:       # also true for an elevation of NaN
         return 0.0
@@ -269,12 +290,13 @@ def carrier_amplitude(c, e, n, u, hidden):
 
 @compiled
 def sample(s, c, amplitude, v_x, v_e, image, normals, first):
-    """Return the (cross-elevation, elevation) error [rad] of one sample of the channels; updates the AGC and level
-    filters.
+    """Return the (cross-elevation, elevation) error [rad] of one sample. The filters of AGC and level advance.
 
-    amplitude: carrier on axis [-]; v_x, v_e: offsets in beamwidths; normals: used from index `first` on.
+    amplitude: sum voltage on axis [-]; v_x, v_e: offsets of the target from the null of the differences, in
+    beamwidths; image: multipath.Image; normals: used from index `first` on.
     """
-    # Real and imaginary part of a channel each have half of its noise power, 1. S_g, D_xg, D_eg: image in the ground.
+    # The noise power 1 of a channel is half in its real and half in its imaginary part. S_g, D_xg, D_eg: patterns for
+    # the image of the target in the ground.
     half = math.sqrt(0.5)
     S, D_x, D_e = channels(v_x, v_e, c.slope, c.cos_beta, c.sin_beta)
     S_imag = D_x_imag = D_e_imag = 0.0
@@ -298,8 +320,10 @@ def sample(s, c, amplitude, v_x, v_e, image, normals, first):
 
 @compiled
 def measure(s, c, amplitude, dX, dE, image, normals):
-    """Return (cross-elevation, elevation) [rad] measured in one step, while the true error changes from that of the
-    state to dX, dE."""
+    """Return the errors (cross-elevation, elevation) [rad] that the receiver measures in one step.
+
+    The true error changes during the step from that of the state s to dX, dE [rad]. Other arguments: see `sample`.
+    """
     from_X, from_E = (s.cross_elevation, s.elevation) if s.error_known != 0 else (dX, dE)
     smooth_x, smooth_e = s.smooth_cross_elevation, s.smooth_elevation
     smoothing.begin(smooth_x)
@@ -333,8 +357,10 @@ def lock(s, c, elapsed_ns):
 
 @compiled
 def rate_and_range(s, c, i, target_state, normals):
-    """Return the measured ((cross-elevation rate, elevation rate) [rad/s], range [m]) of a TargetState; NaN if not
-    measured."""
+    """Return the measured ((cross-elevation rate, elevation rate) [rad/s], range [m]) of a TargetState.
+
+    NaN stands for a number that the receiver does not measure.
+    """
     rates, distance = NOT_MEASURED, math.nan
     first = c.first_measured_normal
     if c.rate_measured != 0:

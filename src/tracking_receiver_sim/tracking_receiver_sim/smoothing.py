@@ -5,8 +5,8 @@
                     1 / ((n - 1) T) rad/s, its mean delay n - 1 samples
     moving_average  the text of the paper, not its eq. (1): the mean of the last n samples, delay (n - 1) / 2 samples
 
-y: sample of the error [rad]; x: smoothed error [rad]; n: number of samples [-]; T: time between two samples [s]. A
-`kind` is a code, one of SMOOTHING_NONE ..., in the compiled laws, and its name in `delay` and `steps_back`.
+y: sample of the error [rad]; x: smoothed error [rad]; n: number of samples [-]; T: time between two samples [s]. The
+argument `kind` is a code such as SMOOTHING_NONE in the compiled laws, and a name of SMOOTHING_KINDS elsewhere.
 """
 import numpy as np
 
@@ -41,8 +41,10 @@ def put(s, y, gain):
 
 @compiled
 def smoothed(s, kind, samples, n):
-    """Return the smoothed error [rad] at the end of a step of `samples`; n: length of the moving average, which is
-    shorter at the start."""
+    """Return the smoothed error [rad] at the end of a step.
+
+    samples: number of samples of a step; n: length of the moving average [samples], which is shorter at the start.
+    """
     if kind == SMOOTHING_RECURSION:
         return s.low_pass
     if kind == SMOOTHING_NONE:
@@ -55,16 +57,16 @@ def smoothed(s, kind, samples, n):
 
 
 def delay(kind, samples, n):
-    """Return the mean delay of a kind, a name of SMOOTHING_KINDS, in samples before the newest."""
+    """Return the mean delay of a kind in samples before the newest; samples: number of samples of a step."""
     return {'none': 0.5 * (samples - 1), 'recursion': n - 1.0, 'moving_average': 0.5 * (n - 1)}[kind]
 
 
 def steps_back(kind, samples, n):
-    """Return the mean age of the steps whose samples are in the result, in drive steps of `samples`; 0 for the last
-    step.
+    """Return the mean age of the steps whose samples are in the result, in drive steps; 0 for the last step.
 
-    A beam that is held within a step has one direction in each step. The control unit therefore needs the age in whole
-    steps to know where the beam was, beside the age of the samples for the place of the target.
+    samples: number of samples of a step. A beam that is held within a step has one direction in each step. For the
+    direction of the beam the control unit therefore needs the age in whole steps, and for the place of the target the
+    age of the samples.
     """
     if kind == 'none':
         return 0.0

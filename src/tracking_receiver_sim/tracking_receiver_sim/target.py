@@ -1,18 +1,20 @@
-"""Position and velocity of the target: every kind in one form that the compiled receiver evaluates at any time.
+"""Position and velocity of the target: every kind of target in one form, which the receiver evaluates at any time.
 
 Trajectories (leo_pass, track_file, flyby) become piecewise cubics in the ENU frame of the station when they are built.
-Because of this, a step needs neither SGP4 nor a file. Angle targets (sine, step, ramp) are closed forms. Before the
-first and past the last break a trajectory is not valid: it has no position, not an extrapolated one.
+So a step needs neither SGP4, the model of satellite orbits, nor a file. Angle targets (sine, step, ramp) are closed
+forms. Before its first break and after its last break, a trajectory has no position. It is never extrapolated.
 
-leo_pass: SGP4 position and velocity at every SGP4_KNOT_SPACING_S, joined by cubic Hermite pieces. They are within 1 mm
-and 15 mm/s of SGP4, whose velocity is 10 mm/s off the derivative of its position. Against skyfield: 0.3 mdeg with
-UT1 = UTC, the default. The true UT1 - UTC (`ut1_offset`, up to 0.9 s of earth rotation) moves an ISS pass by up to
-0.04 deg (7 mdeg on the default pass). The error of SGP4 itself is kilometres within days.
+leo_pass: position and velocity of SGP4 every SGP4_KNOT_SPACING_S, joined by cubic Hermite pieces. The pieces are
+within 1 mm and 15 mm/s of SGP4, whose velocity differs by 10 mm/s from the derivative of its position. Directions are
+within 0.3 mdeg of skyfield if UT1 = UTC, the default. The true UT1 - UTC (`ut1_offset`, up to 0.9 s of earth rotation)
+moves an ISS pass by up to 0.04 deg (7 mdeg on the default pass). The error of SGP4 itself grows to kilometres within
+days.
 
-track_file: a predicted orbit or table of directions (the room `ephemeris`), or the fixes of a log joined by a cubic
-spline, with or without smoothing (the room `track`). On a real 1 Hz helicopter flight the spline predicts left-out
-fixes as well as PCHIP or Akima pieces (9 m, the jitter of the fixes), with half their peak acceleration. In a 3 m/s^2
-turn its velocity is right to 1e-4 m/s; PCHIP flattens every extremum and is 1.3 m/s off.
+track_file: a predicted orbit or a table of directions (folder `ephemeris`), or the fixes of a recorded flight joined
+by a cubic spline, with or without smoothing (folder `track`). On a real helicopter flight with fixes at 1 Hz, the
+spline predicts left-out fixes to 9 m, the jitter of the fixes. PCHIP or Akima pieces predict them equally well, but
+with twice the peak acceleration. In a turn of 3 m/s^2 the velocity of the spline is right to 1e-4 m/s. PCHIP flattens
+every extremum, and its velocity is wrong by 1.3 m/s.
 """
 import functools
 import math
@@ -33,11 +35,14 @@ from tracking_receiver_sim.params import TARGET_KINDS, TARGET_RAMP, TARGET_SINE,
 SGP4_KNOT_SPACING_S = 1.0
 """Time between two SGP4 knots [s]."""
 PASS_SEARCH_STEP_S = 20.0
-"""Step of the pass finder [s]; a LEO pass lasts minutes."""
+"""Step of the pass finder [s]; a pass of a satellite in a low earth orbit (LEO) lasts minutes."""
 PEAK_SEARCH_POINTS = 41
-"""Number of points of each refinement in the search for a peak."""
+"""Number of points of each refinement in the search for the peak of a pass."""
 RUN_MARGIN_S = 5.0
-"""Time before and after the run [s] that a target covers, for a program track; a track_file only up to its ends."""
+"""Time before and after the run [s] that a target covers, for a program track.
+
+A track_file covers this time only as far as the file goes.
+"""
 
 MAX_HORIZON_POINTS = 10_000
 """Largest number of points at which a target is compared with the horizon."""
@@ -47,6 +52,7 @@ TargetState = namedtuple('TargetState', 'valid position velocity')
 valid."""
 
 TARGET_DTYPE = np.dtype([('kind', 'i8'), ('angle', record_type(AngleParameters))], align=True)
+"""Constants of a target. kind: index into TARGET_KINDS; angle: AngleParameters."""
 
 
 class Target(typing.NamedTuple):
@@ -116,6 +122,7 @@ def state(target, breaks, coefficients, t):
 
 @compiled
 def _look_angles(constants, breaks, coefficients, times, azimuth, elevation, distance):
+    """Fill azimuth, elevation [rad] and distance [m], each (n,), at times (n,) [s]; see `look_angles`."""
     for i in range(len(times)):
         e, n, u = state(constants[0], breaks, coefficients, times[i]).position
         azimuth[i], elevation[i] = earth_angles(e, n, u)
@@ -123,7 +130,7 @@ def _look_angles(constants, breaks, coefficients, times, azimuth, elevation, dis
 
 
 def look_angles(built, times):
-    """Return (azimuth, elevation, range) [rad, rad, m] from the station at times [s], each (n,).
+    """Return (azimuth, elevation, range) [rad, rad, m] of a Target from the station at times [s], each (n,).
 
     Azimuth clockwise from north in (-pi, pi]; NaN at times outside the track of the target.
     """
@@ -136,7 +143,8 @@ def look_angles(built, times):
 def build(params, duration, horizon_mask=0.0) -> Target:
     """Return a Target of TargetParameters for a run of `duration` [s] from stamp 0.
 
-    Raises TargetError, also if the target stays below the horizon, or below a horizon_mask [rad] under it.
+    Raises TargetError, also if the target stays below the horizon. A horizon_mask [rad] below 0 takes the place of the
+    horizon.
     """
     builders: dict[str, Callable] = {'leo_pass': _leo_pass, 'track_file': _track_file, 'flyby': _flyby}
     # known: start_time and summary, as far as the kind has them.
@@ -162,10 +170,12 @@ def _require_above(params, built, duration, limit):
 
 
 def _angles(params, duration):
+    """Return (breaks, coefficients) of an angle target: its time range, and coefficients without a meaning."""
     return np.array([-RUN_MARGIN_S, duration + RUN_MARGIN_S]), np.zeros((4, 1, 3))
 
 
 def _flyby(params, duration):
+    """Return (breaks, coefficients) of a straight, level pass by FlybyParameters."""
     flyby = params.flyby
     east, north = math.sin(flyby.heading), math.cos(flyby.heading)
     velocity = flyby.speed * np.array([east, north, 0.0])
@@ -221,7 +231,8 @@ def _peak(elevations, begin, end):
 
 
 def _start(params, satrec, duration):
-    """Return (Julian day, fraction) of stamp 0; the pass finder chooses a whole second of UTC."""
+    """Return (Julian day, fraction) of stamp 0: start_time, or else a whole second of UTC that centres the run on a
+    culmination. satrec: of orbit.satellite."""
     if not params.leo_pass.start_time:
         # The added 0.5 s turns the cut to whole seconds below into rounding.
         start = culmination(params, satrec) - 0.5 * duration + 0.5
@@ -238,6 +249,7 @@ def _start(params, satrec, duration):
 
 @functools.lru_cache(8)
 def _leo_pass(params, duration):
+    """Return (breaks, coefficients, start_time) of a satellite pass by LeoPassParameters."""
     satrec = orbit.satellite(params.leo_pass)
     julian, fraction = _start(params, satrec, duration)
     knots = np.arange(-RUN_MARGIN_S, duration + RUN_MARGIN_S + SGP4_KNOT_SPACING_S, SGP4_KNOT_SPACING_S)
@@ -246,11 +258,11 @@ def _leo_pass(params, duration):
 
 
 def _hermite(x, y, y_dot):
-    """Return coefficients (4, n, columns), highest power first, of cubic pieces through y and y_dot (n + 1, columns)
-    at x.
+    """Return coefficients (4, n, columns), highest power first, of cubic Hermite pieces.
 
-    They equal those of CubicHermiteSpline of scipy to the last bit. This avoids the import of scipy, a third of a
-    second.
+    The pieces have the values y and the derivatives y_dot, both (n + 1, columns), at x (n + 1,). The coefficients
+    equal those of CubicHermiteSpline of scipy to the last bit. This avoids the import of scipy, which takes a third of
+    a second.
     """
     h = np.diff(x)[:, None]
     slope = np.diff(y, axis=0) / h
@@ -261,6 +273,7 @@ def _hermite(x, y, y_dot):
 # track_file
 
 def _track_file(params, duration):
+    """Return (breaks, coefficients, start_time, summary) of the file of TrackFileParameters."""
     from tracking_receiver_sim import track_files  # imports scipy, which only a track file needs
     flight = track_files.lay_out(params, duration, RUN_MARGIN_S)
     return flight.breaks, flight.coefficients, flight.start_time, flight.summary

@@ -1,6 +1,7 @@
-"""Formats of track files and their kinds: a recorded log of fixes, a predicted orbit, a table of directions.
+"""Track files of a target: their formats, and their kinds (recorded fixes, predicted orbit, table of directions).
 
-The first row of FILE_FORMATS that matches the beginning of a file gives its reader and its kind.
+target.py calls `lay_out`. The first row of FILE_FORMATS that matches the beginning of a file gives its reader and its
+kind.
 """
 import re
 import typing
@@ -14,10 +15,11 @@ FORMAT_PROBE_BYTES = 65536
 
 
 class FileKind(typing.NamedTuple):
-    """Kind of track, with two functions.
+    """Kind of track, with two functions of the data that a reader returns.
 
         lay_out         (data, TargetParameters, duration, margin) -> flight.Flight
-        run_parameters  (data, TargetParameters, given) -> {parameter: value} for a scenario that does not set them
+        run_parameters  (data, TargetParameters, given) -> {parameter: value} for a scenario that does not set them;
+                        given: names of the parameters that the scenario sets
     """
     lay_out: typing.Callable
     run_parameters: typing.Callable
@@ -39,12 +41,12 @@ class FileFormat(typing.NamedTuple):
 
 
 def _read_log(rows):
-    """Return the function TrackFileParameters -> fixes.Fixes of a reader of rows."""
+    """Return the function TrackFileParameters -> fixes.Fixes for a function `rows` that yields fixes."""
     return lambda track: fixes.read(track, rows)
 
 
 def _read_object(read):
-    """Return the function TrackFileParameters -> data of a reader of one object."""
+    """Return the function TrackFileParameters -> data for a function read(path, name of the object)."""
     return lambda track: read(track.path, track.aircraft)
 
 
@@ -65,7 +67,7 @@ FOREIGN_FORMATS = (
      'an IGC log of a glider: convert it to GPX, for example with gpsbabel -i igc -f FLIGHT.igc -o gpx -F FLIGHT.gpx'),
     (re.compile(r'#[a-d][PV]\d{4} '),
      'an SP3 file of precise orbits: convert the orbit of one satellite to a CCSDS OEM (KEYWORD = value)'))
-"""(pattern of the beginning, name and remedy) of text formats that are not read."""
+"""(pattern of the beginning of a file, its name and remedy) of text formats that this project cannot read."""
 
 DERIVED_PARAMETERS = (*place.STATION_FIELDS, 'receiver.reference_range', 'duration')
 """Parameters that a track file gives if the scenario does not: of the receiver, and the duration of the run."""

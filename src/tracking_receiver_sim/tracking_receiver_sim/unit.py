@@ -1,5 +1,7 @@
-"""The unit of the tracking receiver: from the true direction of the beam and the truth of the ship to the channels of
-the receiver."""
+"""The unit of the tracking receiver: from the true beam and the truth of the ship to the measurements of the receiver.
+
+The node tracking_receiver runs this unit. Arguments: u, o, c are the inputs, outputs and constants of receiver.step.
+"""
 import math
 import typing
 
@@ -25,12 +27,19 @@ RECORD_DTYPE = np.dtype([('state', receiver.STATE_DTYPE), ('constants', receiver
                          ('inputs', receiver.INPUTS_DTYPE), ('outputs', receiver.OUTPUTS_DTYPE),
                          ('row', 'i8'), ('fault', 'i8'),
                          ('schedule', schedule.SCHEDULE_DTYPE), ('injected', injected.INJECTED_DTYPE)], align=True)
-"""Record of the unit. row: index of the noise of the next step; fault: the last of FAULT_STATUSES since the last
-diagnosis, otherwise LOCKED."""
+"""Record of the unit.
+
+row: row of the noise `normals` for the next step; fault: last status of FAULT_STATUSES since the last diagnosis,
+LOCKED if there was none.
+"""
 
 
 class Memory(typing.NamedTuple):
-    """All data of the receiver. breaks, coefficients: track of the target; normals: noise of the next steps."""
+    """All data of the receiver.
+
+    record: (1,) of RECORD_DTYPE; breaks, coefficients: track of the target, see target.Target; normals: (steps,
+    receiver.normals_per_step), noise of the next steps.
+    """
     record: np.ndarray
     breaks: np.ndarray
     coefficients: np.ndarray
@@ -39,7 +48,10 @@ class Memory(typing.NamedTuple):
 
 @compiled
 def decode(u, stamp, beam, ship):
-    """Set the inputs of the receiver from the messages of a step; without a new ship/truth the last one stays."""
+    """Set the inputs of the receiver from the messages of a step at a stamp [ns].
+
+    beam, ship: records of adu/truth and ship/truth. Without a new ship/truth the inputs keep the last one.
+    """
     u.stamp_ns = stamp
     u.azimuth, u.elevation = beam.position[0], beam.position[1]
     u.azimuth_rate, u.elevation_rate = beam.velocity[0], beam.velocity[1]
@@ -115,8 +127,8 @@ class TrackingReceiver(Simulated):
     def block(self, steps):
         """Return the memory with noise (steps, normals_per_step) drawn for the next steps.
 
-        The scintillation of the air has a random stream of its own. Because of this, the noise of the receiver is the
-        same with and without scintillation.
+        The scintillation has a random generator of its own, `_air`. So the noise of the receiver is equal with and
+        without scintillation.
         """
         self.parts['row'] = 0
         receiver_count = int(self.parts['constants']['first_scintillation_normal'])
@@ -127,8 +139,10 @@ class TrackingReceiver(Simulated):
         return self.memory._replace(normals=drawn)
 
     def diagnose(self):
-        """Return ERROR with the last of FAULT_STATUSES since the last diagnosis, or WARN while not locked; values:
-        C/N0, angle noise."""
+        """Return the Diagnosis, with C/N0 and angle noise among its values.
+
+        The level is ERROR after a status of FAULT_STATUSES since the last diagnosis, and WARN while not locked.
+        """
         outputs, fault = self.parts['outputs'], int(self.parts['fault'])
         self.parts['fault'] = receiver.Status.LOCKED
         status, p = int(outputs['status']), self.parameters

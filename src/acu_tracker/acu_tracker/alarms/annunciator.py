@@ -1,8 +1,13 @@
-"""Records of all alarms: delays, causes, first-out, and the commands of an operator.
+"""The annunciator: it keeps the state of all alarms, and decides which alarms an operator sees as causes.
 
-First-out marks the first alarm of a burst, which often shows the cause. A consequence stands under its cause while the
-cause is listed: when either is raised within CAUSE_WINDOW_S of the other, or while the cause is there. Only an alarm
-that stands under no other is annunciated (see report).
+The conditions of a step become alarms after their delays. The first alarm of a burst is marked (first-out), because it
+often shows the cause of the burst.
+
+By the table an alarm may be the consequence of another alarm, its parent. The alarm stands under its parent in two
+cases: the condition of the parent is present, or both were raised within CAUSE_WINDOW_S. Only an alarm without a
+parent is annunciated (`report`).
+
+s: record of ALARM_LIST_DTYPE; i: index of an alarm in table.ALARMS; t: stamp of the step [s].
 """
 import numpy as np
 
@@ -15,37 +20,37 @@ ALARM_DTYPE = np.dtype([('state', 'i8'), ('active', 'i8'), ('since', 'f8'), ('ra
                         ('parent', 'i8'), ('until', 'f8')], align=True)
 """State of an alarm.
 
-state   of machine.ALARM_STATES
-active  whether its condition is there, after the delays
+state   index in machine.ALARM_STATES
+active  1 if its condition is present, after the delays
 since   last stamp at which the condition was as `active` states [s]
-raised  stamp at which it was raised last [s]
-first   whether it was the first alarm of its burst
-parent  index of the alarm that it is a consequence of, or NO_ALARM
+raised  stamp at which the alarm was last raised [s]
+first   1 if it was the first alarm of its burst
+parent  index of the alarm under which it stands, or NO_ALARM
 until   stamp at which a shelved alarm returns [s]
 """
 
 ALARM_LIST_DTYPE = np.dtype([('alarm', ALARM_DTYPE, (ALARM_COUNT,)), ('burst', 'f8'), ('revision', 'i8')], align=True)
 """State of all alarms.
 
-burst     stamp at which a burst of alarms began [s]
-revision  count of the changes of the published list
+burst     stamp at which the last burst of alarms began [s]
+revision  number of changes of the published list
 """
 
 NO_ALARM = -1
 """Index that stands for no alarm."""
 
 FIRST_OUT_WINDOW_S = 1.0
-"""Time within which the alarms after the first one belong to its burst [s]."""
+"""Time after the first alarm of a burst within which other alarms belong to the burst [s]."""
 
 CAUSE_WINDOW_S = 5.0
-"""Time within which an alarm counts as the consequence of another, whichever is raised first [s]."""
+"""Longest time between two alarms, in either order, in which the one counts as the consequence of the other [s]."""
 
 MAX_SHELVING_TIME_S = 86400.0
 """Longest time for which an alarm may be shelved [s]: a day."""
 
 
 def initialise(s):
-    """Begin with every alarm normal and nothing published; s: view of ALARM_LIST_DTYPE, as in the whole module."""
+    """Begin with every alarm in the state normal and no list published; s: view of ALARM_LIST_DTYPE."""
     s['alarm']['state'] = machine.State.NORMAL
     s['alarm']['parent'] = NO_ALARM
     s['alarm']['since'] = s['alarm']['raised'] = s['burst'] = -np.inf
@@ -61,9 +66,10 @@ def restart(s, t):
 
 @compiled
 def _parent(s, i, t):
-    """Return the index of the first cause of alarm i that is there or was raised within CAUSE_WINDOW_S, or NO_ALARM.
+    """Return the index of the parent of alarm i, or NO_ALARM.
 
-    The cause must be listed and not shelved.
+    The parent is the first possible cause in the table that is listed, not shelved, and present or raised within
+    CAUSE_WINDOW_S.
     """
     for j in range(i):
         cause = s.alarm[j]
@@ -75,7 +81,10 @@ def _parent(s, i, t):
 
 @compiled
 def _raised(s, i, t):
-    """Note that alarm i has been raised: whether it is the first, its parent, its consequences."""
+    """Note that alarm i has been raised: set its first-out mark and its parent.
+
+    Alarm i also becomes the parent of its recent consequences, if these have no parent yet.
+    """
     a = s.alarm[i]
     a.first = t - s.burst > FIRST_OUT_WINDOW_S
     if a.first:
@@ -111,7 +120,10 @@ def apply_event(s, i, event, t):
 
 @compiled
 def _delayed(a, on, t, delay):
-    """Note whether the condition of an alarm's record is there at t [s]. It counts after a delay [s]."""
+    """Set a.active to `on` (the condition is present or not at t) after it has been so for a delay [s].
+
+    a: record of ALARM_DTYPE.
+    """
     if on == a.active:
         a.since = t
     elif t - a.since >= delay:
@@ -120,7 +132,11 @@ def _delayed(a, on, t, delay):
 
 @compiled
 def update(s, t, conditions, judged):
-    """Run one step at t [s]; conditions: bits of the conditions that are there; judged: bits of the judged alarms."""
+    """Run one step at t [s].
+
+    conditions: bits of the alarms whose condition is present; judged: bits of the alarms that have a meaning in this
+    step. The other alarms are suppressed.
+    """
     for i in range(ALARM_COUNT):
         a = s.alarm[i]
         on, is_judged = conditions & judged & 1 << i != 0, judged & 1 << i != 0
@@ -138,7 +154,7 @@ def update(s, t, conditions, judged):
 
 @compiled
 def active_parent(s, i):
-    """Return the index of the alarm that alarm i stands under now, or NO_ALARM."""
+    """Return the index of the parent of alarm i, if the parent is listed and not shelved, else NO_ALARM."""
     parent = s.alarm[i].parent
     if parent != NO_ALARM and machine.IS_ANNUNCIATED[s.alarm[parent].state]:
         return parent
@@ -147,7 +163,7 @@ def active_parent(s, i):
 
 @compiled
 def acknowledge(s, i, t):
-    """Acknowledge alarm i and all alarms under it. Return True if one waited for it."""
+    """Acknowledge alarm i and all alarms that stand under it. Return True if one of them waited for it."""
     done = apply_event(s, i, machine.Event.ACKNOWLEDGE, t)
     for k in range(i + 1, ALARM_COUNT):
         top = k
@@ -160,7 +176,7 @@ def acknowledge(s, i, t):
 
 @compiled
 def shelve(s, i, t, seconds):
-    """Shelve alarm i until t + seconds, in any state."""
+    """Shelve alarm i, in any state, for some seconds from t [s] on."""
     s.alarm[i].until = t + seconds
     s.revision += 1
     apply_event(s, i, machine.Event.SHELVE, t)
@@ -168,7 +184,10 @@ def shelve(s, i, t, seconds):
 
 @compiled
 def persisting_alarm(s, without):
-    """Return the index of a latched alarm whose cause is still there, or NO_ALARM; without: bits of alarms to skip."""
+    """Return the index of a latching alarm whose condition is still present, or NO_ALARM.
+
+    without: bits of the alarms that are not considered.
+    """
     for i in range(ALARM_COUNT):
         alarm = s.alarm[i]
         if table.LATCHED_FLAGS[i] and not without >> i & 1 and alarm.active and machine.IS_ANNUNCIATED[alarm.state]:
@@ -178,14 +197,17 @@ def persisting_alarm(s, without):
 
 @compiled
 def set_condition(s, i, there, t):
-    """Set at t [s] whether the condition of alarm i is there, without its delays."""
+    """Set the condition of alarm i at t [s] without its delays; there: True if the condition is present."""
     s.alarm[i].active = there
     apply_event(s, i, machine.Event.RAISE if there else machine.Event.CLEAR, t)
 
 
 @compiled
 def reset(s, t):
-    """Reset the latched alarms. Return True if there was one. Call it only while no `persisting_alarm` is left."""
+    """Reset the latched alarms. Return True if there was one.
+
+    The caller must make sure before that no latched alarm has its condition (`persisting_alarm`).
+    """
     done = False
     for i in range(ALARM_COUNT):
         if machine.IS_LATCHED[s.alarm[i].state]:

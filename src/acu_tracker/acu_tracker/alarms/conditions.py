@@ -1,4 +1,10 @@
-"""Alarm conditions of a step: detectors on both axes, and the findings of the other parts of the control unit."""
+"""Conditions of the alarms in a step: which rows of the table of alarms have their condition.
+
+The conditions come from the detectors of both axes, from the state of the drive, and from facts of the control unit.
+The result is a number with one bit for each alarm (table.Bit), which the annunciator takes.
+
+s: record of SUPERVISION_DTYPE; u, o: records of signals.INPUTS_DTYPE and of signals.OUTPUTS_DTYPE; facts: the Facts.
+"""
 import math
 from collections import namedtuple
 
@@ -16,31 +22,38 @@ SUPERVISION_DTYPE = np.dtype([
     ('lost', 'i8'), ('alarms', annunciator.ALARM_LIST_DTYPE)], align=True)
 """State of the alarms and of their conditions.
 
+axis       state of the detectors of each axis
 previous   errors [rad] and C/N0 [dB-Hz] of the receiver in the previous step
 least      lowest C/N0 received so far [dB-Hz]
 ready      last stamp at which the drive was ready [s]
-lost       bits of the axes that had only one motor at that stamp
+lost       bits of the axes that had only one motor at that stamp: 1 azimuth, 2 elevation
+alarms     state of the annunciator
 """
 
 INVALID_INPUT_FLAGS = Flag.ENCODER | Flag.ERROR | Flag.ERROR_STAMP | Flag.PROGRAM | Flag.PRESET | Flag.ATTITUDE_ERROR
 """Flags of refused inputs, except the attitude, which has the alarm `INS lost`."""
 
 BRAKE_GRIP_DEADLINE_S = 2.5
-"""Time after the drive ceases to be ready within which its brakes must hold [s]; longer than its longest stop."""
+"""Time within which the brakes must hold after the drive has ceased to follow commands [s].
+
+The time is longer than the longest stop of the drive.
+"""
 
 JUDGED_ALWAYS, JUDGED_WITH_MOTORS, JUDGED_MOVING, JUDGED_FOLLOWING = table.JUDGED_ALARM_BITS
+"""Bits of the alarms of each of table.JUDGED_CASES."""
 
 Facts = namedtuple('Facts', 'dt gap lost latched attitude_lost attitude_jumped signal_lost unasked_rate beamwidth')
 """Facts of a step for the alarms.
 
-dt         time since the previous step [s], 0 after a gap
-gap        length of the gap [s], 0 for none, infinite in the first step
-lost       whether steps between the two were lost
-latched    bits of the alarms that wait for a reset
-attitude_lost, attitude_jumped  of the ship
-signal_lost  whether autotrack has lost its signal without an explanation
-unasked_rate  excess over the commanded rates that counts as uncommanded motion [rad/s]
-beamwidth  of the receiver [rad]
+dt               time since the previous step [s]; 0 after a gap
+gap              length of a gap before this step [s]; 0: no gap, inf: first step
+lost             True if steps are missing between the previous step and this one
+latched          bits of the latched faults that wait for a reset
+attitude_lost    True if the attitude of a ship is not known
+attitude_jumped  True if a jump of the attitude is being corrected
+signal_lost      True if autotrack has lost its signal without an explanation
+unasked_rate     excess over the commanded rates that counts as uncommanded motion [rad/s]
+beamwidth        beamwidth of the receiver [rad]
 """
 
 DRIVE_SILENCE_GAP_S = 0.3
@@ -56,11 +69,15 @@ def initialise(s):
 
 @compiled
 def _of_motors(d, i, u, envelope, p, facts):
-    """Return the bits of the alarms of axis i that its encoder, motors and commands show.
+    """Return the bits of the alarms of axis i that follow from its encoder, its motors and its commands.
 
-    The bit of an azimuth alarm, shifted left by i, is that of axis i. d: its detectors; envelope:
-    uncommanded_motion.ENVELOPE_DTYPE; p: record of its AxisParameters.
+    d         record of AXIS_DETECTORS_DTYPE of the axis
+    envelope  record of uncommanded_motion.ENVELOPE_DTYPE
+    p         record of AxisParameters
+
+    The bit of an azimuth alarm, shifted left by i, is the bit of axis i.
     """
+    # surge: acceleration that the axis may have had in lost steps [rad/s2].
     y, dy, high, low = u.position[i], u.velocity[i], envelope.high[i], envelope.low[i]
     bits, surge = 0, detectors.MAX_ACCELERATION_RATIO * p.limits.acceleration if facts.lost else 0.0
     x = detectors.encoder_motor_mismatch(d, y, dy, facts.dt, surge)
@@ -81,9 +98,10 @@ def _of_motors(d, i, u, envelope, p, facts):
 
 @compiled
 def _of_loop(d, i, e, o, facts):
-    """Return the bits of the alarms of axis i that its following error e [rad] and its limits show.
+    """Return the bits of the alarms of axis i that follow from its following error e [rad] and its limits.
 
-    The following error does not count while the command is limited.
+    d: record of AXIS_DETECTORS_DTYPE. The following error does not count while the command is limited in rate or
+    acceleration.
     """
     bits, limited = 0, o.rate_limited[i] or o.acceleration_limited[i]
     if o.angle_limited[i]:
@@ -97,7 +115,10 @@ def _of_loop(d, i, e, o, facts):
 
 @compiled
 def _of_axes(s, mode, u, o, c, envelope, facts):
-    """Return the bits of the alarms of both axes. c: records (2,) of their constants."""
+    """Return the bits of the alarms of both axes; an electronic beam has none of them.
+
+    c: records (2,) of control_unit.AXIS_CONSTANTS_DTYPE; envelope: record of uncommanded_motion.ENVELOPE_DTYPE.
+    """
     bits, off = 0, u.stamp - s.ready > BRAKE_GRIP_DEADLINE_S
     for i in range(2):
         p, d, y, dy = c[i].p, s.axis[i], u.position[i], u.velocity[i]
@@ -117,11 +138,13 @@ def _of_axes(s, mode, u, o, c, envelope, facts):
 
 @compiled
 def _of_drive(s, u):
-    """Return the bits of the alarms that the drive reports itself by u.drive, a code of adu/state."""
+    """Return the bits of the alarms that the drive itself reports by u.drive, a code of adu/state."""
     if u.drive_ready:
-        # The code of a drive that is ready is the bits of the axes with one motor (topics.ENABLED_STATES), or -1.
+        # The code of a ready drive is a number whose bits are the axes with one motor (topics.ENABLED_STATES), or -1
+        # before the drive has published its state.
         s.ready, s.lost = u.stamp, max(u.drive, 0)
-    # Because the bit of the elevation follows that of the azimuth, the product sets the bits of the axes in s.lost.
+    # The bit of the elevation alarm follows that of the azimuth alarm. The product therefore sets the bits of exactly
+    # the axes in s.lost.
     bits = s.lost * table.Bit.AZIMUTH_MOTOR_LOST
     if u.drive == signals.DRIVE_EMERGENCY_STOP:
         bits |= table.Bit.EMERGENCY_STOP
@@ -132,10 +155,10 @@ def _of_drive(s, u):
 
 @compiled
 def _repeated(s, u):
-    """Return True if the receiver repeats the numbers of the previous step, which its noise makes impossible.
+    """Return True if the receiver repeats the numbers of the previous step.
 
-    An unlocked receiver publishes only the level. The lowest level so far may repeat, because it may be the fixed
-    level of an empty sky.
+    Because of noise a working receiver never does so. An unlocked receiver publishes only the level. The lowest level
+    so far may repeat, because it may be the fixed level of an empty sky.
     """
     previous, z = s.previous, u.cn0_dbhz
     same = z == previous[2] and (u.cross_elevation == previous[0] and u.elevation == previous[1] if u.error_valid else
@@ -148,7 +171,7 @@ def _repeated(s, u):
 
 @compiled
 def _of_unit(s, u, o, facts):
-    """Return the bits of the alarms of the inputs, and of the findings of other parts of the control unit."""
+    """Return the bits of the alarms that follow from the inputs and from the Facts."""
     bits = facts.latched
     if 0.0 < facts.gap < math.inf:
         bits |= table.Bit.TIME_JUMP | (table.Bit.DRIVE_SILENT if facts.gap > DRIVE_SILENCE_GAP_S else 0)
@@ -169,7 +192,7 @@ def _of_unit(s, u, o, facts):
 
 @compiled
 def _of_program(u, o):
-    """Return the bits of the alarms of the program track, by the reason why it is not followed."""
+    """Return the bits of the alarms of the program track: a refused segment, or the reason why it is not followed."""
     bits = table.Bit.PROGRAM_TURNAROUND if u.turnaround else 0
     if o.reason == Reason.BEFORE_PROGRAM:
         return bits | table.Bit.PROGRAM_TOO_EARLY
@@ -180,7 +203,10 @@ def _of_program(u, o):
 
 @compiled
 def _judged(mode, c):
-    """Return the bits of the alarms that are judged in a mode. c: records (2,) of the constants of the axes."""
+    """Return the bits of the alarms that have a meaning in a mode; the others are suppressed.
+
+    c: records (2,) of control_unit.AXIS_CONSTANTS_DTYPE.
+    """
     motors = c[0].p.controller != position_loop.CONTROLLER_BEAM or c[1].p.controller != position_loop.CONTROLLER_BEAM
     return (JUDGED_ALWAYS | (JUDGED_WITH_MOTORS if motors else 0) | (JUDGED_MOVING if mode != Mode.STANDBY else 0)
             | (JUDGED_FOLLOWING if modes.FOLLOWS_TARGET[mode] else 0))
@@ -188,10 +214,11 @@ def _judged(mode, c):
 
 @compiled
 def take(s, mode, u, o, c, envelope, facts):
-    """Bring the alarms to a step with its Facts.
+    """Determine the conditions of all alarms in a step, and update the alarms.
 
-    s: record of SUPERVISION_DTYPE; c: records (2,) of the constants of the axes; envelope:
-    uncommanded_motion.ENVELOPE_DTYPE of their commands.
+    mode      code of the mode; standby while the mode commands no motion
+    c         records (2,) of control_unit.AXIS_CONSTANTS_DTYPE
+    envelope  record of uncommanded_motion.ENVELOPE_DTYPE
     """
     bits = _of_drive(s, u) | _of_unit(s, u, o, facts) | _of_axes(s, mode, u, o, c, envelope, facts)
     if facts.gap > 0.0:

@@ -1,6 +1,14 @@
-"""Laws that detect a fault of an axis from its encoder, its motors and its command.
+"""Detectors of faults of one axis: laws that compare its load encoder, its motors, its torque and its commands.
 
-Each condition begins above a first level and ends below a second level, half of the first unless stated otherwise.
+`conditions` calls them in each step and makes alarms of their results. Each condition begins above a first level and
+ends below a second level, which is half of the first unless stated otherwise.
+
+d          record of AXIS_DETECTORS_DTYPE of the axis
+y          angle of the load encoder [rad]
+dy         rate of the axis by the encoders of the motors [rad/s]
+T          torque of the motors on the load [Nm]
+high, low  envelope of the recent rate commands, from servo.uncommanded_motion [rad/s]
+dt         time since the previous step [s]
 """
 import math
 
@@ -16,12 +24,26 @@ AXIS_DETECTORS_DTYPE = np.dtype([
     ('work', 'f8'), ('pushed', 'f8'), ('behind', 'i8'), ('moves', 'i8'),
     ('e', 'f8'), ('area', 'f8'), ('half_waves', 'f8'), ('oscillates', 'i8'),    # of `oscillation` [rad], [rad s], [-]
 ], align=True)
+"""State of the detectors of one axis.
+
+disagrees, stuck, immobile, overloaded, behind, moves, oscillates  1 while the condition of a detector is present
+mean_torque  mean of the absolute torque [Nm]
+resisted     time for which a brake has resisted the motors [s]
+work         work of the load on the motors [J]
+pushed       direction of the torque during a gust: 1 or -1; 0 without a gust
+e            last following error other than 0 [rad]
+area         area of the present half wave of the following error [rad s]
+half_waves   number of half waves, which decays
+"""
 
 MAX_STEP_MISMATCH_RAD = 3e-3
-"""Difference of encoder and motors over one step [rad]; wind-up and lash of a gear leave less than 1 mrad."""
+"""Largest difference between the motions of encoder and motors in one step [rad].
+
+Wind-up and lash of a gear cause less than 1 mrad.
+"""
 
 STUCK_TEST_TRAVEL_RAD = 3e-3
-"""Travel of the motors over which the encoder must move as well [rad]; longer than the lash."""
+"""Travel of the motors in which the encoder must move as well [rad]; longer than the lash."""
 
 STUCK_TRAVEL_SHARE, FREE_TRAVEL_SHARE = 0.1, 0.5
 """Shares of STUCK_TEST_TRAVEL_RAD below which the encoder is stuck, and above which a stuck encoder moves again."""
@@ -33,48 +55,52 @@ IMMOBILE_RATE_SHARE = 0.1
 """Share of the commanded rate below which an axis is immobile."""
 
 EXCESS_TORQUE_RATIO = 50.0
-"""Ratio of torque to Coulomb friction that no free axis needs for long without a gust.
+"""Ratio of torque to Coulomb friction above which the torque is excessive [-].
 
-It is half of the torque that the brakes hold, and twice that of a strong wind.
+No free axis needs such a torque for long without a gust. The torque is half of what the brakes hold, and twice the
+torque of a strong wind.
 """
 
 DRAG_TORQUE_RATIO = 80.0
-"""Ratio of torque to Coulomb friction above which brakes drag on an axis that moves with its motors.
+"""Ratio of torque to Coulomb friction above which the brakes drag on an axis that its motors move [-].
 
-It is five sixths of the torque that the brakes hold. Because a head wind and weaker brakes take the same work from the
-motors, only their amount distinguishes them.
+The torque is five sixths of what the brakes hold. Below this torque dragging brakes cannot be distinguished from a
+head wind, because both take work from the motors.
 """
 
 MIN_DRAG_RATE_RAD_S = 2e-4
-"""Rate above which an axis moves with its motors [rad/s]: twice the resolution of the rate."""
+"""Rate above which the motors of an axis move it [rad/s]: twice the resolution of the rate."""
 
 MIN_RESISTED_TIME_S = 0.2
-"""Time for which a brake must have resisted the motors while their torque was in excess [s]."""
+"""Time for which a brake must have resisted the motors with excess torque before it is reported [s]."""
 
 WIND_TORQUE_SHARE = 0.5
-"""Share of the excess torque above which the work of the load on the motors counts as that of a gust."""
+"""Share of the excess torque above which the work of the load on the motors counts as the work of a gust [-]."""
 
 MIN_GIVE_RAD = 1e-4
-"""Motion against the excess torque that shows a gust [rad]: 200 times the resolution of the motors' encoders over a
-step, and a tenth of the motion under a gust of 3000 Nm."""
+"""Motion against the excess torque that shows a gust [rad].
+
+The motion is 200 times the resolution of the motor encoders over a step, and a tenth of that under a gust of 3000 Nm.
+"""
 
 INERTIA_UNCERTAINTY = 2.0
-"""Largest ratio of the inertia of an axis to `feedforward.inertia`, and the inverse of the smallest."""
+"""Largest factor between the inertia of an axis and `feedforward.inertia`, in either direction [-]."""
 
 TORQUE_TIME_CONSTANT_S = 0.1
 """Time constant of the mean of the absolute torque [s].
 
-The absolute value is used because an axis with dragging brakes that turns back keeps its large torque.
+The mean is that of the absolute value, because the torque of an axis with dragging brakes stays large when the axis
+changes its direction.
 """
 
 MAX_ACCELERATION_RATIO = 2.0
-"""Ratio of the largest acceleration of an axis to the largest commanded acceleration."""
+"""Ratio of the largest acceleration of an axis to the largest commanded acceleration [-]."""
 
 MAX_MISMATCH_RAD = 1e-2
-"""Difference of encoder and motors within MISMATCH_TIME_CONSTANT_S [rad]: five times lash and wind-up of a gear."""
+"""Largest sum of the differences between encoder and motors [rad]: five times lash and wind-up of a gear."""
 
 MISMATCH_TIME_CONSTANT_S = 2.0
-"""Time constant with which a difference of encoder and motors decays [s]."""
+"""Time constant with which the sum of the differences between encoder and motors decays [s]."""
 
 STANDSTILL_RATE_RAD_S = 2e-3
 """Rate above which an axis moves [rad/s]."""
@@ -83,34 +109,42 @@ FOLLOWING_ERROR_BEAMWIDTHS = 0.25
 """Following error that is too large [beamwidths]."""
 
 MIN_HALF_WAVE_AREA = 1e-4
-"""Smallest area of a half wave of the following error that counts [rad s]: 2 a / w for an amplitude a of 1 mrad at an
-angular frequency w of 3 Hz."""
+"""Smallest area of a half wave of the following error that counts [rad s].
+
+The area is 2 a / w for an amplitude a of 1 mrad and a frequency w / (2 pi) of 3 Hz.
+"""
 
 OSCILLATION_WINDOW_S = 5.0
 """Time constant with which the count of half waves decays [s]."""
 
 OSCILLATION_HALF_WAVES = 10.0
-"""Count of half waves within OSCILLATION_WINDOW_S that is an oscillation: faster than 1 Hz."""
+"""Count of half waves within OSCILLATION_WINDOW_S above which the error oscillates [-]: a frequency above 1 Hz."""
 
 
 @compiled
 def beyond(was, x, on, off):
-    """Return True if x is above its level: `off` if it was above before, else `on`. NaN is not above."""
+    """Return True if x is above a level with hysteresis; NaN is not above.
+
+    was: True if x was above it before; on, off: levels at which the condition begins and ends.
+    """
     return x > (off if was else on)
 
 
 @compiled
 def initialise(d, y, dy):
-    """Begin at the encoder's angle [rad] and the motors' rate [rad/s], after a gap or an invalid encoder."""
+    """Begin at an angle y and a rate dy, after a gap or an invalid encoder."""
     d.y, d.dy, d.turned, d.moved, d.mismatch, d.e, d.area, d.work = y, dy, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
 
 
 @compiled
 def encoder_motor_mismatch(d, y, dy, dt, acceleration):
-    """Return the difference of the motions of encoder and motors in this step [rad]: x = y - y' - (dy + dy') dt / 2.
+    """Return x, the difference between the motions of encoder and motors in this step [rad].
 
-    acceleration: acceleration of the axis that is possible between two steps where steps are lost [rad/s2], else 0. In
-    a gap the motors may have moved by acceleration dt^2 / 4 more than the trapezoid. That part of x is not counted.
+        x = y - y' - (dy + dy') dt / 2;    y', dy': values of the previous step
+
+    acceleration: 0, or the possible acceleration of the axis [rad/s2] if steps are missing before this one. The motors
+    may then have moved by acceleration dt^2 / 4 more than the formula gives. The function subtracts this uncertainty
+    from |x|.
     """
     x = y - d.y - 0.5 * (dy + d.dy) * dt
     return math.copysign(max(abs(x) - 0.25 * acceleration * dt * dt, 0.0), x)
@@ -118,7 +152,7 @@ def encoder_motor_mismatch(d, y, dy, dt, acceleration):
 
 @compiled
 def encoder_jump(x):
-    """Return True if the motions of encoder and motors in this step differ by more than MAX_STEP_MISMATCH_RAD."""
+    """Return True if the load encoder has jumped: |x| of encoder_motor_mismatch is above MAX_STEP_MISMATCH_RAD."""
     return abs(x) > MAX_STEP_MISMATCH_RAD
 
 
@@ -139,10 +173,10 @@ def encoder_stuck(d, y, dy, dt):
 
 @compiled
 def disagreement(d, x, dt):
-    """Return True if encoder and motors have recently moved apart.
+    """Return True if encoder and motors have recently moved by different angles.
 
-    The sum X of the differences x follows X' = x / dt - X / MISMATCH_TIME_CONSTANT_S. The limit of |X| is
-    MAX_MISMATCH_RAD, and half of it for the end of the condition.
+    x: result of encoder_motor_mismatch. The sum X of the differences x follows X' = x / dt - X /
+    MISMATCH_TIME_CONSTANT_S. The condition begins when |X| is above MAX_MISMATCH_RAD.
     """
     d.mismatch += x - d.mismatch * dt / MISMATCH_TIME_CONSTANT_S
     d.disagrees = beyond(d.disagrees, abs(d.mismatch), MAX_MISMATCH_RAD, 0.5 * MAX_MISMATCH_RAD)
@@ -151,14 +185,15 @@ def disagreement(d, x, dt):
 
 @compiled
 def immobile(d, dy, high, low):
-    """Return True if the motors do not follow recent commands of one sign, all above MIN_COMMANDED_RATE_RAD_S.
+    """Return True if the motors do not follow the recent commands.
 
-    The axis is immobile below IMMOBILE_RATE_SHARE of the smallest of those commands, and stays so up to three times
-    that share. The state ends when the commands fall below half of MIN_COMMANDED_RATE_RAD_S. Motion against the
-    commands does not count as immobile. high, low: envelope of the commands (servo.uncommanded_motion).
+    The recent commands must have one sign and be above MIN_COMMANDED_RATE_RAD_S. The axis becomes immobile when its
+    rate is below IMMOBILE_RATE_SHARE of the smallest of these commands. The axis stays immobile up to three times this
+    share, and until the commands fall below half of MIN_COMMANDED_RATE_RAD_S. A fast motion against the commands does
+    not count as immobile.
     """
     threshold = 0.5 * MIN_COMMANDED_RATE_RAD_S if d.immobile else MIN_COMMANDED_RATE_RAD_S
-    # u: the recent command of least magnitude, if all have one sign.
+    # u: recent command of the smallest magnitude, if all recent commands have one sign.
     u = low if low > threshold else high
     if low <= threshold and high >= -threshold:
         d.immobile = 0
@@ -169,10 +204,7 @@ def immobile(d, dy, high, low):
 
 @compiled
 def excess_torque(d, T, limit, dt):
-    """Return True if the mean of the absolute torque on the load is above its limit, both [Nm].
-
-    The time constant of the mean is TORQUE_TIME_CONSTANT_S.
-    """
+    """Return True if the mean of the absolute torque is above a limit [Nm]."""
     if math.isfinite(T):
         d.mean_torque += (abs(T) - d.mean_torque) * min(dt / TORQUE_TIME_CONSTANT_S, 1.0)
     d.overloaded = beyond(d.overloaded, d.mean_torque, limit, 0.5 * limit)
@@ -181,15 +213,18 @@ def excess_torque(d, T, limit, dt):
 
 @compiled
 def pushed_by_wind(d, T, dy, inertia, limit, dt):
-    """Return True if the load has moved the axis against the torque T of its motors [Nm], as only a gust does.
+    """Return True if the load has moved the axis against the torque T of its motors, as only a gust does.
 
-    A brake takes work from an axis and never does work on it. The work that the load has done since its least value is
+    A brake takes work from an axis and never does work on it. The work W that the load has done on the motors is
 
         W_k = max(W_k-1 - T dy dt + f (E_k - E_k-1), 0),    E = J dy^2 / 2
 
-    f is INERTIA_UNCERTAINTY while the axis slows down, and its inverse while the axis accelerates. An inertia that
-    differs by this factor from J, `inertia` [kg m2], therefore does not look like a gust. W counts while the torque
-    has one sign and is above WIND_TORQUE_SHARE of its limit. The finding lasts as long.
+    E     kinetic energy of the axis [J]; J: `inertia` [kg m2]
+    f     INERTIA_UNCERTAINTY while the axis slows down, its inverse while the axis accelerates. Therefore an inertia
+          that differs from J by this factor does not look like a gust
+    limit  excess torque [Nm]
+
+    W counts while the torque has one sign and is above WIND_TORQUE_SHARE of the limit. The result stays True as long.
     """
     least = WIND_TORQUE_SHARE * limit
     if d.pushed * T < least:
@@ -207,11 +242,13 @@ def pushed_by_wind(d, T, dy, inertia, limit, dt):
 
 @compiled
 def resists(T, dy, high, low, friction):
-    """Return True if an axis with excess torque stands in spite of its command, or its motors drag it along.
+    """Return True if an axis with excess torque stands in spite of its commands, or moves with an even larger torque.
 
-    The axis stands if its commands and its torque have one sign, the commands are above STANDSTILL_RATE_RAD_S, and the
-    rate is below IMMOBILE_RATE_SHARE of the least of them. high, low: envelope of the commands
-    (servo.uncommanded_motion).
+    The axis stands if its rate is below IMMOBILE_RATE_SHARE of the smallest recent command. Commands and torque must
+    have one sign, and the commands must be above STANDSTILL_RATE_RAD_S. The axis moves if its motors move it at more
+    than MIN_DRAG_RATE_RAD_S; the torque must then be above DRAG_TORQUE_RATIO.
+
+    friction: Coulomb friction [Nm].
     """
     if abs(dy) > MIN_DRAG_RATE_RAD_S and abs(T) > DRAG_TORQUE_RATIO * friction:
         return T * dy > 0.0
@@ -223,8 +260,7 @@ def resists(T, dy, high, low, friction):
 def brake_not_released(d, T, dy, high, low, p, dt):
     """Return True if a brake resists the motors of an axis with excess torque, and no gust explains the torque.
 
-    T: torque of the motors on the load [Nm]; dy: their rate [rad/s]; high, low: envelope of the commands
-    (servo.uncommanded_motion); p: record of FeedforwardParameters. The finding lasts as long as the excess torque.
+    p: record of FeedforwardParameters. The result stays True as long as the excess torque.
     """
     limit = EXCESS_TORQUE_RATIO * p.friction
     pushed = pushed_by_wind(d, T, dy, p.inertia, limit, dt)
@@ -244,9 +280,9 @@ def moves(d, dy):
 
 @compiled
 def opposes_command(dy, high, low, threshold):
-    """Return True if a rate opposes its recent commands, which were of one sign.
+    """Return True if the axis moves against its recent commands, which all had one sign.
 
-    high, low: envelope of the commands (servo.uncommanded_motion); threshold: rate without an explanation [rad/s].
+    threshold: rate above which a motion against the commands counts [rad/s].
     """
     return (dy > threshold and high <= 0.0 and low < -STANDSTILL_RATE_RAD_S
             or dy < -threshold and low >= 0.0 and high > STANDSTILL_RATE_RAD_S)
@@ -254,18 +290,18 @@ def opposes_command(dy, high, low, threshold):
 
 @compiled
 def following_error(d, e, limit):
-    """Return True if the following error is above FOLLOWING_ERROR_BEAMWIDTHS of a limit [rad], the beamwidth."""
+    """Return True if the following error e [rad] is above FOLLOWING_ERROR_BEAMWIDTHS; limit: the beamwidth [rad]."""
     d.behind = beyond(d.behind, abs(e), FOLLOWING_ERROR_BEAMWIDTHS * limit, 0.5 * FOLLOWING_ERROR_BEAMWIDTHS * limit)
     return d.behind != 0
 
 
 @compiled
 def oscillation(d, e, dt):
-    """Return True if the following error [rad] oscillates.
+    """Return True if the following error e [rad] oscillates.
 
-    Half waves whose area is above MIN_HALF_WAVE_AREA are counted; the count decays with OSCILLATION_WINDOW_S.
-    OSCILLATION_HALF_WAVES of them are an oscillation (T. Haegglund, A control-loop performance monitor, Control
-    Engineering Practice 3, 1995).
+    The law counts half waves with an area (time integral) above MIN_HALF_WAVE_AREA. The count decays with the time
+    constant OSCILLATION_WINDOW_S. The error oscillates if the count is above OSCILLATION_HALF_WAVES (T. Haegglund, A
+    control-loop performance monitor, Control Engineering Practice 3, 1995).
     """
     d.half_waves *= math.exp(-dt / OSCILLATION_WINDOW_S)
     if e * d.e < 0.0:

@@ -1,6 +1,7 @@
-"""States of one alarm and the events between them: ANSI/ISA-18.2-2016, section 6.2 (IEC 62682).
+"""State machine of one alarm: its states, the events that change them, and the table of the transitions.
 
-Only an alarm that is latched by its row of `alarms.table` enters a latched state.
+The states are those of ANSI/ISA-18.2-2016, section 6.2 (IEC 62682). Only an alarm that latches by its row of
+`alarms.table` enters a latched state. `annunciator` applies the events.
 """
 import numpy as np
 
@@ -15,12 +16,13 @@ ALARM_EVENTS = ('raise', 'clear', 'acknowledge', 'reset', 'shelve', 'unshelve', 
 Event = codes(ALARM_EVENTS)
 """Events of an alarm.
 
-raise, clear: the condition is there, or gone, in this step; suppress, release: the alarm is not judged, or judged
-again. The other events are commands of the operator.
+raise, clear       the condition is present, or absent, in this step
+suppress, release  the alarm has no meaning in this mode, or has a meaning again
+others             commands of the operator
 """
 
 EVENT_REFUSED = -1
-"""Next state for an event that a state does not accept."""
+"""Code in the place of the next state, for an event that a state does not accept."""
 
 # The states in the order of ALARM_STATES, and x for an event that is refused.
 _N, _U, _A, _R, _LU, _LA, _SH, _SU, _x = (*range(len(ALARM_STATES)), EVENT_REFUSED)
@@ -36,9 +38,10 @@ STATE_TRANSITIONS = np.array((
     (_SH, _SH, _x, _x, _SH, _N, _SH, _SH),     # shelved
     (_SU, _SU, _x, _x, _SH, _x, _SU, _N),      # suppressed by design
 ))
-"""STATE_TRANSITIONS[state, event] of an alarm that is not latched.
+"""Next state of an alarm that does not latch: STATE_TRANSITIONS[state, event].
 
-An active alarm is not suppressed at once. Its condition counts as gone; the alarm returns and is acknowledged first.
+An active alarm is not suppressed at once. Its condition counts as absent. The alarm returns to normal when it has been
+acknowledged, and is suppressed then.
 """
 
 IS_ANNUNCIATED = (False, True, True, True, True, True, False, False)
@@ -56,7 +59,10 @@ IS_LATCHED = (False, False, False, False, True, True, False, False)
 
 @compiled
 def next_state(state, event, latched):
-    """Return the state after an event, or EVENT_REFUSED if the state does not accept it; latched: of the alarm."""
+    """Return the state after an event, or EVENT_REFUSED if the state does not accept the event.
+
+    latched: 1 for an alarm that latches by its row of the table.
+    """
     if latched and event == Event.CLEAR:
         if state == State.UNACKNOWLEDGED:
             return State.LATCHED_UNACKNOWLEDGED

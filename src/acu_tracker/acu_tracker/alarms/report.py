@@ -1,29 +1,32 @@
-"""List of alarms as a message: diagnostic_msgs/DiagnosticArray on acu/alarms."""
+"""The published list of alarms: which alarms are in it, their order, and the message on acu/alarms.
+
+An alarm is listed in every state except normal and suppressed. Annunciated alarms, at most MAX_ANNUNCIATED_ALARMS,
+come first; their consequences and the shelved alarms follow.
+
+s: view of annunciator.ALARM_LIST_DTYPE; i: index of an alarm in table.ALARMS.
+"""
 from acu_tracker.alarms import annunciator, machine, table
 from pedestal_common.node.unit import LEVEL_ERROR, LEVEL_OK, LEVEL_WARN
 from pedestal_common.wire import messages
 
 MAX_ANNUNCIATED_ALARMS = 10
-"""Largest number of alarms annunciated at once: those of the highest priority, the earliest first."""
+"""Largest number of annunciated alarms: those of the highest priority, among equals the earliest."""
 
 DIAGNOSTIC_LEVELS = {'critical': LEVEL_ERROR, 'high': LEVEL_ERROR, 'medium': LEVEL_WARN, 'low': LEVEL_WARN}
 """{priority of an alarm: level of its DiagnosticStatus}."""
 
 
 def order(s):
-    """Return the indices of the alarms that are listed and not shelved, by priority, then by the time of raising.
-
-    s: view of annunciator.ALARM_LIST_DTYPE, as in the whole module.
-    """
+    """Return the indices of the alarms that are listed and not shelved, by priority, then by the time of raising."""
     chosen = [i for i in range(annunciator.ALARM_COUNT) if machine.IS_ANNUNCIATED[s['alarm'][i]['state']]]
     return sorted(chosen, key=lambda i: (table.ALARM_PRIORITIES.index(table.ALARMS[i].priority),
                                          s['alarm'][i]['raised'], i))
 
 
 def annunciated(s):
-    """Return the indices of the first MAX_ANNUNCIATED_ALARMS alarms that stand under no other.
+    """Return the indices of the annunciated alarms, which call for the attention of an operator.
 
-    These alarms call for the attention of an operator.
+    The annunciated alarms are the first MAX_ANNUNCIATED_ALARMS alarms that are no consequence of another one.
     """
     return [i for i in order(s) if annunciator.active_parent(s, i) == annunciator.NO_ALARM][:MAX_ANNUNCIATED_ALARMS]
 
@@ -36,7 +39,10 @@ def listed(s):
 
 
 def status(s, i, detail='', reason=''):
-    """Return the DiagnosticStatus of alarm i. detail: more about the fault; reason: why the alarm is shelved."""
+    """Return the DiagnosticStatus of alarm i.
+
+    detail: text with details of the fault; reason: text why the alarm is shelved; '' for none.
+    """
     alarm, row, above = s['alarm'][i], table.ALARMS[i], annunciator.active_parent(s, i)
     shelved = alarm['state'] == machine.State.SHELVED
     values = {'state': machine.ALARM_STATES[alarm['state']], 'priority': row.priority,
@@ -54,6 +60,9 @@ def status(s, i, detail='', reason=''):
 
 
 def message(s, details, reasons):
-    """Return the DiagnosticArray of the list; details, reasons: {index: text} of some alarms."""
+    """Return the DiagnosticArray of the list.
+
+    details, reasons: {index of an alarm: text}, for the arguments detail and reason of `status`.
+    """
     return messages.DiagnosticArray(header=messages.header(''), status=[
         status(s, i, details.get(i, ''), reasons.get(i, '')) for i in listed(s)])

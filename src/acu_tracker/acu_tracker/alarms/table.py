@@ -1,7 +1,7 @@
-"""Alarms of the control unit: a row each.
+"""The table of alarms: one row for each alarm of the control unit.
 
-Every cause stands before its consequences, because the annunciator looks for the parent of an alarm among the rows
-before it.
+In the table every cause stands before its consequences. The annunciator needs this order, because it searches the
+parent of an alarm only among the rows before it.
 """
 import typing
 
@@ -11,10 +11,12 @@ from pedestal_common.graph.topics import AXES
 ALARM_PRIORITIES = ('critical', 'high', 'medium', 'low')
 
 JUDGED_CASES = ('always', 'motors', 'moving', 'following')
-"""Cases in which an alarm is judged; otherwise it is suppressed by design.
+"""Cases in which an alarm has a meaning and is judged; in the other cases it is suppressed by design.
 
-always: in every step; motors: if the axes have motors; moving: if the axes have motors and the mode is not standby;
-following: in a mode that follows a target.
+always     in every step
+motors     if the axes have motors
+moving     if the axes have motors and the mode is not standby
+following  in a mode that follows a target
 """
 
 
@@ -26,10 +28,10 @@ class Alarm(typing.NamedTuple):
     on_delay     time for which the condition must last before the alarm is raised [s]
     off_delay    time for which the condition must be gone before the alarm clears [s]
     latched      True if the alarm stays until it is reset
-    cause        names of the alarms that the alarm may be a consequence of
+    cause        names of the alarms that may cause this alarm
     meaning      condition that is reported
     action       recommended action of the operator
-    judged       of JUDGED_CASES
+    judged       one of JUDGED_CASES
     """
     name: str
     priority: str
@@ -43,14 +45,14 @@ class Alarm(typing.NamedTuple):
 
 
 def _of_axes(name, *columns, cause=(), judged='motors'):
-    """Return a row for each axis; in `cause`, '*' stands for the axis."""
+    """Return an Alarm for each axis; in the names of `cause`, '*' stands for the axis."""
     priority, on_delay, off_delay, latched, meaning, action = columns
     return tuple(Alarm(f'{axis} {name}', priority, on_delay, off_delay, latched,
                        tuple(other.replace('*', axis) for other in cause), meaning, action, judged) for axis in AXES)
 
 
 def _both(*names):
-    """Return each name for both axes."""
+    """Return the full names of alarms of both axes; names: without the axis."""
     return tuple(f'{axis} {name}' for name in names for axis in AXES)
 
 
@@ -187,4 +189,4 @@ JUDGED_ALARM_BITS = tuple(sum(1 << i for i, alarm in enumerate(ALARMS) if alarm.
 """Bits of the alarms of each of JUDGED_CASES."""
 
 Bit = bits(ALARM_NAMES)
-"""Bit of each alarm; shifted left by one, the bit of an azimuth alarm is that of the elevation."""
+"""Bit of each alarm. The bit of an azimuth alarm, shifted left by one, is the bit of the same alarm in elevation."""

@@ -1,5 +1,7 @@
-"""Estimation of the direction of the target and of its motion:
-the angle filters, the Cartesian filter, and their choice.
+"""Estimation of the direction of the target and of its motion, from the errors of the receiver.
+
+`target` converts the errors to the frame of the filter, `tracker` gates them, and the package `filters` filters them.
+The other modules are monitors that detect wrong errors of the receiver.
 
 Symbols
     X = (x1 x2 x3)  estimate of one axis: angle, rate, acceleration                     [rad, rad/s, rad/s2]
@@ -7,10 +9,10 @@ Symbols
     F, Q, P         transition, process noise, covariance of X
     y, R, nu, S     measured angle, its variance, innovation, variance of the innovation
     K               gain of the filter; k1, k2, k3 on the innovation of the angle       [-, 1/s, 1/s2]
-    alpha           manoeuvre frequency of an acceleration, x = alpha T                 [1/s], [-]
+    alpha           reciprocal of the duration of an acceleration; x = alpha T          [1/s], [-]
     a_max, abar     largest and mean acceleration of the target                         [rad/s2]
     sigma_a         standard deviation of the acceleration about abar                   [rad/s2]
-    mu, cbar        `imm`: probability of a model; its prediction                       [-]
+    mu, cbar        `imm`: probability of a model after and before a measurement        [-]
     theta3, k_m     beamwidth and monopulse slope of the receiver                       [rad], [-]
-    alpha, beta, gamma (in `constant_gain` only, as in its textbooks): gains of angle, rate and acceleration
+    alpha, beta, gamma   `constant_gain` only: gains of angle, rate and acceleration    [-]
 """

@@ -1,11 +1,16 @@
-"""Divergence of the filter that the antenna follows, detected in its innovations.
+"""Detection of divergence in autotrack: the estimate moves away from the target, and the antenna follows the estimate.
 
     m = mean over the last errors of (nu_A^2 / S_A + nu_E^2 / S_E) / 2
 
-nu: innovation; S: its variance; A, E: azimuth and elevation. m is 1 while the errors are as large as the filter
-expects. An error signal with the wrong sign, with rotated axes or with a gain three times too high drives the antenna
-away from its target. Then m is large before the beam leaves the target, and still large when the signal is lost. This
-avoids coasting on a wrong estimate.
+    nu, S   innovation of an angle [rad] and its variance [rad2] as the filter predicts it
+    A, E    azimuth and elevation
+    m       is 1 while the innovations are as large as the filter expects [-]
+
+An error signal with the wrong sign, with rotated axes or with a gain three times too high drives the antenna away from
+its target. Then m becomes large before the beam leaves the target, and it is still large when the signal is lost. In
+this case autotrack must not coast on the wrong estimate.
+
+The detected divergence is latched: it stays until a reset. s: record of DIVERGENCE_DTYPE.
 """
 import numpy as np
 
@@ -15,29 +20,33 @@ DIVERGENCE_DTYPE = np.dtype([('m', 'f8'), ('diverged', 'i8')], align=True)
 """m: the mean [-]; diverged: 1 from the detection of a divergence until its reset."""
 
 DIVERGENCE_ERROR_COUNT = 100
-"""Number of errors in the mean m. Of a filter without a fault, the largest m is 1.25 in its worst half second."""
+"""Number of errors in the mean m; they take half a second. Without a fault m stays below 1.25."""
 
 MAX_COUNTED_ERROR = 12.5
 """Largest contribution of one error to m [-]: half the default gate.
-This avoids an alarm after a few errors with interference."""
+
+This avoids an alarm after a few errors with interference.
+"""
 
 DIVERGENCE_LIMIT = 7.0
-"""Largest m of a filter in touch with its target [-]. A filter without an acceleration state reaches 6.1 on a target
-that reverses, and keeps the target in the beam."""
+"""Largest m of a filter that still follows its target [-].
+
+A filter without an acceleration state reaches 6.1 on a target that reverses its motion, and keeps it in the beam.
+"""
 
 COASTING_DIVERGENCE_LIMIT = 2.0
-"""Largest m with which the filter may coast [-]."""
+"""Largest m with which the filter may coast after a loss of the signal without a known cause [-]."""
 
 
 @compiled
 def restart(s):
-    """Set m to 1 when autotrack begins."""
+    """Set m to 1 when a mode begins."""
     s.m = 1.0
 
 
 @compiled
 def take(s, innovation):
-    """Add the Innovation of an error to the mean; NaN (no prediction) is ignored."""
+    """Add the Innovation of an error to the mean m; an Innovation of NaN (nothing was predicted) is ignored."""
     # The comparison of x with itself is False for NaN.
     x = 0.5 * (innovation.axis[0].chi_square + innovation.axis[1].chi_square)
     if x == x:
@@ -46,8 +55,10 @@ def take(s, innovation):
 
 @compiled
 def diverges(s, without_signal):
-    """Return True if the filter has diverged. without_signal:
-    the filter coasts, and no known cause explains the loss."""
+    """Return True if the filter has diverged.
+
+    without_signal: True if the filter coasts, and no known cause explains the loss of the signal.
+    """
     return s.m > (COASTING_DIVERGENCE_LIMIT if without_signal else DIVERGENCE_LIMIT)
 
 

@@ -1,8 +1,9 @@
-"""Parameters of the target filter: of the kinds of axis filter, of the Cartesian filter, of gate and lock."""
+"""Parameters of the target filter: axis filters, Cartesian filter, models of receiver and INS, gate and lock."""
 import dataclasses
 import math
 
 from acu_tracker.estimation.filters.kinds import FILTER_KINDS, named_models
+from acu_tracker.estimation.filters.motion_models import MAX_RUNG_COUNT
 from pedestal_common.parameters import ParameterError, Parameters, choice, flag, group, parameter, text
 
 _DEG = math.pi / 180.0
@@ -56,22 +57,29 @@ class CurrentStatisticalParameters(Parameters):
 class ImmParameters(Parameters):
     """Several interacting models, each with its own parameters.
 
-    The defaults form a ladder of noise levels, from a satellite that stands still to a target that reverses. Each
-    level is 30 to 300 times as noisy as the level before. The probabilities of the models adapt Q to the innovations.
+    The defaults form a ladder: a satellite that stands still, and models of constant acceleration with growing white
+    jerk, the last for a target that reverses. The probabilities of the models adapt Q to the innovations.
     """
 
-    models: str = text('cv ca singer current_statistical', 'models in use: two or more of cv, ca, singer, '
-                      'current_statistical')
-    dwell: float = parameter(3000.0, 1e-3, 1e6, 's', 'mean time for which one model is valid')
+    models: str = text('cv ca', 'models in use: two or more of cv, ca, singer, current_statistical')
+    rungs: int = parameter(6, 1, MAX_RUNG_COUNT, '', 'number of models ca, each with more white jerk than '
+                           'the one before')
+    rung_ratio: float = parameter(5.2, 1.01, 1000.0, '', 'white jerk of a model ca over that of the one before')
+    dwell: float = parameter(1000.0, 1e-3, 1e6, 's', 'mean time for which one model is valid')
     cv: CvParameters = group(CvParameters, noise=1e-5 * _DEG)
-    ca: CaParameters = group(CaParameters, noise=2.5e-3 * _DEG)
+    ca: CaParameters = group(CaParameters, noise=5e-4 * _DEG)
     singer: SingerParameters = group(SingerParameters, alpha=0.1, sigma=0.25 * _DEG)
     current_statistical: CurrentStatisticalParameters = group(CurrentStatisticalParameters, alpha=2.0,
                                                               a_max=0.6 * _DEG)
 
     def check(self):
-        """Raise ParameterError unless `models` names two or more models, each once."""
+        """Raise ParameterError unless `models` names two or more models, each once, and the last rung is in the range
+        of a white jerk."""
         named_models(self.models)
+        last, most = self.ca.noise * self.rung_ratio**(self.rungs - 1), 1e3
+        if last > most:
+            raise ParameterError(f'rungs = {self.rungs}: the last model ca has a white jerk of {last:g} '
+                                 f'rad/s3/sqrt(Hz); the largest is {most:g}')
 
 
 @dataclasses.dataclass(frozen=True)
@@ -126,8 +134,8 @@ class ReceiverModelParameters(Parameters):
 class AttitudeModelParameters(Parameters):
     """Error model of an INS, for a ship whose INS does not publish the statistics of its error.
 
-    The part that changes from sample to sample is in every measurement. The slow part cancels, because the target is
-    measured and pointed at with the same attitude; its changes, however, look like a motion of the target.
+    The noise changes from sample to sample and is added to every measurement. The slow error cancels, because
+    measurement and pointing use the same attitude. Changes of the slow error look like a motion of the target.
     """
 
     tilt_noise: float = parameter(3e-5, 0.0, 0.1, 'rad', 'rms white noise of roll and pitch, per sample')

@@ -1,38 +1,45 @@
-"""Detection of errors that are only noise: their change from one to the next is far larger than the receiver model's.
+"""Detection of receiver errors that are only noise: they change far more from one to the next than the model expects.
 
     q = mean over the last errors of (nu_k - nu_k-1)^2 / 2R
 
-nu_k: innovation of error k [rad]; R: variance of an error by the receiver model. q is the mean of both axes, and 1 for
-white noise of the variance R. Slow changes cancel in the difference: a target that turns, a slope of the wrong sign, a
-bias. Because the filter ignores noisy errors, the part of such noise that passes the gate does not mislead it. Source:
-von Neumann, Distribution of the ratio of the mean square successive difference to the variance, Annals of Mathematical
-Statistics 12 (1941) 367.
+    nu_k   innovation of error k [rad]
+    R      variance of an error by the model of the receiver [rad2]
+    q      mean of both axes [-]; 1 for white noise of the variance R
+
+Slow changes cancel in the difference: a target that turns, a slope of the wrong sign, a bias. `tracker` ignores all
+errors while q is above the gate. Some noisy errors would pass the gate alone, and would mislead the filter.
+
+Source: von Neumann, Distribution of the ratio of the mean square successive difference to the variance, Annals of
+Mathematical Statistics 12 (1941) 367.
 """
 import numpy as np
 
 from pedestal_common.compiled import compiled
 
 ROUGHNESS_DTYPE = np.dtype([('nu', 'f8', (2,)), ('q', 'f8')], align=True)
-"""nu: innovations of the previous error [rad], NaN for none; q: the mean [-]."""
+"""nu: innovations of the previous error, of azimuth and elevation [rad], NaN without one; q: the mean [-]."""
 
 ROUGHNESS_ERROR_COUNT = 10
 """Number of errors in the mean q."""
 
 MAX_COUNTED_DIFFERENCE = 100.0
-"""Largest contribution of one difference to q [-]. One outlier makes two large differences. This limit
-keeps q below the default gate of 25, so that the gate alone decides on the outlier."""
+"""Largest contribution of one difference to q [-].
+
+One outlier makes two large differences. The limit keeps q below the default gate of 25 after one outlier, so that the
+gate alone decides on it.
+"""
 
 
 @compiled
 def restart(s):
-    """Set q to 1 when a filter begins."""
+    """Set q to 1 when the filter starts."""
     s.nu[0] = s.nu[1] = np.nan
     s.q = 1.0
 
 
 @compiled
 def take(s, innovation, m):
-    """Add the Innovation of a Measurement to the mean; return q."""
+    """Add an Innovation to the mean and return q; m: the Measurement of the innovation, which holds R."""
     x = 0.0
     for i in range(2):
         nu = innovation.axis[i].nu

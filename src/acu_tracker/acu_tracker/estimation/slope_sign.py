@@ -1,18 +1,32 @@
-"""Detection of receiver errors with the wrong sign, by the smoothness of the target's direction with either sign.
+"""Detection of receiver errors with the wrong sign (a reversed slope) in autotrack.
 
-Beam b and error e are measured. The target is at z+ = b + e if the slope is right, and at z- = b - e if it
-is reversed. A straight line is fitted to the last values of each; its squared innovations over the
-variance R of e are averaged:
+The direction of a real target is smooth. The test computes the direction of the target with either sign of the error,
+and compares which of the two directions is smoother:
+
+    b, e    measured direction of the beam and measured error, on one axis [rad]
+    z+      b + e: direction of the target if the slope is right
+    z-      b - e: direction of the target if the slope is reversed
+
+A straight line is fitted to the last values of b and of e. The squared innovations are averaged:
 
     J+ = mean of (nu_b + nu_e)^2 / R,    J- = mean of (nu_b - nu_e)^2 / R
 
-nu_b, nu_e: innovations of the lines of b and of e. Right slope: the beam is H z+, so that z- = (2 H - 1) z+. H is the
-transfer function of the closed loop, which follows a constant rate without error (type II). Except while H lags, z- is
-at least as rough as z+, however the target turns. Outliers and noise are in both alike. Reversed slope: the
-errors drive the beam away from a target that stays smooth in z-, while z+ moves away twice as fast. The
-comparison is a likelihood ratio of two hypotheses (Willsky, A survey of design methods for failure detection in
-dynamic systems, Automatica 12 (1976) 601). Each axis of the receiver is judged by itself, in earth axes, because
-the deck's motion has no effect there.
+    nu_b, nu_e   innovations of the lines of b and of e [rad]
+    R            variance of e [rad2]
+    J+, J-       roughness of z+ and of z- [-]
+
+Right slope: the beam is H z+, so that z- = (2 H - 1) z+. H is the transfer function of the closed loop, which follows
+a constant rate without error (type II). Except while H lags, z- is at least as rough as z+, however the target turns.
+Outliers and noise are in z+ and z- alike.
+
+Reversed slope: the errors drive the beam away from the target. The direction z- stays smooth, and z+ moves away twice
+as fast as the beam.
+
+The comparison is a likelihood ratio of two hypotheses (Willsky, A survey of design methods for failure detection in
+dynamic systems, Automatica 12 (1976) 601). Each axis of the receiver is tested by itself. The directions are those in
+the earth frame, because the motion of the deck has no effect there.
+
+s: record of SLOPE_SIGN_DTYPE.
 """
 import math
 from collections import namedtuple
@@ -23,19 +37,28 @@ from acu_tracker.geometry.vector import Vector, dot, rotated
 from pedestal_common.compiled import compiled
 
 SLOPE_SIGN_DTYPE = np.dtype([('stamp', 'f8'), ('n', 'i8'), ('line', 'f8', (5, 2)), ('J', 'f8', (2, 2))], align=True)
-"""stamp: of the last error [s], -inf for none; n: number of errors in the lines; line: value and rate of the beam's
-unit vector (ENU) and of both errors [rad]; J: J+ and J- of both axes [-]."""
+"""State of the test.
+
+stamp  time of the last error [s]; -inf: no error yet
+n      number of errors in the lines
+line   value and rate of the five lines: three components of the beam's unit vector (ENU), then both errors [rad]
+J      J+ and J- of cross-elevation, then of elevation [-]
+"""
 
 LINE_ERROR_COUNT = 200
-"""Number of errors in the memory of a line. The longer the memory, the more the travel of the beam counts, and the
-less its speed."""
+"""Number of errors in the memory of a line.
+
+With a longer memory the test depends more on how far the beam travels, and less on how fast.
+"""
 
 SLOPE_ERROR_COUNT = 100
-"""Number of errors in the means J. A target reverses its motion in a shorter time."""
+"""Number of errors in the means J+ and J-. A real target reverses its motion in a shorter time."""
 
 MIN_ERROR_COUNT = 60
-"""Number of errors, after the begin of autotrack or the return of the signal, before the first verdict. Means of fewer
-errors do not give a useful ratio."""
+"""Number of errors before the first verdict, counted from the begin of autotrack or the return of the signal.
+
+The means of fewer errors have no useful ratio.
+"""
 
 MAX_ERROR_BEAMWIDTHS = 0.5
 """Largest error that is used [beamwidths]."""
@@ -44,14 +67,18 @@ REVERSED_SLOPE_RATIO, REVERSED_SLOPE_MARGIN, CROSS_AXIS_LEAKAGE = 5.0, 0.5, 0.1
 """Limits of a reversed slope [-]: J+ > REVERSED_SLOPE_RATIO J- and J+ > J- + REVERSED_SLOPE_MARGIN +
 CROSS_AXIS_LEAKAGE (J+ + J- of the other axis).
 
-A target that reverses is ahead of the beam for a while. At 11 deg/s2 J+ then reaches 2.8 J- in 30 closed loops of
-uav_flyby; without noise it reaches 2.9 J- at a bandwidth of 20 rad/s, 4.6 J- at 10 rad/s. Because the beam's axes turn
-on its way, a part of the other axis leaks in. This part is 0.0015 without noise, where a beam of 1 deg on a rolling
-deck comes from half its width off.
+The ratio: with a right slope J+ is larger than J- for a while after the target has reversed its motion. In 30 closed
+loops of the scenario uav_flyby with a reversal of 11 deg/s2, J+ reached 2.8 J-. Without noise J+ reaches 2.9 J- at a
+bandwidth of 20 rad/s, and 4.6 J- at 10 rad/s.
+
+The leakage: the axes of the beam turn while the beam moves. Therefore a part of the means of one axis appears in those
+of the other axis. Without noise this part is 0.0015, for a beam of 1 deg that starts half a beamwidth off on a rolling
+deck.
 """
 
 Beam = namedtuple('Beam', 'u across up')
-"""Unit Vectors (ENU) along a beam, and along its cross-elevation and elevation."""
+"""Unit Vectors (ENU) of a beam. u: along the beam; across, up: in the directions of growing cross-elevation and
+elevation."""
 
 
 @compiled
@@ -64,19 +91,25 @@ def beam(mat_ed, A, E):
 
 @compiled
 def near(u, beamwidth):
-    """Return True if an error of signals.INPUTS is on the straight part of its curve; beamwidth [rad]."""
+    """Return True if an error of the receiver is on the straight part of the error curve.
+
+    u: record of signals.INPUTS_DTYPE; beamwidth [rad].
+    """
     return math.hypot(u.cross_elevation, u.elevation) < MAX_ERROR_BEAMWIDTHS * beamwidth
 
 
 @compiled
 def restart(s):
-    """Clear the memory when autotrack begins."""
+    """Clear the memory when a mode begins."""
     s.stamp = -math.inf
 
 
 @compiled
 def _innovation(s, i, y, T, alpha, beta):
-    """Update line i with y; return the innovation of y. T: time since the previous value [s]."""
+    """Update line i with a value y; return the innovation of y.
+
+    T: time since the previous value [s]; alpha, beta: gains of the line on value and rate [-].
+    """
     expected = s.line[i, 0] + T * s.line[i, 1]
     nu = y - expected
     s.line[i, 0] = expected + alpha * nu
@@ -86,7 +119,7 @@ def _innovation(s, i, y, T, alpha, beta):
 
 @compiled
 def _begin(s, u, error):
-    """Begin the lines at the first error."""
+    """Begin the lines at the first error; u: unit Vector along the beam."""
     s.n = 1
     s.J[0, 0] = s.J[0, 1] = s.J[1, 0] = s.J[1, 1] = 0.0
     for i, y in enumerate((u.x, u.y, u.z, error[0], error[1])):
@@ -95,17 +128,20 @@ def _begin(s, u, error):
 
 @compiled
 def _reversed(J, other):
-    """Return True if J+ and J- of an axis (J) show a reversed slope; other: J+ and J- of the other axis."""
+    """Return True if an axis has a reversed slope. J: (J+, J-) of the axis; other: (J+, J-) of the other axis."""
     least = J[1] + REVERSED_SLOPE_MARGIN + CROSS_AXIS_LEAKAGE * (other[0] + other[1])
     return J[0] > REVERSED_SLOPE_RATIO * J[1] and J[0] > least
 
 
 @compiled
 def take(s, t, beam, error, variance, gap):
-    """Take an error (cross-elevation, elevation) [rad] of a variance [rad2], measured at t [s] from a Beam; return
-    True if a slope is reversed. The lines restart after more than a gap [s] without errors.
+    """Take an error of the receiver; return True if the slope of an axis is reversed.
 
-    Lines 0 to 2 belong to the beam's unit vector, lines 3 and 4 to the two errors.
+    t         time at which the error was measured [s]
+    beam      Beam at t
+    error     (cross-elevation, elevation) [rad]
+    variance  R [rad2]
+    gap       time without errors after which the lines restart [s]
     """
     T = t - s.stamp
     if T <= 0.0:
@@ -115,7 +151,7 @@ def take(s, t, beam, error, variance, gap):
         _begin(s, beam.u, error)
         return False
     n = s.n = min(s.n + 1, LINE_ERROR_COUNT)
-    # Gains of a least-squares fit to n points; from LINE_ERROR_COUNT points on, old points fade.
+    # alpha, beta: gains of a least-squares fit to n points; from LINE_ERROR_COUNT points on, old points fade.
     alpha, beta = 2.0 * (2 * n - 1) / (n * (n + 1)), 6.0 / (n * (n + 1))
     nu = Vector(_innovation(s, 0, beam.u.x, T, alpha, beta), _innovation(s, 1, beam.u.y, T, alpha, beta),
                 _innovation(s, 2, beam.u.z, T, alpha, beta))

@@ -1,10 +1,13 @@
-"""The target: conversion between the deck, for measurement and pointing, and the frame of its filter.
+"""The estimate of the target: conversion of measurements from the deck to the frame of the filter, and back.
 
-With a measured range the estimate is the line of sight of the INS, otherwise that of the antenna (`lever_arm`). Its
-angles are earth angles, near the zenith angles in a tilted frame (`estimate_frame`).
+The equator of the filter's frame passes through the target (`estimate_frame`). With a measured range the filter
+estimates the line of sight from the INS, otherwise the one from the antenna (`lever_arm`). The module `tracking` calls
+this module.
 
-g: record of TARGET_DTYPE; p, c: records of SharedParameters and of tracker.CONSTANTS_DTYPE; deck: record of
-ATTITUDE_DTYPE.
+g     record of TARGET_DTYPE
+p     record of SharedParameters
+c     record of tracker.CONSTANTS_DTYPE
+deck  record of ATTITUDE_DTYPE, except where a function states otherwise
 """
 import math
 from collections import namedtuple
@@ -24,21 +27,25 @@ from acu_tracker.estimation.filters.measurement import (
 )
 from acu_tracker.geometry import attitude, attitude_error, deck_reference, estimate_frame, lever_arm
 from acu_tracker.geometry.deck_reference import ZERO_VECTOR, Attitude
-from acu_tracker.geometry.motion import LineOfSight, angles, earth_angles, line_of_sight
-from acu_tracker.geometry.vector import Vector, rotated
+from acu_tracker.geometry.motion import angles, earth_angles, line_of_sight
+from acu_tracker.geometry.vector import Vector, rotated, rotation
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry import line_of_sight as pointing
 
 TARGET_DTYPE = np.dtype([('tracker', tracker.TRACKER_DTYPE), ('frame', estimate_frame.FRAME_DTYPE),
                          ('lever_arm', lever_arm.LEVER_ARM_DTYPE)], align=True)
-"""tracker: the filter with its gates; frame: the frame of the estimate; lever_arm: the arm from INS to antenna."""
+"""tracker: the filter with its gates; frame: the frame of the filter; lever_arm: the vector from INS to antenna."""
 
 OUTCOME_GATED, OUTCOME_STALE, OUTCOME_NOISY = tracker.OUTCOME_GATED, tracker.OUTCOME_STALE, tracker.OUTCOME_NOISY
 OUTCOME_NO_ATTITUDE = OUTCOME_NOISY + 1
 """Outcome of `take` without an attitude; the other outcomes are those of the tracker."""
 
 Source = namedtuple('Source', 'framed motion')
-"""The Motion of the target to point at: in the frame of the estimate (framed 1) or in earth angles (framed 0)."""
+"""Target to which the antenna points.
+
+framed  1 if the Motion is in the frame of the filter, 0 if it is in earth angles
+motion  its Motion
+"""
 
 
 def initialise(g):
@@ -48,59 +55,65 @@ def initialise(g):
 
 @compiled
 def _measured_direction(g, p, mat_ed, distance, azimuth, elevation):
-    """Return (azimuth, elevation) [rad] in the filter's frame of a direction in deck angles [rad]; mat_ed: Rotation
-    deck -> earth; distance: measured range [m], NaN for none."""
+    """Return (azimuth, elevation) [rad] of a measured direction in the frame of the filter.
+
+    mat_ed              Rotation deck -> earth
+    distance            measured range [m]; NaN: no range
+    azimuth, elevation  deck angles of the direction [rad]
+
+    For a filter that does not run yet the frame is laid at this direction first.
+    """
     x, y, z = pointing.direction(azimuth, elevation)
     v = lever_arm.from_ins(g.lever_arm, p.lever_arm, distance, g.tracker.running, Vector(x, y, z))
     v = rotated(mat_ed, v)
     azimuth, elevation = pointing.earth_angles(v.x, v.y, v.z)
-    if g.frame.tilted:
-        return estimate_frame.direction_to_frame(g.frame, azimuth, elevation)
-    return azimuth, elevation
+    if not g.tracker.running:
+        e, n, u = pointing.earth_direction(azimuth, elevation)
+        estimate_frame.lay(g.frame, Vector(e, n, u), ZERO_VECTOR)
+    return estimate_frame.direction_to_frame(g.frame, azimuth, elevation)
 
 
 @compiled
-def _measured_rates(g, moves, deck, u, at):
-    """Return (azimuth, elevation) rates [rad/s] of the target in the filter's frame, from the rates of the antenna and
-    of the error. moves: whether the deck moves; deck: its Attitude; at: Pointing of the antenna."""
+def _measured_rates(g, deck, u, at):
+    """Return (azimuth rate, elevation rate) [rad/s] of the target in the frame of the filter.
+
+    The rates are the sum of the rates of the antenna and of the receiver error.
+
+    deck   Attitude of the deck when the error was measured
+    u      record of signals.INPUTS_DTYPE
+    at     Pointing of the antenna when the error was measured
+    """
     n = pointing.displaced_motion(at.A, at.E, at.dA, at.dE, u.cross_elevation, u.elevation, u.error_rate[0],
                                   u.error_rate[1])
-    v, dv = Vector(n[0], n[1], n[2]), Vector(n[3], n[4], n[5])
-    if moves or g.frame.tilted:
-        framed = estimate_frame.of_deck(g.frame, deck)
-        v, dv = lever_arm.to_ins(g.lever_arm, v, dv)
-        return deck_reference.earth_rates(framed, v, dv)
-    motion = angles(LineOfSight(v, dv, ZERO_VECTOR))
-    return motion.azimuth.rate, motion.elevation.rate
+    v, dv = lever_arm.to_ins(g.lever_arm, Vector(n[0], n[1], n[2]), Vector(n[3], n[4], n[5]))
+    return deck_reference.earth_rates(estimate_frame.of_deck(g.frame, deck), v, dv)
 
 
 @compiled
 def take(g, p, c, deck, u, at, measured, restart_gap):
-    """Filter the receiver's error of INPUTS u.
+    """Filter an error of the receiver. Return (its outcome, the Innovation).
 
-    Return (OUTCOME_STARTED, OUTCOME_ACCEPTED, OUTCOME_GATED, OUTCOME_STALE,
-    OUTCOME_NOISY or OUTCOME_NO_ATTITUDE; the Innovation).
+    The outcomes are those of the tracker and OUTCOME_NO_ATTITUDE.
 
-    at: Pointing of the antenna when the error was measured; restart_gap: as in tracker.observe. `measured`: deck
-    angles (azimuth, elevation) [rad] of the target, which are the antenna's, displaced by the error.
+    u            record of signals.INPUTS_DTYPE
+    at           Pointing of the antenna when the error was measured
+    measured     deck angles (azimuth, elevation) of the target [rad]: those of the antenna, displaced by the error
+    restart_gap  time without accepted errors after which the filter restarts [s]
     """
     e = p.tracker.receiver
     t = u.error_stamp - e.age
-    if not g.tracker.running:
-        estimate_frame.level(g.frame)
-    azimuth, elevation = measured
     known, now = attitude.at(deck, p, t)
-    if deck.stabilised or g.frame.tilted:
-        if not known:
-            return OUTCOME_NO_ATTITUDE, NO_INNOVATION
-        azimuth, elevation = _measured_direction(g, p, now.mat, u.range if deck.stabilised else math.nan, azimuth,
-                                                 elevation)
+    if not known:
+        return OUTCOME_NO_ATTITUDE, NO_INNOVATION
+    azimuth, elevation = _measured_direction(g, p, now.mat, u.range if deck.stabilised else math.nan, measured[0],
+                                             measured[1])
     azimuth_rate, elevation_rate = math.nan, math.nan
     if math.isfinite(u.error_rate[0] + u.error_rate[1] + u.error_rate_sigma):
-        azimuth_rate, elevation_rate = _measured_rates(g, deck.stabilised, now, u, at)
+        azimuth_rate, elevation_rate = _measured_rates(g, now, u, at)
+    # R_cross, R_elevation: variances of the measured direction in cross-elevation and elevation [rad2].
     R_cross = R_elevation = error_variance(u.cross_elevation, u.elevation, u.cn0_dbhz, e)
     cos_el = max(math.cos(elevation), 0.01)     # This avoids a division by zero at the zenith.
-    # walk_cross, walk_elevation: growth of the variances by the wander of the attitude [rad2/s].
+    # walk_cross, walk_elevation: growth of these variances by the random walk of the attitude error [rad2/s].
     walk_cross = walk_elevation = 0.0
     if deck.stabilised:
         verticals = estimate_frame.verticals(g.frame, azimuth, elevation)
@@ -115,25 +128,19 @@ def take(g, p, c, deck, u, at, measured, restart_gap):
     outcome, innovation = tracker.observe(g.tracker, p.tracker, c, Measurement(t, axis, u.range, u.range_variance),
                                           restart_gap)
     if outcome != OUTCOME_STALE:
-        _choose_frame(g, c)
+        _follow_with_frame(g, c)
     return outcome, innovation
 
 
 @compiled
-def _choose_frame(g, c):
-    """Move the filter to the frame that suits the elevation of the target."""
-    f = g.frame
+def _follow_with_frame(g, c):
+    """Lay the frame along the motion of a target that is too far off its equator, and turn the filter with it."""
     motion = tracker.outlook(g.tracker, c, g.tracker.stamp)
-    if not (f.tilted or motion.elevation.angle > estimate_frame.TILT_ELEVATION_RAD):
+    if abs(motion.elevation.angle) <= estimate_frame.MAX_FRAME_ELEVATION_RAD:
         return
-    sight = estimate_frame.to_earth(f, motion)
-    if f.tilted and sight.u.z >= math.sin(estimate_frame.LEVEL_ELEVATION_RAD):
-        return
-    if f.tilted:
-        estimate_frame.level(f)
-    else:
-        estimate_frame.tilt(f, sight.u, sight.du)
-    tracker.move(g.tracker, c, estimate_frame.to_frame(f, sight))
+    before, sight = rotation(g.frame.mat), estimate_frame.to_earth(g.frame, motion)
+    estimate_frame.lay(g.frame, sight.u, sight.du)
+    tracker.turn(g.tracker, c, estimate_frame.from_earth(g.frame, before))
 
 
 @compiled
@@ -150,17 +157,22 @@ def earth_outlook(g, c, t):
 
 @compiled
 def on_deck(g, p, deck, t, source):
-    """Return the Motion on the deck (record of ATTITUDE_DTYPE) at t [s] of a Source; p: record of SharedParameters."""
-    if source.framed and (g.frame.tilted or g.lever_arm.range != 0.0):
-        _, now = attitude.at(deck, p, t)
-        framed = estimate_frame.of_deck(g.frame, now)
-        return angles(lever_arm.to_antenna(g.lever_arm, deck_reference.on_deck(framed, line_of_sight(source.motion))))
-    return attitude.on_deck(deck, p, t, source.motion)
+    """Return the Motion in deck angles at t [s]; source: the Source."""
+    if not source.framed:
+        return attitude.on_deck(deck, p, t, source.motion)
+    sight = estimate_frame.to_earth(g.frame, source.motion)
+    known, now = attitude.at(deck, p, t)
+    if not known:
+        return earth_angles(sight)      # As attitude.on_deck does.
+    return angles(lever_arm.to_antenna(g.lever_arm, deck_reference.on_deck(now, sight)))
 
 
 @compiled
 def levelled_azimuth(g, level, source):
-    """Return the azimuth AxisMotion of a Source on a deck at rest; level: Rotation deck -> earth."""
+    """Return the AxisMotion of the azimuth of a Source on a levelled deck at rest.
+
+    level: Rotation from this deck to the earth.
+    """
     still = Attitude(level, ZERO_VECTOR, ZERO_VECTOR)
     if source.framed:
         still = estimate_frame.of_deck(g.frame, still)
@@ -169,15 +181,14 @@ def levelled_azimuth(g, level, source):
 
 @compiled
 def read(g, p, c, deck, t):
-    """Return the Estimate at t [s] in earth angles of the antenna."""
+    """Return the Estimate at t [s] in earth angles, as seen from the antenna."""
     framed, variances = tracker.read(g.tracker, c, t)
-    motion, (azimuth, elevation) = framed, variances
-    if g.frame.tilted:
-        motion = earth_angles(estimate_frame.to_earth(g.frame, framed))
-        A11, E11 = estimate_frame.earth_variances(g.frame, framed, motion, azimuth.p11, elevation.p11)
-        A12, E12 = estimate_frame.earth_variances(g.frame, framed, motion, azimuth.p12, elevation.p12)
-        A22, E22 = estimate_frame.earth_variances(g.frame, framed, motion, azimuth.p22, elevation.p22)
-        azimuth, elevation = AxisVariances(A11, A12, A22), AxisVariances(E11, E12, E22)
+    azimuth, elevation = variances
+    motion = earth_angles(estimate_frame.to_earth(g.frame, framed))
+    A11, E11 = estimate_frame.earth_variances(g.frame, framed, motion, azimuth.p11, elevation.p11)
+    A12, E12 = estimate_frame.earth_variances(g.frame, framed, motion, azimuth.p12, elevation.p12)
+    A22, E22 = estimate_frame.earth_variances(g.frame, framed, motion, azimuth.p22, elevation.p22)
+    azimuth, elevation = AxisVariances(A11, A12, A22), AxisVariances(E11, E12, E22)
     if g.lever_arm.range > 0.0:
         known, now = attitude.at(deck, p, t)
         if known:

@@ -1,6 +1,8 @@
-"""The target tracker: a target filter behind one gate; lock, restarts, and coasting without measurements.
+"""The target tracker: the target filter with its gate, its restarts and its lock.
 
-Between accepted measurements the filter stays at the stamp of the last one; `outlook` and `read` predict from there.
+The gate rejects measurements that differ too much from their prediction. The tracker has lock after lock_count
+consecutive accepted measurements. Between accepted measurements the filter stays at the stamp of the last one;
+`outlook` and `read` predict from there.
 
 t: record of TRACKER_DTYPE; p: record of TrackerParameters; c: record of CONSTANTS_DTYPE; m: a Measurement.
 """
@@ -14,25 +16,43 @@ from acu_tracker.estimation.filters.measurement import NO_INNOVATION, Measuremen
 from pedestal_common.compiled import compiled
 
 CONSTANTS_DTYPE = np.dtype([('filter', target_filter.CONSTANTS_DTYPE), ('gates', 'f8', (2,))], align=True)
-"""gates: largest accepted nu' S^-1 nu [-], of the two angles and of one rate or range."""
+"""Constants of the tracker.
+
+filter  constants of the filter
+gates   largest accepted nu' S^-1 nu [-] of the two angles, and of one rate or range; nu: innovation, S: its covariance
+"""
 
 TRACKER_DTYPE = np.dtype([('filter', target_filter.FILTER_DTYPE), ('stamp', 'f8'), ('running', 'i8'),
                           ('converged', 'i8'), ('roughness', roughness.ROUGHNESS_DTYPE),
                           ('accepted_in_a_row', 'i8'), ('gated_in_a_row', 'i8'), ('rates_in_a_row', 'i8', (2,)),
                           ('gated', 'i8'), ('rates_gated', 'i8'), ('ranges_gated', 'i8')], align=True)
-"""stamp: of the last accepted measurement [s]; accepted_in_a_row, gated_in_a_row: number of consecutive measurements
-with this outcome; rates_in_a_row: number of consecutive rates of an axis that agreed with its angles; gated,
-rates_gated, ranges_gated: total numbers."""
+"""State of the tracker.
+
+stamp              stamp of the last accepted measurement [s]
+running            1 while there is an estimate
+converged          1 if the rates are known well enough for lock
+accepted_in_a_row  number of consecutive accepted measurements
+gated_in_a_row     number of consecutive rejected (gated) measurements
+rates_in_a_row     of each axis: number of consecutive measured rates that agreed with the filter
+gated, rates_gated, ranges_gated  numbers of rejected directions, rates and ranges since the start
+"""
 
 OUTCOME_STARTED, OUTCOME_ACCEPTED, OUTCOME_GATED, OUTCOME_STALE, OUTCOME_NOISY = range(5)
-"""Outcomes of `observe`."""
+"""Outcomes of `observe` for a measurement.
+
+STARTED   it starts the filter
+ACCEPTED  the filter uses it
+GATED     the gate rejects it
+STALE     it is not newer than the last one
+NOISY     it is only noise
+"""
 
 
 def gate_of_one(gate):
-    """Return the gate of one degree of freedom that is exceeded as rarely as `gate` with two,
-    e^(-gate/2); chi-square [-].
+    """Return the gate x of one number that is exceeded as rarely as `gate` of two numbers; both are chi-square [-].
 
-    The tail at x is erfc(z) with z^2 = x/2, so that x - 2 log(e^z^2 erfc(z)) = gate; e^z^2 erfc(z) does not underflow.
+    Two numbers exceed `gate` with the probability e^(-gate/2). One number exceeds x with the probability erfc(z), z^2
+    = x/2. The function solves x - 2 log(e^z^2 erfc(z)) = gate by bisection, because e^z^2 erfc(z) does not underflow.
     """
     low, high = 0.0, gate
     for _ in range(100):
@@ -56,7 +76,7 @@ def constants(params, axes) -> np.ndarray:
 
 @compiled
 def stop(t):
-    """Drop the estimate."""
+    """Discard the estimate; the next measurement starts the filter."""
     t.running = 0
 
 
@@ -67,25 +87,26 @@ def reset_accepted_count(t):
 
 
 @compiled
-def transfer(t, p, c):
-    """Adopt constants that may have changed: a filter of another kind continues from the estimate of the old one."""
-    target_filter.transfer(t.filter, c.filter, p.initial_rate, t.running)
+def transfer(t, c):
+    """Adopt constants that may have changed: a filter of a new kind continues from the estimate of the old filter."""
+    target_filter.transfer(t.filter, c.filter, t.running)
 
 
 @compiled
-def move(t, c, motion):
-    """Move the filter to a frame in which the target has this Motion now."""
-    target_filter.move(t.filter, c.filter, motion)
+def turn(t, c, rotation):
+    """Turn the filter into another frame; rotation: Rotation from the old frame into the new one."""
+    target_filter.turn(t.filter, c.filter, rotation)
 
 
 @compiled
 def _accepted_rate(t, p, c, i, rate, chi_square):
-    """Return the rate [rad/s] measured on axis i if it is accepted, else NaN;
-    chi_square: of the rate, given the angle.
+    """Return the measured rate [rad/s] of axis i if it is accepted, else NaN.
 
-    Only a rate estimated from angles alone can show that a measured rate is wrong. Therefore rates are used
-    after lock_count consecutive rates agreed with it. This avoids that a stuck or biased sensor misleads a
-    filter that has just started.
+    chi_square: squared innovation of the rate over its variance, after the angle was used.
+
+    Only a rate that is estimated from angles alone can show that a measured rate is wrong. Therefore a measured rate
+    is used only after lock_count consecutive measured rates have agreed with the estimated rate. This avoids a new
+    filter that follows a stuck or biased sensor.
     """
     if math.isnan(chi_square):
         return math.nan
@@ -108,12 +129,11 @@ def _with_accepted_rates(t, p, c, m, innovation):
 
 @compiled
 def observe(t, p, c, m, restart_gap):
-    """Take a Measurement.
+    """Take a Measurement. Return (its outcome, the Innovation, of NaN if nothing was predicted).
 
-    Return (OUTCOME_STARTED, OUTCOME_ACCEPTED, OUTCOME_GATED, OUTCOME_STALE or OUTCOME_NOISY; the Innovation, NaN where
-    nothing was predicted). Errors that are only noise (`roughness`) are ignored. The direction is accepted or gated,
-    and then each of range and rates by itself. The filter restarts at gate_restart consecutive gated errors, and after
-    restart_gap [s] without accepted ones.
+    Errors that are only noise (`roughness`) are ignored. The range, the two angles together, and each rate have their
+    own gates. The filter restarts after gate_restart consecutive gated directions, or after restart_gap [s] without an
+    accepted one.
     """
     # T: time since the last accepted measurement [s]; f, k: state and constants of the filter.
     T = m.stamp - t.stamp
@@ -158,10 +178,11 @@ def observe(t, p, c, m, restart_gap):
 
 @compiled
 def _converged(f, k, m, initial_rate):
-    """Return True if the standard deviation of the rates across the line of sight is a quarter of that at the start.
+    """Return True if the standard deviation of the rates across the line of sight is below a quarter of initial_rate.
 
-    The angle is no criterion, because a filter of high bandwidth never estimates it much better than it is measured.
-    The variance of the azimuth grows as 1/cos2 of the elevation.
+    initial_rate: standard deviation of the rates at the start [rad/s]. The angle is no criterion, because a filter of
+    high bandwidth never estimates it much better than it is measured. The ratio of the measured variances converts the
+    azimuth rate to a rate across the line of sight.
     """
     target_filter.predict(f, k, 0.0)
     azimuth, elevation = target_filter.read(f).variances
@@ -171,20 +192,27 @@ def _converged(f, k, m, initial_rate):
 
 @compiled
 def locked(t, p, since_accepted):
-    """Return True if enough consecutive measurements were accepted, the last at most coast_after ago, and the filter
-    has converged. since_accepted: time since the last, beyond the receiver's latency [s]."""
+    """Return True if the tracker has lock: autotrack can begin.
+
+    Three conditions make lock: lock_count consecutive measurements were accepted, the last of them is at most
+    coast_after old, and the filter has converged.
+
+    since_accepted: age of the last accepted measurement, less the receiver's latency [s].
+    """
     return t.running and t.accepted_in_a_row >= p.lock_count and t.converged and since_accepted <= p.coast_after
 
 
 @compiled
 def outlook(t, c, stamp):
-    """Return the predicted Motion at a stamp [s]; before the last accepted measurement,
-    the Motion at that measurement."""
+    """Return the Motion that the filter predicts for a stamp [s].
+
+    For a stamp before the last accepted measurement, return the Motion at that measurement.
+    """
     return target_filter.outlook(t.filter, c.filter, max(stamp - t.stamp, 0.0))
 
 
 @compiled
 def read(t, c, stamp):
-    """Return the Estimate (Motion and variances) at a stamp [s], predicted as in `outlook`."""
+    """Return the Estimate (Motion and variances) at a stamp [s]; the stamp is used as in `outlook`."""
     target_filter.predict(t.filter, c.filter, max(stamp - t.stamp, 0.0))
     return target_filter.read(t.filter)

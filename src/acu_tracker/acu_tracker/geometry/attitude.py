@@ -1,5 +1,9 @@
 """The attitude of the deck: the last measurements of the INS,
-interpolated or extrapolated to any instant near them."""
+interpolated or extrapolated to any instant near them.
+
+s: record of ATTITUDE_DTYPE; p: record of params.SharedParameters; w, dw: angular rate [rad/s] and angular acceleration
+[rad/s2] of the deck, FLU; T: time between two samples, or since the last sample [s].
+"""
 import math
 
 import numpy as np
@@ -16,21 +20,27 @@ from pedestal_common.geometry.quaternion import product
 ATTITUDE_DTYPE = np.dtype([('stabilised', 'i8'), ('history', history_type(10)), ('sample', 'f8', (7,)),
                            ('aligned', 'i8'), ('jump', attitude_jump.ATTITUDE_JUMP_DTYPE),
                            ('error', attitude_error.ATTITUDE_ERROR_DTYPE)], align=True)
-"""stabilised: 1 on a ship, 0 ashore, where the attitude never changes. `history`: quaternion (x, y, z, w) deck ->
-earth, w [rad/s], dw [rad/s2] of the last steps, after the correction of jumps. `sample`: the last q and w as received;
-aligned: whether the INS was aligned; jump: `attitude_jump`; error: `attitude_error`."""
+"""Measured attitude of the deck.
+
+stabilised  1 on a ship; 0 ashore, where the attitude never changes
+history     of the last samples, after the correction of jumps: quaternion (x, y, z, w) deck -> earth, w, dw
+sample      last quaternion and w as received
+aligned     1 if the INS was aligned at the last sample
+jump        state of `attitude_jump`
+error       state of `attitude_error`
+"""
 
 RATE_COLUMN, ACCELERATION_COLUMN = 4, 7
-"""First columns of w and of dw in a sample of the history; the quaternion is in the columns before."""
+"""First columns of w and of dw in a sample of the history; the quaternion is in columns 0 to 3."""
 
 MIN_TURN_RATE_RAD_S = 1e-6
-"""Rate of the deck [rad/s] above which its attitude changes from one measurement to the next."""
+"""Rate of the deck [rad/s] above which its attitude must change from one measurement to the next."""
 
 UNKNOWN_VECTOR = Vector(math.nan, math.nan, math.nan)
 """Vector without a value."""
 
 SAMPLE_INVALID, SAMPLE_REPEATED, SAMPLE_NEW = range(3)
-"""Outcomes of `take`."""
+"""Outcomes of `take`: the sample is unusable, has the stamp of the last sample, or is kept."""
 
 
 @compiled
@@ -43,28 +53,33 @@ def put(s, stabilised):
 
 @compiled
 def newest(s):
-    """Return the quaternion (4,) and rates of the last sample."""
+    """Return the last sample (10,) of the history: quaternion, w, dw."""
     return s.history.sample[s.history.newest]
 
 
 @compiled
 def smoothed_acceleration(before, w, w_before, T, tau):
-    """Return the angular acceleration [rad/s2] from two rates [rad/s] T [s] apart, low-passed with tau [s]; before:
-    its value T ago."""
+    """Return one component of dw [rad/s2], the low-passed difference of two rates.
+
+    before     smoothed acceleration T ago [rad/s2]
+    w, w_before  rate now and T ago [rad/s]
+    T, tau     time between the rates and time constant of the low-pass [s]
+    """
     return before + T / (tau + T) * ((w - w_before) / T - before)
 
 
 @compiled
 def rotation_angle(w, dw, T):
-    """Return the angle [rad] by which the deck rotates in T [s] at a rate w [rad/s] with its
-    derivative dw [rad/s2]."""
+    """Return the angle [rad] by which the deck rotates about one axis in T [s], from a rate w that grows by dw."""
     return T * w + 0.5 * T * T * dw
 
 
 @compiled
 def rotated(q, r):
-    """Return the quaternion (x, y, z, w) of a deck of attitude q (4,) after the rotation vector r [rad]
-    (FLU): q (x) exp(r/2)."""
+    """Return the quaternion (x, y, z, w) of a deck that had the attitude q (4,) and rotated by the vector r [rad].
+
+    r is in FLU. The result is q (x) exp(r/2); (x) is the product of quaternions.
+    """
     rx, ry, rz = r
     angle = math.sqrt(rx * rx + ry * ry + rz * rz)
     k = math.sin(0.5 * angle) / angle if angle > 0.0 else 0.5
@@ -73,8 +88,11 @@ def rotated(q, r):
 
 @compiled
 def _repeats(s, q, w):
-    """Keep a sample of the INS; return True if it equals the previous sample although its
-    rates show a turning deck."""
+    """Keep a sample of the INS: quaternion q and rate w.
+
+    Return True if the sample equals the previous one although its rates show a turning deck. Such an INS repeats its
+    last message.
+    """
     same, turns = True, False
     for i in range(7):
         x = q[i] if i < 4 else w[i - 4]
@@ -92,7 +110,10 @@ def _vector(sample, column):
 
 @compiled
 def _correct_jump(s, row, last, T):
-    """Correct the quaternion in a row of the history for jumps; row `last` is the sample T [s] before."""
+    """Correct the quaternion in a row of the history for a jump; row `last` holds the sample T [s] before it.
+
+    The mean of the rates of both samples predicts the quaternion.
+    """
     a, b = s.history.sample[last], s.history.sample[row]
     w_a, w_b = _vector(a, RATE_COLUMN), _vector(b, RATE_COLUMN)
     predicted = rotated(a, (0.5 * T * (w_a.x + w_b.x), 0.5 * T * (w_a.y + w_b.y), 0.5 * T * (w_a.z + w_b.z)))
@@ -104,9 +125,13 @@ def take(s, p, t_k, stamp, q, w, aligning):
     """Take a measured quaternion q (4,) and rate w (3,) [rad/s] into the history; return SAMPLE_INVALID,
     SAMPLE_REPEATED or SAMPLE_NEW.
 
-    Invalid samples: not finite, no unit quaternion, older than the last sample, later than the step t_k [s], or equal
-    to the last sample while the deck turns. SAMPLE_REPEATED: the stamp of the last sample. aligning: whether the INS
-    aligns, so that its attitude may jump.
+    A sample is invalid if it is not finite, or its quaternion has not the length 1. A sample older than the last one
+    or later than the step is invalid as well. So is a sample that equals the last one while the deck turns. A sample
+    with the stamp of the last one is a repeated sample.
+
+    t_k       stamp of the step [s]
+    stamp     stamp of the sample [s]
+    aligning  True while the INS aligns; its attitude may then jump
     """
     norm = math.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
     if not (abs(norm - 1.0) < 0.01 and math.isfinite(w[0] + w[1] + w[2])):
@@ -142,8 +167,11 @@ def take(s, p, t_k, stamp, q, w, aligning):
 
 @compiled
 def at(s, p, t):
-    """Return (whether the attitude at t [s] is known, between two samples or predicted from the last; the Attitude,
-    deck -> earth, of NaN if unknown)."""
+    """Return (True if the attitude at t [s] is known, the Attitude deck -> earth, of NaN if it is unknown).
+
+    The attitude is interpolated between two samples, or predicted from the last sample for at most attitude_timeout.
+    Ashore it is constant and always known.
+    """
     if not s.stabilised:
         return True, Attitude(turn(ASHORE_ATTITUDE[0], ASHORE_ATTITUDE[1], ASHORE_ATTITUDE[2], ASHORE_ATTITUDE[3]),
                               ZERO_VECTOR, ZERO_VECTOR)
@@ -171,8 +199,10 @@ def at(s, p, t):
 
 @compiled
 def on_deck(s, p, t, motion):
-    """Return the Motion on the deck at t [s] of a Motion in earth angles;
-    ashore, or without an attitude, the same Motion."""
+    """Return the Motion in deck angles at t [s] of a Motion in earth angles.
+
+    Ashore, or without a known attitude, return the Motion unchanged.
+    """
     known, deck = at(s, p, t)
     if s.stabilised and known:
         return angles(deck_reference.on_deck(deck, line_of_sight(motion)))

@@ -1,20 +1,31 @@
-"""Statistics of the attitude error: those that the INS publishes, otherwise those of the parameters."""
+"""Statistics of the error of the measured attitude: noise and slow random walk of tilt and heading.
+
+The INS may publish these statistics on ins/error; otherwise parameters define the statistics. `estimation.target` adds
+the noise to the variance of each measured direction. Tilt stands for roll and for pitch.
+"""
 import numpy as np
 
 from pedestal_common.compiled import compiled
 
 ATTITUDE_ERROR_DTYPE = np.dtype([('published', 'i8'), ('noise', 'f8', (2,)), ('walk', 'f8', (2,))], align=True)
-"""published: 1 after the INS published valid statistics. noise: variances of each sample [rad2], walk: growth of the
-variances as the error wanders [rad2/s], both of tilt (roll and pitch) and of heading."""
+"""Statistics that the INS published.
+
+published  1 after the INS published valid statistics
+noise      variance of the white noise of a sample, of (tilt, heading) [rad2]
+walk       growth of the variance by the random walk of the error, of (tilt, heading) [rad2/s]
+"""
 
 MAX_ATTITUDE_NOISE = 0.5
-"""Largest accepted noise [rad] and wander [rad/sqrt(s)]."""
+"""Largest accepted 1-sigma of the noise [rad] and of the random walk [rad/sqrt(s)]."""
 
 
 @compiled
 def take(e, noise, walk):
-    """Adopt the 1-sigma (3,) of roll, pitch and heading that an INS published; return False, without a change, if one
-    is out of range."""
+    """Adopt the statistics that the INS published; return False, without a change, if a number is out of range.
+
+    noise  1-sigma (3,) of the noise of roll, pitch and heading [rad]
+    walk   1-sigma (3,) of their random walk [rad/sqrt(s)]
+    """
     for i in range(3):
         if not (0.0 <= noise[i] <= MAX_ATTITUDE_NOISE and 0.0 <= walk[i] <= MAX_ATTITUDE_NOISE):
             return False
@@ -28,8 +39,9 @@ def take(e, noise, walk):
 def expected(e, a):
     """Return ((noise of tilt, of heading) [rad2], (walk of tilt, of heading) [rad2/s]).
 
-    a: record of AttitudeModelParameters. Its slow errors are Gauss-Markov processes of standard deviation sigma and
-    correlation time tau, whose variance first grows by 2 sigma^2 / tau [rad2/s].
+    e: record of ATTITUDE_ERROR_DTYPE; a: record of AttitudeModelParameters, used if the INS published no statistics.
+    The slow errors of these parameters are Gauss-Markov processes with the standard deviation sigma (tilt_wander,
+    heading_wander) and the correlation time tau (wander_time). Their variance first grows by 2 sigma^2 / tau [rad2/s].
     """
     if e.published:
         return (e.noise[0], e.noise[1]), (e.walk[0], e.walk[1])

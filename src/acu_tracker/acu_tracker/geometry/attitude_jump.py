@@ -1,13 +1,16 @@
-"""Jumps of the attitude: a change that the rates of the deck do not explain is separated, and admitted slowly.
+"""Correction of jumps in the attitude of the INS: changes that the measured rates of the deck do not explain.
 
-    p_k = b_k-1 (x) exp(w T / 2)    predicted by the rate w from the corrected attitude b of the step before
-    b_k = c (x) q_k                 corrected attitude, q measured by the INS; c = 1 before any jump
-    c = p_k (x) q_k*                after a jump: the angle between b_k and p_k exceeds MAX_UNEXPLAINED_ANGLE_RAD
+A rotation c keeps the corrected attitude continuous at a jump. Afterwards the angle of c decays slowly to 0, so that
+the corrected attitude returns to the measured one.
 
-(x) is the product of quaternions, q* the inverse of q, T the time of a step. The quaternions rotate deck -> earth, so
-that c turns about axes of the earth. The angle of c then decays to 0 at JUMP_DECAY_RATE_RAD_S. A jump does not disturb
-tracking by the receiver, whatever its size, at its begin or at its end. A mode that points by the attitude moves to
-the new one so slowly that the operator can check it.
+    p_k = b_k-1 (x) exp(w T / 2)    attitude of sample k, predicted by the rate w from b_k-1
+    b_k = c (x) q_k                 corrected attitude; q_k: measured by the INS; c = 1 before any jump
+    c = p_k (x) q_k*                set at a jump: the angle between b_k and p_k exceeds MAX_UNEXPLAINED_ANGLE_RAD
+
+(x) is the product of quaternions, q* the inverse of q, w the rate of the deck [rad/s], T the time between two samples
+[s]. The quaternions rotate deck -> earth, so that c turns about axes of the earth. The angle of c decays at
+JUMP_DECAY_RATE_RAD_S. Neither a jump of any size nor this decay disturbs tracking by the receiver. A mode that points
+by the attitude follows the decay so slowly that the operator can check the new attitude.
 """
 import math
 
@@ -17,14 +20,16 @@ from pedestal_common.compiled import compiled
 from pedestal_common.geometry.quaternion import product
 
 ATTITUDE_JUMP_DTYPE = np.dtype([('c', 'f8', (4,)), ('apart', 'i8')], align=True)
-"""c: quaternion (x, y, z, w) earth -> earth; apart: 1 while c is in use."""
+"""c: correcting quaternion (x, y, z, w) earth -> earth; apart: 1 while c is in use, after a jump."""
 
 MAX_UNEXPLAINED_ANGLE_RAD = 3e-3
-"""Largest change in a step that the rates need not explain [rad]: that of a rate with an error of 0.5 rad/s, or a
-hundred times the noise of an INS."""
+"""Largest angle between measured and predicted attitude that is not a jump [rad].
+
+The angle is a hundred times the noise of an INS. In a step of 5 ms a rate with an error of 0.5 rad/s gives this angle.
+"""
 
 JUMP_DECAY_RATE_RAD_S = 1e-3
-"""Rate at which a jump is admitted [rad/s]."""
+"""Rate at which the angle of c decays, and with which the corrected attitude returns to the measured one [rad/s]."""
 
 
 @compiled
@@ -41,7 +46,7 @@ def _half_angle(q):
 
 @compiled
 def clear(s):
-    """Use the measured attitude without a correction."""
+    """Discard c: the measured attitude is used without a correction."""
     s.apart = 0
 
 
@@ -59,7 +64,10 @@ def _decay(s, T):
 
 @compiled
 def jump_corrected(s, predicted, measured, T):
-    """Return the corrected quaternion of a measured one, T [s] after the one before; predicted: by the rates."""
+    """Return the corrected quaternion b_k of a measured quaternion q_k.
+
+    predicted: p_k; measured: q_k; T: time since the sample before [s].
+    """
     q = measured
     if s.apart:
         _decay(s, T)

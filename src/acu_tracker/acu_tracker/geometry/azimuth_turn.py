@@ -1,9 +1,9 @@
-"""The turn of the azimuth by whole revolutions: at a limit of its travel the axis goes round to its target.
+"""The turn of the azimuth axis: at a limit of its travel the axis goes round to another azimuth wrap of its target.
 
 During the turn the beam is off the target on purpose. Errors of the receiver that belong to this time are not used,
-and the outage is explained. The reference of the axis, compared with the azimuth of the target at the same instant,
-shows when the beam is back. A travel below one revolution has such a turn as soon as the target is inside the travel
-again.
+and the outage of the receiver counts as explained. The turn ends when the reference of the axis is near the azimuth of
+the target at the same instant. An axis with less than one revolution of travel waits at its limit, and turns as soon
+as the target is inside the travel again.
 """
 import math
 
@@ -15,11 +15,12 @@ TURN_DTYPE = np.dtype([('under_way', 'i8'), ('begun', 'f8'), ('over', 'f8')], al
 """State of the turn.
 
 under_way    1 from the change of the azimuth wrap until the beam is on the target again
-begun, over  begin [s] of this turn or the last one, -inf for none, and its last instant so far [s]
+begun        begin of this turn or of the last one [s]; -inf: no turn yet
+over         last instant at which this turn was under way [s]; -inf: no turn yet
 """
 
 MAX_OFFSET_BEAMWIDTHS = 0.5
-"""Largest intended pointing offset [beamwidths] at which the receiver's error is still used."""
+"""Largest intended angle between beam and target [beamwidths] at which the receiver's error is still used."""
 
 
 def initialise(s):
@@ -36,15 +37,18 @@ def begin(s, t):
 
 @compiled
 def stop(s):
-    """End the turn: the antenna follows no target."""
+    """End the turn because the antenna follows no target any more."""
     s.under_way = 0
 
 
 @compiled
 def watch(s, axis, target, beamwidth, t):
-    """Compare the azimuth of the axis with deck angles (azimuth, elevation) of the target at t [s]; all in rad.
+    """End the turn at t [s] if the azimuth of the axis is within half a beamwidth of the target.
 
-    `axis` and the azimuth of the target count revolutions.
+    axis    azimuth of the reference of the axis [rad]
+    target  deck angles (azimuth, elevation) of the target [rad]
+
+    Both azimuths count revolutions: they are not reduced to one turn.
     """
     if s.under_way:
         azimuth, elevation = target

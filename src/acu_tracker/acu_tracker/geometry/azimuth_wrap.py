@@ -1,4 +1,7 @@
-"""The azimuth wrap: choice among angles that differ by whole revolutions, for an axis with more than one of travel."""
+"""Choice of the azimuth wrap: of the azimuths that point in the same direction, the one to which the axis goes.
+
+The choice matters for an axis with more than one revolution of travel.
+"""
 import math
 from collections import namedtuple
 
@@ -11,12 +14,13 @@ Travel = namedtuple('Travel', 'below above')
 
 @compiled
 def nearest(azimuth, near, low, high, travel):
-    """Return the wrap of an azimuth [rad], nearest to `near`, from which a Travel stays inside low..high [rad].
+    """Return the wrap of an azimuth [rad] that suits the limits low to high [rad] best.
 
-    If no wrap holds the whole travel, return one that holds the azimuth itself; otherwise the nearest.
+    The first choice is the wrap nearest to `near` [rad] from which the Travel stays inside the limits. The second
+    choice is the nearest wrap that is inside the limits itself. The last choice is the nearest wrap.
     """
-    # Penalties, far above every distance, that rank the wraps: a wrap outside the limits, and a wrap whose travel
-    # leaves the limits.
+    # Two penalties, far above every distance, rank the wraps: 2e6 for a wrap outside the limits, 1e6 for a wrap whose
+    # travel leaves the limits.
     closest = near + wrap(azimuth - near)
     best, score = closest, math.inf
     for i in range(-2, 3):

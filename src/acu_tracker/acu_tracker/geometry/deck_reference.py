@@ -1,14 +1,16 @@
-"""The line of sight of an earth target in the axes of a rotating deck, and back.
+"""Conversion of the line of sight to a target from the earth frame to the rotating deck, and of its rates back.
 
-Exact: the unit vector u to the target is differentiated twice. The suffix _dot is a time derivative.
+The conversion is exact: it differentiates the unit vector u to the target twice. The suffix _dot is a time derivative.
 
     M'_dot = -[w x] M',    u_d = M' u,    u_d_dot = M' du - w x u_d
     u_d_dot_dot = M' ddu - w x (2 M' du - w x u_d) - dw x u_d
 
-    M, M'        rotation deck -> earth (or frame of the filter), its transpose
-    u, du, ddu   unit vector and its derivatives in that frame
-    u_d          the unit vector on the deck
-    w, dw        rate and angular acceleration of the deck, FLU
+    M, M'        rotation deck -> earth, its transpose (Attitude.mat is M); near the zenith the tilted frame of the
+                 filter takes the place of the earth frame (module estimate_frame)
+    u, du, ddu   unit vector and its derivatives in the earth frame, or in the frame of the filter  [-, 1/s, 1/s2]
+    u_d          unit vector on the deck, FLU                                                   [-]
+    w, dw        angular rate and angular acceleration of the deck, FLU                         [rad/s, rad/s2]
+    [w x]        matrix of the cross product with w
 """
 from collections import namedtuple
 
@@ -20,13 +22,17 @@ from pedestal_common.geometry import line_of_sight
 ZERO_VECTOR = Vector(0.0, 0.0, 0.0)
 
 Attitude = namedtuple('Attitude', 'mat w dw')
-"""Rotation from the deck to the frame in which the target is given; rate w [rad/s] and angular acceleration dw
-[rad/s2] of the deck, FLU."""
+"""Attitude of the deck and its motion.
+
+mat  M, the rotation from the deck to the frame in which the target is given
+w    Vector of the angular rate of the deck, FLU [rad/s]
+dw   Vector of its angular acceleration, FLU [rad/s2]
+"""
 
 
 @compiled
 def on_deck(attitude, sight):
-    """Return the LineOfSight in FLU of a LineOfSight in the frame of the attitude."""
+    """Return a LineOfSight on the deck (FLU); sight: the LineOfSight in the frame to which attitude.mat rotates."""
     u, du = rotated_back(attitude.mat, sight.u), rotated_back(attitude.mat, sight.du)
     ddu = rotated_back(attitude.mat, sight.ddu)
     wu, dwu = cross(attitude.w, u), cross(attitude.dw, u)
@@ -35,8 +41,10 @@ def on_deck(attitude, sight):
 
 @compiled
 def fixed_rates(w, A, E):
-    """Return the rates (dA, dE) [rad/s] of the deck angles of an earth-fixed direction, now at A, E [rad], while the
-    deck rotates at w [rad/s] (FLU)."""
+    """Return the rates (dA, dE) [rad/s] of the deck angles of an earth-fixed direction.
+
+    A, E: its deck angles now [rad]; w: Vector of the rate of the deck [rad/s], FLU.
+    """
     u = Vector(*line_of_sight.direction(A, E))
     motion = angles(LineOfSight(u, times(-1.0, cross(w, u)), ZERO_VECTOR))
     return motion.azimuth.rate, motion.elevation.rate
@@ -44,9 +52,10 @@ def fixed_rates(w, A, E):
 
 @compiled
 def earth_rates(attitude, u, du):
-    """Return the rates (dA, dE) [rad/s] of the earth angles of a FLU unit vector u that moves by du [1/s] on the deck.
+    """Return the rates (dA, dE) [rad/s] of the earth angles of a direction that is measured on the deck.
 
-    The rate of the unit vector in the earth's frame is M (du + w x u).
+    u, du: unit vector (FLU) of the direction and its rate on the deck [1/s]. The rate of the unit vector in the earth
+    frame is M (du + w x u). Where attitude.mat rotates to the frame of the filter, the rates are those in that frame.
     """
     wu = cross(attitude.w, u)
     du = Vector(du.x + wu.x, du.y + wu.y, du.z + wu.z)

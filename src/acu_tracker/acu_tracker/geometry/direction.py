@@ -1,5 +1,8 @@
 """A commanded direction, from an operator, a program or another antenna,
-extrapolated by its rates for a limited time."""
+extrapolated by its rates for a limited time.
+
+The modes preset (deck angles) and slave (earth angles) follow such directions.
+"""
 import math
 
 import numpy as np
@@ -9,23 +12,29 @@ from pedestal_common.compiled import compiled
 
 DIRECTION_DTYPE = np.dtype([('stamp', 'f8'), ('angle', 'f8', (2,)), ('rate', 'f8', (2,)), ('moves', 'f8'),
                             ('holds', 'f8')], align=True)
-"""angle, rate: azimuth and elevation [rad] at a stamp [s] and their rates [rad/s]; stamp -inf: no command yet.
-`moves`: time for which the rates continue [s]; holds: time for which the direction is valid [s]."""
+"""Commanded direction.
+
+stamp  time of the command [s]; -inf: no command yet
+angle  azimuth and elevation at the stamp [rad]
+rate   their rates [rad/s]
+moves  time after the stamp for which the rates continue [s]
+holds  time after the stamp for which the direction is valid [s]
+"""
 
 
 def initialise(d, angles):
-    """Set angles (2,) [rad] without a command; d: view of DIRECTION_DTYPE."""
+    """Set initial angles (2,) [rad], as no command has come yet; d: view of DIRECTION_DTYPE."""
     d['stamp'], d['angle'] = -math.inf, angles
 
 
 def set_moving(d, stamp, angles, rates, moves, holds=0.0):
-    """Set angles and rates (2,) at a stamp [s]; d: view of DIRECTION_DTYPE."""
+    """Set a commanded direction; the arguments are the fields of DIRECTION_DTYPE; d: view of DIRECTION_DTYPE."""
     d['stamp'], d['angle'], d['rate'], d['moves'], d['holds'] = stamp, angles, rates, moves, holds
 
 
 @compiled
 def put(d, angle):
-    """Set angles (2,) [rad] at rest in the place of the last ones."""
+    """Replace the direction by angles (2,) [rad] that do not move."""
     d.angle[0], d.angle[1], d.moves = angle[0], angle[1], 0.0
 
 

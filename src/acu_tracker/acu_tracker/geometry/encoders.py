@@ -1,4 +1,4 @@
-"""The encoders of both axes in the last steps, and the pointing of the antenna at any instant among them."""
+"""The angles of the load encoders of both axes in the last steps, interpolated to any instant among these steps."""
 import math
 from collections import namedtuple
 
@@ -6,7 +6,7 @@ from acu_tracker.geometry.history import bracket, history_type, interpolated, pu
 from pedestal_common.compiled import compiled
 
 ENCODERS_DTYPE = history_type(4)
-"""History of the deck angles: azimuth, elevation [rad], and their rates [rad/s]."""
+"""History of the deck angles. Columns of a sample: azimuth, elevation [rad], then their rates [rad/s]."""
 
 Pointing = namedtuple('Pointing', 'A E dA dE')
 """Deck angles of the antenna [rad] and their rates [rad/s]."""
@@ -26,7 +26,7 @@ def take(s, stamp, position, velocity):
 
 @compiled
 def at(s, t):
-    """Return (whether t [s] is among the last steps, the Pointing at t)."""
+    """Return (True if the history covers t [s], the Pointing at t, of NaN if it does not)."""
     older, newer, fraction = bracket(s, t)
     rows, known = (older, newer, fraction), older >= 0
     if not known:

@@ -1,8 +1,13 @@
-"""The frame of the target filter: the earth's, or near the zenith a frame with its equator along the target's motion.
+"""The frame of the target filter: a frame whose equator passes through the target, along its motion.
 
-Azimuth and elevation are singular at the zenith. Above TILT_ELEVATION_RAD the filter changes to a frame in which the
-target moves along the equator, and back below LEVEL_ELEVATION_RAD. In this frame a great circle is an azimuth of
-constant rate.
+In azimuth and elevation of the earth, a target that flies straight has an acceleration and a jerk that grow towards
+the zenith. On the equator of this frame a great circle is an azimuth of constant rate. Therefore the filter needs less
+process noise, and no direction is singular.
+
+The frame is laid when the filter starts, and again when the target is more than MAX_FRAME_ELEVATION_RAD off the
+equator. Between these instants the frame is fixed to the earth.
+
+f: record of FRAME_DTYPE.
 """
 import math
 
@@ -14,61 +19,51 @@ from acu_tracker.geometry.vector import Rotation, Vector, cross, dot, rotated, r
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry.line_of_sight import earth_direction
 
-TILT_ELEVATION_RAD, LEVEL_ELEVATION_RAD = math.radians(75.0), math.radians(70.0)
-"""Elevations in the earth's frame [rad]: above the first the frame is tilted, below the second it is level again."""
+MAX_FRAME_ELEVATION_RAD = math.radians(20.0)
+"""Largest angle [rad] of the target off the equator. At this angle the acceleration of a great circle reaches 0.36 of
+the squared rate. A smaller limit lays the frame more often on the way of a target that turns."""
 
-FRAME_DTYPE = np.dtype([('mat', 'f8', (3, 3)), ('tilted', 'i8')], align=True)
-"""mat: rotation frame -> earth; tilted: 0 while the frame is the earth's."""
-
-
-@compiled
-def level(f):
-    """Set the frame to the earth's."""
-    f.tilted = 0
-    for i in range(3):
-        for j in range(3):
-            f.mat[i, j] = 1.0 if i == j else 0.0
+FRAME_DTYPE = np.dtype([('mat', 'f8', (3, 3))], align=True)
+"""mat: rotation matrix frame -> earth."""
 
 
 @compiled
-def tilt(f, u, du):
-    """Lay the equator from the ENU unit vector u along its rate du [1/s], with azimuth 0 at u."""
-    W = math.sqrt(dot(du, du))
-    if W > 0.0:
-        along = Vector(du.x / W, du.y / W, du.z / W)
+def lay(f, u, du):
+    """Lay the frame: azimuth and elevation 0 are at the target, and the equator leads along its motion.
+
+    u, du: ENU unit vector towards the target and its rate [1/s]. At a target at rest the equator is horizontal.
+    """
+    speed, rho = math.sqrt(dot(du, du)), math.hypot(u.x, u.y)
+    if speed > 0.0:
+        along = Vector(du.x / speed, du.y / speed, du.z / speed)
+    elif rho > 0.0:
+        along = Vector(u.y / rho, -u.x / rho, 0.0)
     else:
-        # Because a target at rest has no direction of motion, the equator is laid towards east.
-        rho = math.sqrt(u.y * u.y + u.z * u.z)
-        along = Vector(rho, -u.x * u.y / rho, -u.x * u.z / rho) if rho > 0.0 else Vector(0.0, 0.0, 0.0)
+        along = Vector(1.0, 0.0, 0.0)
     up = cross(along, u)
     f.mat[0, 0], f.mat[1, 0], f.mat[2, 0] = along
     f.mat[0, 1], f.mat[1, 1], f.mat[2, 1] = u
     f.mat[0, 2], f.mat[1, 2], f.mat[2, 2] = up
-    f.tilted = 1
 
 
 @compiled
 def to_earth(f, motion):
-    """Return the LineOfSight in ENU of a Motion in the frame."""
-    sight = line_of_sight(motion)
-    if not f.tilted:
-        return sight
-    mat = rotation(f.mat)
+    """Return the LineOfSight in ENU; motion: the Motion in the frame."""
+    sight, mat = line_of_sight(motion), rotation(f.mat)
     return LineOfSight(rotated(mat, sight.u), rotated(mat, sight.du), rotated(mat, sight.ddu))
 
 
 @compiled
 def to_frame(f, sight):
-    """Return the Motion in the frame of a LineOfSight in ENU; the inverse of to_earth."""
-    if f.tilted:
-        mat = rotation(f.mat)
-        sight = LineOfSight(rotated_back(mat, sight.u), rotated_back(mat, sight.du), rotated_back(mat, sight.ddu))
-    return earth_angles(sight)
+    """Return the Motion in the frame; sight: the LineOfSight in ENU. The function is the inverse of to_earth."""
+    mat = rotation(f.mat)
+    return earth_angles(LineOfSight(rotated_back(mat, sight.u), rotated_back(mat, sight.du),
+                                    rotated_back(mat, sight.ddu)))
 
 
 @compiled
 def direction_to_frame(f, azimuth, elevation):
-    """Return (azimuth, elevation) [rad] in the frame of a direction's earth angles."""
+    """Return (azimuth, elevation) [rad] of a direction in the frame; azimuth, elevation: its earth angles [rad]."""
     e, n, u = earth_direction(azimuth, elevation)
     v = rotated_back(rotation(f.mat), Vector(e, n, u))
     return math.atan2(v.x, v.y), math.atan2(v.z, math.hypot(v.x, v.y))
@@ -76,27 +71,40 @@ def direction_to_frame(f, azimuth, elevation):
 
 @compiled
 def verticals(f, azimuth, elevation):
-    """Return (across, along): components along the earth's vertical of the unit vectors in which azimuth and elevation
-    of a direction in the frame grow; both angles [rad]. In a level frame they are 0 and the cosine of the elevation.
+    """Return (across, along), the vertical components of two unit vectors at a right angle to a direction.
+
+    The first vector points to growing azimuth, the second to growing elevation. In the frame of the earth their
+    components along the earth's vertical are 0 and cos(elevation). `measurement.attitude_variances` needs these
+    components to separate the errors of heading and tilt. azimuth, elevation: angles of the direction in the frame
+    [rad].
     """
-    # z: the earth's vertical in the frame.
+    # z: the earth's vertical, as components in the frame.
     s, c, z = math.sin(azimuth), math.cos(azimuth), f.mat[2]
     return z[0] * c - z[1] * s, z[2] * math.cos(elevation) - (z[0] * s + z[1] * c) * math.sin(elevation)
 
 
 @compiled
+def from_earth(f, mat):
+    """Return the Rotation into the frame of a Rotation into the earth's frame."""
+    turn, (x, y, z) = rotation(f.mat), transposed(mat)
+    return transposed(Rotation(rotated_back(turn, x), rotated_back(turn, y), rotated_back(turn, z)))
+
+
+@compiled
 def of_deck(f, attitude):
-    """Return the Attitude, deck -> frame, of an Attitude deck -> earth."""
-    mat, (x, y, z) = rotation(f.mat), transposed(attitude.mat)
-    columns = Rotation(rotated_back(mat, x), rotated_back(mat, y), rotated_back(mat, z))
-    return Attitude(transposed(columns), attitude.w, attitude.dw)
+    """Return the Attitude deck -> frame; attitude: the Attitude deck -> earth."""
+    return Attitude(from_earth(f, attitude.mat), attitude.w, attitude.dw)
 
 
 @compiled
 def earth_variances(f, framed, earth, p_A, p_E):
-    """Return the variances [rad2] of azimuth and elevation in the earth's frame from those in the frame, p_A and p_E.
+    """Return the variances of azimuth and elevation in the earth frame, in the unit of p_A and p_E.
 
-    framed, earth: the Motion of the target in each frame. The correlation in the frame is unknown and taken as zero.
+    p_A, p_E       variances of azimuth and elevation in the frame of the filter, of angles [rad2] or of rates; or the
+                   covariances of angle and rate
+    framed, earth  Motion of the target in the frame of the filter and in the earth frame
+
+    The correlation of azimuth and elevation is taken as zero, because the filter does not estimate it.
     """
     A, E = framed.azimuth.angle, framed.elevation.angle
     azimuth, elevation = earth.azimuth.angle, earth.elevation.angle

@@ -1,4 +1,4 @@
-"""A direction that moves on along the great circle of its rate."""
+"""A direction that keeps its angular rate, and so moves along a great circle."""
 import math
 
 from acu_tracker.geometry.vector import Vector
@@ -7,7 +7,7 @@ from pedestal_common.compiled import compiled
 
 @compiled
 def turned(u, du, W, angle):
-    """Return the unit Vector u turned by an angle [rad] in the direction of its rate du [1/s] of length W."""
+    """Return the unit Vector u after a turn by an angle [rad] towards its rate du [1/s]; W: length of du."""
     # du / W is the unit vector along the motion.
     cos, sin = math.cos(angle), math.sin(angle) / W if W > 0.0 else 0.0
     return Vector(cos * u.x + sin * du.x, cos * u.y + sin * du.y, cos * u.z + sin * du.z)

@@ -1,4 +1,4 @@
-"""Stamped samples of the last steps, and their interpolation to an instant."""
+"""Stamped samples of the last steps, and their interpolation to an instant; used for the encoders and the attitude."""
 import numpy as np
 
 from pedestal_common.compiled import compiled
@@ -8,8 +8,13 @@ HISTORY_LENGTH = 64
 
 
 def history_type(width) -> np.dtype:
-    """Return the dtype of a ring of HISTORY_LENGTH stamps [s] with `width` numbers each; `count`: number of rows in
-    use; `newest`: row of the last."""
+    """Return the dtype of a history, a ring buffer of HISTORY_LENGTH rows.
+
+    stamp   time of each row [s]
+    sample  `width` numbers of each row
+    newest  row of the last sample
+    count   number of rows in use
+    """
     return np.dtype([('stamp', 'f8', (HISTORY_LENGTH,)), ('sample', 'f8', (HISTORY_LENGTH, width)),
                      ('newest', 'i8'), ('count', 'i8')], align=True)
 
@@ -25,7 +30,10 @@ def push(history, stamp):
 
 @compiled
 def bracket(history, t):
-    """Return (older row, newer row, fraction between them) around the instant t [s]; rows -1 if t is outside."""
+    """Return (older row, newer row, fraction) of the samples around the instant t [s].
+
+    The fraction runs from 0 at the older row to 1 at the newer row. Both rows are -1 if t is outside the history.
+    """
     newer = history.newest
     if history.count == 0 or not t <= history.stamp[newer]:
         return -1, -1, 0.0
@@ -41,7 +49,7 @@ def bracket(history, t):
 
 @compiled
 def interpolated(history, rows, column):
-    """Return a column of the samples, interpolated linearly; rows: valid rows of `bracket`."""
+    """Return the number in a column, interpolated linearly; rows: a result of `bracket` with valid rows."""
     i, j, f = rows
     a, b = history.sample[i, column], history.sample[j, column]
     return a + f * (b - a)

@@ -1,8 +1,15 @@
-"""The arm r from the INS to the antenna, used if the range is measured.
+"""The lever arm r, the vector from the INS to the antenna; it shifts the direction of a target of measured range.
 
-The antenna of a rolling ship moves, so that a near target appears to move by r / range. Seen from the INS it does not.
+The antenna of a rolling ship moves. Seen from the antenna, a near target therefore appears to move by the angle
+|r| / range. Seen from the INS the target does not move so. With a measured range the filter uses the line of sight
+from the INS.
 
-    R = |rho u + r|    R, rho: range of the target from the INS and from the antenna [m]; u: unit vector to the target
+    R = |rho u + r|
+
+    R, rho   range of the target from the INS and from the antenna   [m]
+    u        unit vector from the antenna to the target, FLU         [-]
+
+s: record of LEVER_ARM_DTYPE.
 """
 import math
 
@@ -14,21 +21,23 @@ from pedestal_common.compiled import compiled
 from pedestal_common.geometry.line_of_sight import earth_angles, earth_direction, wrap
 
 LEVER_ARM_DTYPE = np.dtype([('arm', 'f8', (3,)), ('range', 'f8')], align=True)
-"""arm: r over the range from the INS, FLU [-]; range: that range [m], 0 if it was not measured."""
+"""arm: r / R, FLU [-], zero without a range; range: smoothed R [m], 0 if the filter started without a range."""
 
 RANGE_SMOOTHING_SHARE = 0.05
-"""Share of a new range in the smoothed range [-]."""
+"""Share of each new measurement in the smoothed range [-]."""
 
 
 @compiled
 def from_ins(s, r, measured, running, v):
-    """Return the direction from the INS of a unit vector v (FLU) measured at the antenna: a Vector of length about 1.
+    """Return the direction of the target from the INS, a Vector (FLU) of length about 1.
 
-    r: the arm, record x, y, z [m]; measured: range of the antenna [m], NaN for none; running: whether a filter runs.
+    v         unit vector (FLU) from the antenna to the target
+    r         lever arm, record x, y, z [m]
+    measured  range of the target from the antenna [m]; NaN: no range
+    running   True if the filter of the target runs
 
-    With a range the estimate is the line of sight from the INS, which the deck's rotation does not move: R is
-    smoothed, and the arm is added. Only a filter that starts with a range does so. This avoids an estimate that mixes
-    both lines of sight.
+    For a filter that started with a range the function smooths R and adds the lever arm to rho v. For another filter
+    the function returns v. This avoids an estimate that mixes the lines of sight from the INS and from the antenna.
     """
     along, r2 = v.x * r.x + v.y * r.y + v.z * r.z, r.x * r.x + r.y * r.y + r.z * r.z
     known = measured > 0.0
@@ -48,21 +57,30 @@ def from_ins(s, r, measured, running, v):
 
 @compiled
 def to_antenna(s, sight):
-    """Return the LineOfSight at the antenna of one at the INS, both FLU: v = u - r; the range is taken as constant."""
+    """Return the LineOfSight from the antenna; sight: the LineOfSight from the INS, both FLU.
+
+    The vector r / R is subtracted, with R taken as constant.
+    """
     return normalised(minus(sight.u, vector(s.arm)), sight.du, sight.ddu)
 
 
 @compiled
 def to_ins(s, u, du):
-    """Return (u, du) at the INS of a unit vector u and its rate du [1/s] at the antenna, both FLU."""
+    """Return (unit vector from the INS to the target, its rate [1/s]), both FLU.
+
+    u, du: unit vector from the antenna to the target and its rate [1/s], FLU.
+    """
     sight = normalised(Vector(u.x + s.arm[0], u.y + s.arm[1], u.z + s.arm[2]), du, Vector(0.0, 0.0, 0.0))
     return sight.u, sight.du
 
 
 @compiled
 def earth_angles_to_antenna(s, mat_ed, motion):
-    """Return the Motion in earth angles at the antenna of a Motion at the INS;
-    mat_ed: Rotation deck -> earth; the rates stay."""
+    """Return the Motion of the target in earth angles, as seen from the antenna.
+
+    mat_ed: Rotation deck -> earth; motion: the Motion as seen from the INS. Only the angles differ; the rates and the
+    accelerations stay as they are.
+    """
     A, E = motion.azimuth.angle, motion.elevation.angle
     e, n, u = earth_direction(A, E)
     r = rotated(mat_ed, vector(s.arm))

@@ -1,7 +1,8 @@
 """The motion of a direction: azimuth and elevation, or a unit vector, with their first and second time derivatives.
 
-Azimuth is clockwise, from north in the earth's frame and from the bow on the deck, so that the same formulas hold for
-a vector in north-west-up and one in FLU. Elsewhere earth vectors are ENU; `north_west_up` converts them.
+Azimuth is clockwise: from north in the earth frame, from the bow on the deck. FLU on the deck and the axes north, west
+and up of the earth therefore have the same formulas. Because earth vectors are ENU in the other modules,
+`north_west_up` converts them.
 """
 import math
 from collections import namedtuple
@@ -37,7 +38,10 @@ def line_of_sight(motion):
 
 @compiled
 def north_west_up(v):
-    """Return the north-west-up components of an ENU vector; FLU, if deck angles were passed as earth angles."""
+    """Return the north-west-up components of an ENU vector.
+
+    A vector that line_of_sight made of deck angles becomes one in FLU.
+    """
     return Vector(v.y, -v.x, v.z)
 
 
@@ -45,7 +49,7 @@ def north_west_up(v):
 def angles(sight):
     """Return the Motion of a LineOfSight in FLU or north-west-up.
 
-    Singular at the zenith: within 1e-6 rad of it the rates are those at 1e-6 rad.
+    The azimuth is singular at the zenith. Within 1e-6 rad of the zenith the rates are therefore those at 1e-6 rad.
     """
     u, du, ddu = sight
     rho2 = max(u.x * u.x + u.y * u.y, 1e-12)
@@ -65,8 +69,10 @@ def earth_angles(sight):
 
 @compiled
 def normalised(v, dv, ddv):
-    """Return the LineOfSight along a vector v of any length, with its derivatives:
-    n = v / |v|, n' = (v' - n (n.v')) / |v|."""
+    """Return the LineOfSight along a vector v of any length; dv, ddv: its time derivatives, in the unit of v.
+
+    n = v / |v|, n' = (v' - n (n.v')) / |v|; n: unit vector, ': time derivative, a point: scalar product.
+    """
     k = 1.0 / math.sqrt(dot(v, v))
     n, dv, ddv = times(k, v), times(k, dv), times(k, ddv)
     along = dot(n, dv)
@@ -78,8 +84,10 @@ def normalised(v, dv, ddv):
 
 @compiled
 def motion_of_position(p, v, a):
-    """Return the Motion in earth angles of an ENU position p [m],
-    its velocity v and acceleration a, seen from the origin."""
+    """Return the Motion in earth angles of a point as seen from the origin.
+
+    p, v, a: position [m], velocity [m/s] and acceleration [m/s2] of the point, ENU.
+    """
     r = math.sqrt(dot(p, p))
     u = Vector(p.x / r, p.y / r, p.z / r)
     dr = dot(u, v)

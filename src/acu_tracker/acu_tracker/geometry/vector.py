@@ -1,11 +1,14 @@
-"""Vectors of three components, their products and rotations."""
+"""Vectors of three components, their products and their rotations, for compiled functions.
+
+M, mat: a Rotation; M': its transpose, which is its inverse; a, b: Vectors.
+"""
 from collections import namedtuple
 
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry import line_of_sight
 
 Vector = namedtuple('Vector', 'x y z')
-"""Components along the axes of a frame, which the docstring of the caller names."""
+"""Components of a vector along the axes of a frame. The docstring of the function that uses it names the frame."""
 
 Rotation = namedtuple('Rotation', 'x y z')
 """Matrix of a rotation: its rows, each a Vector."""
@@ -26,7 +29,7 @@ def rotation(mat):
 
 @compiled
 def turn(x, y, z, w):
-    """Return the Rotation of a unit quaternion."""
+    """Return the Rotation of a unit quaternion with the scalar part w."""
     a, b, c = line_of_sight.rows(x, y, z, w)
     return Rotation(Vector(*a), Vector(*b), Vector(*c))
 
@@ -39,7 +42,7 @@ def minus(a, b):
 
 @compiled
 def times(k, a):
-    """Return k a, k a number."""
+    """Return the Vector a times the number k."""
     return Vector(k * a.x, k * a.y, k * a.z)
 
 
@@ -57,18 +60,18 @@ def cross(a, b):
 
 @compiled
 def transposed(mat):
-    """Return M' of a Rotation M."""
+    """Return M', the transpose of a Rotation M."""
     return Rotation(Vector(mat.x.x, mat.y.x, mat.z.x), Vector(mat.x.y, mat.y.y, mat.z.y),
                     Vector(mat.x.z, mat.y.z, mat.z.z))
 
 
 @compiled
 def rotated(mat, a):
-    """Return M a, of a Rotation M."""
+    """Return M a, the Vector a rotated by M."""
     return Vector(dot(mat.x, a), dot(mat.y, a), dot(mat.z, a))
 
 
 @compiled
 def rotated_back(mat, a):
-    """Return M' a, of a Rotation M."""
+    """Return M' a, the Vector a rotated by the inverse of M."""
     return rotated(transposed(mat), a)

@@ -1,1 +1,1 @@
-"""Guidance: the reference of the axes in each mode, and the manual rates of an operator."""
+"""Guidance: it computes the reference of both axes in each mode, also from the manual rates of an operator."""

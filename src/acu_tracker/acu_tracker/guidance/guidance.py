@@ -1,7 +1,14 @@
-"""Reference of the axes: the target of the mode on the deck, on an azimuth wrap that fits, or a slew ahead of it.
+"""Guidance: the reference of both axes in deck angles, from the target of the mode.
 
-g: record of GUIDANCE_DTYPE; k: record of tracking.TRACKING_DTYPE; c: record of control_unit.CONSTANTS_DTYPE; way: the
-bridge.Way of the program; gap: the outage.Outage.
+The target is converted to deck angles, and its azimuth is put on an azimuth wrap inside the limits. Near a keyhole the
+reference is a planned slew of the look-ahead instead. `control_unit` calls this module in each step.
+
+g      record of GUIDANCE_DTYPE
+k      record of tracking.TRACKING_DTYPE
+c      record of control_unit.CONSTANTS_DTYPE
+way    bridge.Way: the program, rotated to the place where the target was last tracked
+gap    outage.Outage: the time without a signal of the receiver
+order  the Order of the step
 """
 import math
 from collections import namedtuple
@@ -31,21 +38,26 @@ GUIDANCE_DTYPE = np.dtype([
     align=True)
 """State of the guidance.
 
+preset           direction of the mode preset, deck angles
+slave            direction of the mode slave, earth angles
+manual           point that an operator moves by hand, in the modes stop and rate
 bridge           rotation of the program to the place where the target was last tracked
+acquisition      state of the modes that use the signal level
+lookahead        planned slews through keyholes, and predicted hidden sectors
+turn             turn of the azimuth to another wrap at a limit of its travel
 azimuth          azimuth of the last reference, before the shaper [rad]
-target_angles    deck angles of the target of that reference [rad]
+target_angles    deck angles (azimuth, elevation) of the target for that reference [rad]
 pointing_offset  intended angle between beam and target [rad]
-turn             turn of the azimuth by whole revolutions
 held             last instant [s] at which a limit held the beam off the target
-overtravel       1: no azimuth wrap holds the whole program
+overtravel       1: no azimuth wrap holds the whole program inside the limits
 """
 
 Order = namedtuple('Order', 'mode begins azimuth stamp')
 """Mode of a step and where it starts.
 
-mode     the mode
-begins   whether the mode begins
-azimuth  last azimuth reference [rad]
+mode     code of the mode
+begins   True if the mode begins in this step
+azimuth  azimuth of the last shaped reference [rad]
 stamp    stamp of the step [s]
 """
 
@@ -63,15 +75,15 @@ def initialise(g, preset):
 
 @compiled
 def start_from(g, azimuth):
-    """Choose the next azimuth wrap near an azimuth [rad]."""
+    """Set the azimuth [rad] near which the next azimuth wrap is chosen."""
     g.azimuth = azimuth
 
 
 @compiled
 def move_by_hand(g, c, order, ends, actual, dt):
-    """Move the manually commanded point on by dt [s].
+    """Advance the point that an operator moves by hand, by dt [s].
 
-    ends: Ends of both axes; actual: Motion of the axes, where the point begins.
+    ends: Ends of both axes, at which the point stops; actual: Motion of the axes, where the point begins.
     """
     valid = order.mode == Mode.RATE and manual.request_valid(g.manual, order.stamp)
     for i in range(2):
@@ -83,7 +95,10 @@ def move_by_hand(g, c, order, ends, actual, dt):
 
 @compiled
 def motion(g, k, c, order, way, gap, now):
-    """Return the `_reference` of each axis at the instant that its controller needs; now: the Instants."""
+    """Return the reference Motion of both axes, each at the instant that its controller needs.
+
+    now: position_loop.Instants of the step.
+    """
     t_azimuth, t_elevation = (position_loop.instant(c.axis[0].p, now.t_k, now.t_m),
                               position_loop.instant(c.axis[1].p, now.t_k, now.t_m))
     motion = _reference(g, k, c, order, way, gap, t_azimuth)
@@ -94,7 +109,7 @@ def motion(g, k, c, order, way, gap, now):
 
 @compiled
 def _reference(g, k, c, order, way, gap, t):
-    """Return the reference Motion on the deck at t [s]: the mode's target on a fitting azimuth wrap, or a slew."""
+    """Return the reference Motion in deck angles at t [s]: the target of the mode, or a slew through a keyhole."""
     mode = order.mode
     if not modes.FOLLOWS_TARGET[mode]:
         start_from(g, order.azimuth)
@@ -120,7 +135,10 @@ def _reference(g, k, c, order, way, gap, t):
 
 @compiled
 def _source(g, k, c, mode, way, gap, t):
-    """Return the target.Source of the mode at t [s]; the program bridges an explained outage."""
+    """Return the target.Source of the mode at t [s].
+
+    In autotrack the rotated program takes the place of the estimate during an explained outage of the receiver.
+    """
     if mode == Mode.SLAVE:
         return target.Source(0, direction.motion_at(g.slave, t))
     if modes.FOLLOWS_TABLE[mode]:
@@ -134,10 +152,14 @@ def _source(g, k, c, mode, way, gap, t):
 
 @compiled
 def _wrapped(g, p, order, program, t, azimuth):
-    """Return the AxisMotion of the azimuth at t [s] on the wrap that fits; p: record of AxisParameters.
+    """Return the AxisMotion of the azimuth at t [s] on an azimuth wrap inside the limits.
 
-    When a program begins, the wrap must hold all of it. Another change of the wrap is a turn, except for a beam, which
-    needs no time for it.
+    p        record of AxisParameters
+    program  the program track
+    azimuth  AxisMotion of the target on any wrap
+
+    When a program begins, the function chooses a wrap that holds the whole program. A later change of the wrap is a
+    turn of the axis. An electronic beam changes the wrap at once and makes no turn.
     """
     travel, before, limits = Travel(0.0, 0.0), g.azimuth, p.limits
     begins = order.begins and modes.FOLLOWS_TABLE[order.mode]
@@ -157,7 +179,7 @@ def _wrapped(g, p, order, program, t, azimuth):
 def watch_beam(g, c, mode, references, limited, t):
     """Note whether a turn of the azimuth is over, and whether a limit holds the beam off the target.
 
-    references: Motion of the axes at t [s]; limited: whether an axis is held at a limit.
+    references: shaped reference Motion of the axes at t [s]; limited: True if an axis is held at a limit.
     """
     beamwidth, elevation = c.p.tracker.receiver.beamwidth, g.target_angles[1]
     azimuth_turn.watch(g.turn, references.azimuth.angle, (g.azimuth, elevation), beamwidth, t)
@@ -169,23 +191,26 @@ def watch_beam(g, c, mode, references, limited, t):
 
 @compiled
 def pointing_offset(g, t):
-    """Return the intended angle [rad] between beam and target for an error measured at t [s]; inf in a turn."""
+    """Return the intended angle [rad] between beam and target for an error of the receiver that was measured at t [s].
+
+    During a turn of the azimuth the angle is inf, so that no error is used.
+    """
     return math.inf if azimuth_turn.covers(g.turn, t) else g.pointing_offset
 
 
 @compiled
 def held(g, c, t):
-    """Return True if a limit holds the beam off the target at t [s], or did within the last coast_time.
+    """Return True if a limit holds the beam off the target at t [s], or held it within the last coast_time.
 
-    The receiver's errors are then no evidence of a divergence. Because a target may come back to the beam, they are
-    used.
+    The errors of the receiver are then no evidence of a divergence. The filter still uses these errors, because the
+    target may come back to the beam.
     """
     return t - g.held <= c.p.tracker.coast_time
 
 
 @compiled
 def bridge_to(g, k, c, program, t):
-    """Rotate the program to the place where the target is tracked at t [s]."""
+    """Rotate the program so that it passes through the estimate of the target at t [s]."""
     bridge.begin(g.bridge, program, t, tracking.sight(k, c, t).u)
 
 
@@ -193,7 +218,8 @@ def bridge_to(g, k, c, program, t):
 def begin_by_level(g, k, c, before, mode, t):
     """Enter a mode that uses the signal level at t [s]; before: the previous mode.
 
-    The target is expected where autotrack tracked it, or else where the antenna points.
+    After autotrack the target is expected at its estimate. After another mode it is expected where the antenna points;
+    between two modes that use the signal level the expected place stays.
     """
     tracked = before == Mode.AUTOTRACK
     if tracked:
@@ -208,7 +234,10 @@ def begin_by_level(g, k, c, before, mode, t):
 
 @compiled
 def check_slope(g, k, c, u, at, way):
-    """Judge an error of signals.INPUTS_DTYPE by the expected place of the target; at: Pointing of the beam."""
+    """Compare an error of the receiver with the expected place of the target, to find a slope of the wrong sign.
+
+    u: record of signals.INPUTS_DTYPE; at: Pointing of the beam when the error was measured.
+    """
     t = u.error_stamp - c.p.tracker.receiver.age
     motion = attitude.on_deck(k.attitude, c.p, t, signal_level_modes.expected(g.acquisition, way, t))
     signal_level_modes.check_slope(g.acquisition, at, motion, (u.cross_elevation, u.elevation))
@@ -216,9 +245,9 @@ def check_slope(g, k, c, u, at, way):
 
 @compiled
 def look_ahead(g, k, c, mode, program, gap, t):
-    """Plan once in planner.LOOK_AHEAD_PERIOD_S for the keyholes and hidden sectors on the path of the target.
+    """Plan for the keyholes and hidden sectors on the path of the target, once in planner.LOOK_AHEAD_PERIOD_S.
 
-    Return True if the mode must restart because the program has been replaced.
+    Return True if the program has been replaced; the mode must then restart.
     """
     h = g.lookahead
     if not modes.FOLLOWS_TARGET[mode] or mode == Mode.SLAVE:

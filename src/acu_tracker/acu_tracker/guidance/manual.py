@@ -1,7 +1,10 @@
-"""Manual rates: the axes move at the commanded rates, and stop when no new command arrives in time.
+"""Manual rates: in the mode rate a commanded point moves at the rates of an operator, and the axes follow it.
 
-    r       rate of the commanded point [rad/s], ramped with the acceleration a towards the commanded rate
-    A       commanded angle [rad], the integral of r
+The point stops when no new command arrives in time. The mode stop uses the point as well, and brakes it to rest. On
+each axis the rate of the point is ramped towards the commanded rate with a constant acceleration. The angle of the
+point is the integral of its rate.
+
+m: record of MANUAL_DTYPE; i: axis, 0 azimuth, 1 elevation. Angles are deck angles.
 """
 import math
 
@@ -11,20 +14,21 @@ from acu_tracker.geometry.motion import AxisMotion, Motion
 from pedestal_common.compiled import compiled
 
 RATE_REQUEST_TIMEOUT_S = 0.5
-"""Time for which a command for rates is valid [s]; a client that jogs repeats it."""
+"""Time for which a command of rates is valid [s]; a client repeats the command while the axes shall move."""
 
 ACCELERATION_SHARE = 0.5
-"""Share of the shaper's acceleration for the ramp of the rate.
+"""Share of the shaper's acceleration that the ramp of the rate uses [-].
 
-The share lets the shaped reference follow without lag.
+Because the share is below 1, the shaper follows the point without lag.
 """
 
 MANUAL_DTYPE = np.dtype([('requested', 'f8', (2,)), ('until', 'f8'), ('angle', 'f8', (2,)), ('rate', 'f8', (2,)),
                          ('acceleration', 'f8', (2,))], align=True)
 """State of the manual rates.
 
-requested  rates that are valid until the stamp `until` [s], in rad/s
-angle, rate, acceleration  of the commanded point
+requested  commanded rates [rad/s]
+until      last stamp at which the commanded rates are valid [s]
+angle, rate, acceleration  of the commanded point [rad, rad/s, rad/s2]
 """
 
 
@@ -46,17 +50,19 @@ def request_valid(m, t):
 
 @compiled
 def begin(m, i, motion):
-    """Begin on axis i at its AxisMotion."""
+    """Put the commanded point of axis i on the AxisMotion of this axis."""
     m.angle[i], m.rate[i], m.acceleration[i] = motion.angle, motion.rate, 0.0
 
 
 @compiled
 def step(m, i, shaper, ends, valid, dt):
-    """Move the commanded point of axis i on by dt [s].
+    """Advance the commanded point of axis i by dt [s].
 
-    shaper: record of its ShaperParameters; valid: whether the commanded rates are valid. The point stops at the Ends
-    of the axis, which are those of its travel or of the floor (the lowest elevation of each azimuth). From there the
-    way back begins at once.
+    shaper  record of the ShaperParameters of the axis
+    ends    Ends of the axis: its limits, or the floor (the lowest elevation at the present azimuth) [rad]
+    valid   True if the commanded rates are valid; otherwise the point brakes to rest
+
+    The point stops at the ends. A command in the opposite direction moves it back from there at once.
     """
     wanted = min(max(m.requested[i], -shaper.rate), shaper.rate) if valid else 0.0
     step = ACCELERATION_SHARE * shaper.acceleration * dt
@@ -74,7 +80,7 @@ def step(m, i, shaper, ends, valid, dt):
 def motion(m, later):
     """Return the Motion of the commanded point, `later` [s] after the last step.
 
-    The acceleration does not enter the angle, because the ramp may end within this time.
+    The angle is extrapolated with the rate only, because the acceleration may end within this time.
     """
     return Motion(AxisMotion(m.angle[0] + m.rate[0] * later, m.rate[0], m.acceleration[0]),
                   AxisMotion(m.angle[1] + m.rate[1] * later, m.rate[1], m.acceleration[1]))

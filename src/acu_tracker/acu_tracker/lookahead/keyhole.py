@@ -1,10 +1,11 @@
-"""A pass near the zenith of the deck, on which the azimuth cannot follow the target.
+"""The keyhole: search of a pass near the zenith that the azimuth cannot follow, and the best slew through it.
 
-The pass needs the azimuth rate W / cos E0, and the axis does not have this rate. W: rate of the target along its great
-circle [rad/s]; E0: the highest elevation of the target [rad].
+A target that passes near the zenith of the deck needs the azimuth rate W / cos E0, which the axis does not have. W:
+rate of the target along its great circle [rad/s]; E0: the highest elevation of the target [rad].
 
-The axis leaves the target at t1, slews at its limits, and meets the target again at t2 on the other side. For each
-direction t1 is chosen for the least loss of signal; t2 follows from it.
+The axis therefore leaves the target at t1, slews at its limits, and meets the target again at t2 on the other side.
+The slew may turn clockwise or counter-clockwise. For each direction t1 is chosen for the least loss of signal, and t2
+is the earliest possible time.
 """
 import math
 from collections import namedtuple
@@ -18,36 +19,48 @@ from pedestal_common.geometry.line_of_sight import wrap
 
 SLEW_LIMITS_DTYPE = np.dtype([('rate', 'f8'), ('acceleration', 'f8'), ('low', 'f8'), ('high', 'f8'), ('highest', 'f8'),
                               ('half_beam', 'f8')], align=True)
-"""Limits of a slew: rate [rad/s], acceleration [rad/s2], azimuth from low to high, elevation up to highest [rad];
-half_beam: half the beamwidth [rad]."""
+"""Limits of a slew.
+
+rate          largest azimuth rate [rad/s]
+acceleration  acceleration of the azimuth [rad/s2]
+low, high     travel of the azimuth [rad]
+highest       largest elevation [rad]
+half_beam     half the beamwidth [rad]
+"""
 
 SLEW_CANDIDATE_COUNT, REFINEMENT_COUNT, SLEW_SAMPLE_COUNT, BISECTION_COUNT = 48, 4, 160, 24
-"""Numbers of candidates for t1, of refinements of t1, of samples in which a slew is
-evaluated, of bisections for t2."""
+"""Effort of a plan: number of candidates for t1, of refinements of t1, of samples in which a slew is evaluated, and of
+bisections for t2."""
 
 PLAN_NO_KEYHOLE, PLAN_SLEW, PLAN_NO_WRAP, PLAN_BEYOND_PATH = range(4)
-"""Outcomes of `plan`: no keyhole, a slew planned, no azimuth wrap that fits, a keyhole that ends beyond the path."""
+"""Outcomes of `plan`: no keyhole; a planned slew; no azimuth wrap inside the limits; a keyhole that ends beyond the
+path."""
 
 Passage = namedtuple('Passage', 'path azimuth limits after tilt')
 """A keyhole that needs a slew.
 
-path: a completed Path; azimuth: of the axis at its first row [rad]; limits: record of SLEW_LIMITS_DTYPE; after: time
-from which following is possible again [s]. `tilt`: rms tilt of the deck about one axis [rad], normally distributed,
-which a slew cannot follow.
+path     a completed Path
+azimuth  azimuth of the axis at the first row of the path [rad]
+limits   record of SLEW_LIMITS_DTYPE
+after    time from which the axis can follow the target again [s]
+tilt     rms tilt of the deck about one horizontal axis [rad]; it is normally distributed, and a slew cannot follow it
 """
 
 Keyhole = namedtuple('Keyhole', 'first last needed')
-"""Rows of a path between which following is impossible, -1 for no keyhole; needed: largest azimuth rate there [rad/s].
+"""Keyhole of a path.
+
+first, last  rows of the path between which the axis cannot follow the target; -1: no keyhole
+needed       largest azimuth rate of the target there [rad/s]
 """
 
 
 @compiled
 def _fit(slew, passage, turn, t1):
-    """Fit a slew that leaves the target at t1 [s] and meets it at the first possible instant from passage.after on;
-    return False if there is none.
+    """Fit a slew that leaves the target at t1 [s] and meets it as early as possible; return False if there is none.
 
-    turn: 1 clockwise, -1 counter-clockwise. azimuth1 is set within +-pi. The instant t2 is tried at the end of the
-    path, then at passage.after, then by bisection between `early`, which is too early, and `late`, which is possible.
+    turn: 1 clockwise, -1 counter-clockwise. The slew meets the target not before passage.after. The function tries t2
+    at the end of the path, then at passage.after. Then it bisects between `early`, which is too early, and `late`,
+    which is possible. The azimuth at t1 is set within +-pi.
     """
     path, k = passage.path, passage.limits
     A1, v1 = paths.azimuth_at(path, t1, k.rate)
@@ -76,7 +89,7 @@ def _fit(slew, passage, turn, t1):
 
 @compiled
 def _unwrap(slew, path, azimuth):
-    """Put a fitted slew on the wrap of the axis, which is near `azimuth` [rad] at the first row of the path."""
+    """Put a fitted slew on the azimuth wrap of the axis; azimuth: of the axis at the first row of the path [rad]."""
     first = path.rows[int((slew.t1 - path.t0) / path.h), paths.AZIMUTH_COLUMN]
     revolutions = math.floor((azimuth - path.rows[0, paths.AZIMUTH_COLUMN]) / (2.0 * math.pi) + 0.5)
     start = 2.0 * math.pi * revolutions + first + wrap(slew.azimuth1 - first)
@@ -97,14 +110,16 @@ def _fits(slew, path, low, high):
 
 @compiled
 def _evaluate(slew, passage, samples):
-    """Set cost, loss and worst of a fitted slew.
+    """Set the fields cost, loss and worst of a fitted slew; samples: number of instants at which it is evaluated.
 
-    cost = integral of x^8 / (1 + x^8), x the pointing offset in half beamwidths. This smooth form of the loss also
-    ranks slews without a loss.
+    cost   integral of x^8 / (1 + x^8) over the time of the slew [s]; x: pointing offset in half beamwidths. This
+           smooth form of the loss also ranks slews without a loss
+    loss   integral of the probability that the target is more than half a beamwidth off the beam [s]
+    worst  largest pointing offset [rad]
 
-    loss = integral of the probability that the target is further than half a beamwidth off. The slew follows only the
-    `true_deck_share` of the deck's tilt. The rest is a normally distributed offset, which adds to x. The error
-    function of a normal distribution has the argument distance / (sqrt(2) standard deviation).
+    The slew follows only the share `true_deck_share` of the tilt of the deck. The rest of the tilt is a normally
+    distributed offset, which adds to the pointing offset. Therefore loss contains the error function of a distance
+    over sqrt(2) standard deviations.
     """
     k = passage.limits
     T = (slew.t2 - slew.t1) / samples
@@ -125,8 +140,10 @@ def _evaluate(slew, passage, samples):
 
 @compiled
 def _attempt(slew, passage, turn, t1, samples):
-    """Fit, unwrap and evaluate a slew that leaves at t1 [s]; return (whether there is one, its cost, inf if it does
-    not fit the limits)."""
+    """Fit, unwrap and evaluate a slew that leaves the target at t1 [s]. Return (True if there is one, its cost [s]).
+
+    The cost is inf for a slew outside the limits of the azimuth. turn, samples: as in _fit and _evaluate.
+    """
     if t1 < passage.path.t0 or not _fit(slew, passage, turn, t1):
         return False, math.inf
     _unwrap(slew, passage.path, passage.azimuth)
@@ -138,8 +155,10 @@ def _attempt(slew, passage, turn, t1, samples):
 
 @compiled
 def find(path, rate, acceleration):
-    """Return the first Keyhole of a path, in which following takes more than rate [rad/s] or acceleration [rad/s2].
-    Two excesses further apart than the time of half a revolution are two keyholes."""
+    """Return the first Keyhole of a path, where the target exceeds the azimuth rate [rad/s] or acceleration [rad/s2].
+
+    If the time between two excesses is longer than that of half a revolution, they are two keyholes.
+    """
     first, last, needed, before = -1, -1, 0.0, 0.0
     for i in range(1, len(path.rows)):
         dA = (path.rows[i, paths.AZIMUTH_COLUMN] - path.rows[i - 1, paths.AZIMUTH_COLUMN]) / path.h
@@ -154,13 +173,14 @@ def find(path, rate, acceleration):
 
 @compiled
 def plan(slew, path, azimuth, limits, tilt):
-    """Find the keyhole of a completed Path and the best slew through it; return PLAN_NO_KEYHOLE, PLAN_SLEW,
-    PLAN_NO_WRAP or PLAN_BEYOND_PATH.
+    """Find the keyhole of a completed Path and the best slew through it; return one of the outcomes PLAN_.
 
-    slew: records (2,) of SLEW_DTYPE, the first for the best slew, the second for trials; other arguments as in
-    Passage. The effort is bounded. For each of the two directions, the first level takes SLEW_CANDIDATE_COUNT + 1
-    slews, and each of the next REFINEMENT_COUNT - 1 levels takes 9, all of SLEW_SAMPLE_COUNT samples. The last level
-    takes one slew of ten times as many samples.
+    slew: records (2,) of SLEW_DTYPE, the first for the best slew, the second for trials. The other arguments are those
+    of Passage.
+
+    The effort is bounded. For each of the two directions the first level evaluates SLEW_CANDIDATE_COUNT + 1 slews of
+    SLEW_SAMPLE_COUNT samples. Each of the next REFINEMENT_COUNT - 1 levels evaluates 9 such slews. The last level
+    evaluates one slew with ten times as many samples.
     """
     first, last, needed = find(path, limits.rate, limits.acceleration)
     if first < 0:
@@ -169,17 +189,17 @@ def plan(slew, path, azimuth, limits, tilt):
     t_in, t_out = path.t0 + first * path.h, path.t0 + last * path.h
     passage = Passage(path, azimuth, limits, t_out, tilt)
     own_travel = path.rows[last, paths.AZIMUTH_COLUMN] - path.rows[first, paths.AZIMUTH_COLUMN]
-    # Leaving earlier than the time of a whole revolution has no advantage.
+    # t1 is searched from t_in back by the time of a whole revolution, because an earlier t1 has no advantage.
     width = min(t_in - path.t0, 2.0 * math.pi / limits.rate) / SLEW_CANDIDATE_COUNT
-    # least: cost of the better direction; other: cost of the other direction; feasible: the target's own direction
-    # (side 0) has a slew that meets the target within the path, inside the limits of the azimuth or not.
+    # Side 0 is the direction in which the target itself turns. least: cost of the better direction; other: cost of the
+    # other direction; feasible: a slew on side 0 meets the target within the path, inside the limits or not.
     feasible, least, other = False, math.inf, math.inf
     for side in range(2):
         turn = math.copysign(1.0, own_travel) * (1.0 - 2.0 * side)
         centre, cost, step = t_in - 0.5 * SLEW_CANDIDATE_COUNT * width, math.inf, width
         for level in range(REFINEMENT_COUNT + 1):
-            # The whole interval, then finer about the best so far, finally the best alone with more samples. After the
-            # last level `trial` is therefore the best slew of this direction, with its most accurate cost.
+            # The first level covers the whole interval, the next levels are finer about the best t1 so far. The last
+            # level repeats the best slew with more samples. `trial` is then the best slew of this direction.
             around = 0 if level == REFINEMENT_COUNT else SLEW_CANDIDATE_COUNT // 2 if level == 0 else 4
             middle = centre
             for k in range(-around, around + 1):
@@ -196,7 +216,7 @@ def plan(slew, path, azimuth, limits, tilt):
             return PLAN_BEYOND_PATH
         if cost < math.inf:
             other = max(least, cost)
-            # If both directions cost the same to 0.1 %, the target's own is used.
+            # If the costs of both directions are equal within 0.1 %, the slew turns as the target does.
             if trial.cost < 0.999 * least:
                 least = trial.cost
                 trial.long_way = side

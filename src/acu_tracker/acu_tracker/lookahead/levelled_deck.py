@@ -1,4 +1,7 @@
-"""The levelled deck: the mean attitude of the ship, on which a keyhole is planned."""
+"""The levelled deck: the frame of the mean attitude of the ship, in which the look-ahead predicts keyholes.
+
+Because the future attitude of a rolling ship is not known, the look-ahead uses the mean attitude.
+"""
 import math
 
 import numpy as np
@@ -7,8 +10,13 @@ from pedestal_common.compiled import compiled
 from pedestal_common.geometry.line_of_sight import ASHORE_ATTITUDE
 
 LEVELLED_DECK_DTYPE = np.dtype([('mean', 'f8', (4,)), ('spread', 'f8'), ('since', 'f8'), ('latest', 'f8')], align=True)
-"""mean: quaternion (x, y, z, w) levelled deck -> earth; spread: mean square of the deck's tilt from it [rad2].
-`since`, `latest`: stamps [s] of the first and the last attitude in the mean, latest -inf before the first."""
+"""Mean attitude.
+
+mean    quaternion (x, y, z, w) levelled deck -> earth
+spread  mean square of the tilt of the deck from the levelled deck, about both horizontal axes together [rad2]
+since   stamp of the first attitude in the mean [s]
+latest  stamp of the last attitude in the mean [s]; -inf: no attitude yet
+"""
 
 
 def initialise(s):
@@ -18,9 +26,13 @@ def initialise(s):
 
 @compiled
 def take(s, stamp, q, mean_time, restart):
-    """Add an attitude q (4,) of stamp [s] to the mean, an average over about mean_time [s].
+    """Add an attitude to the mean, which is an average over about mean_time [s].
 
-    restart: begin with this attitude. The mean begins level, with the heading of the first attitude.
+    stamp    of the attitude [s]
+    q        quaternion (4,) deck -> earth
+    restart  True if the mean shall begin with this attitude
+
+    A mean begins as a horizontal deck with the heading of its first attitude.
     """
     mean = s.mean
     if restart or not s.latest > -math.inf:
@@ -37,7 +49,7 @@ def take(s, stamp, q, mean_time, restart):
         for i in range(4):
             dot += mean[i] * q[i]
         norm = 0.0
-        # Because q and -q are the same attitude, the nearer one to the mean is taken.
+        # q and -q are the same attitude. The sign that is nearer to the mean is used.
         for i in range(4):
             mean[i] += share * (math.copysign(1.0, dot) * q[i] - mean[i])
             norm += mean[i] * mean[i]

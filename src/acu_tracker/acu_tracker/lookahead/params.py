@@ -1,4 +1,4 @@
-"""Parameters of the look-ahead."""
+"""Parameters of the look-ahead: the search of keyholes and the slews through them (acu.keyhole)."""
 import dataclasses
 
 from pedestal_common.parameters import Parameters, parameter
@@ -6,7 +6,7 @@ from pedestal_common.parameters import Parameters, parameter
 
 @dataclasses.dataclass(frozen=True)
 class KeyholeParameters(Parameters):
-    """Planning of a pass through the zenith of the deck."""
+    """Parameters of the search of keyholes, and of the slews through them."""
 
     horizon: float = parameter(60.0, 1.0, 1000.0, 's', 'time ahead that is searched for a keyhole; longer than a slew')
     notice: float = parameter(20.0, 0.0, 1000.0, 's', 'time before a slew begins at which its plan becomes final')

@@ -1,4 +1,7 @@
-"""The path of the target on the levelled deck, from now on: along the program track, or on its great circle."""
+"""The path of the target on the levelled deck for the next seconds, as a table with constant time step.
+
+The path follows the program track, or the great circle on which the target moves. `keyhole` and `planner` search it.
+"""
 import math
 from collections import namedtuple
 
@@ -9,25 +12,37 @@ from pedestal_common.compiled import compiled
 from pedestal_common.geometry.line_of_sight import wrap
 
 PATH_ROW_COUNT, PATH_COLUMN_COUNT = 1025, 6
-"""Largest number of rows of the path of a look-ahead, and number of its columns."""
+"""Largest number of rows of a path, and number of its columns."""
 
 UP_COLUMN, AZIMUTH_COLUMN, LEAST_AZIMUTH_COLUMN, LARGEST_AZIMUTH_COLUMN = range(2, PATH_COLUMN_COUNT)
-"""Columns of a path: the upward component of its unit vector [-]; the unwrapped azimuth; the least and the largest
-azimuth from this row to the end [rad]."""
+"""Columns of a path.
+
+UP              upward component of the unit vector [-]
+AZIMUTH         azimuth, without jumps of a turn [rad]
+LEAST, LARGEST  least and largest azimuth from this row to the end of the path, or to the end of the program [rad]
+"""
 
 Path = namedtuple('Path', 'rows t0 h')
-"""rows (n, 6), one every h [s] from t0 [s] on: the unit vector (FLU of the levelled deck), then the three columns of
-the azimuth, which `complete` sets."""
+"""Path of the target.
+
+rows  (n, 6): unit vector towards the target (FLU of the levelled deck), then three columns of the azimuth, which
+      `complete` sets
+t0    time of the first row [s]
+h     time between two rows [s]
+"""
 
 MIN_ZENITH_DISTANCE_SQUARED = 1e-12
-"""Square of the horizontal part of a unit vector below which the rate of its azimuth is limited [-]."""
+"""Square of the horizontal part of a unit vector below which its azimuth rate is computed with this value instead [-].
+
+This avoids a division by zero at the zenith.
+"""
 
 
 @compiled
 def along_program(path, mat, way):
-    """Lay out the path of a bridge.Way; return the number of rows that it covers.
+    """Write the unit vectors of the path of a bridge.Way; return the number of rows that the program covers.
 
-    mat (3, 3): levelled deck -> earth.
+    mat (3, 3): rotation levelled deck -> earth.
     """
     level = rotation(mat)
     for i in range(len(path.rows)):
@@ -40,7 +55,10 @@ def along_program(path, mat, way):
 
 @compiled
 def along_great_circle(path, mat, u, du):
-    """Lay out the path of an ENU unit vector u that keeps its rate du [1/s]; return the number of rows."""
+    """Write the unit vectors of the path along a great circle; return the number of rows.
+
+    mat (3, 3): rotation levelled deck -> earth; u, du: ENU unit vector of the target at t0 and its rate [1/s].
+    """
     W, level = math.sqrt(dot(du, du)), rotation(mat)
     for i in range(len(path.rows)):
         path.rows[i, 0], path.rows[i, 1], path.rows[i, 2] = rotated_back(level, turned(u, du, W, W * i * path.h))
@@ -49,7 +67,7 @@ def along_great_circle(path, mat, u, du):
 
 @compiled
 def complete(path, travel):
-    """Fill the azimuth columns; travel: the Travel of the azimuth after the end of the path."""
+    """Write the azimuth columns; travel: the Travel of the azimuth from the end of the path to that of the program."""
     rows, n = path.rows, len(path.rows)
     before = math.atan2(-rows[0, 1], rows[0, 0])
     rows[0, AZIMUTH_COLUMN] = before
@@ -66,7 +84,7 @@ def complete(path, travel):
 
 @compiled
 def at(path, t):
-    """Return (unit vector u, its rate du [1/s]) of the path at t [s], in straight lines between its rows."""
+    """Return (unit vector u, its rate du [1/s]) of the path at t [s], interpolated linearly between the rows."""
     i = min(max(int((t - path.t0) / path.h), 0), len(path.rows) - 2)
     f = (t - path.t0) / path.h - i
     a = Vector(path.rows[i, 0], path.rows[i, 1], path.rows[i, 2])
@@ -77,7 +95,7 @@ def at(path, t):
 
 @compiled
 def azimuth_at(path, t, rate):
-    """Return (azimuth [rad], its rate within +-rate [rad/s]) of the path at t [s]."""
+    """Return (azimuth [rad], azimuth rate [rad/s]) of the path at t [s]; the rate is limited to +-rate."""
     u, du = at(path, t)
     dA = (u.y * du.x - u.x * du.y) / max(u.x * u.x + u.y * u.y, MIN_ZENITH_DISTANCE_SQUARED)
     return math.atan2(-u.y, u.x), min(max(dA, -rate), rate)

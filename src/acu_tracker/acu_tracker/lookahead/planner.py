@@ -1,8 +1,9 @@
-"""The look-ahead: a keyhole that the antenna must slew through, sectors of the deck that will hide the target.
+"""The planner of the look-ahead: it forecasts keyholes and hidden sectors on the path of the target.
 
-Every LOOK_AHEAD_PERIOD_S the next `horizon` seconds of the target's path are laid out on the levelled deck. The path
-is the program track, which in autotrack is rotated to begin at the estimate. Without a program it is the great circle
-of the estimate. The levelled deck is the mean attitude of the ship; a planned slew keeps the deck it was planned on.
+The planner runs every LOOK_AHEAD_PERIOD_S, and considers the next `horizon` seconds of the path on the levelled deck,
+the mean attitude of the ship. The path is the program track, which in autotrack is rotated to begin at the estimate.
+Without a program the path is the great circle of the estimate. A planned slew keeps the levelled deck on which it was
+planned.
 
 h, c: records of PLANNER_DTYPE and of CONSTANTS_DTYPE.
 """
@@ -23,8 +24,7 @@ LOOK_AHEAD_PERIOD_S = 1.0
 """Time between two look-aheads [s]."""
 
 FORECAST_TEXTS = ('none', 'keyhole', 'no turn')
-"""Texts of the forecasts: no keyhole ahead; a keyhole with a planned slew; a keyhole for which no azimuth wrap
-fits."""
+"""Names of the forecasts: no keyhole; a keyhole with a planned slew; a keyhole for which no slew fits the limits."""
 FORECAST_NONE, FORECAST_KEYHOLE, FORECAST_NO_WRAP = range(len(FORECAST_TEXTS))
 
 PLANNER_DTYPE = np.dtype([
@@ -34,16 +34,26 @@ PLANNER_DTYPE = np.dtype([
     ('next_slew', slews.SLEW_DTYPE, (2,)), ('next_level', 'f8', (3, 3)),
     ('rows', 'f8', (paths.PATH_ROW_COUNT, paths.PATH_COLUMN_COUNT)),
 ], align=True)
-"""looked: time of the last look-ahead [s]; forecast: index in FORECAST_TEXTS; forecasts: number of forecasts so far.
-`slew`: while the forecast is FORECAST_KEYHOLE, on the levelled deck `level` (levelled deck -> earth); deck_motion: rms
-tilt of the deck from `level` at that time [rad]. `hidden`: begin and end [s] of the time in which a sector will hide
-the target, NaN for none; blockages: their number so far. `program`: key of the last program for `another_program`,
-namely the number of its last row, then time, azimuth and elevation of its first row and of its last row.
-`next_slew`, `next_level`, `rows`: work space of a look-ahead."""
+"""State of the planner.
+
+deck         mean attitude of the ship
+looked       time of the last look-ahead [s]
+forecast     index in FORECAST_TEXTS
+forecasts    number of forecasts so far
+slew         planned slew, while the forecast is FORECAST_KEYHOLE
+level        rotation levelled deck -> earth, of the deck on which the slew was planned
+deck_motion  rms tilt of the deck from the levelled deck when the slew was planned [rad]
+hidden       begin and end of the next time in which a sector will hide the target [s]; NaN: none
+blockages    number of these times so far
+program      key of the last program, for `another_program`: number of its last row, then time, azimuth and elevation
+             of its first row and of its last row
+next_slew, next_level, rows  work space of a look-ahead
+"""
 
 CONSTANTS_DTYPE = np.dtype([('horizon', 'f8'), ('notice', 'f8'), ('limits', keyhole.SLEW_LIMITS_DTYPE),
                             ('sectors', 'f8', (blockage.MAX_SECTORS, 3))], align=True)
-"""horizon, notice: parameters [s]; limits: of a slew; sectors: hidden sectors of the deck, as in `blockage`."""
+"""horizon, notice: parameters of KeyholeParameters [s]; limits: limits of a slew; sectors: hidden sectors of the deck,
+as in pedestal_common.geometry.blockage."""
 
 MIN_PATH_ROW_COUNT = 3
 """Least number of rows of a path: the acceleration of the azimuth follows from three rows."""
@@ -67,7 +77,7 @@ def initialise(h):
 
 @compiled
 def clear_plan(h):
-    """Drop the plan; the next look-ahead is due at once."""
+    """Discard the plan; the next look-ahead is due at once."""
     h.forecast = FORECAST_NONE
     h.looked = -math.inf
     h.hidden[:] = math.nan
@@ -75,8 +85,10 @@ def clear_plan(h):
 
 @compiled
 def another_program(h, program):
-    """Keep the key of the program; return True if the program differs from that of the previous call, in its number of
-    rows, its first or its last row."""
+    """Keep the key of the program; return True if it differs from the key of the previous call.
+
+    Two programs are taken as equal if their numbers of rows, their first rows and their last rows are equal.
+    """
     last = len(program.times) - 1
     same = h.program[0] == last
     h.program[0] = last
@@ -90,15 +102,19 @@ def another_program(h, program):
 
 @compiled
 def due(h, t):
-    """Return True if a look-ahead is due at t [s]: LOOK_AHEAD_PERIOD_S after the last one,
-    and after the end of a slew."""
+    """Return True if a look-ahead is due at t [s].
+
+    A look-ahead is due LOOK_AHEAD_PERIOD_S after the last one, but not before the end of a planned slew.
+    """
     return not (t - h.looked < LOOK_AHEAD_PERIOD_S or (h.forecast == FORECAST_KEYHOLE and t <= h.slew.t2))
 
 
 @compiled
 def look_along_program(h, c, t, azimuth, way):
-    """Search a bridge.Way for a keyhole and hidden sectors from t [s] on;
-    azimuth: of the axis at t, on the deck [rad]."""
+    """Search a bridge.Way from t [s] on for a keyhole and hidden sectors.
+
+    azimuth: deck azimuth of the axis at t [rad].
+    """
     path, program = _begin(h, c, t), way.program
     count = paths.along_program(path, h.next_level, way)
     travel = Travel(0.0, 0.0)
@@ -109,8 +125,10 @@ def look_along_program(h, c, t, azimuth, way):
 
 @compiled
 def look_along_great_circle(h, c, t, azimuth, u, du):
-    """Search the great circle of an ENU unit vector u with its rate du [1/s] from t [s] on; azimuth: of the axis at t,
-    on the deck [rad]."""
+    """Search the great circle of the target from t [s] on for a keyhole and hidden sectors.
+
+    azimuth: deck azimuth of the axis at t [rad]; u, du: ENU unit vector of the target at t and its rate [1/s].
+    """
     path = _begin(h, c, t)
     count = paths.along_great_circle(path, h.next_level, u, du)
     _search(h, c, path, count, azimuth, Travel(0.0, 0.0))
@@ -118,7 +136,7 @@ def look_along_great_circle(h, c, t, azimuth, u, du):
 
 @compiled
 def _begin(h, c, t):
-    """Return the Path to be laid out from t [s] on; the levelled deck is the present mean."""
+    """Return an empty Path from t [s] on; set h.next_level, the levelled deck, to the present mean attitude."""
     q = h.deck.mean
     h.looked = t
     rotation(q[0], q[1], q[2], q[3], h.next_level)
@@ -127,17 +145,17 @@ def _begin(h, c, t):
 
 @compiled
 def _search(h, c, path, count, azimuth, travel):
-    """Search the first `count` rows of a Path for a keyhole and hidden sectors;
-    travel: of the azimuth after these rows.
+    """Search the first `count` rows of a Path for a keyhole and hidden sectors.
 
-    A plan becomes final when its slew begins within `notice`. If no wrap of the azimuth fits, that is forecast now.
+    travel: Travel of the azimuth after these rows. A plan becomes final when its slew begins within `notice`. A
+    keyhole without a fitting azimuth wrap is forecast at once.
     """
     if count < MIN_PATH_ROW_COUNT:
         return
     path = paths.Path(path.rows[:count], path.t0, path.h)
     paths.complete(path, travel)
     _find_sectors(h, c.sectors, path)
-    # The spread belongs to the tilt about two horizontal axes; half of it belongs to one axis.
+    # The spread is that of the tilt about two horizontal axes; half of it belongs to one axis.
     outcome = keyhole.plan(h.next_slew, path, azimuth, c.limits, math.sqrt(0.5 * h.deck.spread))
     if outcome == keyhole.PLAN_SLEW and h.next_slew[0].t1 - path.t0 <= c.notice:
         h.slew = h.next_slew[0]
@@ -154,7 +172,10 @@ def _search(h, c, path, count, azimuth, travel):
 
 @compiled
 def _find_sectors(h, sectors, path):
-    """Find the first interval in which the path is hidden; it counts as new if it begins after the end of the last."""
+    """Find the first time in which a sector hides the target.
+
+    A time that begins after the end of the previous one counts as a new blockage.
+    """
     first = last = -1
     for i in range(len(path.rows)):
         A, E = angles(path.rows[i, 0], path.rows[i, 1], path.rows[i, 2])
@@ -180,6 +201,8 @@ def slewing(h, t):
 
 @compiled
 def motion_at(h, c, t, target, level):
-    """Return (Motion of the axes at t [s] of a slew under way, pointing offset [rad]); target, level as in
-    slew.motion_at."""
+    """Return (Motion of the axes at t [s], pointing offset [rad]) of the planned slew.
+
+    target, level: as in slew.motion_at.
+    """
     return slews.motion_at(h.slew, t, target, level, c.limits.highest)

@@ -1,6 +1,6 @@
 """A slew through the keyhole: the azimuth leaves the target, slews at its limits and meets the target again.
 
-The elevation takes the angle at which the beam is closest to the target.
+At each instant the elevation takes the angle at which the beam is closest to the target. slew: record of SLEW_DTYPE.
 """
 import math
 
@@ -15,18 +15,31 @@ SLEW_DTYPE = np.dtype([('t1', 'f8'), ('t2', 'f8'), ('azimuth1', 'f8'), ('azimuth
                        ('culmination', 'f8'), ('highest', 'f8'), ('needed', 'f8'),
                        ('loss', 'f8'), ('worst', 'f8'), ('cost', 'f8'), ('other_cost', 'f8'), ('long_way', 'i8')],
                       align=True)
-"""t1, azimuth1, rate1: time [s] at which the slew leaves the target, azimuth [rad] and rate [rad/s] there; t2,
-azimuth2, rate2: the same where it meets the target. `peak`: largest rate, signed [rad/s]; acceleration: to the peak
-[rad/s2]; culmination, highest: time [s] and elevation [rad] of the target's highest point on the levelled deck.
-`needed`: largest azimuth rate of following without a slew [rad/s]; loss: expected time [s] further than half a
-beamwidth off; worst: largest pointing offset [rad]. `cost`: share of signal lost, in seconds; other_cost: of the other
-direction, inf if the limits forbid it; long_way: 1 if the slew goes against the target's own direction."""
+"""A planned slew. The index 1 marks its begin, where it leaves the target, the index 2 its end, where it meets it.
+
+t1, t2              times [s]
+azimuth1, azimuth2  deck azimuths [rad]
+rate1, rate2        azimuth rates [rad/s]
+peak                largest azimuth rate, with its sign [rad/s]
+acceleration        acceleration to the peak, and deceleration from it [rad/s2]
+culmination         time of the highest point of the target on the levelled deck [s]
+highest             elevation of this point [rad]
+needed              largest azimuth rate that the target would need without a slew [rad/s]
+loss                expected time in which the target is more than half a beamwidth off the beam [s]
+worst               largest pointing offset [rad]
+cost                smooth form of the loss [s], see keyhole._evaluate
+other_cost          cost of the slew in the other direction [s]; inf if the limits forbid it
+long_way            1 if the slew turns opposite to the target
+"""
 
 
 @compiled
 def azimuth_at(slew, t):
-    """Return the AxisMotion of the azimuth at t1 <= t <= t2 [s]: accelerated, at its peak rate, decelerated."""
-    # begun, left: time since t1 and until t2; rise, fall: times of the acceleration and of the deceleration.
+    """Return the AxisMotion of the azimuth at t1 <= t <= t2 [s].
+
+    The azimuth accelerates to its peak rate, keeps this rate, and decelerates.
+    """
+    # begun, left: time since t1 and until t2; rise, fall: duration of the acceleration and of the deceleration.
     sign = math.copysign(1.0, slew.peak)
     a = sign * slew.acceleration
     begun, left = t - slew.t1, slew.t2 - t
@@ -41,11 +54,11 @@ def azimuth_at(slew, t):
 
 @compiled
 def true_deck_share(slew, t):
-    """Return the AxisMotion [1, 1/s, 1/s2] of the share to which a slew follows the true deck at t [s]: 1 at its ends,
-    0 in its middle.
+    """Return the share to which a slew follows the true deck at t [s], with its derivatives [-, 1/s, 1/s2].
 
-    A slew is planned on the levelled deck. The target, which the slew leaves and meets, moves on the true deck. This
-    share of the difference between both decks is added to the slew (`motion_at`).
+    A slew is planned on the levelled deck. The target, which the slew leaves and meets, moves on the true deck.
+    `motion_at` therefore adds a share of the azimuth difference between both decks to the slew. The share is 1 at the
+    ends of the slew and 0 in its middle.
     """
     T = slew.t2 - slew.t1
     x = 1.0 - 2.0 * (t - slew.t1) / T
@@ -54,11 +67,13 @@ def true_deck_share(slew, t):
 
 @compiled
 def best_elevation(azimuth, sight):
-    """Return the AxisMotion of the elevation at which a beam at an azimuth (AxisMotion) is closest
-    to a LineOfSight in FLU.
+    """Return the AxisMotion of the elevation at which the beam is closest to the target.
 
-    An elevation beyond pi/2 is past the zenith. E = atan2(z, b), where b = x cos a - y sin a is the part of the
-    direction along the beam's azimuth, and c = db/da.
+    azimuth: AxisMotion of the beam; sight: LineOfSight to the target, FLU. An elevation above pi/2 is past the zenith.
+
+        E = atan2(z, b),  b = x cos a - y sin a,  c = db/da
+
+    E is the elevation, a the azimuth, x, y, z the direction of the target, b its part along the azimuth of the beam.
     """
     a, da, dda = azimuth
     u, du, ddu = sight
@@ -73,8 +88,10 @@ def best_elevation(azimuth, sight):
 
 @compiled
 def pointing_offset(azimuth, u, highest):
-    """Return the angle [rad] between a target u (FLU) and the beam at a deck azimuth [rad], at the best elevation up
-    to `highest` [rad]."""
+    """Return the angle [rad] between the target and a beam at a deck azimuth [rad] and the best possible elevation.
+
+    u: unit vector of the target, FLU; highest: largest elevation [rad].
+    """
     sa, ca = math.sin(azimuth), math.cos(azimuth)
     # b, c: horizontal parts of u along and across the beam; p, q: parts of u along the beam at `highest`, and across
     # it in the vertical plane.
@@ -88,11 +105,13 @@ def pointing_offset(azimuth, u, highest):
 
 @compiled
 def motion_at(slew, t, target, level, highest):
-    """Return (Motion of the axes at t [s] on a slew, pointing offset [rad] from the target).
+    """Return (Motion of the axes at t [s] on a slew, pointing offset from the target [rad]).
 
-    target: Motion on the true deck; level: AxisMotion of its azimuth on the levelled deck of the plan. At its ends the
-    slew meets the target on the true deck; in its middle the true deck has no share in it. `highest`: the largest
-    elevation [rad].
+    target   Motion of the target on the true deck
+    level    AxisMotion of the azimuth of the target on the levelled deck of the plan
+    highest  largest elevation [rad]
+
+    At its ends the slew meets the target on the true deck. In its middle it is the planned slew on the levelled deck.
     """
     # D: azimuth of the target on the true deck minus that on the levelled deck.
     azimuth, g = azimuth_at(slew, t), true_deck_share(slew, t)
@@ -110,10 +129,11 @@ def motion_at(slew, t, target, level, highest):
 
 @compiled
 def peak_rate(D, T, v1, v2, a):
-    """Return the cruising rate of a slew by D [rad] in T [s] that begins at v1, ends at v2 [rad/s] and changes rate by
-    a [rad/s2]; inf if T is too short.
+    """Return the peak rate v [rad/s] of a slew through D [rad] in T [s]; inf if T is too short.
 
-    D = v T - (v - v1)^2 / (2 a) - (v - v2)^2 / (2 a), the smaller root of v.
+    v1, v2: rates at begin and end [rad/s]; a: acceleration and deceleration [rad/s2]. v is the smaller root of
+
+        D = v T - (v - v1)^2 / (2 a) - (v - v2)^2 / (2 a)
     """
     half = 0.5 * (v1 + v2 + a * T)
     root = half * half - 0.5 * (v1 * v1 + v2 * v2) - a * D

@@ -1,1 +1,4 @@
-"""Mode of a step: the facts that decide on it, the effects of a change, and the laws of single modes."""
+"""Modes of the control unit: facts that decide on a change of mode, effects of the change, laws of single modes.
+
+The transition function itself is in acu_tracker/modes.py.
+"""

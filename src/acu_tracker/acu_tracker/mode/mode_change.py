@@ -1,4 +1,7 @@
-"""Every change of the mode of the control unit, its reason and the pending request."""
+"""State of the mode machine: the mode of the control unit, its reason and the pending request.
+
+Only this module writes the state. m: record of MODE_DTYPE, except where a function states a view of it.
+"""
 import numpy as np
 
 from acu_tracker import modes
@@ -9,11 +12,11 @@ MODE_DTYPE = np.dtype([('now', 'i8'), ('reason', 'i8'), ('pending', 'i8'), ('beg
                        ('fallback', 'i8')], align=True)
 """State of the mode machine.
 
-now        the mode
-reason     of modes.REASONS
-pending    request that waits, or NO_REQUEST
+now        code of the present mode
+reason     code of modes.REASONS: why the mode was entered, a request was refused, or the receiver has no signal
+pending    mode that is entered as soon as its conditions hold, or NO_REQUEST
 begins     1 until the mode sends its first command to the axes
-table      mode whose table was followed last
+table      mode whose table was followed last: program, tle or sun
 fallback   mode chosen for the loss of the track
 """
 
@@ -32,7 +35,10 @@ def choose(m, name):
 
 @compiled
 def change(m, now, request):
-    """Run the mode machine in a Situation with a `request` or NO_REQUEST. Return its result."""
+    """Run the mode machine in a Situation `now`; request: a mode or NO_REQUEST. Return the result of the request.
+
+    acu_tracker/modes.py defines the results.
+    """
     mode, reason, result = modes.next_mode(m.now, request, now)
     if result == modes.REQUEST_ACCEPTED:
         m.pending = modes.NO_REQUEST
@@ -47,7 +53,7 @@ def change(m, now, request):
 
 @compiled
 def restart(m):
-    """Restart the mode."""
+    """Let the present mode begin again."""
     m.begins = 1
 
 
@@ -59,20 +65,23 @@ def mark_started(m):
 
 @compiled
 def set_pending(m, request):
-    """Set the pending request, or NO_REQUEST."""
+    """Set the pending mode; request: a mode or NO_REQUEST."""
     m.pending = request
 
 
 @compiled
 def continue_in(m, mode):
-    """Continue in a mode after a silence: the mode before it, or STANDBY."""
+    """Continue after a silence (a time without steps) in a mode: the mode before the silence, or STANDBY."""
     if mode != m.now:
         m.now, m.reason = mode, Reason.SILENCE
 
 
 @compiled
 def set_outage_reason(m, reason):
-    """Set the reason of an outage; NONE: the outage is over, which ends only a reason that this function has set."""
+    """Set the reason of an outage of the receiver, or NONE without an outage.
+
+    NONE replaces only a reason that this function has set.
+    """
     if (reason != Reason.NONE or m.reason == Reason.BLOCKED or m.reason == Reason.KEYHOLE
             or m.reason == Reason.TURN):
         m.reason = reason
@@ -80,6 +89,6 @@ def set_outage_reason(m, reason):
 
 @compiled
 def mark_stowed(m):
-    """Note that the pins are in, if stow was requested."""
+    """Replace the reason `requested` of the mode stow by `stow pins in`: the pins have gone in."""
     if m.reason == Reason.REQUESTED:
         m.reason = Reason.PINS_IN

@@ -1,4 +1,7 @@
-"""Outage of the receiver: its duration, and its explanation by a keyhole, a turn of the azimuth or a hidden sector."""
+"""Outage of the receiver: the time without an accepted error, and why the signal may be missing.
+
+A keyhole, a turn of the azimuth or a hidden sector explains an outage: autotrack then coasts on.
+"""
 import math
 from collections import namedtuple
 
@@ -17,9 +20,9 @@ blocked    1 while the target is hidden
 Outage = namedtuple('Outage', 'since coasting permitted')
 """Outage of the receiver at an instant.
 
-since      time [s] since the last accepted measurement, less the receiver's latency and the age of its errors
-coasting   whether that time is longer than coast_after, so that autotrack follows the prediction of the filter
-permitted  whether a keyhole, a turn or a hidden sector explains the outage, now or within the last coast_time
+since      time [s] since the last accepted error, less the receiver's latency and the age of its errors
+coasting   True if `since` is longer than coast_after; autotrack then follows the prediction of the filter
+permitted  True if a keyhole, a turn or a hidden sector explains the outage, now or within the last coast_time
 """
 
 
@@ -30,10 +33,11 @@ def initialise(s):
 
 @compiled
 def now(s, accepted, t, p):
-    """Return the Outage at t [s]; accepted: stamp of the last accepted measurement [s]; p: SharedParameters.
+    """Return the Outage at t [s].
 
-    Autotrack coasts after coast_after without a measurement, and ends after coast_time. An explanation stays valid for
-    coast_time after its last stamp.
+    s: record of OUTAGE_DTYPE; accepted: stamp of the last accepted error [s]; p: record of SharedParameters.
+    Autotrack coasts after coast_after without an accepted error, and ends after coast_time. An explanation stays valid
+    for coast_time after its last stamp.
     """
     since = t - accepted - p.receiver_latency - p.tracker.receiver.age
     return Outage(since, since > p.tracker.coast_after, t - s.stamp <= p.tracker.coast_time)
@@ -43,8 +47,9 @@ def now(s, accepted, t, p):
 def watch(s, hidden, slewing, turning, t):
     """Return the reason why the receiver may be without signal at t [s], or NONE.
 
-    hidden: whether the target is hidden; slewing: whether the beam slews through the keyhole; turning: whether the
-    azimuth goes round at a limit of its travel.
+    hidden   True if a hidden sector hides the target
+    slewing  True if the beam slews through the keyhole
+    turning  True if the azimuth goes round to another wrap at a limit of its travel
     """
     s.blocked = hidden
     if hidden or slewing or turning:

@@ -1,6 +1,7 @@
-"""Reachable directions: angles inside the limits and above the floor, and the tables that modes follow.
+"""Reachable directions: whether fixed angles, or the table that a mode follows, are inside the limits of the axes.
 
-c, u: records of control_unit.CONSTANTS_DTYPE and of signals.INPUTS_DTYPE.
+The floor, the lowest elevation of each azimuth, is one of the limits. A table is the program track, or a predicted
+track of a satellite or the sun. c, u: records of control_unit.CONSTANTS_DTYPE and of signals.INPUTS_DTYPE.
 """
 import math
 
@@ -15,7 +16,11 @@ from pedestal_common.compiled import compiled
 
 @compiled
 def outside(c, A, E):
-    """Return OUTSIDE_LIMITS if deck angles [rad] cannot be reached, else NONE; NaN is outside."""
+    """Return OUTSIDE_LIMITS if the deck angles A (azimuth) and E (elevation) [rad] cannot be reached, else NONE.
+
+    A direction can be reached if both angles are inside the limits of their axes, and the floor at the azimuth A is
+    not above the elevation E. NaN counts as outside.
+    """
     a, e = c.axis[0].p.limits, c.axis[1].p.limits
     inside = a.low <= A <= a.high and e.low <= E <= e.high
     return Reason.NONE if inside and not floor.above(c.floor, A, E) else Reason.OUTSIDE_LIMITS
@@ -23,9 +28,10 @@ def outside(c, A, E):
 
 @compiled
 def _judge_track(deck, c, track, t, azimuth):
-    """Return (NONE or the reason why the program cannot be followed, signals.Flag.PROGRAM for a bad program, else 0).
+    """Return (NONE or the reason why a table cannot be followed, signals.Flag.PROGRAM or 0).
 
-    Times and directions of the program are judged at the instant at which the next command is in force.
+    track: the table; deck, t, azimuth and the flag: as in judge_table. The table must cover t. The direction is
+    judged at t + c.lead, the instant at which the next command is in force.
     """
     obstacle = program_track.status(track, t)
     if obstacle != Reason.NONE:
@@ -35,6 +41,7 @@ def _judge_track(deck, c, track, t, azimuth):
     A, E, limits = motion.azimuth.angle, motion.elevation.angle, c.axis[0].p.limits
     if not math.isfinite(A + E):
         return Reason.NO_PROGRAM, signals.Flag.PROGRAM
+    # Travel(0, 0): only this direction must be inside the limits, not the further path of the target.
     return outside(c, azimuth_wrap.nearest(A, azimuth, limits.low, limits.high, Travel(0.0, 0.0)), E), 0
 
 
@@ -42,7 +49,12 @@ def _judge_track(deck, c, track, t, azimuth):
 def judge_table(deck, c, u, mode, all_tables, t, azimuth):
     """Return (NONE or the reason why the table of a mode cannot be followed at t [s], signals.Flag.PROGRAM or 0).
 
-    The flag marks a bad program. deck: ATTITUDE_DTYPE; azimuth: azimuth of the last reference before the shaper [rad].
+    deck        record of ATTITUDE_DTYPE
+    all_tables  tables.Tables of all modes
+    azimuth     azimuth of the last reference as it was before the shaper limited it [rad]; the azimuth wrap is chosen
+                near it
+
+    The flag marks a table with an angle that is not finite.
     """
     track = tables.of_mode(all_tables, mode)
     if mode != Mode.PROGRAM:
@@ -53,6 +65,7 @@ def judge_table(deck, c, u, mode, all_tables, t, azimuth):
                 and program_track.motion_at(track, t).elevation.angle < 0.0):
             return Reason.BELOW_HORIZON, 0
     obstacle, flag = _judge_track(deck, c, track, t, azimuth)
+    # In a gap between two pieces of the program (u.gap) the table is the next piece, which has not begun.
     if mode == Mode.PROGRAM and u.gap and obstacle == Reason.BEFORE_PROGRAM:
         return Reason.PROGRAM_GAP, flag
     return obstacle, flag

@@ -1,7 +1,8 @@
 """Resumption of the mode that a silence interrupted.
 
-A silence is a time without steps, because the drive or the control unit did not run. The mode is kept, and requested
-again when a restarted drive is ready.
+A silence is a time without steps, because the drive or the control unit did not run. After a short silence the mode
+continues. If the drive was restarted during the silence, the mode ends because the drive is not ready. This module
+keeps the mode, and the control unit requests it again when the drive is ready.
 """
 import math
 
@@ -12,10 +13,10 @@ from acu_tracker.modes import Mode
 from pedestal_common.compiled import compiled
 
 RESUMPTION_DTYPE = np.dtype([('mode', 'i8'), ('until', 'f8')], align=True)
-"""mode: code of the mode before the silence; until: last stamp at which the mode is resumed [s], -inf for none."""
+"""mode: code of the mode before the silence; until: last stamp at which it is resumed [s], -inf if no mode is kept."""
 
 DRIVE_RESTART_GAP_S = 0.3
-"""Silence after which the drive may have been restarted [s]; a mode that ends because of the restart is resumed."""
+"""Shortest silence in which the drive may have been restarted [s]; only after such a silence a mode is kept."""
 
 
 def initialise(s):
@@ -25,7 +26,11 @@ def initialise(s):
 
 @compiled
 def mode_after(s, mode, last, stamp, resume_time):
-    """Return the mode after a silence from `last` to `stamp` [s]: the same mode, or STANDBY after resume_time."""
+    """Return the mode after a silence: `mode`, or STANDBY if the silence was longer than resume_time [s].
+
+    If the drive may have been restarted in the silence, keep the mode in s. last, stamp: stamps of the steps before
+    and after the silence [s].
+    """
     if stamp > last + resume_time:
         return Mode.STANDBY
     if stamp - last > DRIVE_RESTART_GAP_S:
@@ -40,18 +45,21 @@ def is_pending(s):
 
 
 @compiled
-def pending(s, stamp, ended, locked, before):
-    """Return the request that is pending at `stamp` [s].
+def pending(s, stamp, ended, locked, request_before):
+    """Return the request that is pending at `stamp` [s]. The caller calls this function only while `is_pending`.
 
-    ended: the drive was not ready and has ended the mode; locked: the receiver has the target; before: the request
-    that was pending. A kept mode whose time is over is discarded. Without a lock `program` is
-    requested in the place of autotrack, because it hands over to autotrack after lock.
+    ended           True if the mode is standby because the drive was not ready
+    locked          True if autotrack can begin
+    request_before  request that was pending before this step
+
+    A kept mode whose time is over is discarded. If autotrack cannot begin, `program` is requested, because `program`
+    hands over to autotrack.
     """
     if stamp > s.until:
         s.until = -math.inf
         return modes.NO_REQUEST
     if not ended:
-        return before
+        return request_before
     return Mode.PROGRAM if s.mode == Mode.AUTOTRACK and not locked else s.mode
 
 

@@ -1,6 +1,11 @@
-"""Modes that use the signal level: the link between the control unit and the laws of `search`.
+"""The modes search, acquire and steptrack, which use the signal level: link from the control unit to `search`.
 
-a: record of acquisition.ACQUISITION_DTYPE; c: record of control_unit.CONSTANTS_DTYPE; way: bridge.Way of the program.
+The signal level is the C/N0 of the receiver. The modes move the beam about the expected place of the target; the
+laws of these motions are in the package `search`.
+
+a    record of acquisition.ACQUISITION_DTYPE
+c    record of control_unit.CONSTANTS_DTYPE
+way  bridge.Way: the program, rotated to the place where the target was last tracked
 """
 import math
 
@@ -14,9 +19,10 @@ from pedestal_common.compiled import compiled
 from pedestal_common.geometry import line_of_sight as pointing
 
 SIDE_LOBE_TIME_S = 0.3
-"""Time for which the level must be that of a side lobe, before autotrack or in it [s].
+"""Time for which the level must be that of a side lobe before autotrack ends [s].
 
-On the slopes of a side lobe the filter diverges within 0.4 s.
+The time may begin in the mode program, before autotrack. Because the filter diverges within 0.4 s on the slopes of a
+side lobe, the time is shorter.
 """
 
 
@@ -34,14 +40,17 @@ def expected(a, way, t):
 
 @compiled
 def source(a, mode, c, way, t):
-    """Return the target.Source of the beam at t [s]."""
+    """Return the target.Source to which the beam points at t [s]: the expected place plus the offset of the mode."""
     motion = expected(a, way, t)
     return target.Source(0, place.displaced(motion, _offset(a, mode, c, t, motion)))
 
 
 @compiled
 def _offset(a, mode, c, t, motion):
-    """Return the Point of the beam about the expected place, in cross-elevation and elevation."""
+    """Return the Point of the beam relative to the expected place at t [s], in cross-elevation and elevation [rad].
+
+    motion: Motion of the expected place in earth angles.
+    """
     beamwidth = c.p.tracker.receiver.beamwidth
     if mode == Mode.SEARCH:
         p, _ = acquisition.searched(a, c.p.search, c.p.acquisition.time_constant, beamwidth, t)
@@ -53,10 +62,10 @@ def _offset(a, mode, c, t, motion):
 
 @compiled
 def advance(a, mode, c, u, way):
-    """Take the level of a step and advance the mode of the previous step to this one. Return True if a slope is wrong.
+    """Take the level of a step and advance the running mode. Return True if acquire has found a slope of wrong sign.
 
-    While the beam is off the target, the level is noise alone, and its statistics are learnt. Only acquire finds a
-    wrong slope. u: record of signals.INPUTS_DTYPE.
+    mode: the mode of the previous step; u: record of signals.INPUTS_DTYPE. While the beam is off the target, the level
+    is noise alone; the function then learns the statistics of the noise.
     """
     p, beamwidth = c.p.acquisition, c.p.tracker.receiver.beamwidth
     new = u.error_stamp > a.level.stamp and math.isfinite(u.cn0_dbhz)
@@ -81,7 +90,7 @@ def advance(a, mode, c, u, way):
         acquisition.set_offset(a, x, e)
     level_on_axis = side_lobe.expected(p.expected_dbhz, p.reference_range, p.range_exponent, u.range)
     judged = mode == Mode.PROGRAM or mode == Mode.AUTOTRACK
-    # A level is fair if it is not suspected to be that of a side lobe.
+    # A level is called fair if it is not suspected to be that of a side lobe.
     fair = not judged or not u.error_valid or not side_lobe.suspected(u.cn0_dbhz, level_on_axis)
     acquisition.note_fair_level(a, u.stamp, fair)
     return mode == Mode.ACQUIRE and a.phase == acquisition.Phase.WRONG_SLOPE
@@ -89,13 +98,13 @@ def advance(a, mode, c, u, way):
 
 @compiled
 def in_side_lobe(a, c, t):
-    """Return True if autotrack at t [s] follows a level that is that of a side lobe."""
+    """Return True if the level has been that of a side lobe for SIDE_LOBE_TIME_S up to t [s]."""
     return c.p.acquisition.expected_dbhz > 0.0 and t - a.fair > SIDE_LOBE_TIME_S
 
 
 @compiled
 def found(a, mode, c):
-    """Return True if search may hand over to acquire, or acquire to autotrack."""
+    """Return True if the mode search may hand over to acquire, or the mode acquire to autotrack."""
     if mode == Mode.SEARCH:
         return acquisition.peak_passed(a, c.p.acquisition)
     return a.phase == acquisition.Phase.CHECKED
@@ -121,7 +130,7 @@ def end(a, mode, c, t):
 def begin(a, mode, c, t, spread):
     """Enter a mode that uses the signal level at t [s].
 
-    spread: standard deviation of the expected place [rad], NaN where it is not known.
+    spread: standard deviation of the expected place, across the line of sight [rad]; NaN if it is not known.
     """
     level.restart_times(a.level)
     if mode == Mode.SEARCH:
@@ -134,16 +143,16 @@ def begin(a, mode, c, t, spread):
 
 @compiled
 def remember(a, t, u, du):
-    """Store the place of the target at t [s]: an ENU unit Vector u and its rate du [1/s]."""
+    """Store the expected place of the target at t [s]: an ENU unit Vector u and its rate du [1/s]."""
     place.remember(a.place, t, u, du)
     acquisition.set_offset(a, 0.0, 0.0)
 
 
 @compiled
 def check_slope(a, at, motion, error):
-    """Judge an error (cross-elevation, elevation) [rad] by the offset of the target's expected place from the beam.
+    """Compare an error (cross-elevation, elevation) [rad] with the offset of the expected place from the beam.
 
-    at: Pointing of the beam; motion: of the expected place, on the deck.
+    at: Pointing of the beam; motion: Motion of the expected place in deck angles.
     """
     x, y, z = pointing.direction(motion.azimuth.angle, motion.elevation.angle)
     acquisition.take_error(a, pointing.offsets(at.A, at.E, x, y, z), error)

@@ -1,7 +1,9 @@
-"""Stow and unstow: hold the axes at the stow angles and command the pins in, or command the pins out.
+"""The modes stow and unstow: hold the axes at the stow angles and command the stow pins in, or command them out.
 
-A pin that is in locks its axis. The axes get a command only while both pins are out and no pin is commanded in. The
-pins keep the last request, in or out, across mode changes.
+A stow pin is a bolt that locks its axis. The axes get a command only while both pins are out and no pin is commanded
+in. The last request to the pins, in or out, stays in force when the mode changes.
+
+s: record of STOW_DTYPE; code: code of adu/stow_pins, the states of both pins.
 """
 import math
 
@@ -14,24 +16,24 @@ from pedestal_common.graph import topics
 STOW_DTYPE = np.dtype([('requested', 'i8'), ('since', 'f8'), ('not_stowed', 'f8')], align=True)
 """State of stow and unstow.
 
-requested   code of acu/stow_pins, NO_TEXT_CODE before the first request
+requested   code of acu/stow_pins: requested position of both pins, NO_TEXT_CODE before the first request
 since       stamp of that request [s]
 not_stowed  last stamp at which the axes were not at rest at the stow angles [s]
 """
 
 _REQUEST_TEXTS = topics.TOPIC_BY_NAME['acu/stow_pins'].texts
 REQUEST_PINS_OUT, REQUEST_PINS_IN = _REQUEST_TEXTS.index('out'), _REQUEST_TEXTS.index('in')
-"""Codes of acu/stow_pins, the requested position of both pins."""
+"""Codes of acu/stow_pins, on which the control unit requests the position of both pins."""
 
 _PIN_OUT, _PIN_IN, _PIN_FAILED = (topics.PIN_STATE_TEXTS.index(state) for state in ('out', 'in', 'failed'))
-"""States of a pin."""
+"""Codes of the states of one pin."""
 
 _PIN_STATE_COUNT = len(topics.PIN_STATE_TEXTS)
-"""Number of states of a pin. A code of adu/stow_pins is (state of the azimuth) _PIN_STATE_COUNT + state of the
-elevation."""
+"""Number of states of a pin. A code of adu/stow_pins is _PIN_STATE_COUNT times the state of the azimuth pin, plus the
+state of the elevation pin."""
 
 BOTH_PINS_OUT, BOTH_PINS_IN = _PIN_OUT * _PIN_STATE_COUNT + _PIN_OUT, _PIN_IN * _PIN_STATE_COUNT + _PIN_IN
-"""Codes of adu/stow_pins."""
+"""Codes of adu/stow_pins, on which the drive reports the states of both pins."""
 
 MAX_REST_RATE_RAD_S = 1e-3
 """Rate below which an axis is at rest [rad/s]."""
@@ -47,15 +49,14 @@ def initialise(s):
 
 @compiled
 def failed(code, i):
-    """Return True if a code of adu/stow_pins states that the pin of axis i has failed; a code below 0 states
-    nothing."""
+    """Return True if the pin of axis i has failed; a code below 0 means that the drive has reported no state yet."""
     state = code // _PIN_STATE_COUNT if i == 0 else code % _PIN_STATE_COUNT
     return code >= 0 and state == _PIN_FAILED
 
 
 @compiled
 def obstacle(s, fitted, code):
-    """Return the reason why the axes must not move, or NONE. fitted: 1 if there are pins; code: of adu/stow_pins."""
+    """Return the reason why the axes must not move, or NONE. fitted: 1 if the antenna has stow pins."""
     if not fitted:
         return Reason.NONE
     if failed(code, 0) or failed(code, 1):
@@ -65,21 +66,21 @@ def obstacle(s, fitted, code):
 
 @compiled
 def commands_no_motion(s, fitted, code, mode):
-    """Return True if the mode commands no motion."""
+    """Return True if the mode commands no motion; fitted: 1 if the antenna has stow pins."""
     return (mode == Mode.STANDBY or mode == Mode.UNSTOW
             or (mode == Mode.STOW and obstacle(s, fitted, code) != Reason.NONE))
 
 
 @compiled
 def _request_pins(s, place, t):
-    """Request a place of the pins at t [s]; the stamp of a standing request stays."""
+    """Request a position of the pins at t [s]: `out` or `in`. A repeated request keeps its first stamp."""
     if s.requested != place:
         s.requested, s.since = place, t
 
 
 @compiled
 def _at_rest(c, u):
-    """Return True if both axes are at rest at the stow angles."""
+    """Return True if both axes are at rest within stow_window of their stow angles."""
     for i in range(2):
         if not (abs(u.position[i] - c.axis[i].p.stow) <= c.p.stow_window
                 and abs(u.velocity[i]) <= MAX_REST_RATE_RAD_S):
@@ -100,7 +101,8 @@ def step(s, c, u, mode):
         if u.pins == BOTH_PINS_OUT and not _at_rest(c, u):
             s.not_stowed = t
         elif u.pins != BOTH_PINS_OUT or t - s.not_stowed >= MIN_REST_TIME_S:
-            # A pin that is not out keeps the axes from moving to the stow angles, so there is no rest to wait for.
+            # A pin that is not out already keeps the axes from moving. The control unit therefore requests the pins in
+            # without waiting for rest.
             _request_pins(s, REQUEST_PINS_IN, t)
     else:
         s.not_stowed = t

@@ -1,4 +1,7 @@
-"""Latched faults of the control unit, which stay until a reset, and their effect on the modes."""
+"""Latched faults of the control unit, which stay until a reset, and their effect on the modes.
+
+The faults are uncommanded motion of an axis, a drive that repeats its angles (frozen), and divergence of the filter.
+"""
 from acu_tracker.alarms import annunciator, table
 from acu_tracker.modes import Reason
 from pedestal_common.compiled import compiled
@@ -8,7 +11,7 @@ UNCOMMANDED_MOTION_ALARM, FROZEN_DRIVE_ALARM, DIVERGENCE_ALARM = (
 """Indices of the alarms of the latched faults."""
 
 LATCHED_FAULT_BITS = 1 << UNCOMMANDED_MOTION_ALARM | 1 << FROZEN_DRIVE_ALARM | 1 << DIVERGENCE_ALARM
-"""Bits of these alarms."""
+"""Bits of the alarms of the latched faults; bit i belongs to the alarm of index i."""
 
 
 @compiled
@@ -21,16 +24,17 @@ def latched(uncommanded, frozen, diverged):
 def axes_follow_commands(s):
     """Return True if both axes follow their commands; s: record of conditions.SUPERVISION_DTYPE.
 
-    While an axis does not, the target leaves the beam, and the filter is not the cause.
+    While an axis does not follow its command, the target leaves the beam although the filter is right.
     """
     return not (s.axis[0].immobile or s.axis[1].immobile)
 
 
 @compiled
 def drive_refusal(ready, uncommanded, frozen):
-    """Return the reason why the drive may not run a mode, or NONE.
+    """Return the reason why no mode except standby may move the axes, or NONE.
 
-    ready: whether the drive is ready; uncommanded, frozen: whether the fault is latched.
+    ready: True if the drive follows commands; uncommanded, frozen: True if uncommanded motion, or a frozen drive, is
+    latched.
     """
     if uncommanded:
         return Reason.UNCOMMANDED_MOTION

@@ -1,1 +1,4 @@
-"""Operation of the antenna: the commands, the control over them, and the reports of the control unit."""
+"""Operation of the antenna: commands of clients, control by one client, and texts and diagnosis for the operator.
+
+`unit.Acu` uses these modules outside the compiled law.
+"""

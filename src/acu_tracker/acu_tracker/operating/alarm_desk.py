@@ -1,4 +1,4 @@
-"""Commands of an operator to the alarms: acknowledge, reset, shelve, unshelve."""
+"""The commands of an operator to the alarms: acknowledge, reset, shelve, unshelve."""
 from acu_tracker.alarms import annunciator, machine, table
 from pedestal_common.parameters import did_you_mean
 from pedestal_common.wire.commands import Reply
@@ -7,8 +7,11 @@ from pedestal_common.wire.commands import Reply
 class AlarmDesk:
     """Handler of the alarm commands.
 
-    state: view of control_unit.STATE_DTYPE, which holds the alarms and the stamp; reset: function control_unit.reset.
-    The methods are named as command_table.ALARM_COMMANDS. They raise ValueError for an unknown alarm.
+    state    view of control_unit.STATE_DTYPE, which holds the alarms and the stamp
+    reset    the function control_unit.reset
+    reasons  {index of a shelved alarm: reason for shelving}
+
+    The methods have the names of command_table.ALARM_COMMANDS. They raise ValueError for an unknown alarm.
     """
 
     def __init__(self, state, reset):
@@ -29,27 +32,33 @@ class AlarmDesk:
         return self._state['supervision']['alarms']
 
     def reset(self):
-        """Return the Reply to a reset of the latched alarms and faults; it is refused while a cause is there."""
+        """Return the Reply to a reset of the latched alarms and faults.
+
+        The reset is refused while the cause of one of them is present.
+        """
         cause = self._reset(self._state)
         if cause == annunciator.NO_ALARM:
             return Reply(True, 'cleared')
         return Reply(False, f'refused: the cause of {table.ALARM_NAMES[cause]} is still there')
 
     def acknowledge(self, name=''):
-        """Return the Reply to an acknowledgement of the named alarm and all alarms under it; '': of every alarm."""
+        """Return the Reply to an acknowledgement of an alarm and of its consequences.
+
+        name: of the alarm; '': every alarm.
+        """
         chosen = [_index(name)] if name else range(annunciator.ALARM_COUNT)
         done = sum([annunciator.acknowledge(self.alarms, i, self._state['stamp']) for i in chosen])
         return Reply(done > 0, 'acknowledged' if done else 'refused: no alarm waits for an acknowledgement')
 
     def shelve(self, name, seconds, reason):
-        """Return the Reply to shelving the named alarm for some seconds, for a reason."""
+        """Return the Reply to the command that shelves an alarm for some seconds, for a reason."""
         i = _index(name)
         self.reasons[i] = reason
         annunciator.shelve(self.alarms, i, self._state['stamp'], seconds)
         return Reply(True, f'{table.ALARM_NAMES[i]} is shelved for {seconds:g} s: {reason}')
 
     def unshelve(self, name):
-        """Return the Reply to the end of the shelving of the named alarm."""
+        """Return the Reply to the command that ends the shelving of an alarm."""
         i = _index(name)
         if annunciator.apply_event(self.alarms, i, machine.Event.UNSHELVE, self._state['stamp']):
             return Reply(True, f'{table.ALARM_NAMES[i]} is no longer shelved')

@@ -1,6 +1,6 @@
-"""Texts of the look-ahead for the operator, and its numbers for the diagnostics.
+"""Texts for the operator on keyholes, hidden sectors and the end of the azimuth's travel; numbers for the diagnostics.
 
-`h` is a record of lookahead.planner.PLANNER_DTYPE.
+h: record of lookahead.planner.PLANNER_DTYPE; unit: the unit.Acu.
 """
 import math
 
@@ -12,7 +12,10 @@ from acu_tracker.program import tables
 
 
 def keyhole(h, parameters):
-    """Return the text of acu/keyhole: the planned slew, or that no azimuth wrap fits; parameters: AcuParameters."""
+    """Return the text of acu/keyhole: the planned slew, or that no azimuth wrap holds the pass.
+
+    parameters: AcuParameters.
+    """
     beamwidth = parameters.tracker.receiver.beamwidth
     if h['forecast'] == planner.FORECAST_NO_WRAP:
         return f'keyhole ahead: no azimuth wrap holds the pass; {_at_the_end(parameters.azimuth, "")}'
@@ -32,9 +35,9 @@ def keyhole(h, parameters):
 
 
 def _at_the_end(axis, when):
-    """Return the text of the motion of the azimuth at the end of its travel.
+    """Return the text that describes the motion of the azimuth at the end of its travel.
 
-    axis: its AxisParameters; when: text of the time, '' for none.
+    axis: AxisParameters of the azimuth; when: text of the time, with a blank at its end; '' without a time.
     """
     if axis.limits.high - axis.limits.low < 2.0 * math.pi:
         return f'{when}the azimuth stops at the end of its travel until the target is inside the travel again'
@@ -44,9 +47,9 @@ def _at_the_end(axis, when):
 
 
 def overtravel(unit):
-    """Return the text for a program track that no azimuth wrap of an Acu holds, with the time of the end of travel.
+    """Return the text for a program track that no azimuth wrap holds; it states when the end of travel is reached.
 
-    On a ship the time is unknown, because it depends on the motion of the deck.
+    On a ship the text has no time, because the time depends on the motion of the deck.
     """
     state, limits = unit.parts['state'], unit.parameters.azimuth.limits
     now, when = state['stamp'], ''
@@ -63,10 +66,10 @@ def overtravel(unit):
 
 
 def reaches_end(unit):
-    """Return True if the azimuth of an Acu that follows a target without a table is soon at the end of its travel.
+    """Return True if the azimuth will reach the end of its travel within keyhole.notice at its present rate.
 
-    Soon is within keyhole.notice at the present rate. Where there is a program track, `overtravel` shows what it leads
-    to.
+    The function serves modes that follow a target without a table. Where a program track covers the present time, the
+    result is False, because `overtravel` reports the end of travel.
     """
     outputs, state, program = unit.parts['outputs'], unit.parts['state'], unit.memory.tables.program.times
     mode, covered = outputs['mode'], len(program) > 0 and program[0] <= state['stamp'] <= program[-1]
@@ -75,7 +78,7 @@ def reaches_end(unit):
 
 
 def end_of_travel(unit):
-    """Return the text for an azimuth of an Acu that is soon at the end of its travel."""
+    """Return the text for an azimuth that will soon reach the end of its travel."""
     left = unit.parts['outputs']['time_to_limit'][0]
     return _at_the_end(unit.parameters.azimuth, f'at the present rate, in {left:.1f} s ')
 
@@ -87,19 +90,22 @@ def _increasing(x, y):
 
 
 def turn(unit):
-    """Return the text for a turn of the azimuth of an Acu that is under way."""
+    """Return the text for a turn of the azimuth that is under way."""
     guidance, reference = unit.parts['state']['guidance'], unit.parts['state']['axis'][0]['reference']
     return f'the azimuth goes round by {_deg(guidance["azimuth"] - reference["angle"]):+.0f} deg to the target'
 
 
 def hidden(h):
-    """Return the text of acu/blockage: begin and end [s] of the time for which the target will be hidden."""
+    """Return the text of acu/blockage: begin and end [s] of the time in which the target will be hidden."""
     begin, end = h['hidden']
     return f'target hidden from {begin:.1f} s to {end:.1f} s'
 
 
 def numbers(h):
-    """Return [(key, value text)] of the forecast; a slew or a hidden sector appears only where there is one."""
+    """Return [(key, text of the value)] of the forecast for the diagnostics.
+
+    The keys of a slew or of a hidden sector appear only if there is one.
+    """
     values = [('keyhole', planner.FORECAST_TEXTS[h['forecast']])]
     if h['forecast'] == planner.FORECAST_KEYHOLE:
         slew = h['slew']

@@ -1,11 +1,12 @@
-"""Control of the antenna: one client holds it, by name.
+"""Control of the antenna: it belongs to at most one client, whose name is kept here.
 
-Every client may stop the antenna, and may send any command while control is free.
+While a client holds control, the control unit refuses the commands of other clients, except those that stop the
+antenna. While control is free, every client may send any command.
 """
 from pedestal_common.wire.commands import HELD_REFUSAL, Reply
 
 CONTROL_ROLES = ('operator', 'supervisor')
-"""Roles of a client; a supervisor takes control from any holder."""
+"""Roles of a client; a supervisor may take control from another client."""
 
 UNRESTRICTED_COMMANDS = ('standby', 'stop', 'acu/standby', 'acu/stop')
 """Commands and services that are open to every client at any time."""
@@ -23,7 +24,10 @@ class Authority:
             raise ValueError(f'{HELD_REFUSAL} {self.holder}')
 
     def take(self, who, role) -> Reply:
-        """Give control to the client `who`. Raise ValueError if another holds it, except for a supervisor."""
+        """Give control to the client named `who`, and return the Reply.
+
+        Raise ValueError if another client holds control; a supervisor takes it all the same.
+        """
         if not who:
             raise ValueError('a client that takes control must have a name')
         if self.holder not in ('', who) and role != 'supervisor':
@@ -32,6 +36,6 @@ class Authority:
         return Reply(True, f'control is with {who}' + (f', taken from {before}' if before not in ('', who) else ''))
 
     def release(self) -> Reply:
-        """Release control."""
+        """Release control and return the Reply."""
         before, self.holder = self.holder, ''
         return Reply(True, f'control released by {before}' if before else 'control was already free')

@@ -1,4 +1,7 @@
-"""Commands on acu/command: the modes with their arguments, and all other commands."""
+"""The table of the commands that the control unit accepts on acu/command: modes with arguments, and other commands.
+
+The functions at the end write the arguments of a mode into the state of the unit.
+"""
 import math
 
 import numpy as np
@@ -15,7 +18,7 @@ from pedestal_common.wire.commands import Argument, CommandDefinition
 
 
 def _of_axes(doc, low, high, unit, default=None, suffix=''):
-    """Return an Argument for each axis."""
+    """Return an Argument for each axis; suffix: end of its name after the name of the axis."""
     return tuple(Argument(f'{axis}{suffix}', doc, low, high, unit, default=default) for axis in AXES)
 
 
@@ -68,7 +71,7 @@ POINTS_DOC = "named points for `preset`: 'NAME azimuth elevation; ...' [rad], de
 
 
 def points(text) -> dict:
-    """Return {name: (azimuth, elevation) [rad]} of a text as in POINTS_DOC. Raise ParameterError."""
+    """Return {name: (azimuth, elevation) [rad]} of a text as in POINTS_DOC; raise ParameterError for a wrong text."""
     named = {}
     for part in filter(None, map(str.strip, text.split(';'))):
         name, *angles = part.split()
@@ -88,7 +91,10 @@ def _rates(arguments):
 
 
 def _take_preset(unit, arguments):
-    """Take the preset angles and their rates. Raise ValueError for an unknown point."""
+    """Set the direction of the mode preset: angles or a named point, and rates.
+
+    Raise ValueError for an unknown point.
+    """
     angles = [arguments[axis] for axis in AXES]
     if arguments['point']:
         named = points(unit.parameters.points)
@@ -102,20 +108,20 @@ def _take_preset(unit, arguments):
 
 
 def _take_rate(unit, arguments):
-    """Take the commanded rates."""
+    """Set the rates of the mode rate."""
     state = unit.parts['state']
     manual.request_rates(state['guidance']['manual'], [arguments[axis] for axis in AXES], state['stamp'])
 
 
 def _take_slave(unit, arguments):
-    """Take the commanded direction."""
+    """Set the direction of the mode slave."""
     state = unit.parts['state']
     direction.set_moving(state['guidance']['slave'], state['stamp'], [arguments[axis] for axis in AXES],
                          _rates(arguments), arguments['moves'], arguments['holds'])
 
 
 def _take_tle(unit, arguments):
-    """Take other elements, if there are any. Raise ValueError."""
+    """Take the elements of the mode tle, if the command has any; raise ValueError for invalid elements."""
     if any(arguments.values()):
         unit.take_elements(*arguments.values())
 

@@ -1,4 +1,4 @@
-"""Diagnosis of the control unit for /diagnostics."""
+"""Diagnosis of the control unit on /diagnostics: a level, one line of text, and values; unit: the unit.Acu."""
 import math
 
 import numpy as np
@@ -20,26 +20,27 @@ FAULT_TEXTS = {
 GATED_ERROR_TEXTS = {('error_gated',): 'an error of the receiver was outside the gate and was not used',
                      ('error_noisy',): 'the errors of the receiver are noise and are not used',
                      ('error_gated', 'error_noisy'): 'the errors of the receiver are noise and are not used'}
-"""Texts of the diagnosis where only these bits of signals.INVALID_INPUTS are set."""
+"""{names in signals.INVALID_INPUTS: text of the diagnosis}; the text is used if exactly these inputs are invalid."""
 
 NEEDED_FIELDS = {'encoder': ('joint_states', ('position', 'velocity')),
                  'attitude': ('ship/imu/data', ('orientation', 'angular_velocity')),
                  'attitude_error': ('ins/error', ('position', 'velocity'))}
-"""{name in signals.INVALID_INPUTS: (topic, fields of its layout that the control unit needs)}."""
+"""{name in signals.INVALID_INPUTS: (topic, fields of its message that the control unit needs)}."""
 
 INPUTS_OF_REASONS = {Reason.ENCODER_INVALID: 'encoder', Reason.ATTITUDE_INVALID: 'attitude'}
-"""{reason: name in NEEDED_FIELDS}."""
+"""{reason of a refused mode: name in NEEDED_FIELDS of the input that is invalid}."""
 
 
 def missing(unit, name):
-    """Return the text of the numbers that the last message of an input lacks, a name in NEEDED_FIELDS; '' for none.
+    """Return the text that names the numbers which the last message of an input lacks; '' if it lacks none.
 
-    A number is missing where the message has no such number, where it is NaN, and where it is marked as no data.
+    name: name of the input in NEEDED_FIELDS. In a decoded message a number is NaN if the message does not contain it
+    or marks it as no data.
     """
     topic, needed = NEEDED_FIELDS.get(name, ('', ()))
     if topic not in unit.reads and topic != unit.trigger:
         return ''
-    message, absent = unit.inputs[0][topic], []
+    message, absent = unit.inputs[0][topic], []     # inputs (1,): the record of the last step
     for field in needed:
         numbers = np.isnan(message[field])
         names = [column.name for column in layouts.columns(topic) if column.field == field]
@@ -48,7 +49,9 @@ def missing(unit, name):
 
 
 def beyond_limits(parameters, angles):
-    """Return the text of the axes whose deck angles [rad] are outside the limits of AcuParameters; else of the floor.
+    """Return the reason why deck angles [rad] cannot be reached: the axes outside their limits, or else the floor.
+
+    The floor is the lowest elevation that is allowed at an azimuth. parameters: AcuParameters.
     """
     outside = [f'{axis} {math.degrees(angle):.2f} deg: must be {math.degrees(limits.low):.2f} to '
                f'{math.degrees(limits.high):.2f} deg'
@@ -59,7 +62,7 @@ def beyond_limits(parameters, angles):
 
 
 def of(unit):
-    """Return the Diagnosis of an Acu."""
+    """Return the Diagnosis of the unit; its text reports the gravest finding."""
     state, outputs = unit.parts['state'], unit.parts['outputs']
     invalid = tuple(name for i, name in enumerate(signals.INVALID_INPUTS) if unit.parts['invalid'] >> i & 1)
     faults = unit.faults
@@ -75,6 +78,8 @@ def of(unit):
     mode, reason = modes.MODES[outputs['mode']], modes.REASONS[outputs['reason']]
     if state['guidance']['turn']['under_way']:
         return Diagnosis(LEVEL_WARN, f'{mode} ({reason}): {announcement.turn(unit)}', values)
+    # held: last instant at which a limit held the beam off the target [s]; the instant of a command is not before the
+    # stamp of its step.
     if state['guidance']['held'] >= state['stamp']:
         return Diagnosis(LEVEL_WARN, f'{mode} ({reason}): an axis is held at a limit, and the beam is off the target',
                          values)
@@ -86,7 +91,10 @@ def of(unit):
 
 
 def _values(unit, faults, invalid):
-    """Return [(key, text)] of the diagnosis."""
+    """Return the values [(key, text)] of the diagnosis.
+
+    faults: names of the latched faults; invalid: names of the invalid inputs.
+    """
     state, outputs = unit.parts['state'], unit.parts['outputs']
     values = [('mode', modes.MODES[outputs['mode']]), ('reason', modes.REASONS[outputs['reason']]),
               ('fallback', modes.FALLBACK_NAMES[int(state['mode']['fallback'])]), ('control', unit.authority.holder),
@@ -110,8 +118,8 @@ def _values(unit, faults, invalid):
 
 def _uncommanded_motion(movement):
     """Return the text of the measured and commanded rates; movement: view of uncommanded_motion.ENVELOPE_DTYPE."""
-    return ', '.join(f'{axis} {rate:.3g} rad/s, commanded {low:.3g} to {high:.3g}'
-                     for axis, (rate, low, high) in zip(topics.AXES, movement['measured']))
+    return ', '.join('{} {:.3g} deg/s, commanded {:.3g} to {:.3g}'.format(axis, *map(math.degrees, rates))
+                     for axis, rates in zip(topics.AXES, movement['measured']))
 
 
 def _pins(code):

@@ -1,1 +1,5 @@
-"""The program track: a table of times and angles, its interpolation, and its use as a bridge over an outage."""
+"""Tables of directions over time that a mode follows: the program track, and the predicted satellite and sun.
+
+The modules receive, predict and interpolate the tables. `bridge` rotates the program track to the target, as a bridge
+over an outage of the receiver.
+"""

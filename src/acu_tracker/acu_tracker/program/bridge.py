@@ -1,7 +1,10 @@
-"""The program track, rotated by the smallest angle that puts it where the target was last tracked.
+"""The bridge: the program track, rotated so that it passes through the place where the target was last tracked.
 
-It bridges an outage of the receiver with the shape of the program at the place of the estimate. For many seconds this
-is more accurate than the filter's own rate and acceleration.
+The antenna follows the rotated program during an outage of the receiver. For many seconds the rotated program is more
+accurate than the rate and the acceleration that the filter has estimated. The rotation is the one with the smallest
+angle.
+
+b: record of BRIDGE_DTYPE; program: a ProgramTrack; w: a Way.
 """
 import math
 from collections import namedtuple
@@ -15,20 +18,27 @@ from acu_tracker.program import program_track
 from pedestal_common.compiled import compiled
 
 BRIDGE_DTYPE = np.dtype([('axis', 'f8', (3,)), ('cos', 'f8'), ('valid', 'i8')], align=True)
-"""axis: of the rotation, ENU, with the sine of its angle as its length; cos: cosine of the angle;
-valid: 0 without a rotation."""
+"""Rotation of the program.
+
+axis   axis of the rotation, ENU; its length is the sine of the angle of the rotation
+cos    cosine of the angle
+valid  1 if there is a rotation
+"""
 
 Way = namedtuple('Way', 'program valid axis cos')
-"""Path to follow: a ProgramTrack, rotated if valid; the other fields as of BRIDGE_DTYPE."""
+"""Path that the antenna may follow: the ProgramTrack `program`, rotated if `valid` is 1; axis, cos: as in
+BRIDGE_DTYPE."""
 
 MIN_PROGRAM_COSINE = math.cos(math.radians(3.0))
-"""Cosine of the largest angle between program and estimate for which the program is used [-]."""
+"""Cosine of the largest angle between program and estimate for which the program is rotated [-]: 3 deg."""
 
 
 @compiled
 def begin(b, program, t, u):
-    """Find the rotation that puts the program at the ENU unit vector u at t [s];
-    not valid beyond MIN_PROGRAM_COSINE."""
+    """Find the rotation that turns the direction of the program at t [s] to the ENU unit vector u.
+
+    The rotation is not valid if its angle is too large (MIN_PROGRAM_COSINE), or if the program does not cover t.
+    """
     b.valid = 0
     if program_track.status(program, t) == Reason.NONE:
         v = program_track.direction(program, t)
@@ -39,7 +49,7 @@ def begin(b, program, t, u):
 
 @compiled
 def clear(b):
-    """Follow the program without a rotation."""
+    """Discard the rotation: the program is followed as it is."""
     b.valid = 0
 
 
@@ -51,9 +61,10 @@ def way(b, program):
 
 @compiled
 def _rotated(w, v):
-    """Return an ENU Vector v of the program after the rotation: v cos + a x v + a (a.v) / (1 + cos) (Rodrigues).
+    """Return an ENU Vector v of the program after the rotation.
 
-    The length of the axis a is the sine of the angle.
+    The formula of Rodrigues gives v cos + a x v + a (a.v) / (1 + cos), for an axis a with the sine of the angle as its
+    length.
     """
     axis = w.axis
     d = cross(axis, v)

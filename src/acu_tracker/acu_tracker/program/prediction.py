@@ -1,7 +1,11 @@
-"""Predictions of the control unit, as tables of earth angles: a satellite by its elements, and the sun.
+"""Predicted tables for the modes tle and sun: earth angles over time of a satellite (by its elements) and of the sun.
 
-A table begins shortly before the time at which it is made. It is replaced in its second half, if possible while its
-target is below the horizon, because then no mode follows it. Refraction is neglected.
+`unit.Acu` calls the Predictor and gives the tables to the law. A table begins shortly before the time at which it is
+made. The table is replaced in its second half, if possible while its target is below the horizon, because then no mode
+follows the table. Refraction is neglected.
+
+Stamps [s] count from an epoch. In realtime the UTC of the epoch is known, in lockstep only by the parameter
+start_time.
 """
 import dataclasses
 import datetime
@@ -31,7 +35,7 @@ ROWS_PER_ORBIT = 5400
 """Number of rows for one revolution of a satellite; a row every second of a low satellite."""
 
 SUN_ROW_INTERVAL_S = 30.0
-"""Time between two rows of the sun [s], in which it moves by 0.13 deg."""
+"""Time between two rows of the table of the sun [s]. In this time the sun moves by 0.13 deg."""
 
 RISE_SEARCH_SPAN_S = 2.0 * SECONDS_PER_DAY
 """Time ahead in which the next rise is searched [s]."""
@@ -64,8 +68,10 @@ class PredictionParameters(Parameters):
 class Predicted(typing.NamedTuple):
     """A predicted table.
 
-    reason: NONE of modes.REASONS, or why there is no table; since, until: stamps [s] from which it is valid, and at
-    which it must be replaced.
+    track   the table; without rows if there is none
+    reason  Reason.NONE, or why there is no table
+    since   stamp from which the table is valid [s]
+    until   stamp at which the table must be replaced [s]
     """
     track: ProgramTrack
     reason: int
@@ -74,15 +80,17 @@ class Predicted(typing.NamedTuple):
 
 
 class Predictor:
-    """Predictions by PredictionParameters, for stamps counted from `epoch` [ns of UTC];
-    epoch 0: the UTC of stamps is unknown."""
+    """Predictions by PredictionParameters.
+
+    epoch: UTC of stamp 0 [ns since 1970]; 0: unknown, then only the parameter start_time can give it.
+    """
 
     def __init__(self, parameters, epoch=0):
         self.parameters, self.epoch = parameters, epoch
         self._satellite = (orbit.satellite(parameters) if parameters.line_1 or parameters.omm else None)
 
     def with_elements(self, line_1, line_2, omm):
-        """Return a Predictor by other elements: a TLE, or an OMM in JSON. Raises ValueError if they are invalid."""
+        """Return a Predictor with other elements: a TLE, or an OMM in JSON. Raise ValueError if they are invalid."""
         if bool(line_1 or line_2) == bool(omm):
             raise ValueError('elements: must be line_1 and line_2, or omm')
         return Predictor(dataclasses.replace(self.parameters, line_1=line_1, line_2=line_2, omm=omm), self.epoch)
@@ -94,7 +102,7 @@ class Predictor:
 
     @property
     def _utc_known(self):
-        """True if UTC is known; in lockstep stamps count from 0."""
+        """True if the UTC of the stamps is known. In lockstep only the parameter start_time gives it."""
         return self.parameters.start_time != '' or self.epoch > 0
 
     def satellite(self, stamp) -> Predicted:
@@ -110,24 +118,26 @@ class Predictor:
         """Return the Predicted of the sun for a stamp [s]."""
         if not self._utc_known:
             return Predicted(NO_TRACK, Reason.NO_UTC)
-        return _table(self._sun_angles, stamp, SUN_ROW_INTERVAL_S)
+        return _table(self.sun_angles, stamp, SUN_ROW_INTERVAL_S)
 
     def diagnostic_values(self, stamp):
-        """Return [(key, text)] at a stamp [s]: azimuth and elevation of the sun, if UTC is known,
-        and the elements, if any."""
-        sun_now = np.degrees(self._sun_angles(np.array([stamp]))[0]) if self._utc_known else ()
+        """Return the values for the diagnostics [(key, text)] at a stamp [s].
+
+        The values are azimuth and elevation of the sun, if UTC is known, and the elements of the satellite, if any.
+        """
+        sun_now = np.degrees(self.sun_angles(np.array([stamp]))[0]) if self._utc_known else ()
         lines = () if self._satellite is None else ('omm',) if self.parameters.omm else ('line_1', 'line_2')
         return [*((f'sun_{axis}_deg', f'{angle:.2f}') for axis, angle in zip(topics.AXES, sun_now)),
                 *((line, getattr(self.parameters, line)) for line in lines)]
 
     def refusal_details(self, mode, reason, stamp):
-        """Return the details of a refusal of a mode for a reason at a stamp [s]; '' for none."""
+        """Return details of the reason for which a mode is refused at a stamp [s]; '' if there are none."""
         if reason == Reason.NO_UTC:
             return 'set `prediction.start_time`'
         if reason == Reason.TOO_OLD:
             return f'epoch {abs(self._age(stamp)):.1f} days from now; must be at most {self.parameters.oldest:g}'
         if reason == Reason.BELOW_HORIZON:
-            rises = _next_rise(self._satellite_angles if mode == Mode.TLE else self._sun_angles, stamp)
+            rises = _next_rise(self._satellite_angles if mode == Mode.TLE else self.sun_angles, stamp)
             if math.isnan(rises):
                 return f'no rise within {RISE_SEARCH_SPAN_S / SECONDS_PER_DAY:g} days'
             return f'next rise at {orbit.iso(*self._julian(rises))}'
@@ -148,11 +158,11 @@ class Predictor:
         return julian - self._satellite.jdsatepoch + fraction - self._satellite.jdsatepochF
 
     def _satellite_angles(self, times):
-        """Return azimuth and elevation (n, 2) [rad] of the satellite at stamps (n,) [s]. Raises TargetError."""
+        """Return azimuth and elevation (n, 2) [rad] of the satellite at stamps (n,) [s]; raise TargetError."""
         julian, fraction = self._julian(0.0)
         return _angles(orbit.enu(self._satellite, self.parameters.station, julian, fraction, times)[0])
 
-    def _sun_angles(self, times):
+    def sun_angles(self, times):
         """Return azimuth and elevation (n, 2) [rad] of the sun at stamps (n,) [s]."""
         julian, fraction = self._julian(0.0)
         fractions = fraction + times / SECONDS_PER_DAY
@@ -169,14 +179,17 @@ def _angles(enu):
 
 
 def _table(angles_at, stamp, interval):
-    """Return the Predicted of angles_at(times), with a row every interval [s]."""
+    """Return the Predicted for a stamp [s].
+
+    angles_at: function of times (n,) [s] that returns the angles (n, 2) [rad]; interval: time between two rows [s].
+    """
     times = np.floor(stamp) - TABLE_LEAD_TIME_S + interval * np.arange(TABLE_ROW_COUNT)
     try:
         angles = angles_at(times)
     except TargetError:
         return Predicted(NO_TRACK, Reason.NO_ELEMENTS)
-    # The table is replaced at its last row below the horizon between the middle and 19/20 of its rows. If there is
-    # none, the table is replaced at 19/20, so that a table is never followed to its end.
+    # The table is replaced at a row between its middle and 19/20 of its rows: at the last one of these rows with the
+    # target below the horizon. Without such a row it is replaced at 19/20, so that it is never followed to its end.
     late = np.arange(TABLE_ROW_COUNT // 2, TABLE_ROW_COUNT * 19 // 20)
     down = late[angles[late, 1] < 0.0]
     return Predicted(ProgramTrack(times, angles), Reason.NONE, float(times[0]),
@@ -184,7 +197,10 @@ def _table(angles_at, stamp, interval):
 
 
 def _next_rise(angles_at, stamp):
-    """Return the stamp [s] of the next rise after a stamp, to a second; NaN if there is none."""
+    """Return the stamp [s] at which the target next rises after a stamp, accurate to a second.
+
+    The result is NaN without a rise within RISE_SEARCH_SPAN_S. angles_at: as in _table.
+    """
     times = stamp + np.arange(0.0, RISE_SEARCH_SPAN_S, RISE_SEARCH_STEP_S)
     try:
         elevation = angles_at(times)[:, 1]

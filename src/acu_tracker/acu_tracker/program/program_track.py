@@ -1,4 +1,8 @@
-"""A time-tagged table of directions: cubic Hermite interpolation with parabolic slopes, so the rate is continuous."""
+"""A program track: a table of times, azimuths and elevations (earth angles), and its interpolation to any instant.
+
+The interpolation is cubic (Hermite). The slope at a row is that of a parabola through the row and its neighbours.
+Therefore the rate is continuous. The predicted tables of a satellite and the sun have the same type.
+"""
 import math
 import typing
 
@@ -19,8 +23,11 @@ STEEP_ELEVATION_RAD = math.radians(80.0)
 
 
 class ProgramTrack(typing.NamedTuple):
-    """times (n,) [s], increasing; angles (n, 2) [rad]: azimuth and elevation in the earth's
-    frame. n = 0: no program."""
+    """A table of directions.
+
+    times   (n,) [s], increasing; n = 0: no program
+    angles  (n, 2): azimuth and elevation in the earth frame [rad]
+    """
     times: np.ndarray
     angles: np.ndarray
 
@@ -34,8 +41,10 @@ class ProgramTrackError(ValueError):
 
 
 def checked(times, angles):
-    """Return the ProgramTrack of times (n,) [s] and angles (n, 2) [rad azimuth, elevation].
-    Raises ProgramTrackError."""
+    """Return the ProgramTrack of times (n,) [s] and angles (n, 2), azimuth and elevation [rad].
+
+    Raise ProgramTrackError for a table that cannot be followed.
+    """
     times, angles = np.array(times, float), np.array(angles, float)
     if times.ndim != 1 or angles.shape != (len(times), 2):
         raise ProgramTrackError(f'program track: times {times.shape}, angles {angles.shape}; must be (n,), (n, 2)')
@@ -50,8 +59,8 @@ def checked(times, angles):
                                 f'must be after {times[back[0]]:g} s')
     high = np.flatnonzero(np.abs(angles[:, 1]) > 0.5 * math.pi)
     if high.size:
-        raise ProgramTrackError(f'program track row {high[0]}: elevation {angles[high[0], 1]:g} rad; '
-                                'must be -1.5708 to 1.5708')
+        raise ProgramTrackError(f'program track row {high[0]}: elevation {math.degrees(angles[high[0], 1]):.6g} deg; '
+                                'must be -90 to 90')
     return ProgramTrack(times, angles)
 
 
@@ -67,14 +76,20 @@ def status(program, t):
 
 @compiled
 def _difference(program, i, axis):
-    """Return the change of an angle [rad] from row i to the next, of the azimuth (axis 0) the short way round."""
+    """Return the change of an angle from row i to the next row [rad]; axis: 0 azimuth, 1 elevation.
+
+    The azimuth changes the short way round.
+    """
     difference = program.angles[i + 1, axis] - program.angles[i, axis]
     return wrap(difference) if axis == 0 else difference
 
 
 @compiled
 def _slope(program, i, axis):
-    """Return the rate at row i of the parabola through its neighbours; at the ends through the nearest three rows."""
+    """Return the rate of an angle at row i [rad/s], from the parabola through this row and its neighbours.
+
+    At the first and the last row it is the parabola through the nearest three rows.
+    """
     times = program.times
     if len(times) == 2:
         return _difference(program, 0, axis) / (times[1] - times[0])
@@ -87,8 +102,12 @@ def _slope(program, i, axis):
 
 @compiled
 def _hermite(y0, d, m0, m1, x, T):
-    """Return the AxisMotion at the fraction x of an interval of T [s],
-    from y0 to y0 + d with slopes m0 / T and m1 / T at its ends."""
+    """Return the AxisMotion of the cubic polynomial on an interval of T [s].
+
+    y0, d   value at the begin of the interval, and its change to the end
+    m0, m1  slopes at the begin and at the end, times T
+    x       place in the interval, 0 at its begin, 1 at its end
+    """
     c2, c3 = 3.0 * d - 2.0 * m0 - m1, m0 + m1 - 2.0 * d
     return AxisMotion(y0 + x * (m0 + x * (c2 + x * c3)), (m0 + x * (2.0 * c2 + 3.0 * x * c3)) / T,
                       (2.0 * c2 + 6.0 * x * c3) / (T * T))
@@ -96,7 +115,7 @@ def _hermite(y0, d, m0, m1, x, T):
 
 @compiled
 def interpolated(program, t, axis):
-    """Return the AxisMotion of axis 0 (azimuth, the short way round) or 1 (elevation) at t [s]."""
+    """Return the AxisMotion of one axis at t [s], interpolated; axis: 0 azimuth, 1 elevation."""
     times = program.times
     i = interval(times, t)
     T = times[i + 1] - times[i]
@@ -106,13 +125,13 @@ def interpolated(program, t, axis):
 
 @compiled
 def _component(program, i, axis):
-    """Return a component (0 east, 1 north, 2 up) of the unit vector of row i."""
+    """Return a component of the unit vector at row i; axis: 0 east, 1 north, 2 up."""
     return earth_direction(program.angles[i, 0], program.angles[i, 1])[axis]
 
 
 @compiled
 def _component_slope(program, i, axis):
-    """Return the `_slope` of a component."""
+    """Return the rate of a component of the unit vector at row i [1/s], computed as in _slope."""
     times = program.times
     m = min(max(i, 1), len(times) - 2)
     before, after = times[m] - times[m - 1], times[m + 1] - times[m]
@@ -124,7 +143,7 @@ def _component_slope(program, i, axis):
 
 @compiled
 def _interpolated_component(program, i, t, axis):
-    """Return a component, its rate and acceleration at t between rows i and i + 1, interpolated as the angles are."""
+    """Return (component of the unit vector, its rate, its acceleration) at t [s] between rows i and i + 1."""
     times = program.times
     T = times[i + 1] - times[i]
     y0 = _component(program, i, axis)
@@ -136,8 +155,8 @@ def _interpolated_component(program, i, t, axis):
 def motion_at(program, t):
     """Return the Motion in earth angles at t [s].
 
-    Between two rows above STEEP_ELEVATION_RAD the unit vector is interpolated instead of the angles, because there the
-    azimuth may change by any amount.
+    Between two rows above STEEP_ELEVATION_RAD the unit vector is interpolated, not the angles. The reason is that near
+    the zenith the azimuth may change by any amount from row to row.
     """
     i = interval(program.times, t)
     if min(program.angles[i, 1], program.angles[i + 1, 1]) < STEEP_ELEVATION_RAD or len(program.times) < 3:
@@ -159,7 +178,7 @@ def direction(program, t):
 
 @compiled
 def azimuth_travel(program, t):
-    """Return the Travel of the azimuth from its value at t [s] until the end of the program."""
+    """Return the Travel of the azimuth from t [s] until the end of the program, relative to its value at t."""
     first = interval(program.times, t)
     here = interpolated(program, t, 0).angle - program.angles[first, 0]
     at, below, above = 0.0, 0.0, 0.0

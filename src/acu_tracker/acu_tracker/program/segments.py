@@ -1,6 +1,7 @@
-"""The program track in segments, as they are received: appended while it runs, with gaps where rows are missing.
+"""The program track in segments: messages that an operator sends one after the other while the track is followed.
 
-A turnaround is the motion of the axes from the last row of one segment to the first row of the next.
+A segment is one table. Two segments without a gap between them are joined to one piece. A gap is a time in which rows
+are missing. A turnaround is the motion of the axes from the last row of one segment to the first row of the next.
 """
 import math
 import typing
@@ -11,19 +12,24 @@ from acu_tracker.program.program_track import NO_TRACK, ProgramTrack, ProgramTra
 from pedestal_common.graph.topics import AXES
 
 MAX_GAP_INTERVALS = 3.0
-"""Largest gap between two segments that are joined [row intervals]. The row interval is the shorter one of the last
-interval of the earlier segment and the first interval of the later segment."""
+"""Longest time between two segments that counts as no gap, in row intervals; the two segments are then joined.
+
+The row interval is the shorter of two times: between the last two rows of the earlier segment, and between the first
+two rows of the later one.
+"""
 
 
 class TurnaroundError(ProgramTrackError):
-    """A segment that begins where the axes cannot be in time; the message names axis, value and limit."""
+    """Error of a segment whose first row the axes cannot reach in time; the message names axis, value and limit."""
 
 
 class DuePiece(typing.NamedTuple):
-    """The piece to follow at a stamp.
+    """The piece that is due at a stamp.
 
-    in_gap: True if rows are missing at the stamp, because the piece begins later; until: stamp [s] at which another
-    piece follows, inf for none.
+    piece   the table of the piece
+    in_gap  True if the stamp is between the end of the piece before and the beginning of this piece, where rows are
+            missing
+    until   end of this piece, from which on the next piece is due [s]; inf: no next piece
     """
     piece: ProgramTrack
     in_gap: bool
@@ -31,9 +37,9 @@ class DuePiece(typing.NamedTuple):
 
 
 class Segments:
-    """The pieces of a program track without a gap, in order of time.
+    """The pieces of a program track, in order of time; inside a piece there is no gap.
 
-    limits: (rate [rad/s], acceleration [rad/s2]) of each axis, by which a turnaround between two segments is judged.
+    limits: (rate [rad/s], acceleration [rad/s2]) of each axis, which a turnaround must not exceed.
     """
 
     def __init__(self, limits):
@@ -41,11 +47,14 @@ class Segments:
         self._pieces = []
 
     def append(self, times, angles, now, followed):
-        """Take a segment. Raises ProgramTrackError, without a change.
+        """Take a segment; for a wrong one raise ProgramTrackError and change nothing.
 
-        A segment that begins at `now` [s] or before is another program and replaces all pieces. A later segment
-        replaces the rows from its first row on, and is joined to the rows before it unless there is a gap. `followed`:
-        whether a mode follows the track, so that turnarounds are checked.
+        times, angles  of the segment, as in program_track.checked
+        now            present stamp [s]
+        followed       True if a mode follows the track; then turnarounds are checked
+
+        A segment that begins at `now` or before is a new program and replaces all pieces. A later segment replaces the
+        rows from its first row on. The later segment is joined to the rows before it unless there is a gap.
         """
         new = checked(times, angles)
         if new.times[0] <= now:
@@ -63,8 +72,10 @@ class Segments:
         self._pieces = [*kept, new]
 
     def _check_turnaround(self, before, after):
-        """Raise TurnaroundError if the axes would exceed their rate or acceleration,
-        on average between one segment and the next."""
+        """Raise TurnaroundError if an axis would exceed its limits on the way from one segment to the next.
+
+        The mean rate and the mean acceleration on this way are compared with the limits.
+        """
         time = after.times[0] - before.times[-1]
         for i, axis in enumerate(AXES):
             max_rate, max_acceleration = self._limits[i]
@@ -73,11 +84,11 @@ class Segments:
             rate = abs(math.remainder(distance, 2.0 * math.pi) if i == 0 else distance) / time
             acceleration = abs(rate_after - rate_before) / time
             if rate > max_rate:
-                raise TurnaroundError(f'turnaround too fast: {axis} {rate:g} rad/s; must be at most '
-                                      f'{max_rate:g} rad/s')
+                raise TurnaroundError(f'turnaround too fast: {axis} {math.degrees(rate):.4g} deg/s; must be at most '
+                                      f'{math.degrees(max_rate):.4g} deg/s')
             if acceleration > max_acceleration:
-                raise TurnaroundError(f'turnaround too fast: {axis} {acceleration:g} rad/s2; must be at most '
-                                      f'{max_acceleration:g} rad/s2')
+                raise TurnaroundError(f'turnaround too fast: {axis} {math.degrees(acceleration):.4g} deg/s2; must be '
+                                      f'at most {math.degrees(max_acceleration):.4g} deg/s2')
 
     def at(self, t):
         """Return the DuePiece at t [s]: the first piece that has not ended, or the last piece."""
@@ -89,11 +100,11 @@ class Segments:
 
 
 def _rows(piece, begin, end):
-    """Return the rows of a piece from three before `begin` [s], but at least its last three,
-    to `end` [s] (exclusive).
+    """Return the rows of a piece that are kept: from three rows before `begin` [s] to the last row before `end` [s].
 
-    Because the slope at a row follows from its neighbours, three rows keep the path at `begin` as it was. Three rows
-    also give the slope at the end of a piece.
+    If the piece ends before `begin`, its last three rows are kept. The slope at a row follows from this row and its
+    two neighbours. Three rows before `begin` therefore keep the path at `begin` unchanged, and the last three rows of
+    a piece that has ended keep the slope at its end.
     """
     first = max(min(int(np.searchsorted(piece.times, begin)), len(piece.times)) - 3, 0)
     last = int(np.searchsorted(piece.times, end))
@@ -106,7 +117,7 @@ def _last_interval(piece):
 
 
 def _rate(piece, row, i):
-    """Return the rate [rad/s] of axis i between a row of a piece and the next."""
+    """Return the mean rate [rad/s] of axis i from a row of a piece to the next row."""
     distance = piece.angles[row + 1, i] - piece.angles[row, i]
     distance = math.remainder(distance, 2.0 * math.pi) if i == 0 else distance
     return distance / (piece.times[row + 1] - piece.times[row])

@@ -1,10 +1,13 @@
-"""Position of the sun: the low-precision formula of the Astronomical Almanac, within 0.01 deg from 1950 to 2050.
+"""Position of the sun, for the mode sun and the diagnostics.
+
+The formula is the low-precision one of the Astronomical Almanac, with an error below 0.01 deg from 1950 to 2050.
 
     n          days since 2000-01-01 12:00 (J2000)
-    L, g       mean longitude, corrected for aberration, and mean anomaly of the sun
-    longitude  ecliptic longitude; its latitude is 0
-    obliquity  obliquity of the ecliptic
-    R          distance [AU]
+    L          mean longitude of the sun, corrected for aberration [rad]
+    g          mean anomaly of the sun [rad]
+    longitude  ecliptic longitude of the sun [rad]; its ecliptic latitude is 0
+    obliquity  obliquity of the ecliptic [rad]
+    R          distance from the earth [AU]
 
 The Astronomical Almanac (US Naval Observatory, HM Nautical Almanac Office), section C,
 "Low precision formulas for the Sun".
@@ -21,7 +24,10 @@ J2000 = 2451545.0
 
 
 def position(n):
-    """Return the geocentric position (m, 3) [m], equator and equinox of date, at days n (m,) since J2000."""
+    """Return the geocentric positions (m, 3) of the sun [m] at days n (m,) since J2000.
+
+    The frame is that of the equator and the equinox of date.
+    """
     L, g = np.radians(280.460 + 0.9856474 * n), np.radians(357.528 + 0.9856003 * n)
     longitude = L + np.radians(1.915 * sin(g) + 0.020 * sin(2.0 * g))
     obliquity = np.radians(23.439 - 4e-7 * n)

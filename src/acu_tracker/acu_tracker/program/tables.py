@@ -1,4 +1,7 @@
-"""The tables of directions that a mode may follow: the program, a satellite by its elements, the sun."""
+"""The tables of directions that a mode may follow: the program track, a predicted satellite (tle), the sun.
+
+`unit.Acu` keeps the Tables up to date; the law of the control unit reads them.
+"""
 import collections
 import math
 
@@ -15,14 +18,17 @@ Tables = collections.namedtuple('Tables', [row.name for row in TABLE_MODES])  # 
 """One ProgramTrack for each mode that follows a table, the program first."""
 
 NO_TABLES = Tables(*(NO_TRACK for _ in TABLE_MODES))
+"""Tables without a row."""
 
 TABLE_INDEX = tuple(TABLE_MODES.index(row) if row.table else 0 for row in modes.MODE_ROWS)
 """Index in Tables of the table of each mode; 0, the program, for a mode that follows none."""
 
 
 def shifted(track, offset):
-    """Return a ProgramTrack with an offset (time [s], azimuth, elevation [rad]);
-    elevations are limited to the zenith."""
+    """Return a ProgramTrack with an offset (time [s], azimuth, elevation [rad]) added to each row.
+
+    The shifted elevations are limited to the zenith.
+    """
     if not any(offset):
         return track
     time, *angles = offset
@@ -33,5 +39,5 @@ def shifted(track, offset):
 
 @compiled
 def of_mode(tables, mode):
-    """Return the table that a mode follows; the program if it follows none."""
+    """Return the table that a mode follows; for a mode that follows no table, return the program."""
     return tables[TABLE_INDEX[mode]]

@@ -1,11 +1,15 @@
-"""Search, acquisition and loss of a target by the level of its signal.
+"""Search, acquisition and loss of a target by its signal level: laws of the modes search, acquire and steptrack.
 
-Modules: `level` separates signal from noise. `pattern` leads the beam over an area that may contain the target.
-`side_lobe` and `slope_check` judge a signal before the loop is closed on it. `step_track` follows a level if there is
-no angle error. `coast` limits the time of pointing without a signal. `acquisition` combines them.
+level                    separates the signal from noise
+pattern                  leads the beam over an area that may contain the target
+place                    expected place of a target that was lost
+side_lobe, slope_check   test a signal before autotrack closes the loop on it
+step_track               follows the level if the receiver measures no angle error
+coast                    limits the time of autotrack without a signal
+acquisition              combines the other modules; `mode.signal_level_modes` calls it
 
     b       half-power beamwidth                                            [rad]
-    z       level of the sum channel, C/N0                                  [dB-Hz]
+    z       signal level: C/N0 of the sum channel of the receiver           [dB-Hz]
     x, e    offset of the beam from the expected place of the target, in cross-elevation and elevation [rad]
     tau     time constant with which the receiver smooths its level         [s]
     v       speed of the beam along a pattern                               [rad/s]

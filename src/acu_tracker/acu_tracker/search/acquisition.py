@@ -1,17 +1,20 @@
-"""From a lost target to a signal on which the loop may be closed: search, acquire, step track, as offsets of the beam.
+"""The modes search and acquire: the motion of the beam from a lost target to a signal on which autotrack can begin.
 
-Search leads the beam over the last place, the small area and the full one. After the level has passed its peak,
-acquire returns to the peak and
+The mode search leads the beam over the last place of the target, a small area and the full area. After the level has
+passed its peak, the mode acquire returns the beam to the peak. Acquire has these phases:
 
-    settles         until the level is that of the new place,
-    looks around    unless the expected level shows the main lobe; goes to the best place and settles,
-    peaks           by the level at a step to either side of both axes, as step track does,
-    checks          the sign of the slopes on a small circle, and goes to the direction of the errors.
+    settle         wait until the level is that of the new place
+    look around    visit six places around the peak, go to the best one and settle there. This phase is left out if the
+                   expected level shows that the beam is in the main lobe
+    peak           measure the level one step to either side in both axes, as step track does, and go to the peak
+    check          move on a small circle to check the sign of the slopes of the receiver errors, then go to the
+                   direction that the errors show
 
-Every offset is relative to the expected place of the target, which the caller supplies. An offset may jump, because
-the shaper of each axis smooths the motion.
+The result is the offset of the beam from the expected place of the target; the caller supplies this place. An offset
+may jump, because the shaper of each axis smooths the motion.
 
-s: record of ACQUISITION_DTYPE; b, beamwidth: half-power beamwidth [rad]; z: level of the signal, C/N0 [dB-Hz].
+s: record of ACQUISITION_DTYPE; p: record of AcquisitionParameters, except where a function states otherwise;
+beamwidth: half-power beamwidth [rad]; z: signal level, C/N0 [dB-Hz].
 """
 import math
 
@@ -31,41 +34,52 @@ ACQUISITION_DTYPE = np.dtype([
     ('phase', 'i8'), ('since', 'f8'), ('place_number', 'i8'), ('levels', 'f8', (1 + side_lobe.LOOK_AROUND_PLACES,)),
     ('look_around_count', 'i8'), ('peak_count', 'i8'), ('wrong_slope_count', 'i8'), ('fair', 'f8'),
 ], align=True)
-"""place: the expected one without a program; began: begin of search or acquire [s]; radius: of the small area [rad].
-`peak`: highest level so far [dB-Hz]; centre: offset of its place, in cross-elevation and elevation [rad]. `phase`: of
-acquire, entered at `since` [s]; place_number: of the place in the phase, 0 for the centre; levels: at the places
-before it. `look_around_count`, `peak_count`: numbers of look-arounds and of peaks so far; wrong_slope_count: number of
-wrong slope checks. `fair`: time at which the level of autotrack was last that of the main lobe [s]."""
+"""State of search and acquire.
+
+level, slopes, step_track  states of the modules of the same names (slopes: slope_check)
+place               expected place of the target without a program
+began               begin of search or acquire [s]
+radius              radius of the small area [rad]
+peak                highest level so far [dB-Hz]
+centre              offset of the beam from the expected place: of the highest level in search, then the present centre
+                    of acquire, or the offset of step track; cross-elevation, elevation [rad]
+phase, since        phase of acquire, and the time at which it or its present place began [s]
+place_number        number of the present place in the phase; 0: the centre
+levels              levels at the places of the phase [dB-Hz]
+look_around_count, peak_count  numbers of the phases look around and peak so far
+wrong_slope_count   number of slope checks with a wrong slope
+fair                last time at which the level was not suspected to be that of a side lobe [s]
+"""
 
 LEVEL_SETTLING_LAGS = 4.0
-"""Number of time constants after which a level is that of a new place."""
+"""Number of time constants of the level after which it is that of a new place."""
 
 PEAK_DROP_DB = 1.0
-"""Drop of the level behind its peak at which the beam returns [dB]."""
+"""Drop of the level below its peak at which search ends and the beam returns to the peak [dB]."""
 
 MAX_RISE_TIME_S = 1.0
-"""Longest time for which a level may keep rising [s]."""
+"""Time for which the level may stay above its threshold before search ends without a drop [s]."""
 
 CIRCLE_RADIUS_BEAMWIDTHS, CIRCLE_PERIOD_S, CIRCLE_TURN_COUNT = 0.1, 0.5, 2.0
-"""Circle of the slope check: radius [beamwidths], time of a turn [s], number of turns;
-the circle opens in the first."""
+"""Circle of the slope check: radius [beamwidths], time of a turn [s], number of turns. The radius grows during the
+first turn."""
 
 MIN_CHECK_ERROR_COUNT = 50
 """Least number of errors in a slope check."""
 
 MAX_LOOK_AROUND_COUNT = 4
-"""Number of look-arounds after which acquire continues with the present place."""
+"""Number of phases `look around` after which acquire continues with the present place."""
 
 PEAK_STEP_BEAMWIDTHS, MAX_PEAK_MOVE_BEAMWIDTHS = 0.3, 0.7
-"""Step to either side of a peak, and longest move to it [beamwidths]; after a move beyond PEAK_STEP_BEAMWIDTHS the
-peak is repeated."""
+"""Phase `peak`: step to either side of the centre, and longest move of the centre [beamwidths]. After a move beyond
+the length of the step the phase is repeated."""
 
 MAX_PEAK_COUNT = 3
-"""Largest number of peaks before a slope check."""
+"""Largest number of phases `peak` before a slope check."""
 
 PEAK_OFFSETS_BEAMWIDTHS = ((0.0, 0.0), (PEAK_STEP_BEAMWIDTHS, 0.0), (-PEAK_STEP_BEAMWIDTHS, 0.0),
                            (0.0, PEAK_STEP_BEAMWIDTHS), (0.0, -PEAK_STEP_BEAMWIDTHS))
-"""Places of a peak [beamwidths]."""
+"""Offsets of the places of the phase `peak` from the centre: cross-elevation, elevation [beamwidths]."""
 
 
 def initialise(s):
@@ -75,22 +89,24 @@ def initialise(s):
 
 @compiled
 def take_level(s, p, z, stamp, locked):
-    """Take the level z [dB-Hz] of a stamp [s]; locked: whether the receiver measures angle errors. p: record of
-    AcquisitionParameters."""
+    """Take the level z [dB-Hz] of a stamp [s]; locked: True if the receiver measures angle errors."""
     level.take(s.level, p, z, stamp, locked)
 
 
 @compiled
 def learn(s, p, z, stamp):
-    """Take a level [dB-Hz] of a stamp [s] that is noise only; call it before `take_level`."""
+    """Take a level z [dB-Hz] of noise alone, measured at a stamp [s]. Call this function before `take_level`."""
     if stamp > s.level.stamp and math.isfinite(z) and math.isfinite(s.level.stamp):
         level.learn(s.level, p, z, min(stamp - s.level.stamp, p.time_constant))
 
 
 @compiled
 def begin_search(s, p, beamwidth, t, sigma):
-    """Start a search at t [s]; sigma: standard deviation of the expected place [rad], NaN if unknown. p: record of
-    SearchParameters."""
+    """Start a search at t [s].
+
+    p: record of SearchParameters; sigma: standard deviation of the expected place [rad], NaN if it is not known. The
+    radius of the small area is at least 2 sigma.
+    """
     s.began = t
     s.radius = p.small * beamwidth
     if 2.0 * sigma > s.radius:
@@ -102,7 +118,10 @@ def begin_search(s, p, beamwidth, t, sigma):
 
 @compiled
 def area(s, p, tau, beamwidth, full):
-    """Return the pattern.Area of the small or the full stage; tau: time constant of the level [s]."""
+    """Return the pattern.Area of the small area, or of the full area if `full` is True.
+
+    p: record of SearchParameters; tau: time constant of the level [s].
+    """
     radius = p.full * beamwidth if full else s.radius
     return Area(p.pattern, radius, p.across * radius, p.pitch * beamwidth,
                 pattern.highest_speed(beamwidth, tau, p.speed))
@@ -110,8 +129,10 @@ def area(s, p, tau, beamwidth, full):
 
 @compiled
 def searched(s, p, tau, beamwidth, t):
-    """Return (Point of the beam along and across the track at t [s], whether all rounds are over); p: record of
-    SearchParameters."""
+    """Return (Point of the beam at t [s], along and across the track of the target; True if all rounds are over).
+
+    p: record of SearchParameters; tau: time constant of the level [s].
+    """
     small, full = area(s, p, tau, beamwidth, False), area(s, p, tau, beamwidth, True)
     T_small, T_full = pattern.duration(small), pattern.duration(full)
     t -= s.began + p.wait
@@ -130,21 +151,23 @@ def set_offset(s, x, e):
 
 @compiled
 def note_fair_level(s, t, fair):
-    """Keep t [s] if the level of autotrack is fair."""
+    """Keep the time t [s] if the level is fair: not suspected to be that of a side lobe."""
     if fair:
         s.fair = t
 
 
 @compiled
 def waiting(s, p, t):
-    """Return True while the search at t [s] still stays at the last place."""
+    """Return True while the search at t [s] still waits at the last place; p: record of SearchParameters."""
     return t < s.began + p.wait
 
 
 @compiled
 def note_peak(s, offset):
-    """Keep the offset (x, e) [rad] if the level is the highest so far;
-    offset: of the beam when the receiver measured it."""
+    """Keep the offset if the level is the highest so far.
+
+    offset: cross-elevation and elevation of the beam when the receiver measured the level [rad].
+    """
     if s.level.z > s.peak:
         s.peak = s.level.z
         s.centre[0], s.centre[1] = offset
@@ -152,13 +175,13 @@ def note_peak(s, offset):
 
 @compiled
 def peak_passed(s, p):
-    """Return True if there was a signal and the beam has passed its peak. p: record of AcquisitionParameters."""
+    """Return True if there is a signal and the beam has passed its peak, or has had the signal for MAX_RISE_TIME_S."""
     return level.detected(s.level, p) and (s.level.z < s.peak - PEAK_DROP_DB or s.level.above_detect > MAX_RISE_TIME_S)
 
 
 @compiled
 def begin_acquire(s, t):
-    """Start to acquire the signal at the centre at t [s]."""
+    """Start the mode acquire at t [s], with the beam at the centre."""
     s.began, s.look_around_count, s.peak_count, s.wrong_slope_count = t, 0, 0, 0
     s.levels[:] = -math.inf
     _enter(s, Phase.SETTLE, t)
@@ -172,8 +195,7 @@ def _enter(s, phase, t):
 
 @compiled
 def acquire(s, p, beamwidth, t, distance):
-    """Advance acquire to t [s]; distance: measured range of the target [m], NaN for none. p: record of
-    AcquisitionParameters."""
+    """Advance the mode acquire to t [s]; distance: measured range of the target [m], NaN if there is none."""
     settled = t - s.since >= LEVEL_SETTLING_LAGS * p.time_constant
     if s.phase == Phase.SETTLE and settled:
         s.levels[0] = s.level.z
@@ -197,7 +219,7 @@ def acquire(s, p, beamwidth, t, distance):
 
 @compiled
 def _go_to_best(s, beamwidth, t):
-    """After a look-around, settle at the best place, or peak here if no place is better."""
+    """End the phase `look around`: settle at the best place, or begin the phase `peak` if no place is better."""
     chosen = side_lobe.best(s.levels)
     x, e = side_lobe.place(chosen, beamwidth)
     s.centre[0] += x
@@ -210,14 +232,14 @@ def _go_to_best(s, beamwidth, t):
 
 @compiled
 def _peak(s, t):
-    """Begin the steps to either side of the present place. Its level is known, so the first step is place 1."""
+    """Begin the phase `peak` with place 1, because the level at the centre (place 0) is known."""
     _enter(s, Phase.PEAK, t)
     s.place_number, s.peak_count = 1, s.peak_count + 1
 
 
 @compiled
 def _go_to_peak(s, beamwidth, t):
-    """After the steps to either side, go to the peak, and check the slopes there unless it was far."""
+    """End the phase `peak`: go to the peak, and check the slopes there. If the peak was far, repeat the phase."""
     far = False
     for i in range(2):
         move = step_track.peak(s.levels[1 + 2 * i], s.levels[2 + 2 * i], PEAK_STEP_BEAMWIDTHS * beamwidth, beamwidth)
@@ -232,11 +254,11 @@ def _go_to_peak(s, beamwidth, t):
 
 @compiled
 def _apply_verdict(s, t):
-    """After the circle, go to the direction of the errors if the slopes are right; give up if they are wrong twice."""
+    """End the slope check: go to the direction of the errors if the slopes are right; fail if they are wrong twice."""
     verdict = slope_check.verdict(s.slopes, MIN_CHECK_ERROR_COUNT)
     if verdict == slope_check.VERDICT_RIGHT:
-        # The mean error over whole turns is the error at the centre. There the errors are on the straight part of
-        # their curve, and consistent for the filter.
+        # The mean error over whole turns of the circle is the error at the centre. After this move the errors are
+        # small, on the straight part of the error curve, as the filter expects.
         s.centre[0] += s.slopes.e[0]
         s.centre[1] += s.slopes.e[1]
         s.phase = Phase.CHECKED
@@ -251,7 +273,7 @@ def _apply_verdict(s, t):
 
 @compiled
 def acquired(s, beamwidth, t):
-    """Return the Point of the beam at t [s] in cross-elevation and elevation."""
+    """Return the Point of the beam in the mode acquire at t [s], in cross-elevation and elevation."""
     x, e = s.centre[0], s.centre[1]
     if s.phase == Phase.LOOK_AROUND:
         aside, up = side_lobe.place(s.place_number, beamwidth)
@@ -267,16 +289,18 @@ def acquired(s, beamwidth, t):
 
 @compiled
 def take_error(s, expected, error):
-    """Take an error of the receiver while the slopes are checked; expected: offset of the target's expected place from
-    the beam at the time of the measurement, both (cross-elevation, elevation) [rad]."""
+    """Take an error of the receiver during the slope check.
+
+    expected  offset of the expected place of the target from the beam when the error was measured
+    error     the error; both are (cross-elevation, elevation) [rad]
+    """
     if s.phase == Phase.CHECK:
         slope_check.take(s.slopes, expected, error)
 
 
 @compiled
 def failed(s, p, t):
-    """Return True if acquire gives up at t [s]: the signal at the centre is lost, or the timeout is over. p: record of
-    AcquisitionParameters."""
+    """Return True if acquire gives up at t [s]: the signal at the centre is lost, or the timeout is over."""
     at_centre = s.phase != Phase.LOOK_AROUND and s.phase != Phase.PEAK
     settled = at_centre and t - s.since > LEVEL_SETTLING_LAGS * p.time_constant
     return t - s.began > p.timeout or (settled and s.level.below_loss >= p.loss_time)

@@ -1,16 +1,23 @@
-"""The level of the signal: its noise, and the presence of a target in the beam.
+"""Detection of a target by the signal level: the noise is learnt, and the level is compared with thresholds above it.
 
-Off target the level z has a mean m and a variance V, learnt over the last `learn_time` by n samples of length T,
+The level z is the C/N0 of the receiver [dB-Hz]. While the beam is off the target, z has a mean m and a variance V.
+Both are learnt over the last learn_time from samples:
 
     w = max(1/n, T / learn_time),    d = z - m,    m += w d,    V = (1 - w) (V + w d^2)
 
-(Finch, Incremental calculation of weighted mean and variance, 2009, section 9). There are three thresholds above m:
+    n   number of samples so far
+    T   time since the previous sample [s]
+    w   weight of the new sample [-]
+
+The formulas are those of Finch (Incremental calculation of weighted mean and variance, 2009, section 9). There are
+three thresholds above m:
 
     detect = m + 4 sqrt(V)    a level above it for acquire_time begins the mode acquire
     track  = detect + 1 dB    after a level above it for acquire_time, a target is present
     loss   = detect - 2 dB    after a level below it for loss_time, no target is present
 
-The threshold loss is at least m + 2 sqrt(V), because below that the noise itself would hold the target.
+The threshold loss is at least m + 2 sqrt(V). With a lower threshold the noise alone would count as a target after the
+target is lost.
 
 s, p: records of LEVEL_DTYPE and of AcquisitionParameters.
 """
@@ -24,9 +31,14 @@ from pedestal_common.compiled import compiled
 LEVEL_DTYPE = np.dtype([('mean', 'f8'), ('variance', 'f8'), ('samples', 'i8'), ('learnt', 'f8'),
                         ('z', 'f8'), ('stamp', 'f8'), ('above_detect', 'f8'), ('above_track', 'f8'),
                         ('below_loss', 'f8'), ('present', 'i8')], align=True)
-"""mean, variance: m [dB-Hz], V [dB2]; samples, learnt: their number and total length [s]; z, stamp: the last level and
-its stamp [s]. `above_detect`, `above_track`, `below_loss`: time for which the level has been there [s]; present:
-whether there is a target."""
+"""State of the detection.
+
+mean, variance   m [dB-Hz] and V [dB2]
+samples, learnt  number n of the samples of noise, and their total duration [s]
+z, stamp         last level [dB-Hz] and its stamp [s]
+above_detect, above_track, below_loss  time for which the level has been above or below the threshold [s]
+present          1 if there is a target
+"""
 
 Thresholds = namedtuple('Thresholds', 'detect track loss')
 """Thresholds of the level [dB-Hz]."""
@@ -38,12 +50,12 @@ MIN_LOSS_SIGMAS = 2.0
 """Least height of the loss threshold above the mean noise, in standard deviations of the noise."""
 
 TRACK_MARGIN_DB, LOSS_MARGIN_DB = 1.0, -2.0
-"""Heights of the thresholds track and loss above the detection threshold [dB]."""
+"""Heights of the thresholds track and loss relative to the threshold detect [dB]."""
 
 
 @compiled
 def known(s, p):
-    """Return True if the noise has been learnt."""
+    """Return True if the noise is known: learnt for at least learn_time."""
     return s.learnt >= p.learn_time
 
 
@@ -57,8 +69,10 @@ def thresholds(s):
 
 @compiled
 def learn(s, p, z, T):
-    """Take a level z [dB-Hz] off target, T [s] after the last; a level above the known noise is ignored. p: record of
-    AcquisitionParameters."""
+    """Take a level z [dB-Hz] that was measured off the target, T [s] after the last one.
+
+    A level above the known noise is ignored.
+    """
     if known(s, p) and z > thresholds(s).detect:
         return
     s.samples += 1
@@ -73,7 +87,7 @@ def learn(s, p, z, T):
 def take(s, p, z, stamp, locked):
     """Take the level z [dB-Hz] of a stamp [s]; an older stamp has no effect, an equal stamp adds no time.
 
-    locked: whether the receiver measures angle errors. Until the noise is known, only this shows a target.
+    locked: True if the receiver measures angle errors. Until the noise is known, only the lock shows a target.
     """
     T = stamp - s.stamp if math.isfinite(s.stamp) else 0.0
     if not T >= 0.0 or not math.isfinite(z):
@@ -102,13 +116,13 @@ def detected(s, p):
 
 @compiled
 def restart_noise(s, p):
-    """Restart to learn the noise if it is not known yet, because a signal has come."""
+    """Discard the samples of noise if the noise is not known yet: they may contain a signal."""
     if not known(s, p):
         s.samples, s.learnt, s.mean, s.variance = 0, 0.0, 0.0, 0.0
 
 
 @compiled
 def restart_times(s):
-    """Restart the times, because the beam has moved to another place."""
+    """Set the times above and below the thresholds to 0, because the beam has moved to another place."""
     s.above_detect = s.above_track = s.below_loss = 0.0
     s.present = 0

@@ -7,8 +7,11 @@ from pedestal_common.parameters import ParameterError, Parameters, choice, param
 
 @dataclasses.dataclass(frozen=True)
 class StepTrackParameters(Parameters):
-    """Parameters of mode steptrack: the step of the antenna controller GD 7200, with a shorter cycle, for faster
-    targets, and a smaller deadband."""
+    """Parameters of the mode steptrack.
+
+    The step is that of the antenna controller GD 7200. The cycle is shorter, for faster targets; the deadband is
+    smaller.
+    """
 
     cycle: float = parameter(20.0, 1.0, 3600.0, 's', 'period of the climbs; 120 s in the GD 7200')
     step: float = parameter(0.08, 0.01, 0.3, 'beamwidths', 'step of the beam to either side')
@@ -18,7 +21,10 @@ class StepTrackParameters(Parameters):
 
 @dataclasses.dataclass(frozen=True)
 class SearchParameters(Parameters):
-    """Parameters of mode search: the last place, a small area, the full area, and again."""
+    """Parameters of the mode search: the beam waits at the last place, covers a small area, then the full area.
+
+    Small and full area are repeated for a number of rounds.
+    """
 
     pattern: str = choice('spiral', SEARCH_PATTERNS, 'search path; square and raster lie along the track')
     wait: float = parameter(2.5, 0.0, 600.0, 's', 'time at the last place, in which the noise is learnt')

@@ -1,15 +1,19 @@
-"""Search patterns: the path of the beam about the expected place of the target, a pure function of time.
+"""Search patterns: the path on which the beam covers an area around the expected place of the target.
 
-The path passes every place of the area within half a pitch; the square passes a few places near its centre within 0.57
-of a pitch. The beam moves at a constant speed
+The path is a pure function of time. The path passes every place of the area within half a pitch; the pitch is the
+distance between neighbouring lines. Only the square passes a few places near its centre within 0.57 of a pitch. The
+beam moves along its path at a constant speed v:
 
     v <= b / (4 tau)
 
-along its path, so that the target is within the beam for about four time constants of the level. After four time
-constants a smoothed level has 98 % of its final value. b: beamwidth [rad];
-tau: time constant with which the receiver smooths the level [s].
-The beam starts from rest in SPEED_RISE_TIME_S, and rests for an instant in each corner: offset and rate have no jump
-there. The spiral has no corner and ends at full speed, so its rate jumps to zero at its end.
+    b     beamwidth [rad]
+    tau   time constant with which the receiver smooths the level [s]
+
+The target is then within the beam for about four time constants of the level. After this time a smoothed level has
+98 % of its final value.
+
+The beam reaches its speed in SPEED_RISE_TIME_S, and is at rest for an instant in each corner. Therefore offset and
+rate have no jump. The exception is the end of the spiral, where the rate jumps from full speed to zero.
 """
 import math
 from collections import namedtuple
@@ -21,7 +25,8 @@ PATTERN_SPIRAL, PATTERN_RASTER, PATTERN_SQUARE, PATTERN_SECTOR = range(len(SEARC
 """Shapes of a pattern.
 
     spiral      Archimedean
-    raster      lines along the track of the target, the middle line first: a late prediction is off along the track
+    raster      lines along the track of the target, the middle line first, because a target that is early or late is
+                on its track
     square      expanding, along the track and across
     sector      lines from one edge of the area to the other
 """
@@ -30,30 +35,41 @@ SPEED_RISE_TIME_S = 0.2
 """Time in which the beam reaches its speed, and in which it stops [s]."""
 
 Area = namedtuple('Area', 'pattern radius across pitch speed')
-"""Area and pattern of a search. pattern: its code; radius: half length along the track, across: half width
-[rad] (raster and sector; the others use the radius both ways). `pitch`: distance between neighbouring
-lines [rad]; speed [rad/s]."""
+"""Area and pattern of a search.
+
+pattern  code of the shape
+radius   half length of the area along the track of the target [rad]
+across   half width of the area, of raster and sector only [rad]; the others use the radius in both directions
+pitch    distance between neighbouring lines [rad]
+speed    speed of the beam along its path [rad/s]
+"""
 
 Point = namedtuple('Point', 'x y dx dy')
-"""Offset [rad] along x and y, and its rate [rad/s]."""
+"""Offset of the beam from the expected place in two directions [rad], and its rates [rad/s].
+
+The directions are along and across the track of the target, or cross-elevation and elevation.
+"""
 
 
 @compiled
 def highest_speed(beamwidth, time_constant, share):
-    """Return the speed of the beam [rad/s]: share (at most 1) of b / (4 tau)."""
+    """Return the speed of the beam [rad/s]: a share (at most 1) of the highest speed b / (4 tau)."""
     return share * beamwidth / (4.0 * time_constant)
 
 
 @compiled
 def rotated(p, angle):
-    """Return a Point turned by an angle [rad]: from along and across the track to cross-elevation and elevation."""
+    """Return a Point p turned by an angle [rad]: from along and across the track to cross-elevation and elevation.
+
+    angle: place.track of the target.
+    """
     s, c = math.sin(angle), math.cos(angle)
     return Point(c * p.x - s * p.y, s * p.x + c * p.y, c * p.dx - s * p.dy, s * p.dx + c * p.dy)
 
 
 @compiled
 def circle(radius, period, t):
-    """Return the Point at t [s] of a circle about the centre, entered along a radius that grows for one period [s].
+    """Return the Point at t [s] of a circle; its radius grows from 0 to `radius` [rad] during the first period [s].
 
     The circle is no search pattern. `acquisition` uses it to check the slopes of the receiver errors.
     """
@@ -91,22 +107,25 @@ def point(area, t):
 
 @compiled
 def _turn_of(area):
-    """Return the angle [rad] at which the spiral has reached the radius, and half a pitch more,
-    so that all of its edge is seen."""
+    """Return the angle [rad] at which the spiral ends: half a pitch beyond the radius, to cover all of the edge."""
     return 2.0 * math.pi * (area.radius / area.pitch + 0.5)
 
 
 @compiled
 def spiral_length(theta, pitch):
-    """Return the length [rad] of r = k theta, k = pitch / (2 pi), from the centre to the angle theta [rad]: k/2 (theta
-    sqrt(1 + theta^2) + asinh theta)."""
+    """Return the length [rad] of the spiral r = k theta, k = pitch / (2 pi), from its centre to the angle theta [rad].
+
+    The length is k/2 (theta sqrt(1 + theta^2) + asinh theta).
+    """
     return 0.25 * pitch / math.pi * (theta * math.sqrt(1.0 + theta * theta) + math.asinh(theta))
 
 
 @compiled
 def _on_spiral(area, t):
-    """Return the Point of the spiral: the length is v t after the rise,
-    and Newton's method finds the angle of this length."""
+    """Return the Point of the spiral at t [s].
+
+    The length of the path grows with the speed v. Newton's method finds the angle theta that belongs to the length.
+    """
     v, k, end = area.speed, 0.5 * area.pitch / math.pi, _turn_of(area)
     length, rate = v * (t - 0.5 * SPEED_RISE_TIME_S), v
     if t < SPEED_RISE_TIME_S:
@@ -126,17 +145,17 @@ def _on_spiral(area, t):
 def lines_aside(area):
     """Return the number of lines of a raster or a sector on one side of the middle line, at least 0.
 
-    The outermost line is at most half a pitch inside the edge, so that the edge is seen.
+    The outermost line is at most half a pitch inside the edge of the area, so that the beam passes over the edge.
     """
     return max(math.ceil(area.across / area.pitch - 0.5), 0)
 
 
 @compiled
 def vertices(area):
-    """Return the number of corners of a pattern of straight legs, with its begin and its end.
+    """Return the number of corners of a pattern of straight legs; begin and end of the pattern count as corners.
 
-    A raster or a sector has the centre and two ends of each of its 2 lines_aside + 1 lines. A square has the centre
-    and two corners for each length of leg. Its outermost legs are at most half a pitch inside the edge.
+    A raster or a sector has the centre and the two ends of each of its 2 lines_aside + 1 lines. A square has the
+    centre and two corners for each length of leg; its outermost legs are at most half a pitch inside the edge.
     """
     if area.pattern == PATTERN_SQUARE:
         return 4 * max(math.ceil(area.radius / area.pitch - 0.5), 1) + 3
@@ -145,13 +164,13 @@ def vertices(area):
 
 @compiled
 def vertex(area, i):
-    """Return (x, y) [rad] of corner i, 0 the centre."""
+    """Return (x, y) [rad] of corner i; corner 0 is the centre."""
     if i == 0:
         return 0.0, 0.0
     if area.pattern == PATTERN_SQUARE:
-        # Legs of 1, 1, 2, 2, 3, 3 ... pitches, each a quarter of a turn on.
+        # The legs are 1, 1, 2, 2, 3, 3 ... pitches long, and each leg is turned by 90 deg from the one before.
         return _alternating((i + 1) // 2) * area.pitch, _alternating(i // 2) * area.pitch
-    # Boustrophedon: the corners of a line are its two ends, and the next line begins at the side where it ended.
+    # The corners of a line are its two ends. Each line begins on the side where the previous line ended.
     line = (i - 1) // 2
     x = area.radius if (i + line) % 2 == 1 else -area.radius
     return x, (_alternating(line) if area.pattern == PATTERN_RASTER else line - lines_aside(area)) * area.pitch
@@ -173,8 +192,10 @@ def _leg_length(area, i):
 
 @compiled
 def _leg_time(area, i):
-    """Return the time [s] from corner i - 1 to corner i, from rest to rest with the acceleration v /
-    SPEED_RISE_TIME_S."""
+    """Return the time [s] from corner i - 1 to corner i, from rest to rest.
+
+    The acceleration is v / SPEED_RISE_TIME_S; v: speed of the beam along its path.
+    """
     L, v = _leg_length(area, i), area.speed
     return L / v + SPEED_RISE_TIME_S if L > v * SPEED_RISE_TIME_S else 2.0 * math.sqrt(L * SPEED_RISE_TIME_S / v)
 

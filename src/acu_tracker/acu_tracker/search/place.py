@@ -1,9 +1,13 @@
-"""The expected place of a target without a program: on from its last known place along its great circle.
+"""The expected place of a lost target without a program: it moves on along the great circle of the last estimate.
 
-The last known rate becomes less and less certain. It is expected to fade, as in a Singer model (Singer 1970, with the
-rate in the place of the acceleration), so that the target has moved by
+The last known rate becomes less and less certain. The rate is therefore expected to fade, as the acceleration does in
+a Singer model (Singer 1970). In the time T the target has moved by the angle
 
-    W tau (1 - exp(-T/tau)),    W: its rate at the last measurement, T ago.
+    W tau (1 - exp(-T / tau))
+
+    W     rate of the target along its great circle at the last measurement [rad/s]
+    T     time since the last measurement [s]
+    tau   RATE_FADE_TIME_S
 """
 import math
 
@@ -16,7 +20,7 @@ from pedestal_common.compiled import compiled
 from pedestal_common.geometry import line_of_sight
 
 PLACE_DTYPE = np.dtype([('u', 'f8', (3,)), ('du', 'f8', (3,)), ('stamp', 'f8')], align=True)
-"""ENU unit vector u [-] of the target at a stamp [s], and its rate du [1/s]."""
+"""Last known place: ENU unit vector u [-] towards the target at the stamp [s], and its rate du [1/s]."""
 
 ZERO_VECTOR = Vector(0.0, 0.0, 0.0)
 """Vector of length 0."""
@@ -27,7 +31,7 @@ RATE_FADE_TIME_S = 10.0
 
 @compiled
 def remember(s, t, u, du):
-    """Keep that the target is at the ENU unit Vector u with its rate du [1/s] at t [s]."""
+    """Keep the last known place: ENU unit Vector u and its rate du [1/s] at t [s]."""
     s.u[0], s.u[1], s.u[2] = u
     s.du[0], s.du[1], s.du[2] = du
     s.stamp = t
@@ -35,13 +39,13 @@ def remember(s, t, u, du):
 
 @compiled
 def motion_at(s, t):
-    """Return the Motion in earth angles at t [s], not before the last known place."""
+    """Return the Motion of the expected place in earth angles at t [s], a time after the last known place."""
     u, du = vector(s.u), vector(s.du)
     W, left = math.sqrt(dot(du, du)), math.exp((s.stamp - t) / RATE_FADE_TIME_S)
     angle = W * RATE_FADE_TIME_S * (1.0 - left)
     ahead = turned(u, du, W, angle)
-    # d/d angle (u cos + du/W sin) = (du cos - u W sin) / W, and the angle grows by W left. The second derivative is
-    # the sum of the circle, -(W left)^2 ahead, and of the fading rate, -rate / RATE_FADE_TIME_S.
+    # ahead = u cos(angle) + du/W sin(angle), and the angle grows with the rate W left. The second derivative has two
+    # parts: -(W left)^2 ahead of the circle, and -rate / RATE_FADE_TIME_S of the fading rate.
     rate = times(left, turned(du, times(-W * W, u), W, angle))
     bend, fading = times(-(W * left)**2, ahead), times(-1.0 / RATE_FADE_TIME_S, rate)
     return earth_angles(LineOfSight(ahead, rate, Vector(bend.x + fading.x, bend.y + fading.y, bend.z + fading.z)))
@@ -49,15 +53,20 @@ def motion_at(s, t):
 
 @compiled
 def track(motion):
-    """Return the direction [rad] in which a target with this Motion moves,
-    from cross-elevation towards elevation; 0 at rest."""
+    """Return the direction [rad] in which a target with this Motion moves.
+
+    The direction is an angle from cross-elevation towards elevation; it is 0 for a target at rest.
+    """
     return math.atan2(motion.elevation.rate, motion.azimuth.rate * math.cos(motion.elevation.angle))
 
 
 @compiled
 def displaced(motion, p):
-    """Return the Motion of a beam at an offset from a target: a pattern.Point p in cross-elevation and elevation. The
-    accelerations of the pattern are neglected."""
+    """Return the Motion of a beam that is at an offset from a direction.
+
+    motion: Motion of the direction; p: pattern.Point of the offset in cross-elevation and elevation. The accelerations
+    of the pattern are neglected.
+    """
     n = line_of_sight.displaced_motion(motion.azimuth.angle, motion.elevation.angle, motion.azimuth.rate,
                                        motion.elevation.rate, p.x, p.y, p.dx, p.dy)
     beam = angles(LineOfSight(Vector(n[0], n[1], n[2]), Vector(n[3], n[4], n[5]), ZERO_VECTOR))

@@ -1,12 +1,18 @@
 """Check that the receiver's errors lead to the target, before the loop is closed on them.
 
-The beam moves in a known way about the expected place of the target, which is at an offset d from the beam. The errors
-e should follow it one for one. With the sums over the samples, less their means,
+The mode acquire moves the beam on a small circle about the expected place of the target. The measured errors should
+follow the offset of this place one for one. The matrix K of their slopes comes from a least-squares fit:
 
     K = S_ed S_dd^-1,    S_ed = sum (e - e') (d - d')^T,    S_dd = sum (d - d') (d - d')^T
 
-is the matrix of slopes (least squares). Its diagonal is 1 without a fault, negative if a sign is wrong, and cos(beta)
-if the axes of the errors are turned by beta. An error of the prediction is in the means only.
+    d, d'   offset of the expected place from the beam, and its mean over the samples [rad]
+    e, e'   error of the receiver, and its mean over the samples [rad]
+
+Each of these vectors is (cross-elevation, elevation). The diagonal of K is 1 without a fault, negative if a sign is
+wrong, and cos(beta) if the axes of the errors are turned by beta. A constant error of the expected place changes only
+the means, and not K.
+
+s: record of SLOPES_DTYPE.
 """
 import numpy as np
 
@@ -17,7 +23,10 @@ SLOPES_DTYPE = np.dtype([('n', 'i8'), ('d', 'f8', (2,)), ('e', 'f8', (2,)), ('dd
 """n: number of samples; d, e: their means d', e' [rad]; dd, ed: the sums S_dd (xx, xe, ee) and S_ed [rad2]."""
 
 MIN_SLOPE = 0.5
-"""Slope below which the loop is not closed [-]: axes turned by 60 deg, which use up the phase margin."""
+"""Slope below which autotrack does not begin [-].
+
+Axes that are turned by 60 deg have this slope. Such a turn uses up the phase margin of the loop.
+"""
 
 VERDICT_UNKNOWN, VERDICT_RIGHT, VERDICT_WRONG = range(3)
 """Verdicts of the check."""
@@ -35,8 +44,7 @@ def restart(s):
 
 @compiled
 def take(s, d, e):
-    """Take an expected offset d of the target from the beam and the error e, both (cross-elevation, elevation) [rad]
-    (Welford 1962)."""
+    """Take a sample d and e; means and sums are updated as by Welford (1962)."""
     s.n += 1
     dx, de = d[0] - s.d[0], d[1] - s.d[1]
     s.d[0] += dx / s.n
@@ -54,7 +62,10 @@ def take(s, d, e):
 
 @compiled
 def slopes(s):
-    """Return (K_xx, K_ee) [1]; NaN before the beam has moved in two directions."""
+    """Return the slopes (K_xx, K_ee) of cross-elevation and elevation [-].
+
+    Both slopes are NaN until the beam has moved on both axes.
+    """
     det = s.dd[0] * s.dd[2] - s.dd[1] * s.dd[1]
     return ((s.ed[0, 0] * s.dd[2] - s.ed[0, 1] * s.dd[1]) / det,
             (s.ed[1, 1] * s.dd[0] - s.ed[1, 0] * s.dd[1]) / det)
@@ -62,7 +73,7 @@ def slopes(s):
 
 @compiled
 def verdict(s, samples):
-    """Return VERDICT_RIGHT or VERDICT_WRONG after this number of samples, VERDICT_UNKNOWN before."""
+    """Return VERDICT_RIGHT or VERDICT_WRONG; VERDICT_UNKNOWN with less than `samples` samples."""
     if s.n < samples:
         return VERDICT_UNKNOWN
     x, e = slopes(s)

@@ -1,13 +1,18 @@
-"""Step track: the beam climbs to the peak of the level, for a receiver that measures no angle errors.
+"""The law of the mode steptrack: the beam follows the peak of the signal level, without angle errors of the receiver.
 
-Once a cycle the beam stays one step d to either side of its place, first in cross-elevation, then in elevation, and
-averages the level z there. The main lobe is a parabola in decibels, 12 (theta/b)^2, so that the peak is at
+Once a cycle the beam goes one step d to either side of its place, first in cross-elevation, then in elevation. On each
+side the level is averaged. In decibels the main lobe is a parabola, which is 12 (theta/b)^2 below its peak. Therefore
+the peak is at a distance theta0 from the place of the beam:
 
     theta0 = (z+ - z-) b^2 / (48 d)
 
-from the place of the beam. theta: angle from the axis of the beam; z+, z-: levels on the two sides; b: beamwidth. The
-beam moves there by one step at most, and stays if theta0 is within the deadband. For comparison: the antenna
-controller GD 7200 has a step of 8 % of the beamwidth, a cycle of 2 min, and a deadband as large as the step.
+    theta    angle from the axis of the beam [rad]
+    z+, z-   mean levels on the two sides [dB-Hz]
+    b, d     beamwidth and step [rad]
+
+The place moves towards the peak, by one step at most. If theta0 is within the deadband, the place does not move. For
+comparison: the antenna controller GD 7200 has a step of 8 % of the beamwidth, a cycle of 2 min, and a deadband as
+large as the step.
 """
 import math
 
@@ -17,21 +22,26 @@ from pedestal_common.compiled import compiled
 
 STEP_TRACK_DTYPE = np.dtype([('place', 'f8', (2,)), ('began', 'f8'), ('phase', 'i8'), ('since', 'f8'),
                              ('sum', 'f8'), ('samples', 'i8'), ('plus', 'f8')], align=True)
-"""place: offset of the beam between its steps [rad]; began: begin of the cycle [s]; phase: index in STEP_PHASES.
-`since`: time at which the beam went to its place of the phase [s]; sum, samples: sum of the levels there [dB-Hz] and
-their number; plus: the mean on the plus side."""
+"""State of step track.
+
+place         offset of the beam between its steps: cross-elevation, elevation [rad]
+began         begin of the cycle [s]
+phase, since  index in STEP_PHASES, and begin of this phase [s]
+sum, samples  sum [dB-Hz] and number of the levels in this phase
+plus          mean level on the plus side [dB-Hz]
+"""
 
 STEP_PHASES = ('cross-elevation plus', 'cross-elevation minus', 'elevation plus', 'elevation minus', 'rest')
 REST_PHASE = len(STEP_PHASES) - 1
-"""Phases of a cycle, in order: an even phase is the plus side, and two phases belong to each axis."""
+"""Phases of a cycle, in their order. An even index is the plus side; two phases belong to each axis."""
 
 STEP_SETTLING_LAGS = 5.0
-"""Number of time constants after which a level is that of a new place."""
+"""Number of time constants of the level after which it is that of a new place."""
 
 
 @compiled
 def start(s, t, x, e):
-    """Start at t [s] at an offset [rad], with an immediate cycle."""
+    """Start at t [s] at an offset x, e (cross-elevation, elevation) [rad]; a cycle begins at once."""
     s.place[0], s.place[1] = x, e
     s.began = t
     _enter(s, 0, t)
@@ -45,16 +55,18 @@ def _enter(s, phase, t):
 
 @compiled
 def peak(z_plus, z_minus, step, beamwidth):
-    """Return theta0 [rad], the place of the peak, from the levels one step [rad] to either side [dB]."""
+    """Return theta0 [rad], the distance of the peak; z_plus, z_minus: levels one step [rad] to either side [dB-Hz]."""
     return (z_plus - z_minus) * beamwidth * beamwidth / (48.0 * step)
 
 
 @compiled
 def step(s, p, beamwidth, tau, t, z, present):
-    """Return the offset (x, e) of the beam [rad] at t [s].
+    """Advance to t [s] and return the offset (cross-elevation, elevation) of the beam [rad].
 
-    z: level measured since the last step, NaN for none; present: whether there is a signal. p: record of
-    StepTrackParameters; tau: time constant of the level [s].
+    p        record of StepTrackParameters
+    tau      time constant of the level [s]
+    z        level that was measured since the last step [dB-Hz]; NaN: none
+    present  True if there is a signal
     """
     d = p.step * beamwidth
     if not present or (s.phase == REST_PHASE and t - s.began < p.cycle):

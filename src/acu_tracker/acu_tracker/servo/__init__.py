@@ -1,9 +1,11 @@
-"""The position loop of an axis and its laws.
+"""The position loop of an axis: controllers, shaper of the reference, limits, and detectors of drive faults.
+
+`position_loop` selects the controller; `axes` runs both axes for `control_unit`. Where the name of a module stands
+before the meaning of a symbol, the symbol has this meaning in that module only.
 
 Symbols
     e, u, y         error of the axis, rate command, encoder angle                      [rad], [rad/s], [rad]
-    v, a, j         rate, acceleration, jerk of the shaped reference; in `beam_loop` v is the beam's rate,
-                    in `ends` a is the braking
+    v, a, j         rate, acceleration, jerk of the shaped reference                    [rad/s, rad/s2, rad/s3]
     K_p, K_i, K_d   gains of the position loop                                          [1/s], [1/s2], [-]
     D               filtered derivative of e                                            [rad/s]
     k_v, k_a        shares of v and of a fed forward into the rate command              [-], [s]
@@ -15,9 +17,10 @@ Symbols
     l1, l2, l3      `adrc`: gains of the observer over a step h                         [-], [1/s], [1/s2]
     b0              `adrc`: gain from u to the acceleration, equal to w_s               [1/s]
     u0              `adrc`: wanted acceleration                                         [rad/s2]
-    R, alpha, beta  `beam_loop`: angle of the beam, gains on angle and rate             [rad], [-], [-]
-    V               `beam_loop`: rate at which the carrier's motion moves a fixed target [rad/s]
+    R, v            `beam_loop`: angle of the beam and its rate                         [rad], [rad/s]
+    alpha, beta     `beam_loop`: gains on the angle and on the rate                     [-]
+    V               `beam_loop`: rate at which the ship's motion moves a fixed target   [rad/s]
     delta           `beam_loop`: share of V that is compensated                         [-]
-    d, a, t         `ends`: distance to the end of travel, braking, reaction time       [rad], [rad/s2], [s]
-    w, width, depth `notch`: centre, damping of its poles, gain at the centre           [rad/s], [-], [-]
+    d, a, t         `ends`: distance to the end of travel, deceleration, reaction time  [rad], [rad/s2], [s]
+    w, width, depth `notch`: centre, damping ratio of the poles, gain at the centre     [rad/s], [-], [-]
 """

@@ -1,6 +1,7 @@
-"""Both axes of the antenna: their start and their commands. axis: records (2,) of position_loop.AXIS_LOOP_DTYPE.
+"""The position loops of both axes of the antenna: start from the actual angles, following of the reference, rest.
 
-c, u, o: records of control_unit.CONSTANTS_DTYPE, of signals.INPUTS_DTYPE and OUTPUTS_DTYPE.
+axis     records (2,) of position_loop.AXIS_LOOP_DTYPE
+c, u, o  records of control_unit.CONSTANTS_DTYPE, of signals.INPUTS_DTYPE and of signals.OUTPUTS_DTYPE
 """
 from collections import namedtuple
 
@@ -10,24 +11,30 @@ from acu_tracker.servo.position_loop import Feedback
 from pedestal_common.compiled import compiled
 
 BeamInputs = namedtuple('BeamInputs', 'error deck_rates closed')
-"""Inputs of an electronic beam: receiver error [rad] and rate of the deck [rad/s] of each axis; closed: whether the
-beam closes its own loop."""
+"""Inputs of the loop of an electronic beam.
+
+error       receiver error (2,) in deck angles [rad]; NaN: no error in this step
+deck_rates  rates at which the motion of the deck moves a fixed target [rad/s], of each axis
+closed      True if the loop is closed on the receiver error (autotrack)
+"""
 
 
 @compiled
 def now(axis):
-    """Return the Motion of the references."""
+    """Return the present references of both axes, a Motion."""
     return Motion(reference.now(axis[0].reference), reference.now(axis[1].reference))
 
 
 @compiled
 def start_from_actual(axis, c, u, immobile, begins, silence):
-    """Set targets := actual: of both axes if the loop begins,
-    and in every step of an axis that cannot follow its commands.
+    """Set the references to the actual angles: of both axes if they begin to move, and of an axis that cannot move.
 
-    This avoids that the reference of such an axis runs ahead, so that the axis catches up at once when it can follow
-    again. Arguments: immobile, whether each axis cannot follow commands; silence, whether the last command is too old
-    to be in force.
+    For an axis that cannot move this is done in every step. This avoids a reference that runs ahead of the axis, which
+    the axis would chase as soon as it can move again.
+
+    immobile  True for each axis that does not follow its commands
+    begins    True if the axes begin to move
+    silence   True if the last command is too old to be in force
     """
     for i in range(2):
         rate, powerless = u.velocity[i], immobile[i] and not begins
@@ -41,7 +48,7 @@ def start_from_actual(axis, c, u, immobile, begins, silence):
 
 @compiled
 def follow(axis, c, u, o, motion, now, beam):
-    """Run the position loops of both axes towards a Motion; now: the Instants; beam: the BeamInputs."""
+    """Run the position loops of both axes towards a reference Motion; now: the Instants; beam: the BeamInputs."""
     now_ends = floor.ends(c, u, motion.azimuth.angle)
     for i in range(2):
         feedback = Feedback(y=u.position[i], dy=u.velocity[i], error=beam.error[i], V=beam.deck_rates[i],

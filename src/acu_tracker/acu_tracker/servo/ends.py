@@ -1,9 +1,13 @@
-"""Ends of an axis's travel: the largest rate towards an end, and the time until the axis is there.
+"""Ends of the travel of an axis: the largest rate towards an end, and the time until the axis is there.
 
-    v(d): v^2 / (2 a) + v t = d     rate [rad/s] from which an axis stops within d [rad]; a: its braking [rad/s2],
-                                    t: its reaction time [s]
+    v^2 / (2 a) + v t = d
 
-Because dv/dd <= 1 / t, a command that is late by t / e leads to no overshoot.
+    d   distance to the end [rad]
+    v   largest rate from which the axis stops within d [rad/s]
+    a   deceleration of the axis in front of the end [rad/s2]
+    t   reaction time of the axis [s]; AcuParameters.reaction defines it
+
+The slope dv/dd is at most 1 / t. Therefore a command that is late by t / e (e: Euler's number) causes no overshoot.
 """
 import math
 from collections import namedtuple
@@ -11,19 +15,21 @@ from collections import namedtuple
 from pedestal_common.compiled import compiled
 
 Ends = namedtuple('Ends', 'low high')
-"""Least and largest angle of an axis [rad] at present."""
+"""Least and largest angle that an axis may have at present [rad]: its limits, or the floor."""
 
 
 @compiled
 def braking_distance(v, a, t):
-    """Return the distance [rad] in which an axis at a rate v stops."""
+    """Return the distance [rad] in which an axis at a rate v >= 0 stops."""
     return v * v / (2.0 * a) + v * t
 
 
 @compiled
 def stopping_rate(d, a, t):
-    """Return the largest rate [rad/s] towards a limit d [rad] ahead from which an axis stops
-    before it; 0 behind it."""
+    """Return the largest rate [rad/s] towards an end d [rad] ahead from which an axis stops before the end.
+
+    The rate is 0 if the axis is beyond the end (d <= 0).
+    """
     if d <= 0.0:
         return 0.0
     return math.sqrt(a * t * (a * t) + 2.0 * a * d) - a * t
@@ -31,15 +37,19 @@ def stopping_rate(d, a, t):
 
 @compiled
 def inside(u, y, ends, a, t):
-    """Return a rate command u [rad/s] limited so that an axis at y [rad] stops between its Ends;
-    outside it only leads back."""
+    """Return a rate command u [rad/s] limited so that an axis at y [rad] stops between its Ends.
+
+    Beyond an end only motion back inside is left.
+    """
     return min(max(u, -stopping_rate(y - ends.low, a, t)), stopping_rate(ends.high - y, a, t))
 
 
 @compiled
 def time_to(y, dy, ends):
-    """Return the time [s] until an axis at y [rad] is at a limit if it keeps its rate dy [rad/s];
-    0 behind it, inf: never."""
+    """Return the time [s] until an axis at y [rad] reaches an end if it keeps its rate dy [rad/s].
+
+    The time is 0 beyond an end, and inf if the axis is at rest.
+    """
     if y > ends.high or y < ends.low:
         return 0.0
     if dy > 0.0:

@@ -1,6 +1,10 @@
-"""The floor of the elevation over the azimuth, for every mode: straight lines through the points of a table.
+"""The floor: the lowest elevation that the antenna may have at each azimuth, in every mode.
 
-Where the floor rises, the elevation rises before the azimuth goes there, and the azimuth waits in front of it.
+The floor keeps the dish clear of structures around the antenna. A table of points, joined by straight lines, defines
+the floor. Where the floor rises, the azimuth waits until the elevation is above the floor ahead.
+
+c, u: records of control_unit.CONSTANTS_DTYPE and of signals.INPUTS_DTYPE; floor: record of FLOOR_DTYPE; limits: record
+of the LimitsParameters of an axis; A, E: azimuth and elevation in deck angles [rad].
 """
 import math
 
@@ -22,19 +26,30 @@ CELL_WIDTH_RAD = 2.0 * math.pi / CELL_COUNT
 """Width of a cell [rad]."""
 
 FLOOR_DTYPE = np.dtype([('given', 'i8'), ('highest', 'f8', (CELL_COUNT,))], align=True)
-"""given: whether there is a floor; highest: highest value of the floor in each cell [rad], beginning with azimuth 0 to
-CELL_WIDTH_RAD."""
+"""given: 1 if there is a floor; highest: highest value of the floor in each cell [rad].
+
+Cell 0 is from azimuth 0 to CELL_WIDTH_RAD.
+"""
 
 MAX_AZIMUTH_RAD = 1e3
-"""Azimuth [rad] beyond every travel. This avoids the undefined conversion of an infinite azimuth to a cell number."""
+"""Azimuth beyond the travel of every axis [rad].
+
+A larger azimuth is replaced by it, because an infinite azimuth has no cell number.
+"""
 
 FLOOR_CLEARANCE_RAD = 1e-3
-"""Elevation above the floor [rad]. This avoids that the azimuth waits for the last encoder step."""
+"""Least elevation above the floor to which the elevation is sent [rad].
+
+The azimuth waits until the elevation is above the floor. Because of the clearance it does not wait for the last step
+of the encoder.
+"""
 
 
 def points(text):
-    """Return azimuths and elevations (n,) [rad] of a text as in FLOOR_DOC, ((), ()) of an empty text. Raises
-    ParameterError."""
+    """Return (azimuths, elevations) (n,) [rad] of the points in a text as in FLOOR_DOC; ((), ()) for an empty text.
+
+    Raise ParameterError for a wrong text.
+    """
     parts = [part.split() for part in text.split(';') if part.strip()]
     if len(parts) > MAX_FLOOR_POINTS:
         raise ParameterError(f'floor = {text!r}: {len(parts)} points; must be at most {MAX_FLOOR_POINTS}')
@@ -52,14 +67,16 @@ def points(text):
 
 
 def at(text, A):
-    """Return the floor of a text as in FLOOR_DOC at an azimuth [rad]; -inf if there is none."""
+    """Return the floor [rad] at an azimuth A, of a text as in FLOOR_DOC; -inf if there is no floor."""
     azimuths, elevations = points(text)
     return np.interp(A, azimuths, elevations, period=2.0 * math.pi) if azimuths else -math.inf
 
 
 def table(text) -> np.ndarray:
-    """Return the FLOOR_DTYPE (1,) of a text as in FLOOR_DOC: in each cell the highest of its ends
-    and of the points in it."""
+    """Return the FLOOR_DTYPE (1,) of a text as in FLOOR_DOC.
+
+    The value of a cell is the highest value of the floor at its two ends and at the points of the table inside it.
+    """
     A, f = points(text)
     floor = np.zeros(1, FLOOR_DTYPE)
     if A:
@@ -72,14 +89,13 @@ def table(text) -> np.ndarray:
 
 @compiled
 def _cell(A):
-    """Return the cell of an azimuth [rad], not yet wrapped to one turn; an azimuth beyond every travel counts as
-    MAX_AZIMUTH_RAD."""
+    """Return the number of the cell of an azimuth, which still counts turns; modulo CELL_COUNT it is an index."""
     return math.floor(min(max(A, -MAX_AZIMUTH_RAD), MAX_AZIMUTH_RAD) / CELL_WIDTH_RAD)
 
 
 @compiled
 def highest(floor, A, B):
-    """Return the highest value of the floor [rad] between two azimuths [rad]."""
+    """Return the highest value of the floor [rad] between the azimuths A and B [rad]."""
     first, last = _cell(min(A, B)), _cell(max(A, B))
     top = -math.inf
     for i in range(first, min(last, first + CELL_COUNT - 1) + 1):
@@ -89,14 +105,16 @@ def highest(floor, A, B):
 
 @compiled
 def above(floor, A, E):
-    """Return True if the floor is above an elevation at an azimuth [rad]."""
+    """Return True if the floor at the azimuth A is above the elevation E."""
     return floor.given != 0 and floor.highest[_cell(A) % CELL_COUNT] > E
 
 
 @compiled
 def of_azimuth(floor, limits, A, E):
-    """Return the Ends of the azimuth at A: its limits, or where the floor rises above the elevation E [rad]. If the
-    floor at A is above E already, the azimuth may leave."""
+    """Return the Ends of the azimuth, now at A: its limits, or the places where the floor rises above the elevation E.
+
+    If the floor at A is above E already, the azimuth may leave: its Ends are then the limits.
+    """
     if not floor.given or above(floor, A, E):
         return Ends(limits.low, limits.high)
     # first, last: outermost cells up to which the floor is not above E; CELL_COUNT cells are a whole turn.
@@ -114,8 +132,10 @@ def of_azimuth(floor, limits, A, E):
 
 @compiled
 def of_elevation(floor, limits, A, ahead, target):
-    """Return the Ends of the elevation at azimuth A: above the floor from A to the azimuth's stop, `ahead`,
-    and to its target [rad]."""
+    """Return the Ends of the elevation: above the floor on the whole way of the azimuth.
+
+    A: azimuth now; ahead: azimuth at which the axis can stop; target: azimuth to which the axis goes; all in rad.
+    """
     if not floor.given:
         return Ends(limits.low, limits.high)
     top = max(highest(floor, A, ahead), highest(floor, A, target)) + FLOOR_CLEARANCE_RAD
@@ -124,8 +144,7 @@ def of_elevation(floor, limits, A, ahead, target):
 
 @compiled
 def ends(c, u, azimuth):
-    """Return (Ends of the azimuth, of the elevation) at present, with the azimuth on its way to an angle [rad]. c, u:
-    constants and inputs of the control unit."""
+    """Return (Ends of the azimuth, Ends of the elevation) at present; azimuth: angle to which this axis goes [rad]."""
     a, e, A, dA = c.axis[0].p.limits, c.axis[1].p.limits, u.position[0], u.velocity[0]
     ahead = A + math.copysign(braking_distance(abs(dA), c.axis[0].braking, c.axis[0].reaction), dA)
     return of_azimuth(c.floor, a, A, u.position[1]), of_elevation(c.floor, e, A, ahead, azimuth)
@@ -133,7 +152,10 @@ def ends(c, u, azimuth):
 
 @compiled
 def by_hand(c, u, azimuth):
-    """Return the Ends of a point that is moved by hand, now at an azimuth [rad]: as of `ends`, except that the azimuth
-    goes on where the elevation can rise above the floor."""
+    """Return (Ends of the azimuth, Ends of the elevation) of a point that an operator moves by hand.
+
+    azimuth: azimuth of the point [rad]. The result differs from `ends` in one respect: the azimuth of the point goes
+    on wherever the elevation can rise above the floor.
+    """
     _, of_elevation_now = ends(c, u, azimuth)
     return of_azimuth(c.floor, c.axis[0].p.limits, u.position[0], c.axis[1].p.limits.high), of_elevation_now

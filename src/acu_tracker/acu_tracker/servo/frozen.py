@@ -1,25 +1,33 @@
-"""Detection of a drive that repeats its measurements while its axes are commanded to move.
+"""Detection of a frozen drive: one that repeats its measurements while its axes are commanded to move.
 
     dx/dt = u    while every measurement equals that of the step before, else x = 0
 
-x: travel [rad] of an axis by its rate commands u [rad/s] while its measurements repeat.
+    u    rate command of an axis [rad/s]
+    x    travel that the commands have added up while the measurements repeat [rad]
 
-A drive that moves has noise in its currents and steps in its encoders, so that its measurements are constant only at
-rest. If all of them repeat while the commands add up to a travel x, the motion is not measured, and the loop around
-the drive is open.
+A drive that moves has noise in its currents and steps in its encoders. The measurements are therefore constant only at
+rest. If all measurements repeat while x grows, the motion is not measured, and the position loop is open.
+
+s: record of FROZEN_DTYPE.
 """
 import numpy as np
 
 from pedestal_common.compiled import compiled
 
 FROZEN_DTYPE = np.dtype([('last', 'f8', (6,)), ('since', 'f8'), ('travel', 'f8', (2,)), ('frozen', 'i8')], align=True)
-"""last: angles [rad], rates [rad/s] and torques [Nm] of the step before; travel: x of azimuth and elevation
-[rad]. `since`: stamp from which a travel is beyond FROZEN_TEST_TRAVEL_RAD [s]; frozen: 1 after this lasted too
-long, until its reset."""
+"""State of the test.
+
+last    angles [rad], rates [rad/s] and torques [Nm] of both axes in the step before
+travel  x of azimuth and elevation [rad]
+since   last stamp at which no x was above FROZEN_TEST_TRAVEL_RAD [s]
+frozen  1 from the detection of a frozen drive until its reset
+"""
 
 FROZEN_TEST_TRAVEL_RAD = 3e-3
-"""Travel [rad] within which a measurement must change: ten times the lash of a gear,
-a sixth of a beamwidth of a degree."""
+"""Travel within which a measurement must change [rad].
+
+The travel is ten times the lash of a gear, and a sixth of a beamwidth of one degree.
+"""
 
 
 @compiled
@@ -30,15 +38,19 @@ def _restart(s, t):
 
 @compiled
 def release(s, t):
-    """Reset the frozen drive at t [s]."""
+    """Reset the detected fault at t [s]; the test begins again."""
     s.frozen = 0
     _restart(s, t)
 
 
 @compiled
 def watch(s, u, hold, restart):
-    """Take the measurements of a step, signals.INPUTS; return True if the drive is frozen. hold [s]: longest time
-    until a command has an effect on them; restart: no earlier command is in force."""
+    """Take the measurements of a step; return True if the drive is frozen.
+
+    u        record of signals.INPUTS_DTYPE
+    hold     longest time until a command has an effect on the measurements [s]
+    restart  True if no earlier command is in force
+    """
     if restart:
         _restart(s, u.stamp)
     same = True

@@ -1,9 +1,12 @@
-"""Second-order notch in the feedback, against a structural resonance.
+"""Notch filter of second order in the feedback of the position loop, against a resonance of the structure.
 
-N(s) = (s^2 + 2 depth width w s + w^2) / (s^2 + 2 width w s + w^2), `depth` at w and 1 far from it;
-bilinear, prewarped to w.
+    N(s) = (s^2 + 2 depth width w s + w^2) / (s^2 + 2 width w s + w^2)
 
-w: centre [rad/s]; width: damping ratio of the denominator.
+    w       centre frequency [rad/s]
+    depth   gain of N at w [-]; far from w the gain is 1
+    width   damping ratio of the denominator [-]
+
+The discrete filter follows by the bilinear transformation, prewarped so that its centre is exactly at w.
 """
 import math
 
@@ -11,7 +14,10 @@ from pedestal_common.compiled import compiled
 
 
 def coefficients(frequency, width, depth, period):
-    """Return (b0, b1, b2, a1, a2) for steps of period [s]; frequency [Hz], below 0.5 / period; 0: no notch."""
+    """Return the coefficients (b0, b1, b2, a1, a2) of the discrete filter, for steps of period [s].
+
+    y_k = b0 x_k + b1 x_k-1 + b2 x_k-2 - a1 y_k-1 - a2 y_k-2. frequency: centre [Hz], below 0.5 / period; 0: no notch.
+    """
     if frequency == 0.0:
         return 1.0, 0.0, 0.0, 0.0, 0.0
     w = 2.0 * math.pi * frequency
@@ -24,7 +30,10 @@ def coefficients(frequency, width, depth, period):
 
 @compiled
 def removed(x, memory, c):
-    """Return x less the notch's output, any unit; memory (4,): the last two x and y; c (5,): as of `coefficients`."""
+    """Return the part that the notch removes from x: x minus the output y of the filter, in the unit of x.
+
+    memory: (x_k-1, x_k-2, y_k-1, y_k-2); c: result of `coefficients`.
+    """
     y = c[0] * x + c[1] * memory[0] + c[2] * memory[1] - c[3] * memory[2] - c[4] * memory[3]
     memory[0], memory[1], memory[2], memory[3] = x, memory[0], y, memory[2]
     return x - y

@@ -8,7 +8,7 @@ from pedestal_common.parameters import ParameterError, Parameters, choice, param
 
 @dataclasses.dataclass(frozen=True)
 class PidParameters(Parameters):
-    """PID on the raw target, as in paper 000. K_p = bandwidth, K_i = integral K_p^2, K_d = derivative."""
+    """PID on the raw (unshaped) target, as in paper 000. K_p = bandwidth, K_i = integral K_p^2, K_d = derivative."""
 
     bandwidth: float = parameter(20.0, 0.0, 500.0, 'rad/s', 'bandwidth of the position loop: K_p')
     integral: float = parameter(0.05, 0.0, 10.0, '', 'K_i / K_p^2; 0.25: both poles of the loop at K_p / 2')
@@ -42,7 +42,7 @@ class AdrcParameters(Parameters):
 
 @dataclasses.dataclass(frozen=True)
 class BeamParameters(Parameters):
-    """The beam of a phased array (paper 002); alpha and rate_compensation belong to its own loops, type_1, type_2."""
+    """Loop of the beam of a phased array (paper 002); alpha and rate_compensation act in type_1 and type_2 only."""
 
     form: str = choice('tracked', LOOP_FORMS,
                        "form of the loop. tracked: the target's filter predicted to t_m; type_1: the paper's loop; "
@@ -72,7 +72,7 @@ class ShaperParameters(Parameters):
     def check(self):
         """Raise ParameterError if h0 is too short for the jerk, because the end of a move would ring.
 
-        fhan removes the acceleration within about h0, and the jerk needs acceleration / jerk for it.
+        fhan removes the acceleration within about h0 [s]. The jerk limit needs the time acceleration / jerk to do so.
         """
         if self.acceleration > 1.5 * self.jerk * self.h0:
             raise ParameterError(f'h0 = {self.h0:g} s: must be at least acceleration / (1.5 jerk) = '

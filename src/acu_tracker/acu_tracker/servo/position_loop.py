@@ -1,10 +1,19 @@
-"""The position loop of one axis: it selects the controller, hands over without a bump, and keeps the limits.
+"""The position loop of one axis: it runs the selected controller, changes it without a bump, and keeps the limits.
 
-`pid` acts on the raw target at t_k. `feedforward` and `adrc` act on the shaped reference as planned for t_k, and feed
-the reference of t_m forward. `beam` steers an electronic beam, which has no dynamics. Its command is the raw target at
-t_m or, in autotrack of the forms type_1 and type_2, the beam of paper 002's loop on the receiver's error.
+The input is the raw target: the angle, rate and acceleration that guidance requests, before the shaper. The output is
+the rate command. There are four controllers:
 
-t_k: stamp of the step; t_m: middle of the interval in which the command of the step is in force.
+pid          acts on the raw target at t_k
+feedforward  acts on the shaped reference at t_k, and feeds rate, acceleration and torque of t_m forward
+adrc         as feedforward, with an observer of the disturbance
+beam         steers an electronic beam, which has no dynamics. Its command is the raw target at t_m. In autotrack with
+             the forms type_1 and type_2 it is the beam of `beam_loop`, which acts on the receiver's error
+
+t_k: stamp of the step [s]; t_m: middle of the interval in which the command of the step is in force [s].
+
+axis  record of AXIS_LOOP_DTYPE
+c     record of the constants of the axis, control_unit.AXIS_CONSTANTS_DTYPE
+p     record of AxisParameters
 """
 import dataclasses
 from collections import namedtuple
@@ -22,33 +31,48 @@ CONTROLLER_PID, CONTROLLER_FEEDFORWARD, CONTROLLER_ADRC, CONTROLLER_BEAM = range
 AXIS_LOOP_DTYPE = np.dtype([
     ('controller', 'i8'), ('command', 'f8'),                                  # of the last step; [rad/s]
     ('reference', reference.REFERENCE_DTYPE),
-    ('integral', 'f8'), ('error', 'f8'), ('derivative', 'f8'),                # [rad/s], e [rad], D [rad/s]
-    ('z', 'f8', (3,)), ('observed', 'f8'),                                    # adrc: z1 z2 z3 at this instant [s]
-    ('notch', 'f8', (4,)),
+    ('integral', 'f8'), ('error', 'f8'), ('derivative', 'f8'),                # I [rad/s], e [rad], D [rad/s] of pid
+    ('z', 'f8', (3,)), ('observed', 'f8'),                                    # adrc: z1 z2 z3, and their instant [s]
+    ('notch', 'f8', (4,)),                                                    # memory of notch.removed
 ], align=True)
+"""State of the position loop of one axis."""
 
 Instants = namedtuple('Instants', 't_k t_m dt')
-"""t_k: stamp of the drive step [s]; t_m: middle of the interval in which its command is in force [s]; dt: time since
-the step before [s]."""
+"""Times of a step [s].
+
+t_k  stamp of the step
+t_m  middle of the interval in which the command of the step is in force
+dt   time since the step before
+"""
 
 Feedback = namedtuple('Feedback', 'y dy error V closed ends')
-"""Feedback of one axis at t_k: encoder angle y [rad] and rate dy [rad/s].
+"""Feedback of one axis at t_k.
 
-error: of the receiver in this angle [rad], NaN if none came; V: rate [rad/s] at which the deck's motion moves a fixed
-target. `closed`: whether a beam closes its own loop on both; ends: the present Ends of its travel.
+y, dy   angle [rad] and rate [rad/s] of the encoder
+error   receiver error of this axis, as a deck angle [rad]; NaN: no error in this step
+V       rate at which the motion of the deck moves the deck angle of a fixed target [rad/s]
+closed  True if a beam closes its own loop on the receiver error
+ends    present Ends of the travel
 """
 
 Command = namedtuple('Command', 'rate torque reference angle_limited rate_limited acceleration_limited')
-"""rate [rad/s] and load torque [Nm]; reference: the AxisMotion that is compared with the encoder at t_k, for a beam
-the command. `angle_limited`, `rate_limited`, `acceleration_limited`: whether this was limited."""
+"""Command of one axis.
+
+rate       rate command [rad/s]
+torque     load torque that is fed forward [Nm]
+reference  AxisMotion that is compared with the encoder at t_k; for a beam the commanded angle
+angle_limited, rate_limited, acceleration_limited  True if the angle, the rate or the acceleration was limited
+"""
 
 MAX_DELAY_PHASE_RAD = 0.5
-"""Largest bandwidth times delay of the command [rad]: loss of phase margin of a loop."""
+"""Largest product of bandwidth and delay of the command [rad]: the loss of phase margin by the delay."""
 
 
 def slowed(params, delay):
-    """Return AxisParameters whose loops are stable with a delay of the command [s]: none is faster than
-    MAX_DELAY_PHASE_RAD / delay."""
+    """Return AxisParameters whose loops are stable with a delay of the command [s].
+
+    The bandwidth of each controller is reduced to MAX_DELAY_PHASE_RAD / delay, if it is higher.
+    """
     if delay == 0.0:
         return params
     loops = {name: getattr(params, name) for name in ('pid', 'feedforward', 'adrc')}
@@ -59,8 +83,13 @@ def slowed(params, delay):
 
 @compiled
 def limited(wanted, before, dt, rate, acceleration):
-    """Return (rate command [rad/s], rate limited, acceleration limited):
-    within +-rate and a change of acceleration * dt."""
+    """Return (rate command [rad/s], True if the rate was limited, True if the acceleration was limited).
+
+    wanted        rate command before the limits [rad/s]
+    before        rate command of the step before, dt [s] ago [rad/s]
+    rate          largest absolute value of the command [rad/s]
+    acceleration  largest change of the command over time [rad/s2]
+    """
     u = min(max(wanted, -rate), rate)
     rate_limited = u != wanted
     step = acceleration * dt
@@ -70,23 +99,25 @@ def limited(wanted, before, dt, rate, acceleration):
 
 @compiled
 def realised(command, dy):
-    """Return the part of a command that an axis at a rate dy realises, both [rad/s]: at most the command, and no
-    motion against it."""
+    """Return the part of a rate command [rad/s] that an axis realises while it moves at the rate dy [rad/s].
+
+    The part is 0 if the axis moves against the command, the command if the axis is faster, and else dy.
+    """
     return min(max(dy, min(command, 0.0)), max(command, 0.0))
 
 
 @compiled
 def replace_command(axis, rate):
-    """Replace the rate command in force by the realised one [rad/s]."""
+    """Replace the rate command of the last step by another one [rad/s], with which the next step begins."""
     axis.command = rate
 
 
 @compiled
 def initialise(axis, p, t_k, y, dy):
-    """Set targets := actual: the controller starts from the encoder's angle y [rad] and rate dy [rad/s] at t_k [s].
+    """Start the controller from the angle y [rad] and the rate dy [rad/s] of the encoder at t_k [s].
 
-    A beam keeps its last command, because the beam in force lags it by the delay and would be fed back into it for
-    ever. p: record of AxisParameters, here and below.
+    A beam keeps its last command. Because the measured beam lags the command by the delay, each start from the
+    measured beam would move the command back by this lag.
     """
     axis.controller = p.controller
     if p.controller == CONTROLLER_BEAM and axis.reference.planned.count > 0:
@@ -100,7 +131,7 @@ def initialise(axis, p, t_k, y, dy):
 
 @compiled
 def _initialise_feedback(axis, t_k, y, dy):
-    """Reset integral and observer: no disturbance."""
+    """Reset the integral and the observer: they start without a disturbance, at y [rad] and dy [rad/s]."""
     axis.integral = 0.0
     axis.z[0], axis.z[1], axis.z[2] = y, dy, 0.0
     axis.observed = t_k
@@ -108,8 +139,10 @@ def _initialise_feedback(axis, t_k, y, dy):
 
 @compiled
 def stop(axis, p, dt):
-    """Return the Command that brings the rate to zero within the acceleration limit,
-    dt [s] after the last; reset the integral."""
+    """Return the Command that brings the rate to zero within the acceleration limit; reset the integral.
+
+    dt: time since the last command [s].
+    """
     axis.command, _, acceleration_limited = limited(0.0, axis.command, dt, p.limits.rate, p.limits.acceleration)
     axis.integral = 0.0
     return Command(axis.command, 0.0, AxisMotion(axis.reference.angle, 0.0, 0.0), False, False, acceleration_limited)
@@ -117,16 +150,15 @@ def stop(axis, p, dt):
 
 @compiled
 def instant(p, t_k, t_m):
-    """Return the instant [s] at which the controller needs the raw target: t_k for pid, else t_m."""
+    """Return the instant [s] for which the controller needs the raw target: t_k for pid, t_m for the others."""
     return t_k if p.controller == CONTROLLER_PID else t_m
 
 
 @compiled
 def follow(axis, c, target, feedback, now):
-    """Return the Command of one step towards a raw target, an AxisMotion at `instant`; now: the Instants.
+    """Return the Command of one step.
 
-    c: record of the axis's constants, p its AxisParameters, notch its coefficients, reaction the time [s] allowed in
-    front of a limit, braking the deceleration [rad/s2] there.
+    target: AxisMotion of the raw target at `instant`; feedback: the Feedback; now: the Instants.
     """
     if c.p.controller == CONTROLLER_BEAM:
         return _steer(axis, c.p, target, feedback, now.dt)
@@ -135,7 +167,10 @@ def follow(axis, c, target, feedback, now):
 
 @compiled
 def _steer(axis, p, target, feedback, T):
-    """Return the Command of an electronic beam: the raw target at t_m, or the beam of its own loop on the error."""
+    """Return the Command of an electronic beam: the raw target at t_m, or the beam that `beam_loop` computes.
+
+    T: time since the step before [s].
+    """
     b, r = p.beam, axis.reference
     beta, compensation = constant_gain.benedict_bordner(b.alpha), b.rate_compensation * feedback.V
     axis.controller = CONTROLLER_BEAM
@@ -156,8 +191,8 @@ def _steer(axis, p, target, feedback, T):
 def _step(axis, c, target, feedback, now):
     """Return the Command of one step of an axis with motors.
 
-    Anti-windup: if the realised command differs from the wanted one, the integral only moves towards it; the observer
-    of adrc receives the realised command.
+    Anti-windup: if the limits change the command in the direction opposite to the error, the integral keeps its value.
+    The observer of adrc receives the limited command.
     """
     p, r, y, dy = c.p, axis.reference, feedback.y, feedback.dy
     handover = axis.controller != p.controller
@@ -186,7 +221,8 @@ def _step(axis, c, target, feedback, now):
     reference.commanded(r, axis.command)
     if (axis.command - u) * e < 0.0:
         axis.integral = integral
-    # Far from the ends `ends.inside` allows more than limits.rate; a command at limits.rate is limited by the rate.
+    # Far from the ends `ends.inside` allows a higher rate than limits.rate. There a reduced command counts as limited
+    # in rate, not in angle.
     angle_limited |= kept != u and abs(kept) < p.limits.rate
     return Command(axis.command, torque, v, angle_limited, rate_limited or rate_cut,
                    acceleration_limited or acceleration_cut)
@@ -194,7 +230,10 @@ def _step(axis, c, target, feedback, now):
 
 @compiled
 def _held_inside(target, low, high):
-    """Return (AxisMotion of a raw target, held at the ends of travel low, high [rad]; whether it is held)."""
+    """Return (AxisMotion of the raw target, put on the end of travel if it is beyond; True if it was put there).
+
+    low, high: ends of travel [rad].
+    """
     held = not low <= target.angle <= high
     if held:
         return AxisMotion(min(max(target.angle, low), high), 0.0, 0.0), held
@@ -203,7 +242,10 @@ def _held_inside(target, low, high):
 
 @compiled
 def _control_law(axis, p, e, v):
-    """Return (rate command before notch and limits, its part fed forward) [rad/s]; e = v.angle - encoder, v at t_k."""
+    """Return (rate command before notch and limits, the part of it that is fed forward) [rad/s].
+
+    v: AxisMotion of the reference at t_k; e: v.angle minus the encoder angle [rad].
+    """
     if p.controller == CONTROLLER_PID:
         return pid.rate(e, axis.integral, axis.derivative, p.pid.bandwidth, p.pid.derivative), 0.0
     r = axis.reference
@@ -217,9 +259,10 @@ def _control_law(axis, p, e, v):
 
 @compiled
 def _transfer(axis, p, e, v, feedback, t_k):
-    """Start the controller so that its first command equals the last one.
+    """Start another controller so that its first command equals the last command of the controller before.
 
-    The difference goes into the disturbance z3 of adrc, or into the integral. The notch starts in its steady state.
+    The integral takes up the difference of both commands, or the disturbance z3 of adrc. The notch starts in its
+    steady state. The arguments are those of _control_law; t_k: stamp of the step [s].
     """
     axis.controller = p.controller
     axis.error, axis.derivative = e, v.rate - feedback.dy
@@ -234,11 +277,14 @@ def _transfer(axis, p, e, v, feedback, t_k):
 
 @compiled
 def _update(axis, p, e, y, now):
-    """Advance the states of the running controller to t_k."""
+    """Advance the observer, or the integral and the derivative, of the running controller to t_k.
+
+    e: error [rad]; y: encoder angle [rad]; now: the Instants.
+    """
     if p.controller == CONTROLLER_ADRC:
         h = now.t_k - axis.observed
         if h > 0.0:
-            # The command and the acceleration in force since the observer's last instant.
+            # u, v3: command and acceleration that were in force since the last instant of the observer.
             u, v3 = reference.in_force(axis.reference, now.t_k - 0.5 * h)
             axis.z[0], axis.z[1], axis.z[2] = adrc.observed(axis.z, y, u, v3, p.adrc.observer_bandwidth,
                                                             p.adrc.rate_bandwidth, h)

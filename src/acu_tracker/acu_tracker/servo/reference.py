@@ -1,8 +1,12 @@
-"""The shaped reference of one axis and its history: the encoder is compared with the reference
-planned for its instant.
+"""The shaped reference of one axis and its history.
 
-A controller of the raw target uses no reference. The reference then stays at the antenna's own angle and rate, so that
-another controller begins there.
+The shaper computes the reference for t_m, the middle of the interval in which the command of the step is in force. The
+history keeps the reference until the encoder reports this instant, so that both are compared at the same instant.
+
+The controller pid uses no shaped reference. The reference is then kept at the angle and rate of the axis, so that
+another controller can begin there.
+
+r: record of REFERENCE_DTYPE.
 """
 import numpy as np
 
@@ -13,8 +17,11 @@ from pedestal_common.compiled import compiled
 
 REFERENCE_DTYPE = np.dtype([('angle', 'f8'), ('rate', 'f8'), ('acceleration', 'f8'), ('planned', history_type(4))],
                            align=True)
-"""angle, rate, acceleration: the shaped reference at its newest stamp [rad, rad/s, rad/s2]; planned: history, at t_m,
-of the reference and the rate command [rad/s]."""
+"""Shaped reference.
+
+angle, rate, acceleration  the newest reference [rad, rad/s, rad/s2]
+planned                    history of the reference and of the rate command [rad/s]; the stamp of a row is t_m
+"""
 
 ANGLE_COLUMN, RATE_COLUMN, ACCELERATION_COLUMN, COMMAND_COLUMN = range(4)
 """Columns of the history: angle, rate, acceleration of the reference; rate command."""
@@ -22,7 +29,7 @@ ANGLE_COLUMN, RATE_COLUMN, ACCELERATION_COLUMN, COMMAND_COLUMN = range(4)
 
 @compiled
 def now(r):
-    """Return the AxisMotion of the newest stamp."""
+    """Return the newest reference, an AxisMotion."""
     return AxisMotion(r.angle, r.rate, r.acceleration)
 
 
@@ -34,7 +41,10 @@ def put(r, motion):
 
 @compiled
 def _plan(r, stamp, command):
-    """Put the reference into the history at the stamp [s] at which the encoder is compared with it."""
+    """Put the reference into the history.
+
+    stamp: instant for which the reference is planned [s]; command: rate command [rad/s].
+    """
     row = r.planned.sample[push(r.planned, stamp)]
     row[ANGLE_COLUMN], row[RATE_COLUMN], row[ACCELERATION_COLUMN] = r.angle, r.rate, r.acceleration
     row[COMMAND_COLUMN] = command
@@ -42,7 +52,10 @@ def _plan(r, stamp, command):
 
 @compiled
 def initialise(r, stamp, y, dy, command):
-    """Restart at an angle y [rad] and rate dy [rad/s] at a stamp [s]; command: rate command in force [rad/s]."""
+    """Restart the reference at an angle y [rad] and a rate dy [rad/s] at a stamp [s]; clear the history.
+
+    command: rate command in force [rad/s].
+    """
     r.planned.count = 0
     put(r, AxisMotion(y, dy, 0.0))
     _plan(r, stamp, command)
@@ -50,9 +63,13 @@ def initialise(r, stamp, y, dy, command):
 
 @compiled
 def follow(r, p, target, stamp, command, ends):
-    """Shape an AxisMotion to be met at a stamp [s], between its Ends; return (angle, rate, acceleration limited).
+    """Advance the shaped reference towards a target. Return (angle limited, rate limited, acceleration limited).
 
-    p: record of AxisParameters.
+    p        record of AxisParameters
+    target   AxisMotion of the raw target at the stamp
+    stamp    instant for which the reference is planned [s]
+    command  rate command of the step before [rad/s]; `commanded` replaces it in the history
+    ends     present Ends of the axis
     """
     k = p.shaper
     dt = stamp - r.planned.stamp[r.planned.newest]
@@ -66,13 +83,13 @@ def follow(r, p, target, stamp, command, ends):
 
 @compiled
 def commanded(r, command):
-    """Put the rate command [rad/s] of this step beside its reference in the history."""
+    """Put the rate command [rad/s] of this step into the newest row of the history."""
     r.planned.sample[r.planned.newest, COMMAND_COLUMN] = command
 
 
 @compiled
 def _around(history, t):
-    """Return (older row, newer row, fraction between them) at t [s]; the oldest row if t is before it."""
+    """Return the result of `bracket` at t [s]; if t is outside the history, use its oldest row for both rows."""
     i, j, f = bracket(history, t)
     if i < 0:
         i = j = (history.newest + 1 - history.count) % HISTORY_LENGTH
@@ -81,11 +98,14 @@ def _around(history, t):
 
 @compiled
 def planned(r, t):
-    """Return the AxisMotion planned for t [s]; the angle by a cubic Hermite."""
+    """Return the AxisMotion that was planned for t [s].
+
+    The angle is interpolated by a cubic Hermite polynomial, rate and acceleration linearly.
+    """
     i, j, f = rows = _around(r.planned, t)
     a, b = r.planned.sample[i], r.planned.sample[j]
     T = r.planned.stamp[j] - r.planned.stamp[i]
-    # d: change of the angle; m0, m1: slopes at the ends, times T.
+    # T: time between the rows; d: change of the angle; m0, m1: slopes at the ends, times T.
     d, m0, m1 = b[ANGLE_COLUMN] - a[ANGLE_COLUMN], T * a[RATE_COLUMN], T * b[RATE_COLUMN]
     return AxisMotion(a[ANGLE_COLUMN] + f * (m0 + f * (3.0 * d - 2.0 * m0 - m1 + f * (m0 + m1 - 2.0 * d))),
                       interpolated(r.planned, rows, RATE_COLUMN), interpolated(r.planned, rows, ACCELERATION_COLUMN))
@@ -93,6 +113,6 @@ def planned(r, t):
 
 @compiled
 def in_force(r, t):
-    """Return (rate command [rad/s], acceleration [rad/s2] of the reference) at t [s]."""
+    """Return (rate command [rad/s], acceleration of the reference [rad/s2]) that were in force at t [s]."""
     rows = _around(r.planned, t)
     return interpolated(r.planned, rows, COMMAND_COLUMN), interpolated(r.planned, rows, ACCELERATION_COLUMN)

@@ -1,8 +1,9 @@
-"""On-line command shaper: a reference that the axis can follow, within rate, acceleration and jerk.
+"""The shaper: it turns the raw target of an axis into a reference that the axis can follow.
 
-Han's fhan, the time-optimal acceleration of a double integrator in discrete time (Han 2009), acts on shaped minus raw;
-the raw rate and acceleration are fed forward. Therefore a raw reference within the limits is followed without lag, and
-a jump is made in minimum time without overshoot.
+The reference keeps the limits of rate, acceleration and jerk. The acceleration of the reference comes from fhan, the
+time-optimal acceleration of a double integrator in discrete time (Han 2009). The function fhan acts on the difference
+shaped minus raw, and the rate and acceleration of the raw target are fed forward. The reference therefore follows a
+raw target within the limits without lag. After a jump it reaches the raw target in minimum time without overshoot.
 """
 import math
 
@@ -11,15 +12,19 @@ from pedestal_common.compiled import compiled
 from pedestal_common.fhan import fhan
 
 SUB_STEP_COUNT = 4
-"""Number of steps of the shaper in a step of the drive."""
+"""Number of sub-steps in which the shaper computes a step of the drive."""
 
 
 @compiled
 def toward_rate_limit(gap, h, jerk):
-    """Return the largest acceleration [rad/s2] that jerk [rad/s3] can reduce to 0 before the rate has grown by gap
-    [rad/s], in steps of h [s].
+    """Return the largest acceleration a [rad/s2] with which the rate still stays inside its limit.
 
-    a^2/(2 j) + a h/2 = gap; the last part of a step costs up to j h^2/8 more.
+    gap: distance of the rate from its limit [rad/s]; h: sub-step [s]; jerk: largest jerk j [rad/s3]. The jerk must
+    reduce a to 0 before the rate has grown by gap:
+
+        a^2/(2 j) + a h/2 + j h^2/8 = gap
+
+    The second and third term stand for the discrete steps: j h^2/8 is the most that the last part of a step adds.
     """
     room = gap - 0.125 * jerk * h * h
     if room <= 0.0:
@@ -30,8 +35,14 @@ def toward_rate_limit(gap, h, jerk):
 
 @compiled
 def held_inside(raw, low, high, braking, lag):
-    """Return (AxisMotion, whether it was changed): a raw target that could not stop before a limit low, high [rad] is
-    set onto the limit; braking [rad/s2], lag: time until braking begins [s]."""
+    """Return (AxisMotion of the raw target, put on a limit if necessary; True if it was put there).
+
+    A raw target is put on a limit if it is beyond the limit, or if it could not stop before the limit.
+
+    low, high  limits [rad]
+    braking    deceleration [rad/s2]
+    lag        time until the braking begins [s]
+    """
     stop = raw.angle + raw.rate * (abs(raw.rate) / (2.0 * braking) + lag)
     if raw.angle > high or (raw.rate > 0.0 and stop > high):
         return AxisMotion(high, 0.0, 0.0), True
@@ -42,14 +53,17 @@ def held_inside(raw, low, high, braking, lag):
 
 @compiled
 def shape(before, raw, dt, limits):
-    """Return (AxisMotion, rate limited, acceleration limited) of the shaped reference dt [s] after `before`.
+    """Return (AxisMotion of the shaped reference, True if its rate was limited, True if its acceleration was limited).
 
-    raw: the AxisMotion to be followed, at the end of dt; limits: record of ShaperParameters.
+    before  AxisMotion of the shaped reference dt [s] ago
+    raw     AxisMotion of the raw target now, at the end of dt
+    limits  record of ShaperParameters
     """
     p, v, a = before
     h = dt / SUB_STEP_COUNT
-    # The acceleration of the target itself is not available for closing the gap; at least a fifth always closes it.
     # p, v, a: shaped angle, rate, acceleration; e, de: shaped minus raw; back: time from a sub-step to the end of dt.
+    # r: acceleration for reducing e: the part of the limit that the acceleration of the raw target leaves, and at
+    # least a fifth of the limit.
     r = max(limits.acceleration - abs(raw.acceleration), 0.2 * limits.acceleration)
     rate_limited = acceleration_limited = False
     for i in range(SUB_STEP_COUNT):

@@ -1,12 +1,17 @@
-"""Detection of uncommanded motion: the rates of the antenna against the envelope of the recent commands.
+"""Detection of uncommanded motion: a rate of an axis outside the envelope of its recent rate commands.
 
     h_k = max(u_k, h_k-1 + a (u_k - h_k-1)),    l_k = min(u_k, l_k-1 + a (u_k - l_k-1))
 
     u_k        rate command of step k [rad/s]
     h_k, l_k   upper and lower end of the envelope [rad/s]
+    a          share by which the envelope approaches u_k in a step of dt [s] [-]
 
-a = dt / tau after the time for which a command may stay in force, and 0 before. Because an axis may lag behind its
-commands and overshoot them, any rate between 0 and the envelope is allowed, and a part of the envelope's width beyond.
+a is dt / ENVELOPE_TIME_CONSTANT_S, but 0 as long as the command that made the end of the envelope may be in force.
+
+An axis may lag behind its commands and overshoot them. Therefore every rate between 0 and the envelope is allowed. The
+rate may also exceed this range by a threshold and a share of the width of the envelope.
+
+s: record of ENVELOPE_DTYPE.
 """
 import math
 
@@ -15,24 +20,34 @@ import numpy as np
 from pedestal_common.compiled import compiled
 
 ENVELOPE_DTYPE = np.dtype([('high', 'f8', (2,)), ('low', 'f8', (2,)),      # h, l of both axes [rad/s]
-                           ('high_at', 'f8', (2,)), ('low_at', 'f8', (2,)),    # time of their last command [s]
+                           ('high_at', 'f8', (2,)), ('low_at', 'f8', (2,)),    # last command that made them [s]
                            ('since', 'f8'), ('beyond', 'f8'), ('moves', 'i8'),
                            ('measured', 'f8', (2, 3))], align=True)
-"""since: stamp from which the axes are watched [s]; beyond: stamp from which a rate is beyond the envelope [s].
-`moves`: 1 after this lasted MIN_EXCESS_TIME_S, until its reset; measured: rate of each axis at that time, and its
-allowed range."""
+"""State of the detection.
+
+since     stamp from which the axes are watched [s]
+beyond    last stamp at which no rate was outside its allowed range [s]
+moves     1 after a rate was outside for MIN_EXCESS_TIME_S, until a reset
+measured  of each axis, at the detection: rate, lowest and highest allowed rate [rad/s]
+"""
 
 ENVELOPE_TIME_CONSTANT_S = 0.2
-"""Time constant tau with which the envelope shrinks [s]: slower than the ramp of a drive without a command."""
+"""Time constant with which the envelope shrinks [s].
+
+A drive that receives no command ramps to rest faster than the envelope shrinks.
+"""
 
 ENVELOPE_OVERSHOOT_SHARE = 0.25
-"""Share of the envelope's width by which a rate may exceed it."""
+"""Share of the width of the envelope by which a rate may be outside it [-]."""
 
 RESTART_SETTLING_TIME_S = 0.3
 """Time without a test after a silence, or after the drive became ready [s]."""
 
 MIN_EXCESS_TIME_S = 0.014
-"""Least duration of an excess [s], three steps of 5 ms. The excess of a gust of 4000 Nm on both axes is shorter."""
+"""Shortest excess that counts [s]: three steps of 5 ms, less a margin of 1 ms.
+
+A gust of 4000 Nm on both axes causes a shorter excess.
+"""
 
 
 def initialise(s):
@@ -42,7 +57,7 @@ def initialise(s):
 
 @compiled
 def _restart(s, t):
-    """Restart at t [s], when no earlier command is in force any more."""
+    """Restart the detection at t [s], with no command in force."""
     s.since, s.beyond = t, t
     s.high[:] = 0.0
     s.low[:] = 0.0
@@ -56,8 +71,13 @@ def release(s):
 
 @compiled
 def watch(s, t, velocity, threshold, restart):
-    """Take the rates (2,) [rad/s] of a step at t [s], which follow the commands of earlier steps; return True if there
-    is uncommanded motion. restart: no earlier command is in force."""
+    """Take the measured rates of a step; return True if uncommanded motion is detected.
+
+    t          stamp of the step [s]
+    velocity   measured rates (2,), which follow the commands of earlier steps [rad/s]
+    threshold  part of the allowed excess that does not depend on the envelope [rad/s]
+    restart    True if no earlier command is in force
+    """
     if restart or not math.isfinite(s.since):
         _restart(s, t)
     outside = False
@@ -76,16 +96,17 @@ def watch(s, t, velocity, threshold, restart):
 
 @compiled
 def beyond(s, t):
-    """Return True if a rate was beyond the envelope in the step at t [s]."""
+    """Return True if a rate was outside its allowed range in the step at t [s]."""
     return s.beyond < t
 
 
 @compiled
 def command(s, i, rate, t, dt, hold):
-    """Take the command [rad/s] of axis i at t [s]. hold: longest time for which a command stays in force [s].
+    """Take the rate command [rad/s] of axis i at t [s] into the envelope.
 
-    dt [s]: time for which the drive had the previous command. It is at most a period, because a control unit that was
-    late does not make the missed steps.
+    dt    time by which the envelope shrinks [s]; at most a period, because a control unit that was late does not make
+          up the missed steps
+    hold  longest time for which a command stays in force [s]
     """
     a = min(dt / ENVELOPE_TIME_CONSTANT_S, 1.0)
     if rate >= s.high[i]:

@@ -1,4 +1,7 @@
-"""Unit of one electronic beam: its command, the active beam, enable and emergency stop."""
+"""Unit of one electronic beam: command, active beam, enable and emergency stop.
+
+`beam_steering_node` runs one unit for each beam of an array. The law of the beam is in electronic_beam.
+"""
 import math
 import typing
 
@@ -22,7 +25,7 @@ STATE_CODE_ENABLED, STATE_CODE_DISABLED, STATE_CODE_EMERGENCY_STOP = (
 SWITCHES_DTYPE = np.dtype([('wanted', 'i8'), ('emergency', 'i8'), ('stamp', 'i8'), ('invalid', 'i8')])
 """Switches of a beam.
 
-wanted      0 after a request to disable
+wanted      1 at the start and after a request to enable; 0 after a request to disable
 emergency   1 while an emergency stop is latched
 stamp       stamp of the last step [ns]
 invalid     1 if a command since the last diagnosis was invalid
@@ -48,7 +51,7 @@ def condition(switches):
 
 @compiled
 def decode(u, switches, command):
-    """Write the record of a command into the inputs of the beam, at the stamp of the last step."""
+    """Write a command into the inputs u of the beam, at the stamp of the last step. command: record of its message."""
     u.stamp_ns = switches.stamp
     u.due = 1 if command.stamp != NO_STAMP and condition(switches) == STATE_CODE_ENABLED else 0
     if u.due == 1:
@@ -58,7 +61,7 @@ def decode(u, switches, command):
 
 @compiled
 def encode(y, switches, stamp, outputs):
-    """Write the outputs of the beam into the records of its messages.
+    """Write the outputs y of the beam into the records of its messages, with a stamp [ns].
 
     A beam has no rate and no torque, and its reported angles are the true ones.
     """
@@ -163,5 +166,5 @@ class Beam(Unit):
     @staticmethod
     def idle(numbers):
         """Return the reason why a recording does not exercise a beam, '' if it does."""
-        angles = numbers[REFERENCE_TOPIC][:, :2]        # The positions stand before the rates.
+        angles = numbers[REFERENCE_TOPIC][:, :2]        # Columns: two positions, then two rates.
         return '' if len(angles) and np.ptp(angles, axis=0).any() else 'the beam was never steered'

@@ -1,8 +1,8 @@
 """Electronically steered beam of a phased array: no motors, a commanded angle is reached after a pure delay and held.
 
 A command stamped t_k is active from the first step at or after t_k + transport delay, until the next command becomes
-active. This models the delays of the beam steering computer and array of paper 002 (section 2, figure 2), and the hold
-of its closed-loop period.
+active. This models the delays of the beam steering computer and the array of paper 002 (section 2, figure 2). The hold
+models the closed-loop period of that paper. Arguments: s state, c constants, u inputs, y outputs (records below).
 """
 import numpy as np
 
@@ -31,7 +31,12 @@ position             active beam (azimuth, elevation) [rad]
 
 INPUTS_DTYPE = np.dtype([('stamp_ns', 'i8'), ('due', 'i8'), ('command_stamp_ns', 'i8'), ('position', 'f8', (2,))],
                         align=True)
-"""Stamp t_k of the step [ns]; due: 1 with a new command, its stamp [ns] and beam (azimuth, elevation) [rad]."""
+"""Inputs of a step.
+
+stamp_ns           stamp t_k of the step [ns]
+due                1 if the step has a new command
+command_stamp_ns, position    stamp [ns] and beam (azimuth, elevation) [rad] of this command
+"""
 
 OUTPUTS_DTYPE = np.dtype([('position', 'f8', (2,)), ('stale', 'i8'), ('invalid_command', 'i8')], align=True)
 """Outputs at t_k+1.

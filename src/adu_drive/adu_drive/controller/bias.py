@@ -11,8 +11,11 @@ from pedestal_common.compiled import inlined
 
 
 def schedule_constants(p):
-    """Return T_b, out, per_fade of BiasParameters for `scheduled`: full bias [Nm], demand with zero bias [Nm], and the
-    slope of the line between [1/Nm]. An infinite `out` makes the bias constant; a full bias of 0 switches it off."""
+    """Return (T_b, out, per_fade) of BiasParameters for `scheduled`.
+
+    T_b: full bias [Nm]; out: demand with zero bias [Nm]; per_fade: slope of the line between them [1/Nm]. An infinite
+    `out` makes the bias constant; a full bias of 0 switches it off.
+    """
     if p.schedule == 'off':
         return 0.0, p.out, 1.0
     if p.schedule == 'constant':
@@ -23,5 +26,5 @@ def schedule_constants(p):
 
 @inlined
 def scheduled(torque, T_b, out, per_fade):
-    """Return the bias [Nm] at a torque demand per motor [Nm]; per_fade = 1 / (out - hold)."""
+    """Return the bias [Nm] at a torque demand per motor [Nm]; T_b, out, per_fade: see schedule_constants."""
     return T_b * min(max((out - abs(torque)) * per_fade, 0.0), 1.0)

@@ -1,4 +1,4 @@
-"""Absolute encoders: counts of a turn, continued over several turns."""
+"""Absolute encoders of axes and motors: counts, continued over several turns, and errors of the load encoder."""
 import math
 
 from pedestal_common.compiled import inlined
@@ -11,7 +11,7 @@ def counts(angle, per_rad):
 
 
 def errors(p):
-    """Return the constants of EncoderErrorParameters: nested dictionary."""
+    """Return the constants of EncoderErrorParameters: nested dictionary. exact: 1 for an encoder without errors."""
     return {'exact': int(p.zero == p.eccentricity_sin == p.eccentricity_cos == p.interpolation == 0.0),
             'zero': p.zero, 'sin': p.eccentricity_sin, 'cos': p.eccentricity_cos, 'interpolation': p.interpolation,
             'lines': float(p.lines)}
@@ -19,7 +19,7 @@ def errors(p):
 
 @inlined
 def reading(theta, e):
-    """Return the angle [rad] that an encoder with errors `e` measures of an axis at theta [rad].
+    """Return the angle [rad] that a load encoder with the constants e of `errors` measures on an axis at theta [rad].
 
     The disc is mounted off the centre (error once per turn), the signal is interpolated between two lines of the disc,
     and the zeros of encoder and axis differ.

@@ -1,4 +1,4 @@
-"""Faults that trip a drive, from its own measurements. A fault is latched until its reset (drive_state.request)."""
+"""Faults that a drive detects by its own measurements. A fault is latched until its reset (drive_state.request)."""
 import typing
 
 from adu_drive.plant import thermal
@@ -41,7 +41,7 @@ AXIS_FAULTS = (
 Bit = bits([fault.name for fault in AXIS_FAULTS])
 MOTORS_LOST_BITS = Bit.MOTOR_1_LOST | Bit.MOTOR_2_LOST
 ALL_FAULT_BITS = (1 << len(AXIS_FAULTS)) - 1
-# Faults at which an axis cannot or must not be stopped by its motors, and faults on which the drive stops.
+# _TORQUE_OFF_BITS: the motors cannot or must not stop the axis, so the brakes do. _STOP_BITS: the drive stops.
 _TORQUE_OFF_BITS = Bit.OVERCURRENT | Bit.FINAL_LIMIT | Bit.EMERGENCY_LIMIT
 _STOP_BITS = sum(1 << i for i, fault in enumerate(AXIS_FAULTS) if fault.stops)
 
@@ -69,7 +69,7 @@ def removes_torque(bits):
 
 @inlined
 def late(periods, error, limit):
-    """Return the number of successive periods with a rate error [rad/s] beyond its limit."""
+    """Return the number of successive periods with a rate error [rad/s] beyond its limit; periods: number before."""
     return periods + 1 if abs(error) > limit else 0
 
 
@@ -81,7 +81,10 @@ def lost_motor_faults(motors):
 
 @inlined
 def end_switch_faults(theta, omega, c):
-    """Return the fault word of the switches beyond the ends of travel for a load at theta [rad], omega [rad/s]."""
+    """Return the fault word of the switches beyond the ends of travel for a load at theta [rad] with the rate omega.
+
+    omega in rad/s; c: places of the switches, constants `faults` of axis.constants.
+    """
     bits = 0
     if (theta > c.final_high and omega > MIN_OUTWARD_RATE_RAD_S
             or theta < c.final_low and omega < -MIN_OUTWARD_RATE_RAD_S):
@@ -96,10 +99,12 @@ def measured_faults(current_2, omega, disagreement, late_periods, heat, latched,
     """Return the fault word of one period of one axis.
 
     current_2      larger square of a motor current [A2]
-    omega          larger motor speed [rad/s]
+    omega          larger absolute motor speed [rad/s]
     disagreement   load encoder minus mean motor encoder divided by the ratio [rad]
+    late_periods   result of `late`
     heat           larger thermal load of a motor; a latched overtemperature ends below WARNING_THERMAL_LOAD
-    c              trip levels, see params.FaultParameters
+    latched        fault word of the axis before this period
+    c              trip levels, constants `faults` of axis.constants (see params.FaultParameters)
     """
     bits = 0
     if current_2 > c.current_2:

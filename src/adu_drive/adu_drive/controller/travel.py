@@ -9,11 +9,11 @@ MAX_RETURN_RATE_RAD_S = 0.1
 
 @inlined
 def approach_rate(distance, K, a):
-    """Return the largest rate [rad/s] towards an end of travel at a distance [rad].
+    """Return the largest rate [rad/s] towards an end of travel at a distance from it [rad].
 
-    Beyond the end the rate is negative, at most MAX_RETURN_RATE_RAD_S. Far from the end the rate allows braking at a
-    [rad/s2], close to the end it is proportional with K [1/s]. The two parts agree in value and slope at the distance
-    a / K^2.
+    K: rate per distance close to the end [1/s]; a: deceleration farther from the end [rad/s2]. The two parts agree in
+    value and slope at the distance a / K^2. Beyond the end the rate is negative: a return with at most
+    MAX_RETURN_RATE_RAD_S.
     """
     if distance * K < -MAX_RETURN_RATE_RAD_S:
         return -MAX_RETURN_RATE_RAD_S
@@ -24,7 +24,11 @@ def approach_rate(distance, K, a):
 
 @inlined
 def buffer_torque(theta, omega, lower, upper, k, c):
-    """Return the torque [Nm] of the mechanical end stops on the load: spring and damper that only push."""
+    """Return the torque [Nm] of the mechanical end stops on the load: spring and damper that only push.
+
+    theta, omega: angle [rad] and rate [rad/s] of the load; lower, upper: angles of the end stops [rad]; k, c:
+    stiffness [Nm/rad] and damping [Nms/rad].
+    """
     if theta > upper:
         return min(-k * (theta - upper) - c * omega, 0.0)
     if theta < lower:

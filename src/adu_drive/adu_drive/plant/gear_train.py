@@ -1,4 +1,4 @@
-"""Pinion on bull gear: torque of a mesh with lash on the load axis."""
+"""Mesh of a pinion with the bull gear: its torque on the load axis, with lash, uneven teeth and a lost tooth."""
 import math
 
 from pedestal_common.compiled import inlined

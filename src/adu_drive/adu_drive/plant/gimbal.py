@@ -13,8 +13,10 @@
 The equations are those of Newton and Euler. In its own frame (x along the beam, y to port, z up) the elevating part
 turns with omega = C(E) (R(A) w + (0, -E', -A')). Both signs are negative, because azimuth grows clockwise, against z,
 and elevation lifts the beam, against y. The torque on the elevating part is I omega' + omega x I omega. The yoke turns
-with the azimuth only, so that of its inertia only J_yoke counts. Bodies turn about the intersection of the axes;
-gravity acts by the unbalance of an axis. The test has Lagrange's equations of the same bodies.
+with the azimuth only, so it has only the inertia J_yoke. Bodies turn about the intersection of the axes; gravity acts
+by the unbalance of an axis. The test compares with Lagrange's equations of the same bodies.
+
+Argument c of the functions: see `constants`.
 """
 import math
 
@@ -27,8 +29,8 @@ from pedestal_common.geometry.line_of_sight import cross
 def constants(p):
     """Return the constants of the bodies from AduParameters: nested dictionary.
 
-    rigid: 1 if the inertia of the elevating part is given, so that this module is used. per_period: reciprocal of the
-    control period [1/s], with which `drive_unit` makes accelerations of the rates of two periods.
+    rigid         1 if the parameters state the inertia of the elevating part; otherwise this module has no effect
+    per_period    1 / control period [1/s]; `drive_unit` computes accelerations with it from the rates of two periods
     """
     e, I_y = p.elevating, p.elevation.load.inertia
     inertia = np.array([[e.about_beam, -e.product_xy, -e.product_xz], [-e.product_xy, I_y, -e.product_yz],
@@ -39,15 +41,15 @@ def constants(p):
 
 @compiled
 def _times(m, x, y, z):
-    """Return the product of a matrix (3, 3) and a vector (x, y, z)."""
+    """Return the product of a matrix m (3, 3) and a vector (x, y, z)."""
     return (m[0, 0] * x + m[0, 1] * y + m[0, 2] * z, m[1, 0] * x + m[1, 1] * y + m[1, 2] * z,
             m[2, 0] * x + m[2, 1] * y + m[2, 2] * z)
 
 
 @compiled
 def inertia(c, E):
-    """Return (M_AA, M_AE) [kg m2] at an elevation; M_EE is the inertia of the elevation axis."""
-    # (-s, 0, -k): azimuth axis, in the direction of growing azimuth, in the frame of the elevating part.
+    """Return (M_AA, M_AE) [kg m2] at an elevation [rad]; M_EE is the inertia of the elevation axis."""
+    # (-s, 0, -k): unit vector about which the azimuth grows, in the frame of the elevating part.
     s, k = math.sin(E), math.cos(E)
     x, y, z = _times(c.I, -s, 0.0, -k)
     return -s * x - k * z + c.J_yoke, -y
@@ -55,22 +57,27 @@ def inertia(c, E):
 
 @compiled
 def _on_elevating(A, E, x, y, z):
-    """Return a deck vector (FLU) in the frame of the elevating part."""
+    """Return a deck vector (x, y, z), FLU, in the frame of the elevating part at the angles A, E [rad] of the axes."""
     forward, left = x * math.cos(A) - y * math.sin(A), x * math.sin(A) + y * math.cos(A)
     return forward * math.cos(E) + z * math.sin(E), left, z * math.cos(E) - forward * math.sin(E)
 
 
 @compiled
 def gyroscopic(c, angles, rates, w, w_dot):
-    """Return h [Nm] on azimuth and elevation; w, w_dot (3,): rate [rad/s], acceleration [rad/s2] of the deck, FLU."""
+    """Return h [Nm] on azimuth and elevation.
+
+    angles, rates: of azimuth and elevation axis [rad, rad/s]; w, w_dot (3,): rate [rad/s] and angular acceleration
+    [rad/s2] of the deck, FLU.
+    """
     # Vectors in the frame of the elevating part: (wx, wy, wz) is w; (ax, ay, az) the rate of the azimuth axis; (x, y,
     # z) omega; (nx, ny, nz) the torque.
     (A, E), (A_dot, E_dot) = angles, rates
     wx, wy, wz = _on_elevating(A, E, w[0], w[1], w[2])
     ax, ay, az = -math.sin(E) * A_dot, 0.0, -math.cos(E) * A_dot
     x, y, z = wx + ax, wy - E_dot, wz + az
-    # A vector v has, in a frame that turns with the rate r against it, the derivative v x r. Against a vector fixed to
-    # the deck the frame turns with the rates of both axes; against the azimuth axis it turns with that of elevation.
+    # In a frame that turns with the rate r relative to a constant vector v, v has the derivative v x r. Relative to
+    # the deck, the frame of the elevating part turns with the rates of both axes. Relative to the azimuth axis, it
+    # turns with the rate of the elevation axis.
     ux, uy, uz = cross(wx, wy, wz, ax, ay - E_dot, az)
     vx, vy, vz = cross(ax, ay, az, 0.0, -E_dot, 0.0)
     bx, by, bz = _on_elevating(A, E, w_dot[0], w_dot[1], w_dot[2])

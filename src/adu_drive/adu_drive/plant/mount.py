@@ -1,14 +1,22 @@
 """Direction of the beam from the angles of the two axes, for a pedestal with alignment errors.
 
 Convention: each term is ADDED to the wanted deck angles to give the commanded angles, as in the VLBI Field System and
-katpoint. To first order, with azimuth A, elevation E and P of katpoint.PointingModel:
+katpoint. The terms are those of params.MountParameters [rad]. To first order their sums dA and dE [rad], at the
+azimuth A and the elevation E, are
 
     dA = non_perpendicularity tan E - collimation / cos E + (tilt_forward sin A - tilt_starboard cos A) tan E
-    dE = tilt_forward cos A + tilt_starboard sin A + sag cos E            P3, P4, P5, P6, P8; the zeros are P1, P7
+    dE = tilt_forward cos A + tilt_starboard sin A + sag cos E
 
-Here the terms are rotations, exact at any elevation, in this order: collimation sets the beam off the normal of the
-elevation axis. The elevation angle, reduced by the sag, turns the beam. non_perpendicularity leans the elevation axis.
-The azimuth angle turns the elevation axis, and the tilt leans the azimuth axis.
+katpoint.PointingModel names non_perpendicularity P3, collimation P4, tilt_forward P5, tilt_starboard P6 and sag P8.
+Its P1 and P7 are the zeros of the encoders.
+
+This module computes with rotations, which are exact at any elevation, in this order:
+
+    1. collimation sets the beam off the normal of the elevation axis
+    2. the elevation angle, reduced by the sag, turns the beam
+    3. non_perpendicularity leans the elevation axis
+    4. the azimuth angle turns the elevation axis
+    5. the tilt leans the azimuth axis
 """
 import math
 
@@ -31,8 +39,8 @@ def _tilt(forward, starboard):
 
 
 def constants(p):
-    """Return the constants of MountParameters: nested dictionary."""
-    # true: 1 for a mount without errors, whose beam has the angles of the axes.
+    """Return the constants of MountParameters: nested dictionary. true: 1 for a mount without errors."""
+    # The beam of a mount without errors has the angles of the axes.
     lean, off = p.non_perpendicularity, p.collimation
     return {'true': int(p.tilt_forward == p.tilt_starboard == lean == off == p.sag == 0.0),
             'tilt': _tilt(p.tilt_forward, p.tilt_starboard), 'sin_lean': math.sin(lean), 'cos_lean': math.cos(lean),
@@ -41,16 +49,16 @@ def constants(p):
 
 @compiled
 def _leaning(c, x, y, z):
-    """Return a vector of the elevating part in the frame of the yoke, whose elevation axis leans."""
+    """Return a vector (x, y, z) of the elevating part in the frame of the yoke, whose elevation axis leans."""
     return x, c.cos_lean * y + c.sin_lean * z, c.cos_lean * z - c.sin_lean * y
 
 
 @compiled
 def beam(c, A, E, A_dot, E_dot):
-    """Return ((azimuth, elevation) [rad], their rates [rad/s]) of the beam on the deck, from those of the axes.
+    """Return ((azimuth, elevation) [rad], their rates [rad/s]) of the beam, as deck angles.
 
-    Of the azimuths whole turns apart, the azimuth nearest to the axis is returned. If the elevation axis is beyond
-    90 deg, the elevation of the beam is too.
+    c: see `constants`; A, E, A_dot, E_dot: angles [rad] and rates [rad/s] of the axes. Among azimuths whole turns
+    apart, the result is nearest to A. If the elevation axis is beyond 90 deg, the elevation of the beam is too.
     """
     E_beam, E_beam_dot = E - c.sag * math.cos(E), (1.0 + c.sag * math.sin(E)) * E_dot
     cos_E, sin_E = c.cos_off * math.cos(E_beam), c.cos_off * math.sin(E_beam)

@@ -17,7 +17,10 @@ WARNING_THERMAL_LOAD = 0.8
 
 @inlined
 def load(x, torque, per_rated, gain):
-    """Return the thermal load one period h later under a torque [Nm]; gain = 1 - exp(-h / tau)."""
+    """Return the thermal load one period h later, from the thermal load x, under a torque [Nm].
+
+    per_rated = 1 / T_rated; gain = 1 - exp(-h / tau).
+    """
     relative = torque * per_rated
     return x + gain * (relative * relative - x)
 

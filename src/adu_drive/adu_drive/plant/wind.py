@@ -2,7 +2,7 @@
 
 A spectral gust is the sum of SPECTRAL_LINE_COUNT cosines with random phases, one for each of SPECTRAL_LINE_COUNT equal
 steps of log f. So v(t) has the given spectrum (Shinozuka and Deodatis, Applied Mechanics Reviews 44 (1991) 191), and
-equal times give equal torques. Drag grows with the square of the speed of the wind: torque = mean (1 + v / V)^2.
+equal times give equal torques. Drag grows with the square of the wind speed: torque = mean torque times (1 + v / V)^2.
 
 f: frequency [Hz]; V: mean speed of the wind [m/s]; v, sigma_v: turbulence along the wind and its standard deviation.
 """
@@ -18,7 +18,7 @@ SPECTRAL_LINE_COUNT = 128
 """Number of cosines of a spectral gust."""
 
 MIN_GUST_FREQUENCY_HZ, MAX_GUST_FREQUENCY_HZ = 1e-4, 20.0
-"""Range of the spectra [Hz]; gusts above 20 Hz are far smaller than an antenna."""
+"""Lowest and highest frequency of the spectra [Hz]; gusts above 20 Hz are far smaller than an antenna."""
 
 GUST_NONE, GUST_STEP, GUST_SINE, GUST_SPECTRUM = range(4)
 _GUST_KINDS = {'none': GUST_NONE, 'step': GUST_STEP, 'sine': GUST_SINE, 'davenport': GUST_SPECTRUM,
@@ -71,10 +71,10 @@ def turbulence(t, amplitude, omega, phase):
 
 @compiled
 def torques(c, t):
-    """Return the torques [Nm] on the azimuth and elevation loads at the time t [s]."""
+    """Return the torques [Nm] on the azimuth and elevation loads at the time t [s]; c: see `constants`."""
     if c.kind == GUST_SPECTRUM:
         g = 1.0 + turbulence(t, c.amplitude, c.omega, c.phase)
-        return c.azimuth * g * abs(g), c.elevation * g * abs(g)      # A wind that reverses pushes back.
+        return c.azimuth * g * abs(g), c.elevation * g * abs(g)    # A gust that reverses the wind reverses the torque.
     gust = 0.0
     if t >= c.start:
         gust = 1.0 if c.kind == GUST_STEP else math.sin(c.omega_sine * (t - c.start)) if c.kind == GUST_SINE else 0.0

@@ -1,20 +1,20 @@
 """One wind over both axes: speed, direction and turbulence in three components, and its torques on a dish.
 
-    W = V ((1 + u) along + v across + w up),    T = rho / 2 |W|^2 A D C,    C = c_1 sin alpha + c_2 sin 2 alpha
+    W = V ((1 + u) along + v across + w up),    T = rho / 2 |W|^2 S D C,    C = c_1 sin alpha + c_2 sin 2 alpha
 
-    V, W     mean speed of the wind [m/s], its velocity
+    V, W     mean speed of the wind, its velocity vector [m/s]; along, across, up: unit vectors
     u, v, w  turbulence along the wind, across and up, divided by V; f: its frequency [Hz]
     rho      density of the air [kg/m3]
-    A, D     area [m2] and diameter [m] of the dish
+    S, D     area [m2] and diameter [m] of the dish
     alpha    angle between the beam and the direction of the wind source
     C        torque coefficient; a positive C turns the beam to the lee
 
-The square law with a torque coefficient for A D is that of wind tunnels: Gawronski, Modeling and Control of Antennas
-and Telescopes (2008), section on wind disturbances. C is a measured curve there (JPL memo CP-6, 1964), of which c_1
-and c_2 are the first harmonics. The defaults have its size and shape: the largest value is 0.12, with the wind from
-behind at 130 deg. The components v and w have 0.78 and 0.55 of the intensity of u (ESDU 85020) and, for simplicity,
-the von Karman spectrum of u. Gusts smaller than the dish cancel over it: aerodynamic admittance
-1 / (1 + (2 f sqrt(A) / V)^(4/3)) (Vickery 1965).
+This law, dynamic pressure times S D times a coefficient, is used in wind-tunnel tests: Gawronski, Modeling and Control
+of Antennas and Telescopes (2008), section on wind disturbances. There C is a measured curve (JPL memo CP-6, 1964), of
+which c_1 and c_2 are the first harmonics. The default c_1 and c_2 reproduce the size and the shape of this curve: its
+largest value is 0.12, with the wind from behind at alpha = 130 deg. The components v and w have 0.78 and 0.55 of the
+intensity of u (ESDU 85020) and, for simplicity, the von Karman spectrum of u. Gusts smaller than the dish cancel over
+its area. The aerodynamic admittance 1 / (1 + (2 f sqrt(S) / V)^(4/3)) reduces their amplitude (Vickery 1965).
 """
 import math
 import types
@@ -56,19 +56,25 @@ def constants(p):
 
 @compiled
 def torques(c, t, A, E):
-    """Return the torques [Nm] on the azimuth and elevation loads at the time t [s] with the axes at A, E [rad]."""
+    """Return the torques [Nm] on the azimuth and elevation loads at the time t [s] with the axes at A, E [rad].
+
+    c: see `constants`; A, E: azimuth and elevation.
+    """
     u, v, w = (turbulence(t, c.amplitude[0], c.omega[0], c.phase[0]),
                turbulence(t, c.amplitude[1], c.omega[1], c.phase[1]),
                turbulence(t, c.amplitude[2], c.omega[2], c.phase[2]))
+    # x, y, z: W / V in the frame of the azimuth and elevation axes; to_x, to_y: direction to which the wind blows; b:
+    # unit vector along the beam.
     x, y, z = (1.0 + u) * c.to_x - v * c.to_y, (1.0 + u) * c.to_y + v * c.to_x, w
     bx, by, bz = direction(A, E)
     nx, ny, nz = cross(bx, by, bz, x, y, z)     # |W| / V sin alpha, along the axis of the turn from b to W
     speed = math.sqrt(x * x + y * y + z * z)
     cosine = -(bx * x + by * y + bz * z)        # |W| / V cos alpha
     T = c.torque * (c.c_1 * speed + 2.0 * c.c_2 * cosine)
+    # Azimuth turns about (0, 0, -1), elevation about (-sin A, -cos A, 0).
     return -T * nz, -T * (nx * math.sin(A) + ny * math.cos(A))
 
 
 def initial_torques(p, A, E):
-    """Return the torques [Nm] of WindFieldParameters on azimuth and elevation at t = 0."""
+    """Return the torques [Nm] of WindFieldParameters p on both loads at t = 0 with the axes at A, E [rad]."""
     return torques.py_func(types.SimpleNamespace(**constants(p)), 0.0, A, E) if p.speed > 0.0 else (0.0, 0.0)

@@ -1,4 +1,4 @@
-"""Arguments that several verbs share."""
+"""Arguments that several verbs of the command line share: their definition, and the check of their values."""
 import argparse
 import os
 import pathlib
@@ -19,7 +19,7 @@ def add_duration(parser: argparse.ArgumentParser, whole: str = 'a run') -> None:
                         'default: value of the scenario')
 
 
-def add_param(parser: argparse.ArgumentParser, example: str = 'acu.azimuth.feedforward.bandwidth=20') -> None:
+def add_param(parser: argparse.ArgumentParser, example: str = 'acu.azimuth.feedforward.bandwidth=12') -> None:
     """Add --param NODE.KEY=VALUE, which may be repeated."""
     parser.add_argument('--param', action='append', default=[], metavar='NODE.KEY=VALUE',
                         help=f'parameter and its new value, for example {example}; may be repeated')
@@ -66,8 +66,9 @@ def check_elements(options: argparse.Namespace) -> None:
 
 
 def elements(options: argparse.Namespace) -> dict[str, str]:
-    """Return the arguments of the commands `tle` and `elements` from the file of --tle, {} without one. Raises
-    ValueError."""
+    """Return the arguments of the commands `tle` and `elements` from the file of --tle, {} without --tle.
+
+    Raises ValueError."""
     check_elements(options)
     if not options.tle:
         return {}

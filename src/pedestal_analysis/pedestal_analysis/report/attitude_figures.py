@@ -1,4 +1,4 @@
-"""Figures of a report on the INS: attitude error and stated standard deviation."""
+"""Figure of a report on the INS of a ship: attitude error and stated standard deviation."""
 import numpy as np
 
 from pedestal_analysis.report.figures import (
@@ -16,7 +16,10 @@ MIN_DRAWN_ERROR_DEG = 1e-4
 
 
 def attitude(data):
-    """Return the figure of the heading and level errors of the INS [deg] and their stated standard deviations."""
+    """Return the figure of the heading and level errors of the INS [deg], and of their stated standard deviations.
+
+    data: run_data.RunData.
+    """
     known = data.attitude
     figure, panels = new_panels(2, y='error [deg]', sharex=True)
     # known.sigma is (n, 2): level per axis, heading. Both level axes together have sqrt(2) times the sigma of one.
@@ -36,5 +39,5 @@ def attitude(data):
 
 FIGURES = (
     Spec('attitude', 'Attitude error of the INS', 'Error of the attitude that the control unit received (orange) and '
-         'the standard deviation that the INS states (blue).', ('attitude',), attitude),
+         'the standard deviation that the INS states (blue).', ('attitude',), attitude, timed=True),
 )

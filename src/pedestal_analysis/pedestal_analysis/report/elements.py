@@ -1,4 +1,4 @@
-"""Elements of report pages: numbers, tables, figures, and the page as one self-contained HTML file."""
+"""HTML elements of report pages: numbers, tables, figures, and the page as one self-contained file."""
 import html
 import io
 import math
@@ -11,13 +11,13 @@ PAGE_CSS = """
   :root { --ink: #dfe3e8; --soft: #9aa3ae; --line: #3a414a; --paper: #16191d; --bad: #ff8a80; } }
 @media print {
   :root { color-scheme: light; --ink: #000000; --soft: #444444; --line: #bbbbbb; --paper: #ffffff; --bad: #b3261e; }
-  figure { break-inside: avoid; } body { padding: 0; max-width: none; } }
+  figure, tr { break-inside: avoid; } body { padding: 0; max-width: none; } }
 body { margin: 0 auto; padding: 1.2rem; max-width: 60rem; color: var(--ink); background: var(--paper);
        font: 1rem/1.45 system-ui, sans-serif; }
 h1 { font-size: 1.6rem; margin: 0 0 .2rem; }
 h2 { font-size: 1.15rem; margin: 2rem 0 .4rem; padding-top: .8rem; border-top: 1px solid var(--line); }
 p, figcaption { margin: .3rem 0; } .soft, figcaption { color: var(--soft); font-size: .92rem; }
-.bad { color: var(--bad); font-weight: 600; }
+.bad { color: var(--bad); font-weight: 600; } .verdict { font-size: 1.15rem; font-weight: 600; }
 .wide { overflow-x: auto; }
 table { border-collapse: collapse; margin: .5rem 0; font-size: .95rem; font-variant-numeric: tabular-nums; }
 th, td { padding: .22rem 1.4rem .22rem 0; text-align: left; vertical-align: top;
@@ -33,7 +33,7 @@ figure svg { display: block; width: 100%; height: auto; min-width: 26rem; }
 
 
 def page(title, parts):
-    """Return the text of a page of parts, elements of HTML."""
+    """Return the text of an HTML page; parts: its elements as texts."""
     return ('<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
             '<meta name="viewport" content="width=device-width, initial-scale=1">'
             f'<title>{html.escape(title)}</title><style>{PAGE_CSS}</style></head>\n<body>\n'
@@ -41,7 +41,10 @@ def page(title, parts):
 
 
 def figure(spec, data, reason=''):
-    """Return the figure of a figures.Spec with title and caption; reason: why it cannot be drawn, else ''."""
+    """Return a figure as an HTML element with title and caption.
+
+    spec: figures.Spec; data: argument of its function `draw`; reason: why the figure cannot be drawn, or ''.
+    """
     caption = f'<h3>{html.escape(spec.title)}</h3>'
     if reason:
         return f'<figure id="{spec.key}">{caption}<p class="bad">Not drawn: {html.escape(reason)}.</p></figure>'
@@ -58,7 +61,10 @@ def number(value, unit=''):
 
 
 def table(head, rows, kind=''):
-    """Return an HTML table; the first cell of a row is its name; kind 'n' right-aligns the other cells."""
+    """Return an HTML table; head: texts of its header, or None; rows: lists of texts, the name of the row first.
+
+    kind: CSS class; 'n' aligns the other cells to the right, 'meta' is for the table at the head of a page.
+    """
     def line(cells, tag):
         rest = ''.join(f'<{tag} class="{kind}">{html.escape(cell)}</{tag}>' if kind != 'meta' and kind else
                        f'<{tag}>{html.escape(cell)}</{tag}>' for cell in cells[1:])

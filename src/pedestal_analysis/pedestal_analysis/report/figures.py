@@ -1,6 +1,6 @@
-"""Drawing of figures: colours, style, panels, lines, and output as a file or as part of a page.
+"""Drawing of the figures of all reports: colours, style, panels, lines, and output as a file or as part of a page.
 
-Grey marks measured, blue filtered or commanded, and orange true values.
+Measured values are grey, filtered or commanded values blue, and true values orange.
 """
 import pathlib
 import re
@@ -16,6 +16,7 @@ from pedestal_analysis.results.tracking import stretches
 INK_COLOUR = '#20242a'
 RAW_COLOUR, FILTERED_COLOUR, TRUTH_COLOUR = '#8d949e', '#1f6fd1', '#e57a00'
 MOTOR_1_COLOUR, MOTOR_2_COLOUR = '#0b8f8c', '#a04fc4'
+"""Colours of texts and marks, of measured, filtered and true values, and of both motors."""
 FIGURE_WIDTH_INCH = 7.4
 """Width of a figure [inch]."""
 
@@ -32,9 +33,15 @@ MATPLOTLIB_STYLE = {
 
 
 class Spec(typing.NamedTuple):
-    """A figure.
+    """Specification of a figure.
 
-    key: name of its PNG; needs: keys of run_data._NEEDS; draw(RunData) -> Figure; dpi: dots per inch of its PNG.
+    key              name of its file without extension
+    title, caption   texts above the figure
+    needs            data that the figure needs: keys of run_data._NEEDS
+    draw             function draw(data) -> Figure; data: run_data.RunData or trials_page.Trials
+    dpi              dots per inch of its PNG
+    timed            True for panels over time, which get the marks of the events
+    paper            number of the same figure in the paper; 0: none
     """
     key: str
     title: str
@@ -42,12 +49,14 @@ class Spec(typing.NamedTuple):
     needs: tuple
     draw: typing.Callable
     dpi: int = 150
+    timed: bool = False
+    paper: int = 0
 
 
 def thin(t, y, bins=1000):
-    """Return (t, y), both (n,), of the smallest and the largest value in each of `bins` parts, in order.
+    """Return a line t, y (n,) with fewer points: the smallest and the largest value in each of `bins` parts.
 
-    Because gaps must stay visible, the first NaN of each part is kept.
+    Because gaps must stay visible, the first NaN of each part stays too.
     """
     if t.size <= 2 * bins:
         return t, y
@@ -63,15 +72,17 @@ def thin(t, y, bins=1000):
 
 
 def spans(flags):
-    """Return [(first, last index)] of the intervals in which flags (n,) bool are true."""
+    """Return [(first index, last index)] of the intervals in which flags (n,) bool are true."""
     return [(first, end - 1) for first, end in stretches(flags)]
 
 
 def new_panels(rows, columns=1, height=None, width=FIGURE_WIDTH_INCH, x='time [s]', y='', **options):
-    """Return (Figure, axes (rows, columns)).
+    """Return (Figure, axes (rows, columns)) of a figure with some panels.
 
-    height, width: of the figure [inch], by default 1.75 for each row. x, y: labels below the last row and left of the
-    first column, one for all or one for each. options: of Figure.subplots.
+    height, width   size of the figure [inch]; the default height is 0.5, plus 1.75 for each row
+    x               label below the last row: one text for all columns, or one for each
+    y               label left of the first column: one text for all rows, or one for each
+    options         arguments of Figure.subplots
     """
     figure = Figure(figsize=(width, height or 0.5 + 1.75 * rows), layout='constrained')
     axes = figure.subplots(rows, columns, squeeze=False, **options)
@@ -83,7 +94,7 @@ def new_panels(rows, columns=1, height=None, width=FIGURE_WIDTH_INCH, x='time [s
 
 
 def draw_line(axes, t, y, window=None, **options):
-    """Draw y (n,) over t (n,), thinned; window: (first, last t) to draw; options: of Axes.plot."""
+    """Draw y (n,) over t (n,) with fewer points (`thin`); window: (first, last) t to draw; options: of Axes.plot."""
     if window is not None:
         inside = (t >= window[0]) & (t <= window[1])
         t, y = t[inside], y[inside]
@@ -93,28 +104,64 @@ def draw_line(axes, t, y, window=None, **options):
 
 
 def outside_legend(figure, axes):
-    """Return the figure with the legend of some axes above the panels."""
+    """Add the legend of one panel (axes) above all panels, and return the figure."""
     figure.legend(*axes.get_legend_handles_labels(), loc='outside upper right', ncols=4)
     return figure
 
 
+EVENT_COLOURS = {'alarm': '#c81e1e', 'refused': '#c81e1e', 'injected fault': '#b5179e', 'state': '#a87b51',
+                 'command': '#2f7d4f', 'mode': INK_COLOUR}
+"""{kind of event: colour of its mark}, the most urgent first."""
+
+MIN_MARK_DISTANCE = 0.02
+"""Smallest distance of two numbers on a panel [widths of the panel]; closer events share one number."""
+
+
+def mark(figure, events):
+    """Draw a vertical line for each of the events.Event on all panels, with its number, from 1, on the first row."""
+    for axes in figure.axes:
+        low, high = axes.get_xlim()
+        seen = [(number, event) for number, event in enumerate(events, start=1) if low < event.t < high]
+        for _, event in seen:
+            axes.axvline(event.t, color=EVENT_COLOURS[event.kind], linewidth=0.8, linestyle=':')
+        if axes.get_subplotspec().is_first_row():
+            for label, t, colour in _labels(seen, MIN_MARK_DISTANCE * (high - low)):
+                axes.text(t, 0.99, label, color=colour, fontsize=6.5, ha='right', va='top', rotation=90.0,
+                          transform=axes.get_xaxis_transform())
+
+
+def _labels(seen, distance):
+    """Return [(text, time, colour)] of the numbers of events; seen: [(number, Event)] in order; distance: smallest
+    distance of two numbers [s]."""
+    groups = []
+    for numbered in seen:
+        if groups and numbered[1].t - groups[-1][0][1].t < distance:
+            groups[-1].append(numbered)
+        else:
+            groups.append([numbered])
+    order = list(EVENT_COLOURS)
+    return [('-'.join(dict.fromkeys((str(group[0][0]), str(group[-1][0])))), group[0][1].t,
+             EVENT_COLOURS[min((event.kind for _, event in group), key=order.index)]) for group in groups]
+
+
 FILE_METADATA = {'png': {'Software': None}, 'pdf': {'CreationDate': None, 'Creator': None, 'Producer': None},
                  'svg': {'Date': None, 'Creator': None, 'Format': None, 'Type': None}}
-"""Metadata left out of a file of each format, so that equal data give equal bytes."""
+"""{format of a file: metadata that are left out}. This avoids different bytes of equal figures."""
 
 LINE_DASHES = {TRUTH_COLOUR: (0, (6.0, 1.5)), MOTOR_1_COLOUR: (0, (3.0, 1.0, 1.0, 1.0)),
                MOTOR_2_COLOUR: (0, (2.0, 1.2))}
-"""{colour: dashes} that distinguish lines without colour; all other colours are solid."""
+"""{colour: dashes} by which the lines differ in a print without colour. Lines of all other colours are solid."""
 
 
 MIN_WIDE_LINE_PT = 2.0
-"""Line width from which a line needs no dashes [pt]."""
+"""Width above which a line needs no dashes, because its width distinguishes it [pt]."""
 
 
 def tidy(figure):
-    """Dash the solid lines of panels with several lines; label short logarithmic axes with plain numbers.
+    """Make a figure easier to read, after all is drawn.
 
-    The dashes are those of the colours; a short axis has less than three decades.
+    In a panel with several lines, the solid lines become dashed by their colours (LINE_DASHES). A logarithmic axis of
+    less than three decades has plain numbers as labels.
     """
     for axes in figure.axes:
         lines = [line for line in axes.get_lines() if len(line.get_xdata()) > 2]
@@ -137,22 +184,29 @@ def _dash(lines):
 
 
 def store(figure, output, dpi=150):
-    """Write a figure to a path with its suffix as format (.png, .pdf on white), or to a stream as transparent SVG."""
+    """Write a figure to a path or to a stream.
+
+    The suffix of the path is the format; PNG and PDF have a white background. A stream receives a transparent SVG.
+    """
     kind = str(output).rpartition('.')[2] if isinstance(output, pathlib.Path) else 'svg'
     colours = {'transparent': True} if kind == 'svg' else {'facecolor': 'white'}
     figure.savefig(output, format=kind, dpi=dpi, metadata=FILE_METADATA[kind], **colours)
 
 
 def render(spec, data, output):
-    """Draw the figure of a Spec and `store` it in a path or stream. Equal data give equal bytes."""
+    """Draw the figure of a Spec, and `store` it in a path or stream. Equal data give equal bytes."""
     with matplotlib.rc_context({**MATPLOTLIB_STYLE, 'svg.hashsalt': spec.key}):
-        store(spec.draw(data), output, spec.dpi)
+        figure = spec.draw(data)
+        if spec.timed:
+            mark(figure, data.events)
+        store(figure, output, spec.dpi)
 
 
 def inline(svg):
     """Return the text of an SVG file as an element of an HTML page.
 
-    It has no prolog and no names, the text colour of the page, and coordinates to 0.01 pt.
+    The prolog, the names of elements and the metadata are left out. Texts have the colour of the page. Coordinates are
+    cut to 0.01 pt.
     """
     svg = svg[svg.index('<svg'):]
     svg = re.sub(r'<metadata>.*?</metadata>', '', svg, flags=re.DOTALL)

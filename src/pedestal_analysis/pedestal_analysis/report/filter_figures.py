@@ -1,4 +1,7 @@
-"""Figures of a report on the target filter: errors and stated sigma, innovations, probabilities."""
+"""Figures of a report on the target filter: its errors and stated sigma, its innovations, its motion models.
+
+Each function of FIGURES takes the run_data.RunData of a recording (`data`).
+"""
 import numpy as np
 
 from pedestal_analysis.report.figures import (
@@ -14,13 +17,16 @@ from pedestal_analysis.report.figures import (
 from pedestal_analysis.results.consistency import BAND_PROBABILITY, bounds
 from pedestal_common.graph import topics
 
-MODEL_COLOURS = {'cv': '#2f9e5b', 'ca': '#1f6fd1', 'singer': '#8364c8', 'current_statistical': '#e57a00'}
+MODEL_COLOURS = {'cv': '#2f9e5b', 'ca': '#1f6fd1', 'singer': '#8364c8', 'current_statistical': '#b5179e',
+                 'ca_2': '#0b8f8c', 'ca_3': '#7fb069', 'ca_4': '#e0b400', 'ca_5': '#e57a00', 'ca_6': '#d1495b',
+                 'ca_7': '#8d1f3d', 'ca_8': '#4a1025'}
+"""{name of topics.MOTION_MODELS, in their order: colour}."""
 NIS_SPAN_S = 1.0
-"""Span of the average of the NIS in its figure [s]."""
+"""Span over which the figure averages the NIS (normalised innovation squared) [s]."""
 
 
 def estimate(data):
-    """Return the figure of estimate minus truth and twice the stated sigma, angle [deg] and rate [deg/s]."""
+    """Return the figure of estimate minus truth and of twice the stated sigma, for angle [deg] and rate [deg/s]."""
     known = data.filter
     figure, panels = new_panels(2, 2, sharex=True)
     for row, axis, i in zip(panels, topics.AXES, range(2)):
@@ -60,9 +66,10 @@ def innovations(data):
 
 
 def _averaged(t, nis, freedoms):
-    """Return (times, mean NIS, expectation, low, high) over spans of NIS_SPAN_S.
+    """Return the mean NIS in spans of NIS_SPAN_S: arrays (m,) of time [s], mean, expectation, low and high.
 
-    NaN in spans with less than half of the largest number of measurements.
+    t, nis, freedoms (n,): time of the steps [s], NIS and its degrees of freedom. low and high are the band of a
+    consistent filter. A span with less than half of the largest number of measurements is NaN.
     """
     part = np.floor((t - t[0]) / NIS_SPAN_S).astype(int)
     known = np.isfinite(nis)
@@ -76,7 +83,7 @@ def _averaged(t, nis, freedoms):
 
 
 def probabilities(data):
-    """Return the figure of the probability of each motion model."""
+    """Return the figure of the probability of each motion model, for both axes."""
     known = data.filter
     figure, panels = new_panels(2, y='probability', sharex=True)
     for axes, axis, i in zip(panels[:, 0], topics.AXES, range(2)):
@@ -92,11 +99,12 @@ def probabilities(data):
 FIGURES = (
     Spec('estimate', 'Error and stated sigma of the filter', 'Estimate minus truth (orange) and twice the standard '
          'deviation that the filter states (blue): about 95 % should lie between the lines. On a ship the error '
-         'includes the attitude error of the INS, which the filter does not model.', ('truth', 'filter'), estimate),
+         'includes the attitude error of the INS, which the filter does not model.', ('truth', 'filter'), estimate,
+         timed=True),
     Spec('innovations', 'Innovations', 'Innovation: measurement minus prediction. Mean NIS: mean square of the '
          f'innovations over their stated variance, over {NIS_SPAN_S:g} s. Above the band the stated variance is too '
          'small, or the target moves as no model predicts. Below the band the stated variance is too large.',
-         ('filter',), innovations),
+         ('filter',), innovations, timed=True),
     Spec('probabilities', 'Motion models', 'Probability of each motion model of the filter; a single model has '
-         'probability 1.', ('filter', 'bank'), probabilities),
+         'probability 1.', ('filter', 'bank'), probabilities, timed=True),
 )

@@ -1,4 +1,4 @@
-"""Page of `pedestal report`: a recording as one self-contained HTML file, its figures also as PNG."""
+"""Page of `pedestal report`: a recording as one self-contained HTML file, its figures also as PNG, and as PDF."""
 import html
 import itertools
 import pathlib
@@ -8,13 +8,15 @@ import numpy as np
 from pedestal_analysis.report import (
     attitude_figures,
     elements,
+    events,
     figures,
     filter_figures,
+    print_pdf,
     run_data,
     run_figures,
     subject,
 )
-from pedestal_analysis.results import consistency, isolation, results, tracking
+from pedestal_analysis.results import consistency, isolation, results, tracking, verdict
 from pedestal_analysis.results.tracking import DEG_PER_RAD
 from pedestal_common.graph import topics
 from pedestal_common.graph.topics import AXES
@@ -26,20 +28,33 @@ MAX_DIAGNOSTICS_ROWS = 200
 """Largest number of rows of the table of diagnostics."""
 
 
-def write(bag_path, output=None, png_folder=None, beam='', vector=None) -> pathlib.Path:
-    """Write the report of a bag and return its path: output, default report.html in the bag (beside a bare .mcap).
+PAPER_SCENARIOS = ('uav_flyby',)
+"""Scenarios that repeat the experiment of the paper; only their reports name its figures."""
 
-    beam: of several, default the first. png_folder: folder for the figures and the overview as PNG; vector: 'pdf' or
-    'svg' for a second file of each figure. The same bag gives the same bytes.
-    Raises bag.BagError if the bag cannot be read to its end, OSError if the report cannot be written.
+
+def write(bag_path, output=None, png_folder=None, beam='', vector=None, author='', pdf=False) -> pathlib.Path:
+    """Write the report of a bag, and return the path of its file.
+
+    output       file of the report, by default report.html in the bag (beside a bare .mcap)
+    png_folder   folder for the figures and the overview as PNG, None for no such files
+    beam         name of one of several beams, '' for the first
+    vector       'pdf' or 'svg' for a second file of each figure in that folder
+    author       text on the page, '' for none
+    pdf          True to print the page as PDF too, beside the HTML file
+
+    Equal bags give equal bytes, except for the PDF. Raises bag.BagError if the bag cannot be read to its end, OSError
+    if the report cannot be written, ValueError if no browser for the PDF is installed.
     """
+    browser = print_pdf.browser() if pdf else None
     whole = bags.read(bag_path)
     bag = whole.view(beam)
     output = pathlib.Path(output) if output is not None else bag.file.parent / 'report.html'
     data = run_data.read(bag)
-    page = _page(bag, data, verify(whole))
+    page = _page(bag, data, verify(whole), author)
     output.parent.mkdir(parents=True, exist_ok=True)
     output.write_text(page, encoding='utf-8')
+    if browser:
+        print_pdf.write(browser, output, output.with_suffix('.pdf'))
     if png_folder is not None:
         folder = pathlib.Path(png_folder)
         folder.mkdir(parents=True, exist_ok=True)
@@ -52,12 +67,12 @@ def write(bag_path, output=None, png_folder=None, beam='', vector=None) -> pathl
 
 
 def _of_axes(name, values, last=''):
-    """Return a row of numbers [(value, unit)] of azimuth and elevation."""
+    """Return a row of a table: name, numbers [(value, unit)] of azimuth and elevation, and the text `last`."""
     return [name, *(elements.number(*value) for value in values), last]
 
 
 def _pointing(bag, data, values):
-    """Return the rows of the table of pointing and torques, per axis."""
+    """Return the rows of the table of pointing errors and torques; values: those of results.measured."""
     noise = values['single_sample_noise_deg'][0]
 
     def row(name, *keys, scale=1.0, unit='deg'):
@@ -79,21 +94,28 @@ def _pointing(bag, data, values):
 
 
 def _torques(data):
+    """Return the rows of the motor torques, [] without them."""
     return [_of_axes(f'torque of motor {i}, rms of the run',
                      [(tracking.known_rms(data.motors[f'{axis}_motor_{i}.effort']), 'Nm') for axis in AXES])
             for i in (1, 2)] if data.motors else []
 
 
 def _labelled(parts, *names):
-    """Return rows [label, number] of results of some parts: the results in names, else all results with a label."""
+    """Return rows [label, number] of results with a label; parts: see results.measured.
+
+    They are the results in names or, without names, all of them.
+    """
     values = results.measured(parts)
     return [[results.RESULT_BY_NAME[name].label, elements.number(*values[name])] for name in names or values
             if results.RESULT_BY_NAME[name].label]
 
 
 def _loop(bag, check):
-    """Return rows on the control loop: rate in the time of the drive, in realtime also in wall time, and lost
-    steps."""
+    """Return rows on the control loop: its rate by the time of the drive, lost steps, and steps missing in the
+    recording.
+
+    In realtime they also state the rate and the jitter by the wall time. check: verify.Report.
+    """
     rows = []
     joints = run_data.table(bag, 'joint_states')
     if joints is not None and joints['t'].size > 1 and joints['t'][-1] > joints['t'][0]:
@@ -120,7 +142,7 @@ def _loop(bag, check):
 
 
 def _not_evaluated(run):
-    """Return a sentence on the reason why nothing of a tracking.Tracking was evaluated."""
+    """Return the sentence that states why a tracking.Tracking has no evaluated part."""
     unknown = run.t.size - np.sum(run.known_mode)
     if unknown == run.t.size:
         return 'The recording does not state the mode of the ACU, so nothing was evaluated.'
@@ -130,7 +152,7 @@ def _not_evaluated(run):
 
 
 def _results(bag, data, check):
-    """Return the section with the results of the run against the truth, if known, and of its control loop."""
+    """Return the section on the results of the run, against the truth if it was recorded, and on its control loop."""
     parts, rows = ['<h2 id="results">Results</h2>'], []
     if data.run is None:
         parts.append(f'<p class="bad">No comparison with the truth: {html.escape(data.no_truth)}.</p>')
@@ -154,7 +176,7 @@ def _results(bag, data, check):
 
 
 def _gaps(bag, check):
-    """Return the section on the problems that verify found and on topics without a message."""
+    """Return the section on the problems in a verify.Report, and on topics without a message."""
     parts = []
     if not check.complete:
         problems = check.problems + [f'{topic.name}: {problem}' for topic in check.topics
@@ -168,16 +190,29 @@ def _gaps(bag, check):
 
 
 def _warnings(check):
-    """Return the warnings above all results: aborted run, lost steps, foreign messages."""
+    """Return the warnings at the head of the page: aborted run, lost steps, foreign messages."""
     return [line for line in (check.ending, check.loss, *check.foreign) if line]
 
 
-def _figures(module, data):
-    return [elements.figure(spec, data, data.lacks(spec.needs)) for spec in module.FIGURES]
+def _figures(module, data, of_paper=False):
+    """Return the figures of a module; of_paper: True if their titles name the figures of the paper."""
+    return [elements.figure(spec._replace(title=f'{spec.title} (figure {spec.paper} of the paper)')
+                            if of_paper and spec.paper else spec, data, data.lacks(spec.needs))
+            for spec in module.FIGURES]
+
+
+def _events(bag, data):
+    """Return the section with the table of the events."""
+    title = '<h2 id="events">What happened</h2>'
+    if not data.events:
+        return [title, '<p class="soft">No event in the bag.</p>']
+    return [title, elements.table(['no.', 'time [s]', 'duration [s]', 'event', 'by', 'what'],
+                                  events.rows(data.events, bag.end)),
+            '<p class="soft">The numbers mark these events on the curves below.</p>']
 
 
 def _consistency_table(known):
-    """Return the table of a consistency.Consistency and a sentence for each axis."""
+    """Return the table of a consistency.Consistency, and its verdict as a sentence for each axis."""
     judged = known.axes
 
     def row(name, field, marks=(), unit='', scale=1.0):
@@ -204,7 +239,7 @@ def _consistency_table(known):
 
 
 def _deck(bag, data):
-    """Return the section on the attitude of the INS and the isolation from the ship; [] ashore."""
+    """Return the section on the attitude of the INS and the isolation from the ship; [] for an antenna ashore."""
     if data.attitude is None:
         return []
     ship = isolation.read(bag, data.run) if data.run is not None else None
@@ -214,7 +249,10 @@ def _deck(bag, data):
 
 
 def _diagnostics(statuses):
-    """Return the section on diagnostics other than OK; a status that a node repeats is one row."""
+    """Return the section on diagnostics other than OK. A status that a node repeats is one row.
+
+    statuses: of run_data.RunData.
+    """
     title = '<h2 id="diagnostics">Diagnostics other than OK</h2>'
     rows = {}
     for node in dict.fromkeys(node for _, node, _, _ in statuses):
@@ -232,32 +270,48 @@ def _diagnostics(statuses):
             *([f'<p class="soft">and {hidden} more.</p>'] if hidden else [])]
 
 
-def _provenance_table(bag, data):
-    """Return the table of the subject, configuration, versions and file of a bag."""
+def _provenance_table(bag, data, author):
+    """Return the table at the head of the page: author, subject, configuration, versions and file of a bag."""
     stamps = bag.index.log
     duration = (stamps.max() - stamps.min()) / 1e9 if stamps.size else 0.0
     versions = ', '.join(f'{key.removeprefix("version.")} {value}' for key, value in bag.metadata.items()
                          if key.startswith('version.'))
     rows = [[key, value] for key, value in bag.metadata.items() if not key.startswith(('version.', 'beamwidth'))]
-    rows = [*subject.rows(bag, data), *rows, ['duration', f'{duration:g} s'],
-            ['versions', versions or 'not in the bag'],
+    rows = [*([['author', author]] if author else []), ['date of the run', subject.date(bag)],
+            *subject.rows(bag, data), *rows, ['duration', f'{duration:g} s'],
+            ['software versions', versions or 'not in the bag'],
             ['file', f'{", ".join(file.name for file in bag.files)}, '
              f'{sum(file.stat().st_size for file in bag.files) / 1e6:.2f} MB, {stamps.size} messages'],
             ['sha256', ', '.join(map(sha256, bag.files))]]
     return elements.table(None, rows, 'meta')
 
 
-def _page(bag, data, check):
-    name = (bag.metadata.get('scenario') or bag.file.stem) + f'/{bag.beam}'.rstrip('/')
+def _parameters(bag):
+    """Return the section on the parameters that differ from their defaults."""
+    title = '<h2 id="parameters">Parameters that differ from their defaults</h2>'
+    if not bag.configuration['parameters']:
+        return [title, '<p class="soft">The bag states no parameters.</p>']
+    rows = subject.changed_parameters(bag)
+    return [title, elements.table(['parameter', 'value', 'default', 'unit'], rows) if rows else '<p>None.</p>']
+
+
+def _page(bag, data, check, author):
+    """Return the text of the page; check: verify.Report of the bag."""
+    scenario = bag.metadata.get('scenario', '')
+    name = (scenario or bag.file.stem) + f'/{bag.beam}'.rstrip('/')
+    of_paper = scenario in PAPER_SCENARIOS
+    found = verdict.of(bag, data.run) if data.run is not None else None
+    paper = ('"The paper" is the one on antenna tracking with a Kalman filter and a dual-motor anti-backlash drive; '
+             'its figures are from a UAV experiment. ') if of_paper else ''
     parts = [
         f'<h1>Tracking run: {html.escape(name)}</h1>',
+        *([f'<p class="verdict{" bad" if found.failed else ""}">{html.escape(found.text)}</p>'] if found else []),
         *(f'<p class="bad">{html.escape(line.capitalize())}.</p>' for line in _warnings(check)),
-        _provenance_table(bag, data),
+        _provenance_table(bag, data, author), *_parameters(bag), *_events(bag, data),
         *_results(bag, data, check), *_gaps(bag, check),
-        '<h2 id="figures">Figures</h2><p class="soft">"The paper" is the one on antenna tracking with a Kalman filter '
-        'and a dual-motor anti-backlash drive; its figures are from a UAV experiment. Grey: measured, blue: filtered '
-        'or achieved, orange: truth.</p>',
-        *_figures(run_figures, data),
+        f'<h2 id="figures">Figures</h2><p class="soft">{paper}Grey: measured, blue: filtered or achieved, orange: '
+        'truth. Dotted vertical lines: the numbered events of the table "What happened".</p>',
+        *_figures(run_figures, data, of_paper),
         '<h2 id="filter">Consistency of the filter</h2>',
         *([_consistency_table(data.filter)] if data.filter is not None else []),
         *_figures(filter_figures, data), *_deck(bag, data), *_diagnostics(data.statuses)]

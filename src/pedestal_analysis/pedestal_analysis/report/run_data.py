@@ -1,9 +1,10 @@
-"""Data of a report: the run against the truth, if recorded, and the other topics of the recording."""
+"""Data of the report on a recording: its run against the truth, if recorded, and its topics."""
 import dataclasses
 import typing
 
 import numpy as np
 
+from pedestal_analysis.report import events
 from pedestal_analysis.results import consistency, known_attitude, measured_direction, tracking
 from pedestal_common.graph import topics
 from pedestal_recording import bag as bags
@@ -11,14 +12,16 @@ from pedestal_recording import bag as bags
 
 @dataclasses.dataclass
 class RunData:
-    """Data of a recording for the figures.
+    """Data of a recording for the page and the figures of its report.
 
-    run, no_truth     tracking.Tracking, or None and the reason why there is no truth
-    raw_angles        (n, 2) measured earth angles of the target [rad]
+    run               tracking.Tracking, or None if there is no truth
+    no_truth          reason why there is no truth, or ''
+    raw_angles        (n, 2) measured earth angles of the target [rad], without the filter; None without `run`
     motors, receiver  tables of adu/motor_states and tracking_receiver/angle_error, None without a message
-    modes             [(start, stop [s], mode)], one for each change
-    statuses          [(stamp [s], node, level, message)]
-    beamwidth         [rad], NaN if the bag does not state it
+    modes             [(start [s], stop [s], mode)] of the modes of the ACU, in order
+    statuses          [(time [s], node, level, message)] of the diagnostics; level: 0 OK, 1 WARN, 2 ERROR, 3 STALE
+    events            [events.Event], in the order of time
+    beamwidth         half-power beamwidth [rad], NaN if the bag does not state it
     filter            consistency.Consistency, None without acu/filter
     attitude          known_attitude.KnownAttitude, None ashore
     """
@@ -29,12 +32,13 @@ class RunData:
     receiver: typing.Any
     modes: list
     statuses: list
+    events: list
     beamwidth: float
     filter: typing.Any = None
     attitude: typing.Any = None
 
     def lacks(self, needs):
-        """Return the reasons why a figure with these needs (keys of _NEEDS) cannot be drawn, '' if it can be drawn."""
+        """Return the reasons why a figure with some needs (keys of _NEEDS) cannot be drawn, '' if it can be drawn."""
         reasons = [_NEEDS[need](self) for need in needs]
         return '; '.join(dict.fromkeys(filter(None, reasons)))
 
@@ -68,8 +72,9 @@ def read(bag) -> RunData:
     statuses = [((log - bag.start) / 1e9, status.name, int(status.level), status.message)
                 for _, log, _, array in bag.messages('diagnostics') for status in array.status
                 ] if table(bag, 'diagnostics') else []
-    return RunData(run, no_truth, raw, motors, table(bag, 'tracking_receiver/angle_error'), _modes(bag), statuses,
-                   tracking.beamwidth(bag), _filter(bag, run), _attitude(bag))
+    modes = _modes(bag)
+    return RunData(run, no_truth, raw, motors, table(bag, 'tracking_receiver/angle_error'), modes, statuses,
+                   events.read(bag, modes), tracking.beamwidth(bag), _filter(bag, run), _attitude(bag))
 
 
 def table(bag, topic):
@@ -89,7 +94,7 @@ def table(bag, topic):
 
 
 def _tracking(bag):
-    """Return (Tracking, '') or (None, reason)."""
+    """Return (tracking.Tracking, '') of a bag.Bag, or (None, reason)."""
     absent = [name for name in ('joint_states', 'target/truth') if table(bag, name) is None]
     if absent:
         return None, f'no message of {" and ".join(absent)}'
@@ -102,8 +107,10 @@ def _tracking(bag):
 
 
 def _raw_angles(run, ship):
-    """Return the measured earth angles (n, 2) [rad] of the target, without filter; ship: table of ship/truth or
-    None."""
+    """Return the measured earth angles (n, 2) [rad] of the target at the steps of a Tracking, without the filter.
+
+    ship: table of ship/truth, None for an antenna ashore.
+    """
     quaternions = None
     if ship is not None:
         at = np.searchsorted(ship['t'], run.t - 1e-9).clip(0, ship['t'].size - 1)
@@ -112,7 +119,7 @@ def _raw_angles(run, ship):
 
 
 def _filter(bag, run):
-    """Return the consistency.Consistency, None without truth or without the numbers."""
+    """Return the consistency.Consistency of a bag; None without truth, or without the numbers of the filter."""
     try:
         return consistency.read(bag, run) if run is not None and table(bag, 'acu/filter') is not None else None
     except KeyError:
@@ -120,7 +127,7 @@ def _filter(bag, run):
 
 
 def _attitude(bag):
-    """Return the known_attitude.KnownAttitude, None ashore or without the numbers."""
+    """Return the known_attitude.KnownAttitude of a bag; None ashore, or without the numbers of the INS."""
     try:
         return known_attitude.read(bag) if table(bag, 'ship/imu/data') is not None else None
     except KeyError:
@@ -128,7 +135,7 @@ def _attitude(bag):
 
 
 def _modes(bag):
-    """Return [(start, stop [s], mode)], one for each change; the first begins with the recording."""
+    """Return [(start [s], stop [s], mode)] of the modes of the ACU; the first begins with the recording."""
     stated = table(bag, 'acu/mode')
     changes = list(zip(stated['t'].tolist(), stated['data'])) if stated else []
     joints = table(bag, 'joint_states')

@@ -1,4 +1,8 @@
-"""Figures of a report on the run: pointing, errors, angles, torques, signal, sky, modes. Angles in degrees."""
+"""Figures of a report on a run: pointing, errors, angles, torques, signal, sky plot and modes. Angles are in degrees.
+
+Each function of FIGURES takes the run_data.RunData of a recording (`data`). Functions named draw_ draw into given axes
+of matplotlib, and are also used by the overview.
+"""
 import functools
 import itertools
 
@@ -25,17 +29,20 @@ from pedestal_analysis.report.figures import (
 MODE_COLOURS = dict(zip(modes.MODES, itertools.cycle((
     '#9aa0a6', '#a87b51', '#8364c8', '#b9a3e3', '#e0ac00', '#2f9e5b', '#3aa6b9', '#d1495b', '#e58a95', '#f2b84b',
     '#5b6abf', '#7a8b2a', '#c46aa8', '#4f4f4f'))))
-"""{mode: colour} of the timeline."""
+"""{mode of the ACU: its colour}."""
 LEVEL_COLOURS = (('OK', '#a5d8b5'), ('WARN', '#f2772b'), ('ERROR', '#c81e1e'), ('STALE', '#9aa0a6'))
+"""(name, colour) of each level of the diagnostics, 0 to 3."""
 LOCKED_COLOUR = '#5f93c4'
 ZOOM_SPAN_S = 2.0
 """Span of a zoomed figure [s]."""
+SKY_POINTS = 3000
+"""Largest number of points of a path in the sky plot."""
 
 
 def _continuous(angle, beside=None):
-    """Return an angle [rad] in degrees without the jump at +-180.
+    """Return an angle (n,) [rad] in degrees, without jumps at +-180.
 
-    beside: a continuous angle [deg]; the result stays within half a turn of it.
+    beside (n,): another angle without jumps [deg]. The result is then within half a turn of that angle.
     """
     angle = np.degrees(angle)
     if beside is not None:
@@ -47,14 +54,17 @@ def _continuous(angle, beside=None):
 
 
 def _middle(run):
-    """Return (first, last time) of the ZOOM_SPAN_S in the middle of the evaluated part, else of the run."""
+    """Return (first, last) time [s] of the ZOOM_SPAN_S in the middle of the evaluated part of a Tracking.
+
+    Without an evaluated part it is the middle of the run.
+    """
     t = run.t[run.tracking] if run.tracking.any() else run.t
     middle = 0.5 * (t[0] + t[-1])
     return middle - 0.5 * ZOOM_SPAN_S, middle + 0.5 * ZOOM_SPAN_S
 
 
 def _slowest(run, angles):
-    """Return (first, last time) of the ZOOM_SPAN_S of the evaluated part in which the angles (n, 2) changed least."""
+    """Return (first, last) time [s] of the ZOOM_SPAN_S of the evaluated part in which angles (n, 2) changed least."""
     steps = round(ZOOM_SPAN_S / np.median(np.diff(run.t)))
     if run.tracking.sum() <= steps or not 0 < steps < run.t.size:
         return _middle(run)
@@ -64,26 +74,43 @@ def _slowest(run, angles):
     return start, start + ZOOM_SPAN_S
 
 
-def _scale_to(axes, t, values, tracking):
-    """Scale the axes to the evaluated part; add a note if values outside the part leave the frame."""
-    shown = np.abs(values[tracking & np.isfinite(values)])
-    whole = np.abs(values[np.isfinite(values)])
-    if not shown.size or shown.max() == 0.0:
+def _scale_to(axes, curves, tracking, unit='°', centred=True):
+    """Scale the axes to the evaluated part of curves [(n,)]; add a note if values outside the part leave the frame.
+
+    tracking: mask (n,) of the evaluated part; centred: True for a frame with zero in the middle.
+    """
+    whole = np.concatenate([values[np.isfinite(values)] for values in curves])
+    shown = np.concatenate([values[tracking & np.isfinite(values)] for values in curves])
+    low, high = _frame(shown, centred)
+    if low == high:
         return
-    limit = 1.25 * shown.max()
-    axes.set_ylim(-limit, limit)
-    if whole.max() > limit:
-        axes.text(0.995, 0.04, f'off scale outside the evaluated part, up to {whole.max():.2g}°', ha='right',
-                  va='bottom', fontsize=7.5, transform=axes.transAxes)
+    axes.set_ylim(low, high)
+    if whole.min() < low or whole.max() > high:
+        extremes = (f'up to {np.abs(whole).max():.2g}{unit}' if centred else
+                    f'{whole.min():.3g} to {whole.max():.3g}{unit}')
+        axes.text(0.995, 0.04, f'off scale outside the evaluated part, {extremes}', ha='right', va='bottom',
+                  fontsize=7.5, transform=axes.transAxes)
+
+
+def _frame(shown, centred):
+    """Return the (lowest, highest) value of a frame around values (m,), equal without a frame."""
+    if not shown.size:
+        return 0.0, 0.0
+    if centred:
+        limit = 1.25 * np.abs(shown).max()
+        return -limit, limit
+    margin = 0.1 * np.ptp(shown)
+    return shown.min() - margin, shown.max() + margin
 
 
 AXIS_TITLES = (('cross-elevation', 'azimuth'), ('elevation', 'elevation'))
+"""(name of the error, name of the angle) of each axis."""
 
 
 def draw_errors(axes, data, i, window=None):
-    """Draw the receiver error and the filtered error [deg], i: 0 cross-elevation, 1 elevation.
+    """Draw the receiver error and the filtered error [deg]; i: 0 cross-elevation, 1 elevation.
 
-    In a window (first, last time [s]) the true error is drawn too.
+    window: (first, last) time [s] to draw, then together with the true error; None for the whole run.
     """
     run = data.run
     raw, filtered = np.degrees(run.measured[:, i]), np.degrees(run.filtered[:, i])
@@ -92,14 +119,14 @@ def draw_errors(axes, data, i, window=None):
         truth = np.degrees((run.cross_elevation, run.elevation_error)[i])
         draw_line(axes, run.t, truth, window, color=TRUTH_COLOUR, label='truth')
     else:
-        _scale_to(axes, run.t, raw, run.tracking)
+        _scale_to(axes, [raw], run.tracking)
     draw_line(axes, run.t, filtered, window, color=FILTERED_COLOUR, linewidth=1.2, label='after the filter')
     axes.set_ylabel('error [deg]')
     axes.set_title(AXIS_TITLES[i][0])
 
 
 def error(data, window=None):
-    """Return the figure of receiver error and filtered error on both axes [deg]; window as in `draw_errors`."""
+    """Return the figure of receiver error and filtered error on both axes [deg]; window: see `draw_errors`."""
     figure, panels = new_panels(2, sharex=True)
     for i in range(2):
         draw_errors(panels[i, 0], data, i, window)
@@ -107,27 +134,32 @@ def error(data, window=None):
 
 
 def error_zoom(data):
-    """Return `error` over the middle ZOOM_SPAN_S, with the truth."""
+    """Return the figure `error` over ZOOM_SPAN_S in the middle of the evaluated part, with the true error."""
     return error(data, _middle(data.run))
 
 
 def angle(data, zoomed=False):
     """Return the figure of the measured and the filtered line of sight in earth angles [deg].
 
-    zoomed: the ZOOM_SPAN_S in which the target moved least, with the truth.
+    zoomed: True for the ZOOM_SPAN_S in which the target moved least, with the true line of sight.
     """
     run = data.run
     figure, panels = new_panels(2, y=[f'{name} [deg]' for _, name in AXIS_TITLES], sharex=True)
-    truth = np.column_stack([_continuous(run.target_earth[:, i]) for i in range(2)])
+    # In azimuth the branch is that of the beam, as in `azimuth`.
+    truth = np.column_stack((_continuous(run.target_earth[:, 0], _continuous(run.beam_earth[:, 0])),
+                             _continuous(run.target_earth[:, 1])))
     window = _slowest(run, truth) if zoomed else None
     for i, axes in enumerate(panels[:, 0]):
         beam = _continuous(run.beam_earth[:, i], truth[:, i])
         scale = np.cos(run.beam_earth[:, 1] + run.filtered[:, 1]) if i == 0 else 1.0
         filtered = beam + np.degrees(run.filtered[:, i] / scale)
-        draw_line(axes, run.t, _continuous(data.raw_angles[:, i], truth[:, i]), window, color=RAW_COLOUR,
-                  linewidth=0.8 if zoomed else 2.5, label='measured, before the filter')
+        measured = _continuous(data.raw_angles[:, i], truth[:, i])
+        draw_line(axes, run.t, measured, window, color=RAW_COLOUR, linewidth=0.8 if zoomed else 2.5,
+                  label='measured, before the filter')
         if zoomed:
             draw_line(axes, run.t, truth[:, i], window, color=TRUTH_COLOUR, label='truth')
+        else:
+            _scale_to(axes, [measured, filtered], run.tracking, centred=False)
         draw_line(axes, run.t, filtered, window, color=FILTERED_COLOUR, linewidth=1.2, label='after the filter')
     return outside_legend(figure, panels[0, 0])
 
@@ -151,18 +183,20 @@ def azimuth(data):
 
 
 def _shade_modes(axes, data):
+    """Shade each time by the colour of its mode, and mark the changes of the mode by dotted lines."""
     for start, stop, mode in data.modes:
         axes.axvspan(start, stop, color=MODE_COLOURS.get(mode, RAW_COLOUR), alpha=0.10, linewidth=0.0)
-    for start, _, _ in data.modes[1:]:
-        axes.axvline(start, color=INK_COLOUR, linewidth=0.6, linestyle=':')
 
 
 def draw_pointing(axes, data, i):
-    """Draw the true pointing error [deg], i: 0 cross-elevation, 1 elevation; dashed: a tenth of the beamwidth."""
+    """Draw the true pointing error [deg]; i: 0 cross-elevation, 1 elevation.
+
+    Dashed lines mark a tenth of the beamwidth.
+    """
     run = data.run
     error = np.degrees((run.cross_elevation, run.elevation_error)[i])
     draw_line(axes, run.t, error, color=TRUTH_COLOUR, linewidth=0.8)
-    _scale_to(axes, run.t, error, run.tracking)
+    _scale_to(axes, [error], run.tracking)
     if np.isfinite(data.beamwidth):
         for sign in (-0.1, 0.1):
             axes.axhline(sign * np.degrees(data.beamwidth), color=INK_COLOUR, linewidth=0.8, linestyle='--')
@@ -171,8 +205,10 @@ def draw_pointing(axes, data, i):
 
 
 def pointing(data):
-    """Return the figure of the true pointing error on both axes and of the angle off the beam [deg], with ACU
-    modes."""
+    """Return the figure of the true pointing error on both axes, and of the angle from the beam to the target [deg].
+
+    The background shows the modes of the ACU.
+    """
     run = data.run
     figure, panels = new_panels(3, sharex=True)
     distance = np.degrees(np.hypot(run.cross_elevation, run.elevation_error))
@@ -197,7 +233,10 @@ def _mode_legend(figure, data):
 
 
 def draw_torques(axes, data, axis, window=None):
-    """Draw the torques of both motors of an axis, 'azimuth' or 'elevation', and their bias torque [Nm]."""
+    """Draw the torques of both motors of an axis ('azimuth' or 'elevation'), and their bias torque [Nm].
+
+    window: (first, last) time [s] to draw. Without a window the axes show the torques of the evaluated part, if any.
+    """
     motors = data.motors
     first, second = motors[f'{axis}_motor_1.effort'], motors[f'{axis}_motor_2.effort']
     width = 0.7 if window is None else 1.0
@@ -205,11 +244,15 @@ def draw_torques(axes, data, axis, window=None):
     draw_line(axes, motors['t'], second, window, color=MOTOR_2_COLOUR, linewidth=width, label='motor 2')
     draw_line(axes, motors['t'], 0.5 * (first - second), window, color=INK_COLOUR, linewidth=0.9, linestyle='--',
               label='bias, half the difference')
+    if window is None and data.run is not None:
+        tracking = np.isin(motors['t'], data.run.t[data.run.tracking])
+        _scale_to(axes, [first, second], tracking, ' Nm')
     axes.set_ylabel('torque [Nm]')
     axes.set_title(axis)
 
 
 def _start(data):
+    """Return (first, last) time [s] of the first ZOOM_SPAN_S of the motor torques."""
     start = data.motors['t'][0]
     return start, start + ZOOM_SPAN_S
 
@@ -217,7 +260,7 @@ def _start(data):
 def torques(data):
     """Return the figure of the torques of both motors of each axis [Nm]: whole run and first ZOOM_SPAN_S."""
     window = _start(data)
-    figure, panels = new_panels(2, 2, height=4.5, sharex='col', sharey='row', width_ratios=(3, 2))
+    figure, panels = new_panels(2, 2, height=4.5, sharex='col', width_ratios=(3, 2))
     for row, axis in zip(panels, ('azimuth', 'elevation')):
         draw_torques(row[0], data, axis)
         draw_torques(row[1], data, axis, window)
@@ -246,6 +289,19 @@ def carrier(data):
     return figure
 
 
+def _along(angles):
+    """Return the indices of at most SKY_POINTS of angles (n, 2) [rad], evenly spread over path and time together.
+
+    A fast slew has few samples in a part of the time, so an even spread over time alone would draw it as chords.
+    """
+    from_zenith = 0.5 * np.pi - angles[:, 1]
+    turn = (np.diff(angles[:, 0]) + np.pi) % (2.0 * np.pi) - np.pi
+    steps = np.nan_to_num(np.hypot(np.diff(from_zenith), turn * from_zenith[1:]))
+    place = np.concatenate(((0.0,), np.cumsum(steps)))
+    both = place / (place[-1] or 1.0) + np.linspace(0.0, 1.0, place.size)
+    return np.unique(np.searchsorted(both, np.linspace(0.0, both[-1], SKY_POINTS)))
+
+
 def draw_sky(axes, data):
     """Draw target and beam over the station, north up, on polar axes."""
     run = data.run
@@ -253,7 +309,7 @@ def draw_sky(axes, data):
     axes.set_theta_direction(-1)
     for angles, colour, width, label in ((run.target_earth, TRUTH_COLOUR, 3.0, 'target'),
                                          (run.beam_earth, FILTERED_COLOUR, 1.1, 'beam')):
-        path = angles[::max(1, run.t.size // 1500)]
+        path = angles[_along(angles)]
         axes.plot(path[:, 0], 90.0 - np.degrees(path[:, 1]), color=colour, linewidth=width, label=label)
         known = angles[np.isfinite(angles).all(axis=1)]
         for row, marker in ((0, 'o'), (-1, 's')) if known.size else ():
@@ -345,31 +401,32 @@ def overview(data):
 
 FIGURES = (
     Spec('pointing', 'True pointing error', 'True angle from the beam axis to the target on both axes, and its size '
-         'over the whole run. Background and dotted lines show the mode of the ACU.', ('truth',), pointing),
-    Spec('error', 'Error before and after the filter (figure 7 of the paper)', 'The receiver error (grey) changes '
+         'over the whole run. The background shows the mode of the ACU.', ('truth',), pointing, timed=True),
+    Spec('error', 'Error before and after the filter', 'The receiver error (grey) changes '
          'from sample to sample. The position loop follows the filtered line of sight, here seen from the true beam '
          '(blue). The loop itself uses the encoders and, on a ship, the attitude of the INS.',
-         ('truth', 'lock'), error),
-    Spec('error_zoom', 'Error, zoomed (figure 8 of the paper)',
+         ('truth', 'lock'), error, timed=True, paper=7),
+    Spec('error_zoom', 'Error, zoomed',
          f'The middle {ZOOM_SPAN_S:g} s of the evaluated part. The position loop holds the filtered error (blue) near '
          'zero. The true error (orange) is the rest of the noise (grey) after the filter.',
-         ('truth', 'lock'), error_zoom),
-    Spec('angle', 'Angle before and after the filter (figure 9 of the paper)', 'Line of sight in earth angles: '
+         ('truth', 'lock'), error_zoom, timed=True, paper=8),
+    Spec('angle', 'Angle before and after the filter', 'Line of sight in earth angles: '
          'measured (grey: encoder plus receiver) and filtered (blue). At this scale both are one curve.',
-         ('truth', 'lock'), angle),
-    Spec('angle_zoom', 'Angle, zoomed (figure 10 of the paper)',
+         ('truth', 'lock'), angle, timed=True, paper=9),
+    Spec('angle_zoom', 'Angle, zoomed',
          f'The {ZOOM_SPAN_S:g} s in which the target moved least, so that the noise shows best: filtered (blue), '
-         'measured (grey) and true (orange).', ('truth', 'lock'), functools.partial(angle, zoomed=True)),
-    Spec('azimuth', 'Azimuth trajectory (figure 11 of the paper)', 'The azimuth of the antenna (blue) reaches the '
-         'azimuth of the target (orange) and stays on it.', ('truth',), azimuth),
+         'measured (grey) and true (orange).', ('truth', 'lock'), functools.partial(angle, zoomed=True),
+         timed=True, paper=10),
+    Spec('azimuth', 'Azimuth trajectory', 'The azimuth of the antenna (blue) reaches the '
+         'azimuth of the target (orange) and stays on it.', ('truth',), azimuth, timed=True, paper=11),
     Spec('torques', 'Motor torques', 'Both motors of an axis share the load. The bias torque (dashed) pulls them '
          'against each other and closes the backlash; it fades at large load. Right: the start of the run.',
-         ('motors',), torques),
+         ('motors',), torques, timed=True),
     Spec('carrier', 'Signal and lock', 'C/N0 at the receiver; shaded: receiver locked, with errors as output.',
-         ('receiver',), carrier),
+         ('receiver',), carrier, timed=True),
     Spec('sky', 'Sky plot', 'Target and beam over the station: north up, azimuth clockwise, zenith in the middle, '
          'horizon on the rim.', ('truth',), sky),
     Spec('timeline', 'Modes and health', 'Mode of the ACU, lock of the receiver, and reported level of each node.',
-         ('modes',), timeline),
+         ('modes',), timeline, timed=True),
 )
 OVERVIEW_FIGURE = Spec('overview', '', '', ('truth', 'lock', 'motors'), overview, dpi=100)

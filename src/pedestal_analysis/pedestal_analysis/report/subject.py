@@ -1,4 +1,4 @@
-"""Subject of a recording in words: date, station and target."""
+"""Subject of a recording in words, for the head of its report: target, date, station, changed parameters."""
 import datetime
 import math
 
@@ -6,6 +6,7 @@ import numpy as np
 
 from pedestal_common import parameters
 from pedestal_common.geometry import orbit
+from pedestal_common.graph import nodes
 from tracking_receiver_sim.params import TargetParameters
 
 TARGET_DESCRIPTIONS = {
@@ -18,14 +19,52 @@ TARGET_DESCRIPTIONS = {
     'step': lambda target: f'step at {target.angle.start:g} s',
     'ramp': lambda target: f'constant rate from {target.angle.start:g} s on',
 }
-"""{kind of target: TargetParameters -> description}."""
+"""{kind of target: function of TargetParameters that returns a description}."""
 
 STATION_TARGET_KINDS = ('leo_pass', 'track_file')
 """Kinds of target that depend on the position of the station."""
 
 
+MAX_VALUE_CHARACTERS = 80
+"""Length of a shown parameter value, above which its middle is left out [characters]."""
+
+
+def date(bag):
+    """Return the date of a run as text: its first message in realtime, else the date of the file."""
+    if bag.start and bag.index.size:
+        return f'{_utc(bag.index.log.min() / 1e9)} UTC'
+    written = f'file of {_utc(bag.file.stat().st_mtime)} UTC'
+    return f'{written}; a lockstep recording states no date' if bag.metadata.get('pacing') == 'lockstep' else written
+
+
+def _utc(seconds):
+    """Return a Unix time [s] as UTC text."""
+    return f'{datetime.datetime.fromtimestamp(seconds, datetime.timezone.utc):%Y-%m-%d %H:%M:%S}'
+
+
+def changed_parameters(bag):
+    """Return rows [node.parameter, value, default, unit] of the recorded parameters that differ from the defaults."""
+    rows = []
+    for name, values in bag.configuration['parameters'].items():
+        if nodes.plain(name) not in nodes.NODE_NAMES:
+            continue
+        kind = nodes.row(name, bag.beams > 0).parameters_type()
+        defaults, units = parameters.defaults(kind), {key: field.metadata.get('unit', '')
+                                                      for key, field in parameters.flatten(kind)}
+        rows += [[f'{name}.{key}', _shown(value), _shown(defaults[key]), units[key]] for key, value in values.items()
+                 if key in defaults and value != defaults[key]]
+    return rows
+
+
+def _shown(value):
+    """Return a parameter value as text, without the middle of a long text."""
+    text = f'{value:.6g}' if isinstance(value, float) else str(value)
+    half = MAX_VALUE_CHARACTERS // 2
+    return text if len(text) <= MAX_VALUE_CHARACTERS else f'{text[:half]} ... {text[-half:]}'
+
+
 def place(station):
-    """Return StationParameters as text."""
+    """Return the position in StationParameters as text."""
     return f'latitude {station.latitude_deg:g}, longitude {station.longitude_deg:g} deg, height {station.height:g} m'
 
 
@@ -45,7 +84,7 @@ def rows(bag, data):
 
 
 def _sky(bag, data):
-    """Return rows on the UTC at 0 s and on the highest elevation, for a target with a date."""
+    """Return rows [name, text] on the UTC at 0 s and on the highest elevation; [] for a target without a date."""
     try:
         begin = orbit.instant('stamp_0_utc', _begin(bag))
     except orbit.TargetError:
@@ -61,7 +100,7 @@ def _sky(bag, data):
 
 
 def _begin(bag):
-    """Return the UTC of 0 s in the diagnostics of the receiver, '' if there is none."""
+    """Return the text of the UTC at 0 s that the receiver states in its diagnostics, '' if it states none."""
     if 'diagnostics' not in bag.topics or not bag.rows('diagnostics').size:
         return ''
     for _, _, _, array in bag.messages('diagnostics'):

@@ -1,9 +1,9 @@
-"""`pedestal export --format tdm`: measured directions of the target as a CCSDS Tracking Data Message.
+"""`pedestal export --format tdm`: write the measured directions of the target as a CCSDS Tracking Data Message.
 
-The format is CCSDS 503.0-B-2 in keyword = value notation, for orbit determination. A record contains azimuth and
-elevation (encoders plus receiver error), the range if measured, and C/N0. Only steps in autotrack with a locked
-receiver are written. On a ship the attitude of the INS rotates the angles. Nothing is corrected for refraction. Times
-are UTC.
+A program for orbit determination reads this message. The format is CCSDS 503.0-B-2 in keyword = value notation. A
+record contains azimuth and elevation (encoders plus receiver error), the range if it was measured, and C/N0. Only
+steps in autotrack with a locked receiver are written. On a ship, the attitude of the INS rotates the deck angles to
+earth angles. Nothing is corrected for refraction. Times are UTC.
 """
 import json
 import pathlib
@@ -20,19 +20,19 @@ from pedestal_recording.export import atomic_file
 from tracking_receiver_sim.track import instant
 
 RATE_LIMITS_HZ = 1e-3, 1000.0
-"""Smallest and largest rate of records [Hz]."""
+"""Smallest and largest allowed rate of records [Hz]."""
 
 SEGMENT_STEPS = 10_000
-"""Number of steps of a segment, all in memory at once."""
+"""Largest number of steps in a segment of the message, all of which are in memory at once."""
 
 DEFAULT_STATION_NAME = 'PEDESTAL'
 """Default name of the station."""
 
 PARTICIPANT_PATTERN = re.compile(r'[ -~]{1,80}')
-"""Pattern of the name of a participant."""
+"""Pattern of the name of a participant (station or target): printable ASCII characters."""
 
 TLE_DESIGNATOR_PATTERN = re.compile(r'(\d\d)(\d{3})([A-Z]{1,3}) *')
-"""Pattern of the international designator of a TLE."""
+"""Pattern of the international designator in a TLE (two-line elements): year, number of the launch, piece."""
 
 TLE_DESIGNATOR_COLUMNS = slice(9, 17)
 """Columns of the international designator in line 1 of a TLE."""
@@ -41,18 +41,18 @@ TOPIC_COLUMNS = {'joint_states': ('azimuth.position', 'elevation.position'),
                  'tracking_receiver/angle_error': ('x', 'y', 'z'),
                  'ship/imu/data': tuple(f'orientation.{axis}' for axis in 'xyzw'),
                  'tracking_receiver/range': ('range',)}
-"""{topic: columns to read}."""
+"""{topic: columns of its table that a record needs}."""
 
 
 def export(path, created, output=None, rate=10.0, participants=(), overwrite=False):
-    """Write the tracking data of a bag and yield (file, records) for each beam.
+    """Write the tracking data of the bag at a path. Yield (file, number of records) for each beam.
 
-    created       datetime of the message, UTC
-    output        a file with the suffix .tdm, or a folder, default `export` in the bag
-    rate          largest number of records a second
-    participants  names of the station and the target, default DEFAULT_STATION_NAME and the international designator of
-                  the TLE
-    overwrite     True to replace files
+    created       creation date that the message states, datetime in UTC
+    output        file with the suffix .tdm, or folder; by default the folder `export` in the bag
+    rate          largest number of records per second
+    participants  names of the station and of the target; by default DEFAULT_STATION_NAME, and the international
+                  designator of a satellite
+    overwrite     True to replace existing files
 
     Raises bag.BagError and ValueError, or FileExistsError before anything is written.
     """
@@ -99,7 +99,8 @@ def _files(bag, output, overwrite):
 class _Tracks:
     """The exported steps of a bag of one beam, at most `rate` a second.
 
-    bag.start is the stamp of the time 0 of the scenario [ns]; utc_of_zero is the UTC of the same time.
+    stamps        stamps of these steps [ns]
+    utc_of_zero   UTC of time 0 of the scenario, whose stamp is bag.start
     """
 
     def __init__(self, bag, rate):
@@ -110,12 +111,15 @@ class _Tracks:
         if missing:
             raise bags.BagError(f'{bag.path}: no message of {missing[0]} in the bag')
         stamps = np.unique(self.rows['joint_states'].stamp)
-        # Of the steps in each interval of 1 / rate, the first is exported.
+        # In each interval of 1 / rate, only the first step is exported.
         _, first = np.unique((stamps - stamps[:1]) * rate // 1e9, return_index=True)
         self.stamps = stamps[first]
 
     def segments(self):
-        """Yield (times, angles (n, 2) [deg], range (n,) [km] or NaN, C/N0 (n,) [dB-Hz]) of segments with n > 0."""
+        """Yield (times, angles (n, 2), range (n,), C/N0 (n,)) of each segment that is not empty.
+
+        times: texts of the UTC; angles: azimuth and elevation [deg]; range [km], NaN if not measured; C/N0 [dB-Hz].
+        """
         for at in range(0, len(self.stamps), SEGMENT_STEPS):
             stamps = self.stamps[at:at + SEGMENT_STEPS]
             beam, error = self._at('joint_states', stamps), self._at('tracking_receiver/angle_error', stamps)
@@ -131,7 +135,7 @@ class _Tracks:
                        cn0_dbhz[exported])
 
     def _at(self, topic, stamps):
-        """Return the TOPIC_COLUMNS (n, k) of a topic at stamps (n,) [ns]; NaN where no message has the stamp."""
+        """Return the k TOPIC_COLUMNS (n, k) of a topic at stamps (n,) [ns]; NaN where no message has the stamp."""
         out = np.full((len(stamps), len(TOPIC_COLUMNS[topic])), np.nan)
         rows = self.rows.get(topic, self.bag.index[:0])
         _, here, there = np.intersect1d(stamps, rows.stamp, return_indices=True)
@@ -149,9 +153,9 @@ class _Tracks:
 def _utc_of_zero(bag):
     """Return the UTC of the time 0 of a bag of one beam, datetime64[us].
 
-    It is the UTC that the receiver publishes for a target with a date (a satellite, a dated flight). For another
-    target it is the start stamp of a realtime recording, which is UTC. A lockstep recording starts at stamp 0, which
-    is no date. Raises bag.BagError without both.
+    For a target with a date (a satellite, a flight with a date), the receiver publishes this UTC. For another target
+    it is the start stamp of a realtime recording, which is UTC. A lockstep recording starts at stamp 0, which is no
+    date. Raises bag.BagError if neither exists.
     """
     date = bag.last_values(f'{bag.beam}tracking_receiver').get('stamp_0_utc', '')
     if date:
@@ -163,6 +167,7 @@ def _utc_of_zero(bag):
 
 
 def _header(bag, created):
+    """Return the text of the header of a message."""
     run = ', '.join(filter(None, (bag.metadata.get('scenario', ''), f'seed {bag.metadata.get("seed", "unknown")}',
                                   bag.metadata.get('pacing', ''))))
     run = ''.join(letter if ' ' <= letter <= '~' else '?' for letter in run[:200])
@@ -173,7 +178,7 @@ def _header(bag, created):
 
 
 def _participants(bag, names):
-    """Return (name of the station, name of the target)."""
+    """Return (name of the station, name of the target): the names that were given, else the default names."""
     receiver = bag.configuration['parameters'].get('tracking_receiver', {})
     target = str(receiver.get('target.kind', 'TARGET')).upper()[:80]
     launch = TLE_DESIGNATOR_PATTERN.fullmatch(str(receiver.get('target.leo_pass.line_1', ''))[TLE_DESIGNATOR_COLUMNS])
@@ -182,14 +187,18 @@ def _participants(bag, names):
         target = json.loads(elements).get('OBJECT_ID', target)
     elif target == 'LEO_PASS' and launch:
         year, number, piece = launch.groups()
-        # Two digits of the year: from 57, the year of the first satellite, in 19xx, otherwise in 20xx.
+        # A year has two digits: 57 (the first satellite) to 99 are 19xx, 00 to 56 are 20xx.
         target = f'{1900 + int(year) + 100 * (int(year) < 57)}-{number}{piece}'
     return (*names, *(DEFAULT_STATION_NAME, target
                       if PARTICIPANT_PATTERN.fullmatch(target) else 'TARGET')[len(names):])
 
 
 def _segment(segment, participants):
-    """Return the text of a segment, with the keywords in the order of table 3-3 of CCSDS 503.0-B-2."""
+    """Return the text of a segment of _Tracks.segments, with the keywords in the order of table 3-3 of CCSDS
+    503.0-B-2.
+
+    participants: names of station and target.
+    """
     times, angles, distance, cn0 = segment
     lines = ['META_START', 'COMMENT angles = encoders + error of the receiver, not corrected for refraction',
              'TIME_SYSTEM = UTC', f'START_TIME = {times[0]}', f'STOP_TIME = {times[-1]}',

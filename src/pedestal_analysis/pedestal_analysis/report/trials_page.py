@@ -1,4 +1,4 @@
-"""Page of `pedestal trials`: histograms, scatter plots, the worst and the median trial."""
+"""HTML page of `pedestal trials`: histograms, scatter plots, signals of the worst and of the median trial, tables."""
 import dataclasses
 import html
 import math
@@ -23,20 +23,20 @@ from pedestal_common.graph import nodes
 HISTOGRAM_RESULTS = ('pointing_rms_deg', 'pointing_max_deg', 'azimuth_following_rms_deg',
                      'elevation_following_rms_deg', 'lock_time_s', 'loss_s', 'azimuth_nis_mean', 'azimuth_nees_mean',
                      'elevation_nis_mean', 'elevation_nees_mean', 'isolation_db', 'heading_error_rms_deg')
-"""Names of results with a histogram, if their values vary."""
+"""Names of the results that have a histogram, if their values vary."""
 
 
 @dataclasses.dataclass
 class Trials:
     """Data of the page.
 
-    plan, table  plan.Plan and table.Table
+    plan, table  plan.Plan of the trials and its table.Table
     by           name of the result that ranks the trials
-    worst        numbers of the worst trials, the worst first
-    runs         [(title, tracking.Tracking)] of the worst and the median trial
+    worst        numbers of the worst trials, the worst trial first
+    runs         [(title, tracking.Tracking)] of the worst and of the median trial
     sides        comparison.Sides of the two best sides, or None
-    sentences    lines on the comparison and on the requirements
-    command      command line
+    sentences    sentences on the comparison and on the requirements
+    command      command line that made the page
     """
     plan: object
     table: object
@@ -49,7 +49,10 @@ class Trials:
 
 
 def read(plan, table, by, sides, sentences, command, count=10) -> Trials:
-    """Return the Trials of a plan and its table; run the worst and the median trial again for their signals."""
+    """Return the Trials of a plan and its table; count: number of worst trials on the page.
+
+    The worst and the median trial run again, because the table does not hold their signals.
+    """
     places = statistics.ranking(by, table.column(by)).tolist()
     # Trials without the result rank as the worst, so the median is that of the trials that have the result.
     known = [i for i in places if math.isfinite(table.column(by)[i])] or places
@@ -66,14 +69,14 @@ def _label(name):
 
 
 def _varying(table, names):
-    """Return [(name, values)] of the named columns whose values vary."""
+    """Return [(name, values (n,))] of the columns in names whose values vary."""
     found = [(name, table.column(name)) for name in names]
     return [(name, values) for name, values in found
             if np.isfinite(values).any() and np.ptp(values[np.isfinite(values)]) > 0.0]
 
 
 def histograms(trials):
-    """Return the figure of the histograms of the results, two in a row; dashed: the median."""
+    """Return the figure with the histograms of the results, two in a row. A dashed line marks the median."""
     shown = _varying(trials.table, [name for name in trials.table.measured_results
                                     if nodes.plain(name) in HISTOGRAM_RESULTS])
     rows = max(1, -(-len(shown) // 2))
@@ -90,7 +93,7 @@ def histograms(trials):
 
 
 def scatter(trials):
-    """Return the figure of the ranking result over each varied parameter; the worst trials are orange."""
+    """Return the figure with the result `by` over each varied parameter. The worst trials are orange."""
     varied = _varying(trials.table, trials.table.varied)
     rows = max(1, -(-len(varied) // 2))
     figure, panels = new_panels(rows, 2, height=0.5 + 2.0 * rows, x='')
@@ -109,7 +112,10 @@ def scatter(trials):
 
 
 def worst_and_median(trials):
-    """Return the figure of the pointing error, else the following error, of the worst and the median trial."""
+    """Return the figure with the pointing errors of the worst and of the median trial.
+
+    Without a pointing error it shows the following errors.
+    """
     pointing = any(run.tracking.any() for _, run in trials.runs)
     figure, panels = new_panels(2, 2, y='pointing error [deg]' if pointing else 'following error [deg]', sharex=True,
                                 sharey='row')
@@ -125,7 +131,7 @@ def worst_and_median(trials):
 
 
 def pairs(trials):
-    """Return the figure of the ranking result of both sides, pair by pair, and of the histogram of the difference."""
+    """Return the figure with the result `by` of both sides, pair by pair, and the histogram of its difference."""
     figure, panels = new_panels(1, 2, height=3.3, x=('', 'difference of a pair'))
     a, b = trials.sides.pairs(trials.by)
     left, right = panels[0]
@@ -141,7 +147,7 @@ def pairs(trials):
 
 
 def _figures(trials):
-    """Return [(Spec, reason why the figure cannot be drawn, else '')]."""
+    """Return [(figures.Spec, reason why the figure cannot be drawn, or '')]."""
     nothing_varied = '' if _varying(trials.table, trials.table.varied) else 'no parameter was varied'
     found = [(Spec('histograms', 'Histograms', 'Distribution of each result over the trials in which it was measured; '
                    'dashed: the median.', (), histograms), ''),
@@ -157,7 +163,7 @@ def _figures(trials):
 
 
 def _estimates(rows, head):
-    """Return an HTML table of --json rows with values and intervals."""
+    """Return an HTML table of rows of --json with their values and intervals; head: texts of its header."""
     lines = [[row['case'], row['metric'], elements.number(row['value'] if row['value'] is not None else math.nan,
                                                           row['unit']),
               '' if row['ci_low'] is None and row['ci_high'] is None else
@@ -170,7 +176,7 @@ def _bound(value):
 
 
 def page(trials, rows):
-    """Return the page of Trials and of their --json rows as text."""
+    """Return the page of Trials as text; rows: their rows of --json."""
     title = f'{trials.plan.runs} trials: {trials.plan.name}'
     values = trials.table.column(trials.by)
     worst = [[f'trial {i}', elements.number(values[i], statistics.unit(trials.by)), trials.plan.command(i)]

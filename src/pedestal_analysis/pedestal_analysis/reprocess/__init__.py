@@ -1,1 +1,1 @@
-"""Reprocess a recording: recompute a node, replay the recording into live nodes, rerun the whole run."""
+"""Reprocess a recording: recompute a node, or rerun the whole run; and replay a recording into live nodes."""

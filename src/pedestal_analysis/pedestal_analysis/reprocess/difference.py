@@ -1,7 +1,7 @@
-"""Differences between recorded messages of a topic and new ones: count and order first, then the fields.
+"""Differences between the recorded and the new messages of a topic: first number and order, then each field.
 
-`compare` pairs messages by stamp and allows a tolerance of the numbers; it serves recomputed nodes.
-`compare_messages` pairs messages by position and allows no difference; it serves runs that were rerun.
+`pedestal recompute` uses `compare`, which pairs messages by stamp and allows a tolerance of the numbers.
+`pedestal rerun` uses `compare_messages`, which pairs messages by position and allows no difference.
 """
 import dataclasses
 import fnmatch
@@ -15,18 +15,19 @@ from pedestal_common.wire import messages
 from pedestal_recording import columns
 
 REST_FIELD = 'names, frames and the rest'
-"""Name of the field that collects all content of a message except its stamp and its numbers."""
+"""Name of a field in the report for all content of a message except its stamp and its numbers."""
 
 RELATIVE_TOLERANCE = 1e-9
-"""Default relative tolerance [-]; the absolute tolerance is that of the column (layouts)."""
+"""Default relative tolerance [-]. The default absolute tolerance is that of the column (layouts.Column)."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Tolerance:
-    """Allowed difference of numbers.
+    """Allowed difference of numbers: absolute + relative * |recorded number|.
 
-    absolute: None for the tolerance of the column; relative: None for RELATIVE_TOLERANCE; ignored: patterns of topics
-    or of topic.field without comparison, for example 'acu/reference*'.
+    absolute   in the unit of the column; None for the tolerance of the column
+    relative   [-]; None for RELATIVE_TOLERANCE
+    ignored    patterns of the topics or TOPIC.FIELD that are not compared, such as 'acu/reference*'
     """
     absolute: float | None = None
     relative: float | None = None
@@ -38,7 +39,7 @@ class Tolerance:
                 RELATIVE_TOLERANCE if self.relative is None else self.relative)
 
     def ignores(self, name):
-        """Return True if a topic or topic.field is not compared."""
+        """Return True if a topic or TOPIC.FIELD is not compared."""
         return any(fnmatch.fnmatchcase(name, pattern) for pattern in self.ignored)
 
 
@@ -46,8 +47,11 @@ class Tolerance:
 class FieldDifference:
     """One field of a topic that differs.
 
-    different, beyond: numbers of messages that differ at all and beyond the tolerance; largest: largest difference
-    (inf: a number against NaN, or no number); first: stamp of the first difference [s].
+    name        name of the field
+    different   number of messages in which the field differs at all
+    beyond      number of messages in which it differs by more than the tolerance
+    largest     largest difference; infinite for a number against NaN, or for a text
+    first       stamp of the first difference [s]
     """
     name: str
     different: int
@@ -58,9 +62,12 @@ class FieldDifference:
 
 @dataclasses.dataclass
 class TopicDifference:
-    """A topic with messages paired by stamp.
+    """Differences of a topic whose messages are paired by stamp.
 
-    was, now: numbers of recorded and new messages; problems: texts on count and order; fields: [FieldDifference].
+    name       name of the topic
+    was, now   number of recorded messages, number of new messages
+    problems   texts on their number and order
+    fields     [FieldDifference]
     """
     name: str
     was: int
@@ -79,7 +86,7 @@ class TopicDifference:
         return not self.problems and not self.fields
 
     def lines(self):
-        """Return the topic as lines of text, a line for each field that differs."""
+        """Return the differences of the topic as lines of text, one for each field that differs."""
         lines = [f'{self.name:34} {self.now:9} {self.was:9}  {"identical" if self.identical else ""}'.rstrip()]
         lines += [f'  {problem}' for problem in self.problems]
         for field in self.fields:
@@ -89,7 +96,7 @@ class TopicDifference:
 
 
 def lines(differences) -> list:
-    """Return TopicDifferences as the lines of a table."""
+    """Return [TopicDifference] as the lines of a table."""
     text = [f'{"topic":34} {"computed":>9} {"recorded":>9}']
     if any(topic.fields for topic in differences):
         text.append(f'  {"field":32} {"differ":>9} {"beyond":>9} {"largest":>11} {"first s":>14}')
@@ -98,10 +105,13 @@ def lines(differences) -> list:
 
 @dataclasses.dataclass
 class Output:
-    """Messages of one topic as numbers: stamps (n,) [ns], values (n, columns) in the units of the topic.
+    """Messages of one topic as arrays.
 
-    texts: (n,) instead of values for a text topic. read: values as a subscriber takes them, NaN where their message
-    marks them as no data; None: all of them.
+    stamps   (n,) [ns]
+    values   (n, columns) in the units of the topic; without columns for a text topic
+    texts    [n] of a text topic, else None
+    read     (n, columns): values as a subscriber uses them, NaN where their message marks them as no data. None if the
+             type has no such mark, so that they equal `values`.
     """
     stamps: np.ndarray
     values: np.ndarray
@@ -109,7 +119,7 @@ class Output:
     read: np.ndarray | None = None
 
     def table(self, topic):
-        """Return {column: array (n,)} with the names of columns.table."""
+        """Return {column: array (n,)} with the names of pedestal_recording.columns.table; topic: name of the topic."""
         if self.texts is not None:
             return {'t': self.stamps / 1e9, 'data': self.texts}
         return {'t': self.stamps / 1e9,
@@ -117,8 +127,10 @@ class Output:
 
 
 def recorded(data, log, topic) -> Output:
-    """Return the Output of CDR messages of a topic logged at `log` (n,) [ns]. Raises ValueError for invalid
-    messages."""
+    """Return the Output of messages of a topic: a list of CDR bytes, with their log times (n,) [ns].
+
+    Raises ValueError for invalid messages.
+    """
     type_name = topics.TOPIC_BY_NAME[topic].type
     log = np.asarray(log, np.int64)
     if type_name == 'std_msgs/msg/String':
@@ -129,7 +141,7 @@ def recorded(data, log, topic) -> Output:
 
 
 def _values(table, topic):
-    """Return the numbers (n, columns) of a topic in a table of its columns; NaN for a column that is missing."""
+    """Return the numbers (n, columns) of a topic from a table {column: array (n,)}; NaN for a missing column."""
     values = np.full((len(table['t']), len(layouts.columns(topic))), math.nan)
     for number, column in enumerate(layouts.columns(topic)):
         values[:, number] = table.get(column.name, math.nan)
@@ -137,9 +149,10 @@ def _values(table, topic):
 
 
 def compare(topic, was: Output, now: Output, tolerance=Tolerance(), data=None, template=None) -> TopicDifference:
-    """Compare the recorded messages of a topic with the recomputed ones.
+    """Return the TopicDifference between the recorded messages `was` of a topic and the recomputed messages `now`.
 
-    data, template: recorded CDR messages and a message that the node makes, to compare the content without numbers.
+    data, template: CDR bytes of the recorded messages, and a message that the node makes. With them, the content
+    outside the numbers is compared too (REST_FIELD).
     """
     difference = TopicDifference(topic, len(was.stamps), len(now.stamps), _order(was.stamps, now.stamps), [])
     # Pair the messages by stamp: was.values[here[k]] and now.values[there[k]] have the same stamp.
@@ -172,7 +185,7 @@ def compare(topic, was: Output, now: Output, tolerance=Tolerance(), data=None, t
 
 
 def _order(was, now):
-    """Return texts on the problems of the recorded stamps (n,) [ns], compared with the expected stamps."""
+    """Return texts on missing, doubled and descending stamps; was, now: recorded and recomputed stamps [ns]."""
     problems = []
     if len(was) != len(now):
         problems.append(f'{len(was)} messages recorded, {len(now)} recomputed')
@@ -191,10 +204,13 @@ def _order(was, now):
 
 @dataclasses.dataclass
 class MessageDifference:
-    """A topic with messages paired by position.
+    """Differences of a topic whose messages are paired by position.
 
-    was, now: numbers of recorded and new messages; different: number of pairs that differ; first: log time of the
-    first different pair [ns]; changes: texts on its differences.
+    name        name of the topic
+    was, now    number of recorded messages, number of new messages
+    different   number of pairs that differ
+    first       log time of the first pair that differs [ns]
+    changes     texts on the differences of this pair
     """
     name: str
     was: int
@@ -205,8 +221,7 @@ class MessageDifference:
 
 
 def compare_messages(name, was, now):
-    """Return the MessageDifference of a topic in two bags (bag.Bag); None if the messages are equal to the last
-    byte."""
+    """Return the MessageDifference of a topic in two bags (bag.Bag); None if its messages have equal bytes."""
     kinds = was.topics.get(name, 'none'), now.topics.get(name, 'none')
     old, new = ([(log, data) for _, log, _, data in bag.raw(name)] if name in bag.topics else []
                 for bag in (was, now))
@@ -222,7 +237,10 @@ def compare_messages(name, was, now):
 
 
 def compare_order(was, now):
-    """Return the MessageDifference at the first different position in two bags with equal topics, or None."""
+    """Return the MessageDifference at the first position at which the order of the messages differs, or None.
+
+    was, now: bag.Bags whose topics have equal messages.
+    """
     for old, new in zip(was.raw(), now.raw()):
         if old != new:
             change = f'position in the file; the new file has {new[0]} at {new[1] / 1e9:.6f} s there'

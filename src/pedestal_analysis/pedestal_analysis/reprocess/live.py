@@ -1,4 +1,7 @@
-"""`pedestal recompute --live`: feed the recorded inputs of a node to its real process, in lockstep over DDS."""
+"""`pedestal recompute --live`: feed the recorded inputs of a node to the process of the node, in lockstep over ROS.
+
+The module starts the process of the node, and takes the place of all other nodes of the graph.
+"""
 import collections
 import os
 import pathlib
@@ -24,19 +27,24 @@ from pedestal_common.text_files import parameter_file
 from pedestal_common.wire import commands, messages, records
 
 NODE_START_TIMEOUT_S = 300.0
-"""Time allowed for the start of the node, which may compile its laws for the first time [s]."""
+"""Time allowed for the start of the node [s]. The node may have to compile its laws first."""
 ANSWER_TIMEOUT_S = 20.0
 """Time allowed for the answer of the node to a step [s]."""
 STOP_TIMEOUT_S = 10.0
 """Grace period between SIGINT and SIGKILL [s]."""
 NODE_DISCOVERY_TIME_S = 0.5
-"""Time for the node to discover the feeder, after the feeder has discovered the node [s]."""
+"""Time after the discovery of the node by the Feeder, in which the node discovers the Feeder [s]."""
 
 
 class Feeder(Operator):
-    """The graph around the node: it publishes the inputs of the node and subscribes to its outputs.
+    """ROS node in place of the graph around a node: it publishes the inputs of the node, and keeps its outputs.
 
-    inputs: topics to publish; written: output topics, whose messages are kept in `answers`.
+    node      name of the node
+    inputs    topics that the Feeder publishes
+    written   output topics of the node
+    answers   {output topic: [CDR bytes]} received so far
+    replies   [CDR bytes] of the replies of the node to commands
+    readers   the other ROS nodes that `stand_in` made
     """
 
     def __init__(self, node, inputs, written):
@@ -53,10 +61,10 @@ class Feeder(Operator):
                                      self.replies.append, middleware.qos(self.links[row.replies].rate), raw=True)
 
     def stand_in(self, names):
-        """Make nodes of these names, which are in the node list of the process, as subscribers of its outputs.
+        """Make a ROS node for each of these names, as a subscriber of the outputs of the node.
 
-        Because a lockstep node waits until the named nodes have subscribed, each needs a stand-in. The stand-in of the
-        recorder keeps the outputs; the others drop them.
+        Because a node in lockstep waits until all nodes in its parameter graph.nodes have subscribed, each needs such
+        a stand-in. The stand-in of the recorder keeps the outputs in `answers`; the others drop them.
         """
         for reader in names:
             if reader not in (self.node, self.name):
@@ -73,7 +81,7 @@ class Feeder(Operator):
         return self.create_publisher(middleware.message_class(link.type), link.name, middleware.qos(link.rate))
 
     def announce_now(self, name, data):
-        """Publish a message that no step waits for, and wait for its acknowledgement."""
+        """Publish a message for which no step waits, and wait for its acknowledgement. Raises RunError without it."""
         publisher = self.publishers_of[name]
         publisher.publish(data)
         if not publisher.wait_for_all_acked(Duration(seconds=ANSWER_TIMEOUT_S)):
@@ -81,7 +89,13 @@ class Feeder(Operator):
 
 
 class Live:
-    """The process of the node and the feeder, whose nodes are spun while waiting."""
+    """The process of the node together with the Feeder.
+
+    feeder     Feeder
+    process    subprocess.Popen of the node
+    log        path of the log of the process
+    services   names of the services of the node
+    """
 
     def __init__(self, feeder, process, log, services):
         self.feeder, self.process, self.log, self.services = feeder, process, log, services
@@ -90,13 +104,14 @@ class Live:
             self.executor.add_node(node)
 
     def until(self, condition, limit, missing):
-        """Spin until condition() is true.
+        """Spin the ROS nodes of the Feeder until condition() is true.
 
-        Raises RunError if the node dies, or after `limit` [s]; missing() -> name of the missing message.
+        limit: longest wait [s]; missing: function that returns the name of the missing message, for the error.
+        Raises RunError if the node dies, or after the limit.
         """
         deadline = time.monotonic() + limit
         while not condition():
-            if self.process.poll() not in (None, 0):     # 0: the node has reached its end, its last messages may come
+            if self.process.poll() not in (None, 0):     # 0: it ended as planned, and its last messages may follow
                 raise RunError(f'{self.feeder.node} exited with code {self.process.returncode}: '
                                f'{" ".join(self.log.read_text(errors="replace").split())}')
             if time.monotonic() > deadline:
@@ -104,7 +119,7 @@ class Live:
             self.executor.spin_once(timeout_sec=0.1)
 
     def send_command(self, command):
-        """Send a Command by its service or by the command topic, and wait for the reply."""
+        """Send a commands.Command by its service or by the command topic, and wait for the reply. Raises RunError."""
         if command.verb not in self.services:
             before = len(self.feeder.replies)
             self.feeder.command_publisher.publish(messages.serialize(commands.message(command)))
@@ -119,10 +134,10 @@ class Live:
 
 
 def outputs(recording, done, params):
-    """Return {topic: Output} of the process of a node fed with the inputs of a Recomputed.
+    """Return {topic: Output} of the process of a node that is fed with the inputs of a recompute.Recomputed.
 
-    The outputs of the Recomputed give the number of messages due at each step. Raises RunError if messages are
-    missing.
+    done: the Recomputed, whose outputs give the number of messages due at each step; params: parameters of the node.
+    Raises RunError if messages are missing, RecomputeError for a recording in realtime.
     """
     if not recording.lockstep:
         raise recompute.RecomputeError('--live feeds in lockstep, and steps of a realtime recording may lack inputs; '
@@ -136,9 +151,9 @@ def outputs(recording, done, params):
 
 
 def _graph(recording, unit):
-    """Return the node list of the process: the node, the recorder, and nodes that determine its inputs.
+    """Return the parameter graph.nodes of the process: the node, the recorder, and the optional nodes that feed it.
 
-    The recorder takes part because it reads every output, so the process sends each of them.
+    Because the recorder subscribes to every output, the process publishes each of them.
     """
     optional = [node.name for node in nodes.NODES if (node.optional or node.name == 'operator')
                 and any(topic in unit.NODE.reads and recording.has(topic) for topic in node.writes)]
@@ -146,6 +161,7 @@ def _graph(recording, unit):
 
 
 def _run(recording, done, params, folder):
+    """Start the process of the node with its files in a folder, feed it, end it, and return its {topic: Output}."""
     file, log = folder / 'parameters.yaml', folder / 'log'
     names = _graph(recording, done.unit)
     values = {**parameters.as_dict(params), 'graph.pacing': 'lockstep', 'graph.nodes': ','.join(names),
@@ -178,7 +194,7 @@ def _run(recording, done, params, folder):
 
 
 def _feed(recording, done, live):
-    """Feed all steps; return {topic: step at which each of its messages came}."""
+    """Feed all steps to the process. Return {output topic: [step at which each message came]}."""
     feed, feeder = done.feed, live.feeder
     events = collections.defaultdict(list)
     for step, name, row in feed.events:
@@ -209,12 +225,13 @@ def _feed(recording, done, live):
 
 
 def _due(done, name):
-    """Return the number of messages of a topic that are due by each step (n,), that of the step included."""
+    """Return the number (n,) of messages of an output topic that are due up to each step, this step included."""
     if records.is_text(name):
         return np.searchsorted(done.outputs[name].stamps, done.feed.stamps, side='right')
     return np.cumsum(done.steps[name]['stamp'] != records.NO_STAMP)
 
 
 def _output(name, data, done, steps):
+    """Return the Output of a topic from its CDR bytes and the step at which each message came."""
     log = done.feed.stamps[np.array(steps[:len(data)], np.int64)]
     return difference.recorded([bytes(message) for message in data[:len(log)]], log, name)

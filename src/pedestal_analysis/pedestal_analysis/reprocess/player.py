@@ -1,4 +1,8 @@
-"""The node that publishes a recording: subscribers, due times and acknowledgements of its messages."""
+"""Player: the ROS node of `pedestal replay` that publishes a Playlist of recorded messages.
+
+The player waits for the subscribers of its topics, keeps the due times of the messages, and checks that subscribers
+acknowledge the messages. With --lockstep it also waits for the answers of the nodes under test.
+"""
 import contextlib
 import dataclasses
 import struct
@@ -18,55 +22,61 @@ from pedestal_recording import bag as bags
 
 ANSWER_TOPICS = {node.name: (None if node.reads[0] in node.writes else node.reads[0], node.answer)
                  for node in nodes.NODES if node.answer}
-"""{node: (trigger topic, topic of the answer with the same stamp)} of the answers that lockstep waits for.
+"""{node: (topic that triggers a step, topic of its answer with the stamp of the step)} for the replay in lockstep.
 
-Because the drive begins the steps, it has no trigger (None). The INS is left out because its answers are late by its
-latency.
+Because the drive begins the steps itself, it has no trigger (None). Because the INS answers late by its latency, it is
+not in the table.
 """
 
 KEY_HELP = 'space: pause, resume   n or right arrow: one step   q: quit'
 MAX_UNACKNOWLEDGED_MESSAGES = 1000
-"""Largest number of unacknowledged messages of a topic; Fast DDS keeps 5000 and refuses more."""
+"""Largest number of unacknowledged messages of a topic. Fast DDS keeps 5000, and refuses more."""
 
 DISCOVERY_SETTLING_S = 0.5
-"""Time from the discovery of the last subscriber to the first message, for the discovery between other nodes [s]."""
+"""Time from the discovery of the last subscriber to the first message [s]. Other nodes discover each other in it."""
 
 UNDISCOVERED_NODE_PATH = '_NODE_NAMESPACE_UNKNOWN_/_NODE_NAME_UNKNOWN_'
-"""Name that rmw gives the node of a publisher that was discovered before its node."""
+"""Name that the ROS middleware (rmw) states for a node while only its publisher has been discovered."""
 
 POSITION_REFRESH_S, SUBSCRIBER_POLL_S, KEYBOARD_POLL_S = 0.1, 0.5, 0.05
-"""Periods of the shown position, of the check of subscribers, and of the keyboard poll while waiting [s]."""
+"""Periods of the update of the shown position, of the check of subscribers, and of the check for pressed keys [s]."""
 
 SUBSCRIBER_EXIT_TIMEOUT_S = 5.0
-"""Time without acknowledgement after which a missing subscriber counts as killed [s].
+"""Time without acknowledgement after which a subscriber that disappeared counts as killed [s].
 
-A subscriber that ends is known at once. Fast DDS waits 20 s for a killed one and then drops its messages.
+A subscriber that ends by itself disappears at once. Of a killed subscriber, Fast DDS waits 20 s for acknowledgement,
+and then drops its messages.
 """
 
 MAX_SPIN_PAUSE_S = 0.01
-"""Largest time between two spins of the node during the replay [s]."""
+"""Largest time between two spins of the player, in which it receives answers [s]."""
 
 ANSWER_QUIET_S, STOPPED_ARRIVAL_TIMEOUT_S = 0.5, 1.0
-"""Time without an answer that ends the wait for a node under test; time a stopped replay waits for acknowledgement
-[s]."""
+"""ANSWER_QUIET_S: time without an answer after which the wait for the last answers ends [s].
+
+STOPPED_ARRIVAL_TIMEOUT_S: time for which a stopped replay waits for acknowledgement [s].
+"""
 
 _stamp_of = struct.Struct('<iI').unpack_from
 
 
 def answer_of(node, graph):
-    """Return the ANSWER_TOPICS of a node by its name in a graph {name: Link}; an array uses the topics of its first
-    beam."""
+    """Return the row of ANSWER_TOPICS of a node, with the names of the topics in a graph {name: Link}.
+
+    An array answers by the topics of its first beam.
+    """
     return tuple(name if name is None or name in graph else f'{nodes.beam_of(node) or "beam_1"}/{name}'
                  for name in ANSWER_TOPICS[nodes.plain(node)])
 
 
 @dataclasses.dataclass
 class NodeUnderTest:
-    """A node that answers every step.
+    """A live node that receives the replayed messages and must answer every step.
 
-    trigger              topic that begins a step, None for a node that begins the steps
+    name                 name of the node
+    trigger              topic that begins a step, None for a node that begins the steps itself
     answer               topic of its answers
-    triggered, answered  stamps [ns] of the last trigger and the last answer
+    triggered, answered  stamps [ns] of the last trigger and the last answer, -1 before the first
     steps, answers       numbers of triggers and answers
     """
     name: str
@@ -78,18 +88,21 @@ class NodeUnderTest:
     answers: int = 0
 
     def owes(self, stamp=-1):
-        """Return True if the node must answer before the messages of this stamp may be published."""
+        """Return True if the node must still answer before messages with a stamp [ns] may be published."""
         return self.answered < (stamp if self.trigger is None else self.triggered)
 
     def silence(self, stamp, deadline):
-        """Return the GraphError for a missing answer after the deadline [s]."""
+        """Return the GraphError for an answer that was missing for longer than the deadline [s]."""
         step = stamp if self.trigger is None else self.triggered
         return GraphError(f'no {self.answer} for step {step / NS_PER_SECOND:.6f} s after {deadline:g} s; silent: '
                           f'{self.name}')
 
 
 class Pace:
-    """Due times of messages: `rate` times real time, None for at once; keys pause, make single steps or quit."""
+    """Pace of a replay: due times of the messages. Keys pause it, make a single step or quit.
+
+    rate: multiples of real time, None if each message is due at once; paused, quit: states.
+    """
 
     def __init__(self, rate, paused):
         self.rate, self.paused, self.quit = rate, paused, False
@@ -97,7 +110,7 @@ class Pace:
         self._base = None
 
     def press(self, key):
-        """Apply a key."""
+        """Apply a pressed key (bytes), see KEY_HELP."""
         if key == b' ':
             self.paused, self._steps = not self.paused, 0
         elif key == b'n' or key in RIGHT_ARROW_CODES:
@@ -107,7 +120,10 @@ class Pace:
             self.quit = True
 
     def wait(self, stamp, now):
-        """Return the time [s] from now [s] until the messages of a stamp [ns] are due; use up a single step."""
+        """Return the time to wait until the messages of a stamp [ns] are due [s]; now: steady time [s].
+
+        A single step that was requested by a key is used up.
+        """
         if self.paused:
             self._base = None
             if self._steps:
@@ -126,17 +142,22 @@ class Pace:
 
 @dataclasses.dataclass
 class Channel:
-    """A published topic: publisher, number of sent messages, number known to be acknowledged."""
+    """A published topic: its publisher, number of sent messages, number of messages known as acknowledged."""
     publisher: object
     sent: int = 0
     arrived: int = 0
 
 
 class Player(Node):
-    """Publisher of a Playlist according to ReplayOptions.
+    """ROS node that publishes a Playlist as the ReplayOptions state.
 
-    Each topic must have its subscribers among the nodes of the options or, without nodes, any subscriber. The topic
-    `companion` needs no subscriber; it is published only if it has no other publisher. stopped() -> True to end.
+    playlist    Playlist to publish
+    companion   topic (the clock) that is published too if it has no other publisher; it needs no subscriber
+    options     ReplayOptions
+    keyboard    terminal.Keyboard
+    stopped     function stopped() that returns True when the replay must end
+
+    Each topic must have the nodes of the options as its subscribers or, without nodes, any subscriber.
     """
 
     def __init__(self, playlist, companion, options, keyboard, stopped):
@@ -158,6 +179,7 @@ class Player(Node):
         self._next_refresh = self._next_subscriber_check = self._last_spin = 0.0    # monotonic [s]
 
     def _publisher(self, name, type_name):
+        """Return a publisher of a recorded topic. Raises BagError for a wrong type or a type that is not installed."""
         topic = self.graph.get(name)
         if topic is not None and topic.type != type_name:
             raise bags.BagError(f'{self.playlist.bag.path}: {name} is a {type_name}; must be a {topic.type}')
@@ -169,7 +191,7 @@ class Player(Node):
         return self.create_publisher(kind, name, middleware.qos(topic.rate if topic is not None else 'step'))
 
     def _listen(self, topic):
-        """Subscribe to an output of a node under test, in place of the missing nodes."""
+        """Subscribe to an output of a node under test, as the missing nodes would."""
         node = next((node for node in self.under_test if node.answer == topic.name), None)
 
         def take(data):
@@ -185,7 +207,11 @@ class Player(Node):
         self._last_spin = time.monotonic()
 
     def _other_writers(self, name):
-        """Return the other publishers of a topic; of a topic of all nodes, those with messages in the recording."""
+        """Return the names of the other nodes that publish a topic.
+
+        A topic with several publishers, such as the diagnostics, may have other publishers than the recorded nodes.
+        Those are left out.
+        """
         others = [shell.node_of(info) for info in self.get_publishers_info_by_topic(name)]
         if self.get_name() in others:
             others.remove(self.get_name())
@@ -193,7 +219,7 @@ class Player(Node):
         return [node for node in others if topic is None or len(topic.writers) == 1 or node in topic.writers]
 
     def _unread(self):
-        """Return (topic, missing subscribers) of the first topic without its subscribers, else None."""
+        """Return (topic, its missing subscribers as a text) of the first topic without its subscribers, or None."""
         for name, channel in self.channels.items():
             if name == self.companion:
                 continue
@@ -205,10 +231,10 @@ class Player(Node):
         return None
 
     def connect(self):
-        """Wait until each topic has its subscribers; return True, or False if stopped meanwhile.
+        """Wait until each topic has its subscribers. Return True, or False if the replay ended meanwhile.
 
-        Raises GraphError if a topic already has a publisher, or has no subscriber after the deadline. A publisher
-        whose node is not discovered yet counts only after the deadline, because it may be one of this node.
+        Raises GraphError if a topic already has another publisher, or has no subscriber after the deadline. Because a
+        publisher whose node is not discovered yet may be one of this node, it counts only after the deadline.
         """
         begun = settled = time.monotonic()
         while not self._ended():
@@ -235,10 +261,10 @@ class Player(Node):
         return False
 
     def play(self):
-        """Publish to the end of the list, or until quit or stopped.
+        """Publish the messages until the end of the playlist, a key or a signal.
 
-        Raises GraphError if a subscriber disappears or an answer of lockstep is missing after the deadline, and
-        shell.Stopped if stopped while a subscriber acknowledges nothing.
+        Raises GraphError if a subscriber disappears, or if an answer in lockstep is missing after the deadline. Raises
+        shell.Stopped after a signal while a subscriber acknowledges nothing.
         """
         for stamp, group in self.playlist.steps():
             if not self._await_turn(stamp):
@@ -252,12 +278,14 @@ class Player(Node):
                         self._send(name, stamp, data)
 
     def _announce(self, name, stamp, data):
+        """Publish a message of a latched topic. All earlier messages arrive before it, all later messages after it."""
         for other in self.channels:
             self._await_arrival(other, self.deadline)
         self._send(name, stamp, data)
         self._await_arrival(name, self.deadline)
 
     def _send(self, name, stamp, data):
+        """Publish a message. Before it, wait if too many messages are unacknowledged (MAX_UNACKNOWLEDGED_MESSAGES)."""
         channel = self.channels[name]
         if channel.sent - channel.arrived >= MAX_UNACKNOWLEDGED_MESSAGES:
             self._await_arrival(name, self.deadline)
@@ -268,6 +296,10 @@ class Player(Node):
                 node.triggered, node.steps = stamp, node.steps + 1
 
     def _await_arrival(self, name, limit):
+        """Wait until the subscribers of a topic have acknowledged all messages; limit: longest wait [s].
+
+        Raises GraphError after the limit or if a subscriber died, and shell.Stopped after a signal.
+        """
         channel = self.channels[name]
         since, readers = time.monotonic(), channel.publisher.get_subscription_count()
         while not channel.publisher.wait_for_all_acked(Duration(seconds=0)):
@@ -295,7 +327,7 @@ class Player(Node):
             self._check_subscribers(now)
             wait = self._time_to_wait(stamp, now, since)
             if wait <= 0.0:
-                # At a high rate no wait spins the node, and the answers would not be received.
+                # At a high rate the player never waits, so it must spin here to receive the answers.
                 if now - self._last_spin > MAX_SPIN_PAUSE_S:
                     self._spin(0)
                 return True
@@ -305,7 +337,7 @@ class Player(Node):
         return self.pace.quit or self.stopped()
 
     def _time_to_wait(self, stamp, now, since):
-        """Return the time to wait for the messages of a stamp [s]; since: start of the wait.
+        """Return the time to wait for the messages of a stamp [ns], in s; now, since: now and start of the wait [s].
 
         Raises GraphError if an answer is missing after the deadline.
         """
@@ -317,10 +349,11 @@ class Player(Node):
         return KEYBOARD_POLL_S
 
     def _late(self, stamp=-1):
-        """Return the first node under test that owes an answer before the messages of a stamp, None without one."""
+        """Return the first node under test that must still answer before the messages of a stamp [ns], or None."""
         return next((node for node in self.under_test if node.owes(stamp)), None)
 
     def _show_position(self, now):
+        """Show the position, the pace and the keys in the status line; now: steady time [s]."""
         if now >= self._next_refresh:
             self._next_refresh = now + POSITION_REFRESH_S
             start, end = self.playlist.origin, self.playlist.end
@@ -340,8 +373,8 @@ class Player(Node):
     def finish(self):
         """Wait until all messages are acknowledged and the nodes under test have answered.
 
-        Raises GraphError after the deadline. A stopped replay waits STOPPED_ARRIVAL_TIMEOUT_S for acknowledgement
-        only.
+        Raises GraphError after the deadline. After a key or a signal to end, wait for acknowledgement only, at most
+        STOPPED_ARRIVAL_TIMEOUT_S for each topic.
         """
         if self._ended():
             with contextlib.suppress(GraphError, shell.Stopped):

@@ -1,8 +1,12 @@
-"""Selection and order of the messages of a replay. No ROS here.
+"""Playlist of a replay: selection and order of the recorded messages. The module works without ROS.
 
-The order is that of the stamps (`header.stamp`, else the log time). At equal stamps latched topics come first, and all
-subscribers acknowledge them before the next message, as with Shell.announce. Then comes the order of the table of
-topics, with topics outside the table last, and then the order of the file.
+The messages are in the order of their stamps; a message without a header has its log time. Messages with equal stamps
+are in this order:
+
+1. latched topics. All subscribers acknowledge such a message before the next message, as with Shell.announce.
+2. the other topics of the table of topics, in the order of the table
+3. topics outside the table
+4. within a topic, the order of the file
 """
 import itertools
 
@@ -30,10 +34,11 @@ def latched(graph, name):
 
 
 def selected_topics(bag, input_nodes, names):
-    """Return the topics of a bag.Bag to publish.
+    """Return the topics of a bag.Bag that a replay publishes.
 
-    They are the topics in names, else the inputs of input_nodes that none of these nodes publishes, else all topics.
-    Raises BagError for a topic that is not in the bag, an unknown node, or a node without inputs in the bag.
+    They are the topics in names. Without names they are the inputs of input_nodes that none of these nodes publishes.
+    Without both they are all topics. Raises BagError for a topic that is not in the bag, an unknown node, or a node
+    without inputs in the bag.
     """
     if names:
         return bags.chosen_topics(bag, names)
@@ -54,14 +59,16 @@ def selected_topics(bag, input_nodes, names):
 
 
 class Playlist:
-    """Messages of a bag.Bag in the order of this module.
+    """Messages of a bag.Bag in the order that the module states.
 
-    names: topics. start [s]: from the first message of a topic that is not latched. duration [s]: None to the end.
-    Because a latched message stays valid, the last message of each latched topic before the start is published first.
+    names         topics
+    start         begin of the playlist [s], counted from `origin`
+    duration      length of the playlist [s], None to the end
+    origin, end   stamps [ns] of the first message of a topic that is not latched, and of the last message of the bag
+    first, last   stamps [ns] of the first and the last message of the playlist
+
+    Because a latched message stays valid, the last message of each latched topic before the start comes first.
     Raises BagError if there are no messages.
-
-    origin, end  stamps [ns] of the first message that is not latched and of the last message
-    first, last  stamps [ns] of the published messages
     """
 
     def __init__(self, bag, names, start, duration):
@@ -96,7 +103,7 @@ class Playlist:
         self._where, self._stamps = where[chosen], stamps[chosen]
 
     def steps(self):
-        """Yield (stamp, iterator of (topic, CDR bytes)) for each stamp."""
+        """Yield (stamp [ns], iterator of (topic, CDR bytes)) for each stamp in order."""
         rows = zip(self._stamps.tolist(), self.bag.take(self.bag.index[self._where]))
         for stamp, group in itertools.groupby(rows, lambda row: row[0]):
             yield stamp, ((name, data) for _, (name, _, _, data) in group)

@@ -1,16 +1,18 @@
-"""`pedestal recompute`: feed the recorded inputs of a node to its unit and compare the outputs with the recorded ones.
+"""`pedestal recompute`: feed the recorded inputs of a node to its unit, and compare new outputs with recorded outputs.
 
-The nodes' own code matches inputs to steps (pedestal_common.graph.steps) and decodes and encodes messages (the unit
-module of each package). Accuracy:
+A unit is the set of step functions of a node with their state, without ROS. The module uses the code of the nodes
+themselves: pedestal_common.graph.steps matches inputs to steps, and the unit decodes and encodes messages. Accuracy:
 
-lockstep   Stamps assign inputs to steps, so the same version on the same machine gives the same bits.
-realtime   A step receives the messages published (in a foreign recording: recorded) before the next step began. These
-           are the inputs of the node, except for messages in transit at that moment.
-both       Commands and services are repeated before the step at which the node replied. For a node without recorded
-           replies, a change of acu/mode or adu/state that the unit does not make by itself is requested at that step.
-           A parameter changed during the run leaves no trace.
-           A recording that begins in the middle of a run starts from the initial state, so its outputs differ until
-           the filter has converged.
+lockstep   Stamps assign inputs to steps. Therefore an equal version on the same machine gives equal bits.
+realtime   A step receives the messages that were published before the next step began. In a recording of another tool
+           it receives the messages that were recorded before. These are the inputs that the node had, except for
+           messages in transit at that moment.
+both       Recorded commands and service calls are repeated before the step at which the node replied. If a node
+           has no recorded replies, some changes of acu/mode or adu/state cannot follow from the inputs alone. Such a
+           change is requested at its step.
+           A parameter that was changed during the run leaves no trace in the recording.
+           In a recording that begins during its run, the unit begins with its initial state. Its outputs then differ
+           until the filter has converged.
 """
 import dataclasses
 import time
@@ -27,33 +29,34 @@ from pedestal_common.wire import commands, messages, records
 from pedestal_recording import bag as bags
 
 SUBSTITUTE_TOPICS = {'adu/truth': 'joint_states'}
-"""{topic: topic that replaces it in an old recording}: old receivers used the direction of the encoders."""
+"""{topic: topic that replaces it in an old recording}. Old receivers used the angles of the encoders."""
 
 AFTER_LAST_STAMP = 2**63 - 1
-"""Stamp of the step of a message that is later than the last answer of its publisher [ns]."""
+"""Stamp [ns] in place of the step of a message that its publisher sent after its last answer to a step."""
 
 RECOMPUTABLE_NODES = tuple(node.name for node in nodes.NODES if node.unit)
 """Names of the nodes that can be recomputed."""
 
 
 def row_of(recording, node) -> nodes.Node:
-    """Return the row of a node for a recording; the drive of the recording may be an array."""
+    """Return the nodes.Node of the name of a node, for a recording whose drive may be an array."""
     return nodes.row(node, recording.bag.beams > 0)
 
 
 def publishing_node(topic) -> nodes.Node:
-    """Return the Node that publishes a topic."""
+    """Return the nodes.Node that publishes a topic."""
     return next(node for node in nodes.NODES if topic in (*node.writes, node.replies))
 
 
 class RecomputeError(ValueError):
-    """A bag lacks data for a recomputation, or an option does not fit the bag; one line."""
+    """Error of a bag without the data for a recomputation, or of an option that does not fit. Its text is one line."""
 
 
 class Recording:
-    """The messages of a bag by topic, read once; of several beams, the messages of one.
+    """The messages of a bag by topic. Each topic is read from the file once.
 
-    lockstep: True to match messages by stamp, False by arrival, None for the pacing that the bag states.
+    lockstep: True to match messages to steps by stamp, False by arrival, None by the pacing that the bag states.
+    beam: name of one of several beams, '' for the first.
     """
 
     def __init__(self, path, lockstep=None, beam=''):
@@ -66,30 +69,31 @@ class Recording:
         return topic in self.bag.topics and len(self.rows(topic)) > 0
 
     def source(self, topic):
-        """Return the recorded topic for a subscriber of a topic: the topic or, if missing, its SUBSTITUTE_TOPICS."""
+        """Return the recorded topic that feeds a topic: the topic itself or, if missing, its substitute."""
         return topic if topic in self.bag.topics else SUBSTITUTE_TOPICS.get(topic, topic)
 
     def feeds(self, topic):
-        """Return True if there are messages for a subscriber of a topic."""
+        """Return True if the bag has messages that feed a topic, see `source`."""
         return self.has(self.source(topic))
 
     def rows(self, topic):
-        """Return the rows of a topic, or of its substitute, in the bag."""
+        """Return the rows of Bag.index of a topic, or of its substitute."""
         if topic not in self._rows:
             self._rows[topic] = self.bag.rows(self.source(topic))
         return self._rows[topic]
 
     def arrival(self, topic):
-        """Return numbers (n,) that increase in the order of arrival of the messages.
+        """Return numbers (n,) that increase in the order of arrival of the messages of a topic.
 
-        They are publish times by the clock of the machine; in a foreign recording, places in the file.
+        They are the publish times [ns] by the clock of the machine. In a recording of another tool, they are the
+        places in the file.
         """
         rows = self.rows(topic)
         # A place is the number of a chunk and the offset in the unpacked chunk, which is far below 2^40 bytes.
         return rows.publish if 'pacing' in self.bag.metadata else (rows.chunk << 40) + rows.start
 
     def data(self, topic):
-        """Return the CDR bytes of the messages of a topic."""
+        """Return [CDR bytes] of the messages of a topic. Raises RecomputeError for another type."""
         if topic not in self._data:
             wanted, source = topics.TOPIC_BY_NAME[topic].type, self.source(topic)
             if self.bag.topics[source] != wanted:
@@ -98,7 +102,7 @@ class Recording:
         return self._data[topic]
 
     def output(self, topic) -> difference.Output:
-        """Return the messages of a topic as numbers or texts."""
+        """Return the messages of a topic as an Output of numbers or texts. Raises RecomputeError."""
         if topic not in self._outputs:
             try:
                 output = difference.recorded(self.data(topic), self.rows(topic).log, topic)
@@ -109,10 +113,11 @@ class Recording:
         return self._outputs[topic]
 
     def steps(self, topic):
-        """Return the stamps (n,) [ns] of the steps of messages without a stamp.
+        """Return the stamps (n,) [ns] of the steps to which the messages of a topic without stamps belong.
 
-        In a lockstep recording of this software the log time is the stamp. In others a message belongs to the step of
-        the publisher's next answer: AFTER_LAST_STAMP if no answer follows, the log time if no answers were recorded.
+        In a lockstep recording of this software this is the log time. In other recordings a message belongs to the
+        step that its publisher answers next. The stamp is AFTER_LAST_STAMP if no answer follows, and the log time if
+        no answers were recorded.
         """
         log = self.rows(topic).log - self.bag.start
         answer = publishing_node(topic).writes[0]
@@ -122,9 +127,10 @@ class Recording:
         return np.append(self.output(answer).stamps, AFTER_LAST_STAMP)[after]
 
     def commands(self, topic, stamps):
-        """Return {step: [Command]} of a topic of replies; a step is an index of stamps (n,) [ns].
+        """Return {step: [Command]} of the commands in a topic of replies.
 
-        Because the parameters contain the schedules, commands of schedules are left out. Raises RecomputeError.
+        stamps (n,): stamps of the steps [ns]; a step is an index of them. Because the unit makes the commands of
+        schedules by itself, from its parameters, these are left out. Raises RecomputeError.
         """
         found = {}
         rows = np.searchsorted(stamps, self.steps(topic)).tolist() if self.has(topic) else ()
@@ -138,7 +144,10 @@ class Recording:
         return found
 
     def states(self, topic, stamps):
-        """Return {step: text} of a recorded acu/mode or adu/state; a step is an index of stamps (n,) [ns]."""
+        """Return {step: text} of the changes of a recorded acu/mode or adu/state.
+
+        stamps (n,): stamps of the steps [ns]; a step is an index of them.
+        """
         if not self.has(topic):
             return {}
         output = self.output(topic)
@@ -149,13 +158,14 @@ class Recording:
 
 @dataclasses.dataclass
 class Feed:
-    """The inputs of a unit by step.
+    """The recorded inputs of a unit, matched to its n steps.
 
-    inputs   (n,) records of the unit
-    rows     {topic: row of the message at each step, -1 for none}
-    stamps   (n,) [ns]
-    events   [(step that follows the message, topic, row)] of messages that no step waits for; texts are also in inputs
-    problem  reason of an early end, or ''
+    inputs   (n,) records of the inputs, one per step
+    rows     {topic: (n,) index of its message at each step, -1 for none}
+    stamps   (n,) stamps of the steps [ns]
+    events   [(step that follows the message, topic, index of the message)] of the messages for which no step waits.
+             Texts among them are also in `inputs`.
+    problem  reason why the matching ended early, or ''
     refused  number of messages that belong to no step
     """
     inputs: np.ndarray
@@ -167,9 +177,10 @@ class Feed:
 
 
 def feed(recording, unit) -> Feed:
-    """Match the recorded inputs of a unit to its steps.
+    """Return the Feed of a unit: the recorded inputs, matched to the steps of the unit.
 
-    A drive makes its own steps. Without a recorded clock, the stamps of joint_states are the steps.
+    The drive makes the steps itself, at the stamps of the recorded clock. Without a recorded clock, the stamps of
+    joint_states take their place. Raises RecomputeError if an input is missing.
     """
     paces = unit.trigger in unit.NODE.writes
     trigger = unit.NODE.writes[0] if paces and not recording.has(unit.trigger) else unit.trigger
@@ -207,9 +218,10 @@ def feed(recording, unit) -> Feed:
 
 
 def _events(recording, unit, stamps, taken):
-    """Return the events of a Feed, in order; taken (n,): arrival of the last input of each step.
+    """Return the events of a Feed, in order.
 
-    A publisher with a latency publishes its other messages with the same latency.
+    stamps (n,): stamps of the steps [ns]; taken (n,): arrival of the last input of each step. A publisher whose step
+    topic has a latency publishes its other messages with an equal latency.
     """
     events = []
     for name in unit.reads:
@@ -225,7 +237,10 @@ def _events(recording, unit, stamps, taken):
 
 
 def _gathered(recording, unit, trigger, steps):
-    """Return (inputs (n,), rows) of matched steps."""
+    """Return the fields (inputs, rows) of a Feed.
+
+    steps: matched steps [(stamp, index of the trigger message, {topic: index of its message})].
+    """
     rows = {trigger: np.array([row for _, row, _ in steps], np.int64)}
     for name in unit.latencies:
         rows[name] = np.array([-1 if row[name] is None else row[name] for _, _, row in steps], np.int64)
@@ -240,16 +255,16 @@ def _gathered(recording, unit, trigger, steps):
 
 
 def state_of(unit) -> str:
-    """Return the text topic with the state of a unit that accepts requests for a state; '' for other units."""
+    """Return the text topic with the state of a unit (acu/mode or adu/state); '' for a unit without services."""
     states = [name for name in unit.NODE.writes if records.is_text(name) and name not in unit.MOMENTARY]
     return states[0] if unit.REQUESTS else ''
 
 
 def compute(recording, unit, fed, states=None, requests=None):
-    """Return (outputs (n,), requests made {step: [(Command, granted)]}) of a unit on a Feed.
+    """Run a unit on a Feed. Return (outputs (n,), {step: [(Command, True if granted)]} of the requests made).
 
-    states: {step: text} of recorded states; a state that the unit does not reach by itself is requested.
-    requests: {step: [Command]} that are always made.
+    states     {step: text} of recorded states. If the unit does not reach such a state by itself, it is requested.
+    requests   {step: [Command]} that are requested in any case
     """
     states, requests, made, events = states or {}, requests or {}, {}, {}
     state = state_of(unit)
@@ -292,7 +307,7 @@ def compute(recording, unit, fed, states=None, requests=None):
 
 
 def outputs_of(unit, fed, outputs):
-    """Return {topic: Output} of the outputs (n,) of a unit."""
+    """Return {topic: Output} of the outputs (n,) that `compute` returned for a unit and its Feed."""
     written = {}
     for name in unit.writes:
         if not records.is_text(name):
@@ -306,8 +321,15 @@ def outputs_of(unit, fed, outputs):
 
 @dataclasses.dataclass
 class Recomputed:
-    """One node recomputed from one recording: steps (n,): outputs of each step of the feed; outputs: the same by
-    topic."""
+    """One node, recomputed from one recording.
+
+    node       name of the node
+    unit       its unit after the last step
+    feed       its Feed of n steps
+    steps      (n,) records of its outputs at each step
+    outputs    {topic: Output}: these outputs, by topic
+    requests   {step: [(Command, True if granted)]} of the requests made
+    """
     node: str
     unit: object
     feed: Feed
@@ -317,7 +339,7 @@ class Recomputed:
 
 
 def unit_of(recording, node, params):
-    """Return the unit of a node with parameters of its dataclass, in the recorded graph."""
+    """Return a new unit of a node in the recorded graph; params: its parameters (dataclass)."""
     row = row_of(recording, node)
     names = [other.name for other in nodes.NODES if any(map(recording.has, other.writes))]
     flags = [flag for flag in topics.TOPIC_FLAGS if getattr(params, flag, False)]
@@ -327,9 +349,10 @@ def unit_of(recording, node, params):
 
 
 def recompute(recording, node, params, requests=None) -> Recomputed:
-    """Recompute a node with parameters of its dataclass.
+    """Recompute a node; params: its parameters (dataclass).
 
-    requests: {step: [Command]}; None: the commands in the recorded replies or, without replies, the recorded states.
+    requests: {step: [Command]} to make. None: those of the recorded replies or, without replies, those that the
+    recorded states need.
     """
     unit = unit_of(recording, node, params)
     fed = feed(recording, unit)
@@ -343,7 +366,10 @@ def recompute(recording, node, params, requests=None) -> Recomputed:
 
 
 def idle(recording, done) -> str:
-    """Return the reason why a recording does not exercise a node, else ''; recorded outputs take precedence."""
+    """Return the reason why a recording does not exercise a node, such as a receiver without lock; '' if it does.
+
+    done: Recomputed. The unit judges the recorded outputs or, without these, the recomputed outputs.
+    """
     numbers = {}
     for name, output in done.outputs.items():
         output = recording.output(name) if recording.has(name) else output
@@ -354,7 +380,7 @@ def idle(recording, done) -> str:
 
 
 def compare(recording, outputs, unit, tolerance) -> list:
-    """Return the TopicDifference of each recorded output."""
+    """Return [difference.TopicDifference] of the outputs {topic: Output} of a unit that were also recorded."""
     compared = []
     for name, output in outputs.items():
         if recording.has(name) and not tolerance.ignores(name):
@@ -365,10 +391,11 @@ def compare(recording, outputs, unit, tolerance) -> list:
 
 
 def chosen(recording, names, file_values):
-    """Return the nodes to recompute: the nodes in names, else all nodes that the recording allows.
+    """Return the nodes to recompute: the nodes in names or, if empty, all nodes that the recording allows.
 
-    It must contain parameters, inputs and outputs of a node; the ACU needs no outputs. A recording without parameters
-    allows the ACU.
+    A recording allows a node if it contains parameters, inputs and outputs of the node; the ACU needs no outputs. A
+    recording without any parameters allows the ACU only. file_values: parameters in place of the recorded ones, or
+    None. Raises RecomputeError.
     """
     names = [name.removeprefix(recording.bag.beam) for name in names]
     for name in names:
@@ -405,7 +432,10 @@ def file_parameters(path, beam=''):
 
 
 def overrides(texts, names):
-    """Return {node: {key: value}} of texts [node.]key=value; with one node its name may be left out."""
+    """Return {node: {key: value}} of texts node.key=value; names: the recomputed nodes.
+
+    With only one node, a text may leave out its name. Raises RecomputeError.
+    """
     parameters = {}
     for text in texts:
         if text.partition('=')[0].partition('.')[0] not in scenario.SECTION_NODES and len(names) == 1:
@@ -418,7 +448,11 @@ def overrides(texts, names):
 
 
 def parameters_of(recording, node, file_values=None, changes=()):
-    """Return the parameter dataclass of a node: of the file, else as recorded, else the defaults; with changes."""
+    """Return the parameters (dataclass) of a node: those of the file or, without a file, the recorded ones.
+
+    file_values: {node: {key: value}} of the file, or None; changes: {key: value} that replace them. A parameter
+    without a value has its default. Raises RecomputeError.
+    """
     values = (file_values if file_values is not None else recording.bag.configuration['parameters']).get(node, {})
     values = {key: value for key, value in values.items() if not key.startswith('graph.')}
     try:
@@ -431,9 +465,9 @@ def parameters_of(recording, node, file_values=None, changes=()):
 
 
 def measure(path, node='acu'):
-    """Return the ratio of recorded time to the wall time of reading a bag, recomputing a node and comparing.
+    """Return the recorded time of a bag, divided by the wall time to read it, recompute a node and compare.
 
-    A first run, which compiles the laws, is not counted.
+    A first run, which compiles the laws, does not count.
     """
     def run():
         recording = Recording(path)

@@ -1,4 +1,4 @@
-"""The verb `pedestal recompute`: printed lines, --json rows, written bag and verdict."""
+"""Report of `pedestal recompute`: its printed lines and verdicts, the rows of --json, and the bag of --output."""
 import dataclasses
 import math
 
@@ -8,6 +8,7 @@ from pedestal_analysis import console
 from pedestal_analysis.reprocess import difference, recompute, what_if
 from pedestal_analysis.results import tracking
 from pedestal_analysis.results.results import row
+from pedestal_common import parameters
 from pedestal_common.graph import topics
 from pedestal_common.graph.steps import NS_PER_SECOND
 from pedestal_common.wire import messages, records
@@ -17,10 +18,13 @@ from pedestal_recording.writer import Writer
 
 @dataclasses.dataclass
 class NodeReport:
-    """Report on one node.
+    """Report on one recomputed node.
 
-    lines: to print; rows: of --json; outputs: {topic: Output} recomputed; templates: {topic: message that the node
-    makes}; well: True if the outputs are as required.
+    lines       lines to print
+    rows        rows of --json
+    outputs     {topic: difference.Output} of the recomputed outputs
+    templates   {topic: message that the node makes}, from which `write` makes the messages
+    well        True if the outputs are as required
     """
     lines: list
     rows: list
@@ -30,8 +34,9 @@ class NodeReport:
 
 
 def main(options):
-    """Return (lines to print, rows of --json, True if all is well) for the options of the verb.
+    """Return (lines to print, rows of --json, True if the outputs of all nodes are as required).
 
+    options: options of the verb.
     Raises ValueError for an option that does not fit the bag, RunError if a live node does not answer.
     """
     lockstep = None if options.pacing is None else options.pacing == 'lockstep'     # None: as the bag states
@@ -61,9 +66,10 @@ def main(options):
 
 
 def _node_report(recording, node, given, changes, options):
-    """Return the NodeReport of a node with the given parameters.
+    """Return the NodeReport of a node.
 
-    changes: {key: value} of parameters, None to compare with the recorded outputs.
+    given: {node: {key: value}} of --params-file, None for the recorded parameters; changes: {key: value} of --param,
+    None to compare with the recorded outputs; options: options of the verb.
     """
     params = recompute.parameters_of(recording, node, given)
     done = recompute.recompute(recording, node, params)
@@ -71,7 +77,7 @@ def _node_report(recording, node, given, changes, options):
     if changes:
         new = recompute.recompute(recording, node, recompute.parameters_of(recording, node, given, changes),
                                   {step: [command for command, _ in made] for step, made in done.requests.items()})
-        report = _old_against_new(recording, done, new, tolerance, changes)
+        report = _old_against_new(recording, done, new, tolerance, _changed(params, changes, options.params_file))
     elif options.live:
         from pedestal_analysis.reprocess import live
         report = _against_recorded(recording, live.outputs(recording, done, params), done, tolerance)
@@ -92,6 +98,7 @@ def _node_report(recording, node, given, changes, options):
 
 
 def _title(recording, done, params_file):
+    """Return the first line of a report: bag, node, steps, pacing and origin of the parameters."""
     stamps = done.feed.stamps / NS_PER_SECOND
     span = f'{stamps[0]:g} to {stamps[-1]:g} s' if len(stamps) else 'no step'
     pacing = 'lockstep' if recording.lockstep else 'realtime'
@@ -105,12 +112,13 @@ def _title(recording, done, params_file):
 
 
 def _substitutes(recording, done):
-    """Return lines on inputs that were not recorded and their substitutes."""
+    """Return lines on the inputs that were not recorded, and on the topics that replace them."""
     return [f'no {topic} in the recording: {source} replaces it' for topic in done.feed.rows
             if (source := recording.source(topic)) != topic]
 
 
 def _input_problems(done):
+    """Return lines on inputs that could not be matched to steps."""
     lines = []
     if done.feed.problem:
         lines.append(f'NOT recomputed to the end: {done.feed.problem}')
@@ -120,7 +128,7 @@ def _input_problems(done):
 
 
 def _requests(done):
-    """Return lines on the commands and services that were repeated."""
+    """Return lines on the commands and service calls that were repeated."""
     lines = [line for step, made in done.requests.items() for line in _requests_of_step(done, step, made)]
     return lines + ([f'{len(lines)} requests repeated'] if lines else [])
 
@@ -131,7 +139,7 @@ def _requests_of_step(done, step, made):
 
 
 def _against_recorded(recording, outputs, done, tolerance):
-    """Return the NodeReport of outputs {topic: Output} against the recorded outputs."""
+    """Return the NodeReport that compares outputs {topic: Output} of a node with its recorded outputs."""
     compared = recompute.compare(recording, outputs, done.unit, tolerance)
     if not compared:
         return _new_numbers(recording, outputs, done)
@@ -155,7 +163,7 @@ def _against_recorded(recording, outputs, done, tolerance):
 
 
 def _new_numbers(recording, outputs, done):
-    """Return the NodeReport of a node without recorded outputs."""
+    """Return the NodeReport of a node without recorded outputs: the numbers of messages and, for the ACU, results."""
     lines = [f'{done.node}: the recording has no output of the node, so there is no comparison']
     lines += [f'{name:34} {len(output.stamps):9} messages' for name, output in done.outputs.items()]
     rows = [row(done.node, f'{name} recomputed', len(output.stamps)) for name, output in done.outputs.items()]
@@ -168,15 +176,29 @@ def _new_numbers(recording, outputs, done):
 
 
 def _encoder_note(recording):
-    """Return [note that errors are those of the encoders], or [] if the true direction of the dish was recorded."""
+    """Return [the note tracking.ENCODER_BEAM_NOTE], or [] if the true direction of the dish was recorded."""
     return [f'note: {tracking.ENCODER_BEAM_NOTE}'] if tracking.by_encoders(recording.bag) else []
 
 
-def _old_against_new(recording, old, new, tolerance, changes):
-    """Return the NodeReport of a node recomputed with changed parameters: results of both and message differences."""
+def _changed(params, changes, params_file):
+    """Return the line on changes {key: value} of a parameter dataclass: which differ from its values and which do
+    not."""
+    values, origin = parameters.as_dict(params), params_file or 'the recording'
+    same = ', '.join(f'{key} = {value}' for key, value in changes.items() if value == values[key])
+    different = ', '.join(f'{key} = {value}' for key, value in changes.items() if value != values[key])
+    if not different:
+        return f'nothing is changed: {origin} has the same values ({same})'
+    return f'changed: {different}' + (f'; the same as in {origin}: {same}' if same else '')
+
+
+def _old_against_new(recording, old, new, tolerance, changed):
+    """Return the NodeReport of a node with changed parameters: old and new results, and differences of the messages.
+
+    old, new: Recomputed with the unchanged and with the changed parameters; changed: line about the changes.
+    """
     before = {name: recording.output(name) if recording.has(name) else output for name, output in old.outputs.items()}
     origin = 'recorded' if any(map(recording.has, old.outputs)) else 'recomputed with unchanged parameters'
-    lines = [f'changed: {", ".join(f"{key} = {value}" for key, value in changes.items())}; old: {origin}']
+    lines = [f'{changed}; old: {origin}']
     lines += [line for step, made in new.requests.items() for line in _requests_of_step(new, step, made)]
     rows = []
     if new.node == 'acu' and len(new.feed.stamps):
@@ -192,10 +214,11 @@ def _old_against_new(recording, old, new, tolerance, changes):
 
 
 def write(path, recording, outputs, templates, changes):
-    """Write a bag: the recording with some topics replaced.
+    """Write a bag at a path: the recording with the recomputed topics in place of the recorded ones.
 
-    In lockstep the log time of a message is its stamp. In realtime a replaced message gets the log time of the newest
-    recorded joint state whose stamp is not later.
+    outputs: {topic: Output}; templates: see NodeReport; changes: {node: {key: value}} for the metadata.
+    In lockstep the log time of a message is its stamp. In realtime a recomputed message gets the log time of the
+    newest recorded joint state whose stamp is not later than its own.
     """
     named = [topic for topic in topics.TOPICS if topic.name in outputs or topic.name in recording.bag.topics]
     rows = []
@@ -216,13 +239,13 @@ def write(path, recording, outputs, templates, changes):
 
 
 def _logged(recording, stamps):
-    """Return the log times of messages with these stamps: those of the recorded joint states."""
+    """Return the log times (n,) [ns] of the joint states that are the newest at the stamps (n,) [ns]."""
     rows, output = recording.rows('joint_states'), recording.output('joint_states')
     return rows.log[np.clip(np.searchsorted(output.stamps, stamps, side='right') - 1, 0, None)]
 
 
 def _bytes(topic, output, templates):
-    """Return the CDR messages of an Output."""
+    """Return [CDR bytes] of the messages of an Output."""
     if output.texts is not None:
         return [messages.serialize(messages.String(data=text)) for text in output.texts]
     encoder = records.Encoder(topic, templates[topic])

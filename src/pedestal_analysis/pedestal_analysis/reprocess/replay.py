@@ -1,4 +1,7 @@
-"""`pedestal replay`: publish a recording into a live graph in the order of its Playlist, bytes as recorded."""
+"""`pedestal replay`: publish the recorded messages of a bag into a live graph of ROS nodes, byte by byte.
+
+playlist.py chooses and orders the messages, and player.py publishes them.
+"""
 import contextlib
 import dataclasses
 import math
@@ -20,9 +23,14 @@ from pedestal_recording import bag as bags
 class ReplayOptions:
     """Selection and pace of a replay.
 
-    nodes: publish the inputs of these nodes; names: publish these topics; without both, publish all topics.
-    rate: times real time; None for lockstep with the nodes. start, duration [s]: from the first message on, None to
-    the end. paused: True to begin with a pause. deadline: longest wait for a subscriber or an answer [s].
+    nodes      nodes whose inputs are published
+    names      topics that are published; without nodes and names, all topics
+    rate       speed of the replay, in multiples of real time; None: in lockstep with the nodes
+    start      time after the first message at which the replay begins [s]
+    duration   length of the replay [s], None to the end of the recording
+    paused     True to begin with a pause
+    deadline   longest wait for a subscriber or for an answer [s]
+
     Raises ValueError for a number out of range.
     """
     nodes: list = dataclasses.field(default_factory=list)
@@ -44,10 +52,14 @@ class ReplayOptions:
 
 @dataclasses.dataclass
 class ReplayResult:
-    """Counts of a replay.
+    """Result of a replay.
 
-    sent: {topic: count}; first, last: stamps [s]; wall: wall time [s]; answers: {node: (answers, triggered steps)};
-    ended: 'whole', 'quit' (by key) or 'stopped' (by a signal).
+    bag           path of the bag
+    sent          {topic: number of sent messages}
+    first, last   stamps of the first and the last sent message [s]
+    wall          wall time of the replay [s]
+    answers       {node: (number of its answers, number of steps that it had to answer)}
+    ended         'whole', 'quit' (by a key) or 'stopped' (by a signal)
     """
     bag: str
     sent: dict
@@ -71,7 +83,10 @@ class ReplayResult:
 
 @contextlib.contextmanager
 def stop_by_signal():
-    """Yield stopped() -> True after a signal to end. This avoids leaving rclpy in the middle of a call."""
+    """Yield a function stopped() that returns True after a signal to end the process.
+
+    Without this handler the signal would interrupt a call of rclpy.
+    """
     signals = []
     before = {number: signal.signal(number, lambda *_: signals.append(True))
               for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
@@ -84,16 +99,17 @@ def stop_by_signal():
 
 
 def replay(path, options, ready=lambda: None) -> ReplayResult:
-    """Publish a bag into the live graph of this ROS domain according to ReplayOptions.
+    """Publish the bag at a path into the live graph of this ROS domain, as the ReplayOptions state.
 
-    ready() is called before the first message. Raises BagError, ValueError for options that do not fit the bag,
+    ready() is called before the first message. Raises BagError; ValueError for options that do not fit the bag;
     GraphError for a graph that does not fit.
     """
     bag = bags.read(path)
     chosen = selected_topics(bag, options.nodes, options.names)
     if options.rate is None:
         _check_lockstep(options.nodes, chosen, bag.graph)
-    # The clock is published as a companion: simulated nodes may need it, and no node of the replay publishes it.
+    # The clock is always published too, because simulated nodes may need it. The exceptions are a clock that is chosen
+    # anyway, and a node under test that publishes the clock itself.
     written = 'clock' in chosen or any(writes(bag.graph, node, 'clock') for node in options.nodes)
     companion = 'clock' if 'clock' in bag.topics and not written else None
     playlist = Playlist(bag, [*chosen, *filter(None, [companion])], options.start, options.duration)
@@ -125,6 +141,7 @@ def replay(path, options, ready=lambda: None) -> ReplayResult:
 
 
 def _check_lockstep(under_test, chosen, graph):
+    """Raise ValueError if the nodes under test cannot answer the steps of a replay of the chosen topics."""
     answering = [node for node in under_test if nodes.plain(node) in ANSWER_TOPICS]
     if not answering:
         problem = (f'{", ".join(under_test)} does not answer steps at their stamps' if under_test else

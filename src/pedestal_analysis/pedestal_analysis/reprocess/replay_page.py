@@ -1,4 +1,7 @@
-"""`pedestal replay --page`: show a recording on the operator's page with a slider, from the bag without a graph."""
+"""`pedestal replay --page`: show a recording on the page of the operator, with a slider for the time.
+
+The page takes the messages from the bag. No graph of ROS nodes runs.
+"""
 import itertools
 import math
 import queue
@@ -19,19 +22,19 @@ from pedestal_operator.page.page_server import PageServer
 from pedestal_recording import bag as bags
 
 PAGE_FRAME_PERIOD_S, SLOW_FRAME_PERIOD_S = 0.1, 1.0
-"""Period of the states sent to pages, and of their slow sections [s]."""
+"""Period of the states that are sent to the pages [s]; period of the sections that change slowly [s]."""
 
 MIN_REPLAY_RATE, MAX_REPLAY_RATE = 0.05, 50.0
-"""Limits of the replay rate [times real time]."""
+"""Limits of the speed of the replay [multiples of real time]."""
 
 MAX_PAGES = 32
 """Largest number of pages that show the recording at a time."""
 
 MAX_EVENT_MESSAGES = 5000
-"""Largest number of messages of a topic for the event log, from the beginning."""
+"""Largest number of messages of a topic that fill the event log, from the beginning of the recording."""
 
 DIAGNOSTICS_LOOKBACK = 60
-"""Number of diagnostics messages that are searched for the last status of each node."""
+"""Number of the last diagnostics messages in which the last status of each node is searched."""
 
 NUMBER_TOPICS = (*remote_node.NUMBER_TOPICS, *page_state.EXTRA_NUMBER_TOPICS)
 """Topics whose numbers the page shows."""
@@ -42,9 +45,10 @@ LIST_TOPICS = ('acu/alarms', 'acu/program_track', 'diagnostics', 'acu/command_re
 
 
 class Recording(Antenna):
-    """A bag.Bag of one beam with the interface of an Antenna: the newest messages at `position` [s].
+    """A recording with the interface of a live Antenna: it has the newest messages at a position in the recording.
 
-    length: of the recording [s]. Raises BagError if the bag has no joint_states.
+    bag: bag.Bag of one beam. position: time since the first joint state [s]; length: length of the recording [s].
+    Raises BagError if the bag has no joint_states.
     """
 
     def __init__(self, bag):
@@ -68,7 +72,7 @@ class Recording(Antenna):
 
     @property
     def now(self):
-        """Time in the recording [s]; UTC in realtime."""
+        """Stamp of the position [s]; UTC in a recording in realtime."""
         return (self._begin + round(self.position * NS_PER_SECOND)) / NS_PER_SECOND
 
     def age(self, name):
@@ -76,11 +80,11 @@ class Recording(Antenna):
         return self.now - self._received.get(name, -math.inf)
 
     def lines(self):
-        """Return the events up to now, for the event log."""
+        """Return the lines of the event log up to the position."""
         return [line for line in self.log.lines if line['t'] <= self.now][-page_log.MAX_LOG_LINES:]
 
     def move(self, position):
-        """Go to a position [s]."""
+        """Go to a position [s], with all topics."""
         self.move_numbers(position)
         for name in TEXT_TOPICS:
             for text in self._messages(name, 1):
@@ -95,7 +99,7 @@ class Recording(Antenna):
                 self.status[status.name], self._received[status.name] = status, time_of / NS_PER_SECOND
 
     def move_numbers(self, position):
-        """Go to a position [s] with the numbers only."""
+        """Go to a position [s], with the topics of numbers only, which is faster."""
         self.position = min(max(position, 0.0), self.length)
         self.numbers, self.texts, self.status, self._received = {}, {}, {}, {}
         for name in NUMBER_TOPICS:
@@ -104,12 +108,12 @@ class Recording(Antenna):
                 self._received[name] = time_of / NS_PER_SECOND
 
     def _count(self, name):
-        """Return the number of messages of a topic up to now."""
+        """Return the number of messages of a topic up to the position."""
         moment = self._begin + round(self.position * NS_PER_SECOND)
         return int(np.searchsorted(self._times[name], moment, 'right')) if name in self._rows else 0
 
     def _last(self, name, most):
-        """Return [(time [ns], CDR bytes)] of the last messages of a topic, at most `most`."""
+        """Return [(time [ns], CDR bytes)] of the last messages of a topic up to the position, at most `most`."""
         last = self._count(name)
         first = max(last - most, 0)
         if last == 0:
@@ -118,10 +122,11 @@ class Recording(Antenna):
                                                           self._bag.take(self._rows[name][first:last]))]
 
     def _messages(self, name, most):
+        """Return the messages of `_last`, deserialized."""
         return [messages.deserialize(data, self._bag.topics[name]) for _, data in self._last(name, most)]
 
     def _read_log(self):
-        """Fill the event log, in the order of the log times."""
+        """Fill the event log with all events of the recording, in the order of their log times."""
         events = []
         for name in ('acu/mode', 'adu/state', 'acu/command_result', 'acu/alarms'):
             rows = self._rows.get(name, ())[:MAX_EVENT_MESSAGES]
@@ -138,9 +143,10 @@ class Recording(Antenna):
 
 
 class Player:
-    """Player of a Recording on a page at a port: play, pause, go to a position.
+    """Player that shows a Recording on pages: play, pause, go to a position.
 
-    options: start, rate and paused of a replay.ReplayOptions.
+    port: TCP port of the server of the pages; options: replay.ReplayOptions, of which start, rate and paused count.
+    url: address of the page.
     """
 
     def __init__(self, recording, port, options):
@@ -152,7 +158,7 @@ class Player:
         self.url = self._server.access.url(PAGE_ROLES[0])
 
     def play(self, stopped):
-        """Serve the page until stopped() is true."""
+        """Serve the pages until stopped() returns True."""
         before, last_slow = time.monotonic(), -math.inf
         while not stopped():
             now = time.monotonic()
@@ -191,13 +197,13 @@ class Player:
             if _number(wanted.get('rate')):
                 self._rate = min(max(float(wanted['rate']), MIN_REPLAY_RATE), MAX_REPLAY_RATE)
             if isinstance(wanted.get('playing'), bool):
-                # At its end, a recording plays again from its beginning.
+                # "Play" at the end of the recording begins again at its beginning.
                 again = wanted['playing'] and self._recording.position >= self._recording.length
                 self._go(0.0 if again else self._recording.position)
                 self._playing, moved = wanted['playing'], moved or again
 
     def _show(self, slowly):
-        """Send the state to the pages; slowly: with the sections that change slowly."""
+        """Send the state at the position to the pages; slowly: True to send the sections that change slowly too."""
         recording = self._recording
         sections = {'now': page_state.now(recording), 'status': page_state.status_section(recording),
                     'alarms': page_state.alarms(recording), 'log': recording.lines(),
@@ -212,11 +218,12 @@ class Player:
         self._server.publish(sections)
 
     def _past(self):
+        """Return the rows of the strip charts before the position, for a page that connects."""
         with self._lock:
             return [page_state.history_row(frame) for frame in self._frames(page_state.CHART_PERIOD_S)]
 
     def _frames(self, period):
-        """Return [page_state.now] at intervals of `period` [s] over the span of the strip charts before now."""
+        """Return [page_state.now] every `period` [s] over the span of the strip charts up to the position."""
         recording, position = self._recording, self._recording.position
         frames = []
         for count in itertools.count(-round(page_state.CHART_SPAN_S / period)):

@@ -1,7 +1,7 @@
-"""Scenario of a recorded run, and the comparison of its recording with the recording of the rerun.
+"""Two parts of `pedestal rerun`: the scenario of a recorded run, and the comparison of the old and new recordings.
 
-`pedestal rerun` (pedestal/verbs/recordings/rerun.py) makes the run between these two. The comparison covers the bytes,
-then the messages, then the metadata.
+The verb (pedestal/verbs/recordings/rerun.py) runs the scenario between these two parts. The comparison covers the
+bytes of the files, the messages and the metadata.
 """
 import dataclasses
 import pathlib
@@ -13,17 +13,18 @@ from pedestal_common.text_files import files
 from pedestal_recording import bag as bags
 
 MAX_SHOWN_FIELDS = 4
-"""Number of shown fields of the first message that differs on a topic."""
+"""Largest number of fields that are shown of the first message that differs on a topic."""
 
 
 @dataclasses.dataclass
 class RerunResult:
-    """Comparison of a recording with the recording of its rerun, at path.
+    """Comparison of a recording (the old one) with the recording of its rerun (the new one).
 
-    topics    [difference.MessageDifference], the earliest first
-    metadata  {record: {key: (was, now)}} of different values
+    path      path of the new recording
+    topics    [difference.MessageDifference] of the topics that differ, the earliest difference first
+    metadata  {record: {key: (old value, new value)}} of the values that differ
     end       last log time of the old recording [ns]
-    sha256    of the new file
+    sha256    SHA-256 of the new file
     same      True if the files are equal to the last byte
     """
     path: pathlib.Path
@@ -40,9 +41,9 @@ class RerunResult:
 
     @property
     def cut(self):
-        """True if the old recording only lacks messages at its end, and is equal up to there.
+        """True if the old recording is equal up to its end, and only lacks the later messages.
 
-        On such a topic the number of different messages is the number of missing messages.
+        On each topic, the number of different messages then equals the number of missing messages.
         """
         return all(topic.was < topic.now == topic.was + topic.different for topic in self.topics)
 
@@ -69,6 +70,7 @@ class RerunResult:
 
 
 def _line(topic):
+    """Return a difference.MessageDifference as one line."""
     counts = f'{topic.was} messages' if topic.was == topic.now else f'{topic.was} messages, now {topic.now}'
     more = f' and {len(topic.changes) - MAX_SHOWN_FIELDS} more fields' if len(topic.changes) > MAX_SHOWN_FIELDS else ''
     return (f'{topic.name}: {counts}, {topic.different} differ, the first at {topic.first / 1e9:.6f} s: '
@@ -76,16 +78,17 @@ def _line(topic):
 
 
 def _short(text):
-    """Return a value of the metadata on one line; for a long text (the scenario) only its length."""
+    """Return a value of the metadata as one line: of a long text, such as the scenario, only its length."""
     if not text:
         return 'none'
     return text if len(text) < 60 and '\n' not in text else f'a text of {len(text)} characters'
 
 
 def scenario_of_recording(bag):
-    """Return the Scenario of a recording; parameters with a changed default are set to their recorded values.
+    """Return the scenario.Scenario of a recording (bag.Bag).
 
-    Raises bag.BagError for a recording that cannot be rerun.
+    A parameter whose default has changed since the recording has its recorded value. Raises bag.BagError for a
+    recording that cannot be rerun.
     """
     recorded = bag.configuration['parameters']
     if not bag.configuration['scenario']:
@@ -99,7 +102,7 @@ def scenario_of_recording(bag):
         if node not in chosen.nodes:
             raise bags.BagError(f'{bag.file}: contains parameters of {node}, which is no node of its scenario')
         now = parameters.as_dict(chosen.node_parameters(node))
-        # A key that this version does not know is kept on purpose, so that node_parameters below refuses it by name.
+        # A key that this version does not have stays in, so that node_parameters below refuses it by name.
         values[node].update({key: value for key, value in then.items() if key not in now or now[key] != value})
         # A recording without the flag of an optional topic was made by a version that did not have this topic.
         # Because the rerun must not have the topic either, its flags are set to false.
@@ -115,7 +118,7 @@ def scenario_of_recording(bag):
 
 
 def result(was, now) -> RerunResult:
-    """Compare a recording with that of its rerun; both bag.Bag."""
+    """Return the comparison of a recording `was` with the recording `now` of its rerun; both are a bag.Bag."""
     metadata = {}
     for record in dict.fromkeys((*was.metadata_records, *now.metadata_records)):
         old, new = (bag.metadata_records.get(record, {}) for bag in (was, now))

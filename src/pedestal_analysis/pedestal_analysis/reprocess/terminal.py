@@ -1,10 +1,10 @@
-"""Keys of a terminal without waiting, and a status line.
+"""Terminal of `pedestal replay`: pressed keys without waiting for Enter, and a status line.
 
-No library needs fewer lines:
+No library would make this module shorter:
 
-readchar  waits for a key
-blessed   has 22,000 lines with wcwidth and reads keys only if standard output is a terminal too
-rich      has no keys, and its status line needs a thread and wraps
+readchar  stops the program until a key is pressed
+blessed   has 22,000 lines together with wcwidth, and reads keys only if standard output is a terminal too
+rich      reads no keys; its status line needs a thread, and wraps on a narrow terminal
 """
 import os
 import re
@@ -14,13 +14,16 @@ import termios
 import tty
 
 _KEY = re.compile(rb'\x1b[\[O][A-D]|.', re.DOTALL)
+"""Bytes of one key: an arrow key, or a single byte."""
 RIGHT_ARROW_CODES = (b'\x1b[C', b'\x1bOC')
-"""Bytes of the right arrow key."""
+"""Bytes of the right arrow key, in both modes of a terminal."""
 
 
 def _in_foreground():
-    """Return True if this process may read the terminal; signals stop a process in the background (SIGTTIN,
-    SIGTTOU)."""
+    """Return True if this process runs in the foreground of the terminal.
+
+    Signals (SIGTTIN, SIGTTOU) would stop a process in the background that uses the terminal.
+    """
     try:
         return os.tcgetpgrp(sys.stdin.fileno()) == os.getpgrp()
     except OSError:
@@ -28,9 +31,9 @@ def _in_foreground():
 
 
 class Keyboard:
-    """Keyboard without waiting for Enter; Ctrl-C remains a signal. Use as a context.
+    """Keyboard that gives each key without waiting for Enter; Ctrl-C remains a signal. Use as a context.
 
-    `available` is False, and there are no keys, if standard input is no terminal or belongs to another process.
+    available: False if standard input is no terminal, or if this process is in the background. There are no keys then.
     """
 
     def __init__(self):
@@ -47,21 +50,21 @@ class Keyboard:
             termios.tcsetattr(sys.stdin, termios.TCSADRAIN, self._before)
 
     def pressed(self):
-        """Return [bytes of a key] of the keys pressed since the last call."""
+        """Return [bytes of one key] of the keys that were pressed since the last call."""
         if not self.available or not select.select([sys.stdin], [], [], 0)[0]:
             return []
         return _KEY.findall(os.read(sys.stdin.fileno(), 1024))
 
 
 class StatusLine:
-    """A line on standard error that each text overwrites; without effect if standard error is no terminal."""
+    """A line on standard error; each new text replaces the last one. It has no effect without a terminal."""
 
     def __init__(self):
         self._on = sys.stderr.isatty()
         self._last = ''
 
     def show(self, text):
-        """Replace the text of the line."""
+        """Show a text in place of the last text."""
         if self._on and text != self._last:
             self._last = text
             sys.stderr.write(f'\r\x1b[K{text}')

@@ -1,8 +1,9 @@
-"""Comparison of the recorded outputs of an ACU with outputs recomputed from the recording with other parameters.
+"""Effect of other parameters of the ACU on a recorded run, for `pedestal recompute --param`.
 
-The recorded antenna does not move with the recomputed command, so a recording cannot show the pointing that other
-parameters would give. It can show the error of the estimate against the recorded truth, the noise and lag of the
-estimate, and the noise of the command.
+The module compares the recorded outputs of the ACU with outputs that are recomputed from the recording with other
+parameters. Because the recorded antenna does not move with the recomputed command, the comparison cannot show the
+pointing that the other parameters would give. It can show the error of the estimate against the recorded truth, the
+noise and the lag of the estimate, and the noise of the command.
 """
 import dataclasses
 import functools
@@ -16,7 +17,7 @@ from pedestal_analysis.results.tracking import DEG_PER_RAD, known_rms, largest
 from pedestal_common.graph.topics import AXES
 
 RIPPLE_WINDOW_S = 0.25
-"""Length of the moving mean; the difference from the mean counts as noise of a rate [s]."""
+"""Length of the moving mean of a rate [s]. The rate minus this mean counts as noise."""
 
 COMPARISON_NOTE = ('the recorded antenna does not move with the recomputed command, so the table compares the '
                    'estimate with the recorded truth, and the noise of estimate and command; for the pointing, run '
@@ -25,7 +26,11 @@ COMPARISON_NOTE = ('the recorded antenna does not move with the recomputed comma
 
 
 class Overlay:
-    """A recording with replaced outputs of one node, with the part of the interface of bag.Bag that results need."""
+    """A recording in which the outputs of one node are replaced.
+
+    It has the part of the interface of bag.Bag that the results need. bag: bag.Bag; outputs: {topic:
+    difference.Output}.
+    """
 
     def __init__(self, bag, outputs):
         self.path, self.beam, self.beams, self.metadata = bag.path, bag.beam, bag.beams, bag.metadata
@@ -34,24 +39,27 @@ class Overlay:
         self.topics = {**bag.topics, **dict.fromkeys(outputs, '')}
 
     def table(self, topic):
-        """Return {column: array (n,)} of a topic."""
+        """Return {column: array (n,)} of a topic, as Bag.table."""
         return self._outputs[topic].table(topic) if topic in self._outputs else self._bag.table(topic)
 
     @property
     def start(self):
-        """Time 0 of the scenario in the stamps [ns]."""
+        """Stamp of time 0 of the scenario [ns]."""
         return self._bag.start
 
     def messages(self, topic):
-        """Iterator of (topic, log time, publish time [ns], message) of a recorded topic."""
+        """Return an iterator of (topic, log time, publish time [ns], message) of a recorded topic, as Bag.messages."""
         return self._bag.messages(topic)
 
 
 class RecomputedAcu:
-    """Outputs of an ACU in an Overlay.
+    """Outputs of an ACU in an Overlay: recorded, or recomputed with some parameters.
 
-    estimate, command: tables of acu/estimate and acu/rate_command; autotrack: stamps [s] of the estimates in
-    autotrack; known: number of the estimates with a known mode; common: stamps [s] at which the ACU is evaluated.
+    estimate    table of acu/estimate
+    command     table of acu/rate_command
+    autotrack   stamps of the estimates in autotrack [s]
+    known       number of the estimates with a known mode
+    common      stamps at which the ACU is evaluated [s], set by `numbers`
     """
 
     def __init__(self, overlay):
@@ -62,12 +70,13 @@ class RecomputedAcu:
         self.common = t[:0]
 
     def ripple(self, table):
-        """Return the rms [rad/s] of the velocities of a table minus their moving mean over RIPPLE_WINDOW_S."""
+        """Return the rms of the velocities in a table minus their moving mean over RIPPLE_WINDOW_S [rad/s]."""
         return known_rms(np.concatenate([_ripple(table['t'], table[f'{axis}.velocity'], self.common)
                                          for axis in AXES]))
 
 
 def _ripple(t, values, common):
+    """Return values (n,) minus their moving mean, at the stamps t (n,) [s] that are in `common`."""
     values = values[np.isin(t, common)]
     length = max(1, round(RIPPLE_WINDOW_S / np.median(np.diff(t)))) if t.size > 1 else 1
     if values.size < 2 * length:
@@ -78,18 +87,21 @@ def _ripple(t, values, common):
 
 @dataclasses.dataclass
 class TruthComparison:
-    """The estimate of an ACU and the recorded antenna in a tracking.Tracking, against the recorded truth."""
+    """Estimate of an ACU, and pointing of the recorded antenna, against the recorded truth.
+
+    acu: RecomputedAcu; run: tracking.Tracking of its Overlay.
+    """
     acu: RecomputedAcu
     run: tracking.Tracking
 
     @functools.cached_property
     def evaluated(self):
-        """Mask (n,) bool of the evaluated steps of the run."""
+        """Mask (n,) bool of the steps of the run that are evaluated."""
         return np.isin(self.run.t, self.acu.common)
 
     @functools.cached_property
     def true(self):
-        """True pointing error (k, 2) [rad] of the recorded antenna."""
+        """True pointing error (k, 2) [rad] of the recorded antenna: cross-elevation, elevation."""
         return np.column_stack((self.run.cross_elevation, self.run.elevation_error))[self.evaluated]
 
     @functools.cached_property
@@ -104,9 +116,9 @@ class TruthComparison:
 
     @functools.cached_property
     def motion(self):
-        """(lag [s] behind the true direction, rms of the rate error [rad/s]) of the estimate, in earth angles.
+        """(lag [s] of the estimate behind the true direction, rms error of its rate [rad/s]), in earth angles.
 
-        The lag is the least-squares fit of the error e to the true rate w: - sum(e w) / sum(w w).
+        The lag is the least-squares fit of the error e of the angle to the true rate w: lag = - sum(e w) / sum(w w).
         """
         if self.evaluated.sum() < 3:
             return math.nan, math.nan
@@ -161,9 +173,10 @@ COMPARISON_RESULTS = (
 
 
 def numbers(bag, versions) -> dict:
-    """Return {metric: ([value of each version], unit)} of the outputs of an ACU; versions: [{topic: Output}].
+    """Return {metric: ([value of each version], unit)} of several versions of the outputs of an ACU.
 
-    All versions are evaluated on the same samples: the time in which all are in settled autotrack.
+    versions: [{topic: difference.Output}]. All versions are evaluated on the same samples: those in which all of them
+    are in settled autotrack.
     """
     overlays = [Overlay(bag, outputs) for outputs in versions]
     acus = [RecomputedAcu(overlay) for overlay in overlays]

@@ -1,13 +1,16 @@
-"""Consistency of the target filter of a recorded run: NIS of its innovations, NEES of its errors against truth.
+"""Consistency of the target filter of a recorded run: are its errors as large as the uncertainty that it states?
 
-Both are squared errors in units of the covariance that the filter states (Bar-Shalom, Li, Kirubarajan 2001, section
-5.4). NIS compares with the measurements: chi-square with one degree of freedom for each measured number. NEES compares
-angle and rate with the truth: two degrees of freedom. Larger values mean that the stated covariance is too small (the
-filter is too sure), smaller values that it is too large (the filter is too careful).
+The NIS (normalised innovation squared) answers this for the innovations, and the NEES (normalised estimation error
+squared) for the errors of the estimate. Both are squared errors in units of the covariance that the filter states
+(Bar-Shalom, Li, Kirubarajan 2001, section 5.4). In a consistent filter the NIS is chi-square distributed, with one
+degree of freedom for each measured number. The NEES of angle and rate has two degrees of freedom. Larger values mean
+that the stated covariance is too small (the filter is too sure). Smaller values mean that it is too large (the filter
+is too careful).
 
 The filter estimates the target in the frame of its sensors. The slow errors of INS, encoders and boresight turn this
-frame, and the measurements cannot show them. Because the antenna points in the same frame, they are no error of the
-filter. The truth is therefore the direction that sensors with these slow errors, and without noise, would measure.
+frame, and the measurements cannot show these errors. Because the antenna points in the same frame, the slow errors are
+no error of the filter. The truth for the NEES is therefore the direction that sensors with these slow errors, and
+without noise, would measure.
 """
 import dataclasses
 import functools
@@ -27,30 +30,40 @@ from pedestal_common.graph import topics
 NEES_FREEDOMS = 2
 """Degrees of freedom of the NEES: angle and rate."""
 BAND_PROBABILITY = 0.95
-"""Share of consistent filters inside a band."""
+"""Probability that the mean NIS or NEES of a consistent filter lies inside its band [-]."""
 
 NOTABLE_DEVIATION = 0.1
-"""Smallest relative deviation of a mean from its expectation that a table marks, outside the band.
+"""Smallest relative deviation of a mean NIS or NEES from its expectation that a table marks [-].
 
-Because over minutes the band becomes narrower than the accuracy of any model, the band alone would mark every filter.
+The mean must also lie outside its band. Because the band of a run of minutes is narrower than the accuracy of any
+model, the band alone would mark every filter.
 """
 
 SLOW_ERROR_TIME_S = 1.0
-"""Time over which the errors of INS and encoders are averaged [s]. The filter follows the slower errors. The faster
-errors are noise, which the filter must expect."""
+"""Time over which the errors of INS and encoders are averaged to find their slow part [s].
+
+The filter follows the slow errors. The faster errors are noise, which the filter must expect.
+"""
 
 FILTER_NUMBERS = ('innovation', 'rate_innovation', 'nis', 'sigma', 'rate_sigma', 'correlation')
+"""Numbers of the topic acu/filter that this module reads, for each axis; their units are in topics.FILTER_UNITS."""
 
 
 @dataclasses.dataclass
 class Consistency:
-    """Numbers of acu/filter on the steps of a Tracking: arrays (n, 2) of azimuth and elevation, NaN where missing.
+    """Numbers of the target filter at the n steps of a Tracking.
 
-    innovation [rad], rate_innovation [rad/s], nis       of the measurements
-    sigma [rad], rate_sigma [rad/s], correlation         stated covariance of the estimate
-    probability                                          (n, 2, m) of the m topics.MOTION_MODELS
-    error [rad], rate_error [rad/s], nees                estimate minus truth in the frame of the sensors
-    tracking                                             (n,) bool: the evaluated part
+    The arrays are (n, 2) for azimuth and elevation, NaN where missing.
+
+    t                                (n,) time of the step [s]
+    innovation, rate_innovation      measurement minus prediction, of angle [rad] and rate [rad/s]
+    nis                              normalised innovation squared [-]
+    sigma, rate_sigma, correlation   standard deviations of angle [rad] and rate [rad/s] that the filter states, and
+                                     their correlation [-]
+    probability                      (n, 2, m): probability of each of the m topics.MOTION_MODELS
+    error, rate_error                estimate minus truth in the frame of the sensors, of angle [rad] and rate [rad/s]
+    nees                             normalised estimation error squared [-]
+    tracking                         (n,) bool: the evaluated part of the run, see Tracking
     """
     t: np.ndarray
     innovation: np.ndarray
@@ -78,9 +91,12 @@ class Consistency:
 
 @compiled
 def _rates(relative, velocity, attitude, ship_velocity, rates):
-    """Fill the rates (n, 2) of earth azimuth and elevation of a target seen from a ship.
+    """Fill the rates (n, 2) [rad/s] of earth azimuth and elevation of a target seen from a ship.
 
-    relative [m] and velocity [m/s]: of the target, ENU; ship_velocity [m/s]: in the frame of the ship.
+    relative (n, 3)        vector from ship to target, ENU [m]
+    velocity (n, 3)        velocity of the target, ENU [m/s]
+    attitude (n, 4)        quaternion x, y, z, w of the rotation deck -> earth
+    ship_velocity (n, 3)   velocity of the ship in its own frame, FLU [m/s]
     """
     for k in range(len(relative)):
         q = attitude[k]
@@ -94,8 +110,8 @@ def _offsets_of_sensors(deck, error, known_attitude, target, offsets):
     """Fill offsets (n, 2) (cross-elevation, elevation) [rad]: the direction that the sensors measure without noise,
     seen from the true direction.
 
-    deck (n, 2): angles of the encoders; error (n, 2): true pointing error (cross-elevation, elevation), both [rad];
-    known_attitude (n, 4): that of the INS; target (n, 2): true earth angles [rad].
+    deck (n, 2): angles of the encoders [rad]; error (n, 2): true pointing error (cross-elevation, elevation) [rad];
+    known_attitude (n, 4): attitude of the INS; target (n, 2): true earth angles of the target [rad].
     """
     mat = np.empty((3, 3))
     for k in range(len(deck)):
@@ -104,23 +120,23 @@ def _offsets_of_sensors(deck, error, known_attitude, target, offsets):
         q = known_attitude[k]
         line_of_sight.rotation(q[0], q[1], q[2], q[3], mat)
         east, north, up = line_of_sight.to_earth(mat, x, y, z)
-        # Earth angles are clockwise, as deck angles are: north, west, up take the place of FLU.
+        # Earth angles turn clockwise like deck angles, so north, west, up take the place of FLU.
         offsets[k, 0], offsets[k, 1] = line_of_sight.offsets(target[k, 0], target[k, 1], north, -east, up)
 
 
 @compiled
 def _turn_rows(angles, rates, offsets):
-    """Turn angles (n, 2) [rad] and rates (n, 2) [rad/s] in place by offsets (n, 2) (cross-elevation, elevation) [rad].
+    """Turn earth angles (n, 2) [rad] and their rates (n, 2) [rad/s] in place by offsets (n, 2) [rad].
 
-    Each row is turned as if its offset stood still, because the filter takes the changes of a slow error for a walk of
-    the angle, not for a rate.
+    An offset is (cross-elevation, elevation). Each row is turned as if its offset stood still. Because the filter
+    takes the changes of a slow error for a random walk of the angle, they are no rate.
     """
     for k in range(len(angles)):
         azimuth, elevation = line_of_sight.displaced(angles[k, 0], angles[k, 1], offsets[k, 0], offsets[k, 1])
         sight = line_of_sight_of(Motion(AxisMotion(angles[k, 0], rates[k, 0], 0.0),
                                         AxisMotion(angles[k, 1], rates[k, 1], 0.0)))
         u = Vector(*line_of_sight.earth_direction(azimuth, elevation))
-        # The rotation vector r of this small turn moves the rate by r x du.
+        # The small turn has the rotation vector r = u_before x u_after, and adds r x du to the derivative du.
         more = cross(cross(sight.u, u), sight.du)
         du = Vector(sight.du.x + more.x, sight.du.y + more.y, sight.du.z + more.z)
         motion = earth_angles(LineOfSight(u, du, Vector(0.0, 0.0, 0.0)))
@@ -129,7 +145,7 @@ def _turn_rows(angles, rates, offsets):
 
 
 def _slow(values, period):
-    """Return values (n, 2) averaged over SLOW_ERROR_TIME_S about each row, NaN excepted; period [s] of the rows."""
+    """Return values (n, 2) averaged over SLOW_ERROR_TIME_S about each row, without NaN; period of the rows [s]."""
     window = np.ones(2 * round(0.5 * SLOW_ERROR_TIME_S / period) + 1)
     known = np.isfinite(values)
     with np.errstate(invalid='ignore'):
@@ -139,7 +155,11 @@ def _slow(values, period):
 
 
 def _boresight(bag):
-    """Return the offset (cross-elevation, elevation) [rad] of the receiver's null from the beam, stated by a bag."""
+    """Return the boresight offset (2,) (cross-elevation, elevation) [rad] of the receiver, from the parameters of a
+    bag.
+
+    It is the direction in which the receiver measures no error, seen from the beam.
+    """
     of_receiver = bag.configuration['parameters'].get('tracking_receiver', {})
     return np.array([of_receiver.get(f'antenna.boresight_{axis}', 0.0) for axis in ('cross_elevation', 'elevation')])
 
@@ -182,10 +202,10 @@ def read(bag, run):
 
 
 def effective_count(values):
-    """Return the number of independent samples that is equivalent to a correlated series (n,), for its mean.
+    """Return the number of independent samples whose mean is as accurate as the mean of a correlated series (n,).
 
-    It is n / (1 + 2 sum of the autocorrelations). The sum ends at the first pair of neighbours whose sum is not
-    positive (Geyer 1992, initial positive sequence).
+    This number is n / (1 + 2 sum of the autocorrelations). The sum ends at the first pair of neighbours whose sum is
+    not positive (Geyer 1992, initial positive sequence).
     """
     n = values.size
     deviation = values - values.mean()
@@ -199,11 +219,11 @@ def effective_count(values):
 
 
 def bounds(freedoms):
-    """Return (low, high) that contain a chi-square value with BAND_PROBABILITY.
+    """Return (low, high), between which a chi-square value lies with BAND_PROBABILITY.
 
-    freedoms: degrees of freedom, a number or an array.
+    freedoms: its degrees of freedom, a number or an array.
     """
-    # Because chdtri iterates for each value and a long run has few different ones, each is computed once.
+    # Because chdtri is slow and a long run has few different degrees of freedom, each of them is computed once.
     different, places = np.unique(freedoms, return_inverse=True)
     places = places.reshape(np.shape(freedoms))
     tails = 0.5 + 0.5 * BAND_PROBABILITY, 0.5 - 0.5 * BAND_PROBABILITY
@@ -211,15 +231,19 @@ def bounds(freedoms):
 
 
 def band(freedoms, count):
-    """Return (low, high) that contain the mean of `count` chi-square values with BAND_PROBABILITY."""
+    """Return (low, high), between which the mean of `count` chi-square values lies with BAND_PROBABILITY."""
     return tuple(float(bound / count) for bound in bounds(freedoms * count))
 
 
 class Axis:
-    """One axis, 0 azimuth or 1 elevation, of a Consistency over the evaluated part; NaN where nothing was measured.
+    """Statistics of one axis i, 0 azimuth or 1 elevation, of a Consistency over the evaluated part of the run.
 
-    nis: mean; nis_expected: mean degrees of freedom; nees: mean; error [rad], rate_error [rad/s]: rms; sigma,
-    rate_sigma: rms of the stated values.
+    nis, nees           mean NIS and mean NEES
+    nis_expected        expected mean NIS, the mean of its degrees of freedom
+    error, rate_error   rms errors of angle [rad] and rate [rad/s]
+    sigma, rate_sigma   rms of the stated standard deviations of angle [rad] and rate [rad/s]
+
+    A value is NaN where nothing was measured.
     """
 
     def __init__(self, known, i):
@@ -234,7 +258,7 @@ class Axis:
 
     @functools.cached_property
     def nis_inside(self):
-        """Share of the values of the NIS inside their bands."""
+        """Share of the values of the NIS between their `bounds` [-]."""
         if not self._nis.size:
             return math.nan
         low, high = bounds(self._freedoms)
@@ -257,17 +281,17 @@ class Axis:
 
     @property
     def nis_mark(self):
-        """The `mark` of the mean NIS."""
+        """The note on the mean NIS, see `mark`."""
         return mark(self.nis, self.nis_expected, self.nis_band)
 
     @property
     def nees_mark(self):
-        """The `mark` of the mean NEES."""
+        """The note on the mean NEES, see `mark`."""
         return mark(self.nees, NEES_FREEDOMS, self.nees_band)
 
     @property
     def verdict(self):
-        """The result of the test as a sentence."""
+        """The sentence on the mean NEES: too sure, too careful or consistent."""
         if not math.isfinite(self.nees):
             return 'nothing was evaluated'
         low, high = self.nees_band
@@ -279,7 +303,7 @@ class Axis:
 def mark(mean, expected, band):
     """Return 'too sure' or 'too careful' for a mean that is outside its band and off by more than NOTABLE_DEVIATION.
 
-    mean: of squared errors; expected: its expectation; band: (low, high). Return '' otherwise.
+    Return '' otherwise. mean: mean NIS or NEES; expected: its expectation; band: its band (low, high).
     """
     if mean > max(band[1], (1.0 + NOTABLE_DEVIATION) * expected):
         return 'too sure'

@@ -1,13 +1,17 @@
-"""Identification of the rate loop of an axis on the drive core, and the feed-forward gains that follow from the loop.
+"""Identification of the rate loop of each axis by a simulated test of the drive, for `pedestal tune --feedforward`.
 
-Small sines of a few low frequencies are added to a constant rate. At that rate friction is constant and the bias
-torque keeps the teeth closed. W(jw) is the response of the antenna's rate without the known delay: transport plus half
-a period of the hold, which the ACU's prediction covers. Least squares fit the series
+The rate loop is the drive from the rate command to the rate of the axis. The test adds small sines of a few low
+frequencies to a constant rate. At this rate the friction is constant, and the bias torque keeps the teeth in contact.
+
+W(jw) is the frequency response of the rate loop at the angular frequency w [rad/s], without its known delay. This
+delay is the transport delay plus half a period, because the drive holds each command for one period. The prediction of
+the ACU covers it. Least squares fit the terms f_1 to f_4 of the series
 
     1 / W(jw) = f_1 + f_2 jw + f_3 (jw)^2 + f_4 (jw)^3.
 
-The rate command k_v v + k_a a needs k_v = f_1, k_a = f_2 (paper 003, eq. 14 to 18, as corrected in
-acu_tracker.servo.feedforward).
+The feed-forward adds k_v v + k_a a to the rate command, from rate v [rad/s] and acceleration a [rad/s2] of the
+reference. It needs k_v = f_1 [-] and k_a = f_2 [s]. Source: paper 003, eq. 14 to 18, as corrected in
+acu_tracker.servo.feedforward.
 """
 import dataclasses
 import math
@@ -22,22 +26,30 @@ from pedestal_common.graph import topics
 from pedestal_common.parameters import record
 
 SINE_FREQUENCIES_HZ = np.array([0.25, 0.5, 1.0, 1.5, 2.0, 2.5])
-"""Frequencies of the excitation, each with whole periods in COMMON_PERIOD_S [Hz]."""
+"""Frequencies of the sines [Hz]. Each has a whole number of periods in COMMON_PERIOD_S."""
 COMMON_PERIOD_S = 4.0
-"""Period of the sum of the sines [s]."""
+"""Period of the sum of all sines [s]."""
 SETTLING_PERIODS, MEASURED_PERIODS = 1, 2
-"""Numbers of common periods to settle and to measure."""
+"""Number of common periods before the measurement, and number of measured common periods."""
 SERIES_TERMS = 4
 """Number of terms of the series of 1 / W."""
 IDENTIFICATION_RATES_RAD_S = (0.1, 0.06)
-"""Constant rates of azimuth and elevation, above the excitation and inside the travel for a whole record [rad/s]."""
+"""Constant rates of azimuth and elevation [rad/s].
+
+They are larger than the sum of the sines, so the axis never turns back. A whole test stays inside the travel.
+"""
 SINE_PEAK_RAD_S = 0.004
-"""Peak of each sine [rad/s]."""
+"""Amplitude of each sine [rad/s]."""
 
 
 @dataclasses.dataclass(frozen=True)
 class RateLoop:
-    """Identified rate loop of one axis: W (n,) complex at w (n,) [rad/s]; f (SERIES_TERMS,): series of 1 / W."""
+    """Identified rate loop of one axis.
+
+    w (n,)              angular frequencies [rad/s]
+    W (n,)              complex response without the known delay [-]
+    f (SERIES_TERMS,)   terms of the series of 1 / W, see the module
+    """
     w: np.ndarray
     W: np.ndarray
     f: np.ndarray
@@ -53,12 +65,12 @@ class RateLoop:
         return float(self.f[1])
 
     def error(self, k_v, k_a):
-        """Return |1 - (k_v + k_a jw) W| (n,), the relative angle error that a feed-forward leaves."""
+        """Return |1 - (k_v + k_a jw) W| (n,), the relative angle error that a feed-forward leaves at w [-]."""
         return np.abs(1.0 - (k_v + 1j * k_a * self.w) * self.W)
 
 
 def series(w, W, terms=SERIES_TERMS):
-    """Return f (terms,) of the least-squares fit 1 / W(jw) = f_1 + f_2 jw + f_3 (jw)^2 + ..."""
+    """Return f (terms,) of the least-squares fit 1 / W(jw) = f_1 + f_2 jw + f_3 (jw)^2 + ... at w (n,) [rad/s]."""
     basis = (1j * w[:, np.newaxis]) ** np.arange(terms)
     wanted = 1.0 / W
     return np.linalg.lstsq(np.concatenate((basis.real, basis.imag)), np.concatenate((wanted.real, wanted.imag)),
@@ -66,10 +78,11 @@ def series(w, W, terms=SERIES_TERMS):
 
 
 def response(commanded, position, T, delay, w):
-    """Return W (n,) at w (n,) [rad/s] of a rate loop, without its delay and its hold.
+    """Return the response W (n,) of a rate loop at w (n,) [rad/s], without the delay and the hold of the commands.
 
-    commanded (m,): rates [rad/s], each held for T [s] from t_k + delay [s] on; position (m,): angle [rad] at t_k.
-    The record contains whole periods of each w. A linear trend is removed.
+    commanded (m,): rate commands [rad/s]; command k acts from t_k + delay [s] on, for the period T [s].
+    position (m,): angle of the axis [rad] at t_k.
+    The m samples contain a whole number of periods of each w. A linear trend is removed.
     """
     t = T * (np.arange(len(commanded)) - 0.5 * (len(commanded) - 1))
     waves = np.cos(w * t[:, np.newaxis]), np.sin(w * t[:, np.newaxis])
@@ -81,7 +94,11 @@ def response(commanded, position, T, delay, w):
 
 @compiled
 def _drive(state, constants, inputs, outputs, rate, torque, position):
-    """Fill position (n, 2) [rad] with the encoders before each step with the commands rate and torque (n, 2)."""
+    """Run the drive with n commands, and fill position (n, 2) [rad] with the encoder angles before each command.
+
+    rate (n, 2): rate commands [rad/s]; torque (n, 2): torque feed-forward [Nm]. The columns are azimuth and elevation.
+    The other arguments are the records of the unit of the drive, each in an array of one.
+    """
     u, y = inputs[0], outputs[0]
     for k in range(len(rate)):
         position[k, 0], position[k, 1] = y.azimuth.position, y.elevation.position
@@ -91,10 +108,10 @@ def _drive(state, constants, inputs, outputs, rate, torque, position):
 
 
 def identify(scenario, torque=True) -> dict:
-    """Return {axis: RateLoop} of a scenario's drive in still air.
+    """Return {axis: RateLoop} of the drive in a scenario.Scenario, in still air.
 
-    torque: True to include the ACU's torque feed-forward. Raises ValueError if the period of the drive does not divide
-    COMMON_PERIOD_S or if the travel is too short.
+    torque: True if the commands include the torque feed-forward of the ACU. Raises ValueError if the period of the
+    drive does not divide COMMON_PERIOD_S or if the travel is too short.
     """
     acu, drive = scenario.node_parameters('acu'), scenario.node_parameters('adu')
     axes = [getattr(drive, name) for name in topics.AXES]
@@ -111,7 +128,7 @@ def identify(scenario, torque=True) -> dict:
         if axis.limits.upper - axis.limits.lower < 1.1 * turn * duration:
             raise ValueError(f'adu.{name}.limits: travel must be at least '
                              f'{1.1 * turn * duration:g} rad to identify the drive')
-    # Because Schroeder's phases keep the peak of the sum low, the sines have these phases.
+    # Because the phases of Schroeder keep the peak of the sum low, the sines have these phases.
     k = np.arange(len(w))
     angle = w * drive.period * np.arange(steps)[:, np.newaxis] - math.pi * k * (k + 1) / len(k)
     v, a = SINE_PEAK_RAD_S * np.cos(angle).sum(axis=1), -SINE_PEAK_RAD_S * (w * np.sin(angle)).sum(axis=1)

@@ -1,4 +1,7 @@
-"""Rows of results, intervals of results over independent runs, and targets of results."""
+"""Confidence intervals of results over independent runs, their rows in a --json file, and targets of results.
+
+The trials and the studies use this module.
+"""
 import math
 
 import numpy as np
@@ -9,11 +12,14 @@ CONFIDENCE_LEVEL = 0.95
 
 
 def interval(values):
-    """Return (mean, low, high) of the values (n,) of n independent runs: mean and interval by Student's t,
+    """Return (mean, low, high) of a result in n independent runs, from its values (n,): mean and confidence interval.
 
-        mean -+ t_(n-1) s / sqrt(n),        s: standard deviation of the values.
+        low, high = mean -+ t_(n-1) s / sqrt(n)
 
-    The interval has the confidence CONFIDENCE_LEVEL. NaN if a value is not finite; low and high of one run are NaN.
+        s         standard deviation of the values
+        t_(n-1)   quantile of Student's t with n - 1 degrees of freedom, for CONFIDENCE_LEVEL
+
+    All are NaN if a value is not finite; low and high of one run are NaN.
     """
     values = np.asarray(values, float)
     n, mean = len(values), float(np.mean(values))
@@ -24,10 +30,14 @@ def interval(values):
 
 
 def pseudo_values(parts, statistic):
-    """Return values (n,) with the mean and the `interval` of a statistic over all runs together, such as an rms.
+    """Return values (n,) for `interval` of a statistic that is taken over all runs together, such as an rms.
 
-    parts: n about equal parts of the runs; statistic(parts) -> number. Tukey's jackknife (Efron and Stein, Annals of
-    Statistics 9 (1981) 586): theta_i = n theta - (n - 1) theta_-i, with theta_-i from all parts except i.
+    parts: n about equal parts of the runs; statistic(parts) -> number. The method is Tukey's jackknife (Efron and
+    Stein, Annals of Statistics 9 (1981) 586):
+
+        value i = n theta - (n - 1) theta_-i
+
+        theta, theta_-i   statistic of all parts; statistic of all parts except i
     """
     n, whole = len(parts), statistic(parts)
     return np.array([n * whole - (n - 1) * statistic(parts[:i] + parts[i + 1:]) if n > 1 else whole
@@ -37,8 +47,9 @@ def pseudo_values(parts, statistic):
 def row(case, metric, value, unit='', paper=None, target=None, runs=None):
     """Return one row of a --json file.
 
-    value: a number, or the values (n,) of n random runs. For values the row has the mean, its interval and n; `runs`
-    replaces n if each value belongs to several runs. paper: printed number or None; target: text for `meets`, or None.
+    value: a number, or the values (n,) of n random runs. For values, the row states their mean, its interval and the
+    number of runs. This number is n, or `runs` if each value belongs to several runs.
+    paper: number that a paper prints, or None; target: text for `meets`, or None.
     """
     if np.ndim(value):
         return estimated(case, metric, interval(value), unit, runs or len(value), paper, target)
@@ -46,7 +57,7 @@ def row(case, metric, value, unit='', paper=None, target=None, runs=None):
 
 
 def estimated(case, metric, estimate, unit, runs, paper=None, target=None):
-    """Return the `row` of an estimate (value, low, high) from a number of runs."""
+    """Return the `row` of an estimate (value, low, high) from a number of runs; low, high: its confidence interval."""
     value, low, high = estimate
     return {**row(case, metric, value, unit, paper, target), 'ci_low': _finite(low), 'ci_high': _finite(high),
             'runs': runs}
@@ -71,6 +82,6 @@ def meets(value, target):
 
 
 def missed(row):
-    """Return True if a row misses its target; the whole interval of a random value must meet the target."""
+    """Return True if a row misses its target. Of a random value, the whole interval must meet the target."""
     judged = ('ci_low', 'ci_high') if 'runs' in row else ('value',)
     return row['target'] is not None and not all(meets(row[key], row['target']) for key in judged)

@@ -1,23 +1,27 @@
-"""Isolation of the pointing error of a recorded run from the rotation of the ship.
+"""Isolation of a recorded run: how far the antenna suppresses the rotation of the ship in its pointing error, in dB.
 
-isolation = 20 log10(motion / coherent), from the recorded truth. It is computed over the evaluated part of the run
-(Tracking.tracking) with the target within half a beamwidth, without slews through a keyhole. Each rms is per axis and
-sample, cross-elevation and elevation together.
+    isolation = 20 log10(motion / coherent) [dB]
 
-motion    Motion of the direction to the target on the deck because the ship rotates about its mean attitude: the angle
-          between the direction and the direction on a deck in the mean attitude.
-coherent  Part of the true pointing error that a linear law of the ship's rotation explains. It is the least-squares
-          fit of each axis to nine series: rotation of the deck from its mean attitude, angular velocity and angular
-          acceleration, without their means, each in the axes of the beam (cross-elevation, elevation, along). The
-          velocity is a quarter period from both rotation and acceleration, so leads and lags are included. The axes
-          are those of the beam because a wrong attitude, a delay or friction acts there while the target crosses the
-          deck.
+    motion      rms motion of the line of sight on the deck that the rotation of the ship causes [rad]: the angle
+                between the direction to the target on the deck and on a deck in the mean attitude
+    coherent    rms of the part of the true pointing error that a linear law of the ship's rotation explains [rad]
 
-Noise that is independent of the ship also fits nine series a little, by chance. `floor` is the expected rms of that
-fit for noise of random phase. The power spectrum of the noise is that of the remainder of the regression, smoothed
-over SMOOTHING_HALF_WIDTH_HZ. `limit`, 20 log10(motion / floor), is therefore the highest isolation that a run of this
-length and noise can show. Near the limit (or above, by chance), the effect of the ship cannot be separated from noise.
-A run with less noise shows more isolation (tracking_receiver.receiver.cn0_dbhz, the noises of the ins).
+Both are computed from the recorded truth. Only the evaluated part of the run (Tracking.tracking) counts, with the
+target within half a beamwidth, and without slews through a keyhole. Each rms is per axis and sample, cross-elevation
+and elevation together.
+
+The linear law is the least-squares fit of the pointing error of each axis to nine series. They are the three
+components of the rotation of the deck from its mean attitude, of its angular velocity and of its angular acceleration,
+each without its mean. Because the velocity is a quarter period away from rotation and acceleration, the fit includes
+leads and lags. The components are taken along the axes of the beam: cross-elevation, elevation and along the beam.
+Because a wrong attitude, a delay or friction acts in these axes, they fit while the target crosses the deck.
+
+Noise that is independent of the ship also fits nine series a little, by chance. `floor` [rad] is the expected rms of
+this fit for noise of random phase. The noise has the power spectrum of the remainder of the fit, smoothed over
+SMOOTHING_HALF_WIDTH_HZ. Therefore `limit`, 20 log10(motion / floor), is the highest isolation that a run of this
+length and noise can show. Near the limit, the effect of the ship cannot be separated from noise. By chance, the
+isolation may also exceed the limit. A run with less noise can show more isolation: parameter
+tracking_receiver.receiver.cn0_dbhz, and the noises of the node `ins`.
 """
 import dataclasses
 import math
@@ -27,14 +31,14 @@ import numpy as np
 from pedestal_analysis.results import tracking
 
 SMOOTHING_HALF_WIDTH_HZ = 0.02
-"""Half the width of the average over the power spectrum of the remainder [Hz]."""
+"""Half the width over which the power spectrum of the remainder of the fit is averaged [Hz]."""
 MIN_TRACKED_TIME_S = 20.0
 """Shortest evaluated time for an isolation: a few periods of the ship [s]."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Isolation:
-    """motion, coherent, floor: rms [rad]."""
+    """Isolation of a run, from motion, coherent and floor: rms [rad], see the module."""
     motion: float
     coherent: float
     floor: float
@@ -46,7 +50,7 @@ class Isolation:
 
     @property
     def limit(self):
-        """Highest isolation that the run can show [dB]."""
+        """Highest isolation that a run of this length and noise can show [dB]."""
         return _decibels(self.motion, self.floor)
 
 
@@ -55,8 +59,10 @@ def _decibels(large, small):
 
 
 def _beam_axes(direction):
-    """Return unit vectors cross-elevation, elevation and along the beam as rows (n, 3, 3), for directions (n, 3)
-    FLU."""
+    """Return the axes (n, 3, 3) of beams in the directions (n, 3) FLU.
+
+    The three rows are unit vectors FLU in cross-elevation, in elevation and along the beam.
+    """
     x, y, z = direction.T
     flat = np.hypot(x, y)
     sa, ca = -y / flat, x / flat
@@ -68,8 +74,10 @@ def _beam_axes(direction):
 def measure(dt, error, target, attitude, deck_rate) -> Isolation:
     """Return the Isolation of n samples at intervals of dt [s].
 
-    error (n, 2) [rad]: cross-elevation, elevation; target (n, 3): ENU from the ship, of any length; attitude (n, 4):
-    true quaternions x, y, z, w deck -> earth; deck_rate (n, 3): [rad/s] FLU.
+    error (n, 2)       true pointing error in cross-elevation and elevation [rad]
+    target (n, 3)      vector from ship to target, ENU, of any length
+    attitude (n, 4)    true quaternions x, y, z, w of the rotation deck -> earth
+    deck_rate (n, 3)   true angular velocity of the deck, FLU [rad/s]
     """
     # Because the import is slow and most runs are ashore, it is made here.
     from scipy import ndimage
@@ -90,7 +98,8 @@ def measure(dt, error, target, attitude, deck_rate) -> Isolation:
     error = error - error.mean(axis=0)
     explained = basis.T @ error
     n = len(error)
-    # The regression removes the share `weight` of the noise at each frequency; the neighbours restore the level.
+    # The fit takes the share `weight` of the noise at each frequency out of the remainder. The smoothing over the
+    # neighbouring frequencies and the division by the remaining share restore the spectrum of the noise.
     weight = np.sum(np.abs(np.fft.fft(basis, axis=0))**2, axis=1) / n
     power = np.sum(np.abs(np.fft.fft(error - basis @ explained, axis=0))**2, axis=1) / n
     width = 2 * round(SMOOTHING_HALF_WIDTH_HZ * n * dt) + 1
@@ -104,7 +113,7 @@ def measure(dt, error, target, attitude, deck_rate) -> Isolation:
 def read(bag, run):
     """Return the Isolation of a bag.Bag whose tracking.Tracking is `run`.
 
-    None ashore, and for less than MIN_TRACKED_TIME_S of evaluated time.
+    Return None for an antenna ashore, or if the evaluated time is below MIN_TRACKED_TIME_S.
     """
     if 'ship/truth' not in bag.topics or run.t.size < 2:
         return None

@@ -1,4 +1,4 @@
-"""Attitude that the INS of a recorded run reported, against the truth and against the stated standard deviations."""
+"""Errors of the attitude that the INS of a recorded run reported, against the truth, and its stated uncertainty."""
 import dataclasses
 import math
 
@@ -13,11 +13,11 @@ ATTITUDE_TOPIC, INS_STATE_TOPIC = 'ship/imu/data', 'ins/state'
 class KnownAttitude:
     """Errors of the INS at its stamps t (n,) [s].
 
-    error    (n, 3) [rad] rotation from the true to the reported attitude about east and north (level) and, clockwise,
-             about up (heading), up to half a turn
-    sigma    (n, 2) [rad] stated standard deviations of level and heading
-    aligned  stamp [s] at which ins/state became `aligned`; NaN if it never did, the first stamp of a bag without
-             ins/state
+    error    (n, 3) [rad]: rotation from the true to the reported attitude. Columns: about east and about north (level
+             errors), and about up, clockwise (heading error).
+    sigma    (n, 2) [rad]: standard deviations of level and heading that the INS states
+    aligned  stamp [s] at which ins/state became `aligned`; NaN if it never did. In a bag without ins/state, the first
+             stamp.
     """
     t: np.ndarray
     error: np.ndarray
@@ -36,7 +36,7 @@ class KnownAttitude:
 
     @property
     def is_aligned(self):
-        """Mask (n,) bool of the rows from alignment on."""
+        """Mask (n,) bool of the rows after alignment."""
         return self.t >= self.aligned
 
     @property
@@ -48,7 +48,7 @@ class KnownAttitude:
 
 
 def read(bag):
-    """Return the KnownAttitude of a bag.Bag; None ashore."""
+    """Return the KnownAttitude of a bag.Bag; None for an antenna ashore."""
     if any(topic not in bag.topics or not bag.rows(topic).size for topic in ('ship/truth', ATTITUDE_TOPIC)):
         return None
     table = bag.table(ATTITUDE_TOPIC)
@@ -59,7 +59,7 @@ def read(bag):
     both = np.isfinite(true + reported).all(axis=1)
     if not both.any():
         return None
-    from scipy.spatial.transform import Rotation  # slow to import, and most runs are ashore
+    from scipy.spatial.transform import Rotation  # imported here, because the import is slow and most runs are ashore
     t, true = t[both], Rotation.from_quat(true[both])
     error = (Rotation.from_quat(reported[both]) * true.inv()).as_rotvec() * (1.0, 1.0, -1.0)
     # The INS states equal variances for roll and pitch, so x stands for both level axes; z is the heading.
@@ -68,6 +68,7 @@ def read(bag):
 
 
 def _aligned(bag, first):
+    """Return KnownAttitude.aligned [s]; first: first stamp of the attitude [s]."""
     if INS_STATE_TOPIC not in bag.topics or not bag.rows(INS_STATE_TOPIC).size:
         return float(first)
     states = bag.table(INS_STATE_TOPIC)

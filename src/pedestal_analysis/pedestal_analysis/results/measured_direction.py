@@ -1,4 +1,7 @@
-"""Measured direction of the target: from encoders, receiver errors and attitude to earth angles."""
+"""Measured direction of the target in earth angles, from beam direction, receiver errors and attitude of the deck.
+
+The report shows this direction beside the truth, and `pedestal export --format tdm` writes it.
+"""
 import numpy as np
 
 from pedestal_common.compiled import compiled
@@ -7,7 +10,10 @@ from pedestal_common.geometry import line_of_sight
 
 @compiled
 def _displaced(azimuth, elevation, errors, quaternions, earth):
-    """Fill the earth angles (n, 2) of a target at the errors (n, 2) from a beam at deck angles (n,)."""
+    """Fill earth (n, 2) with the earth angles [rad] of a target, as `earth_angles` states.
+
+    azimuth, elevation (n,): deck angles of the beam; errors (n, 2) and quaternions (n, 4): see `earth_angles`.
+    """
     mat_ed = np.empty((3, 3))
     for k in range(azimuth.size):
         line_of_sight.rotation(quaternions[k, 0], quaternions[k, 1], quaternions[k, 2], quaternions[k, 3], mat_ed)
@@ -18,10 +24,13 @@ def _displaced(azimuth, elevation, errors, quaternions, earth):
 
 
 def earth_angles(beam, errors, quaternions=None):
-    """Return earth azimuth in (-pi, pi] and elevation (n, 2) [rad] of the target, from beam and receiver errors.
+    """Return the earth angles (n, 2) [rad] of the target: azimuth in (-pi, pi] and elevation.
 
-    beam (n, 2): deck azimuth and elevation [rad]; errors (n, 2): cross-elevation and elevation [rad]; quaternions
-    (n, 4): attitude deck -> earth, None ashore. NaN where an input is NaN.
+    beam (n, 2)          azimuth and elevation of the beam on the deck [rad]
+    errors (n, 2)        receiver errors in cross-elevation and elevation [rad]
+    quaternions (n, 4)   attitude x, y, z, w of the rotation deck -> earth, None ashore
+
+    The result is NaN where an input is NaN.
     """
     if quaternions is None:
         quaternions = np.tile(np.array(line_of_sight.ASHORE_ATTITUDE), (len(beam), 1))

@@ -1,38 +1,52 @@
-"""Pointing error in the modes that follow a direction without the receiver's errors.
+"""Pointing error of a recorded run in the modes that follow a direction without the angle errors of the receiver.
 
-In `program`, `tle` and `steptrack` the direction is that of the true target. In `preset` it is the requested deck
-angle, which is the reference of the position loop while that stands. The slew to the direction is left out: the part
-begins when the error has moved by less than MAX_DRIFT beamwidths per second for SETTLING_TIME_S. Because step track
-moves the beam on purpose, its part begins HANDOVER_SETTLING_S after the mode.
+The error is the direction that the mode follows minus the direction of the beam. `program`, `tle` and `steptrack`
+follow the true target. `preset` follows the requested deck angle, which is the reference of the position loop while
+this reference stands. `slave` follows the commanded earth angle with its rates, `sun` the sun as seen from the
+station.
+
+Only the settled part of a mode counts, without the slew to the direction. It begins when the error has moved by less
+than MAX_DRIFT beamwidths per second for SETTLING_TIME_S. In `preset` and `slave`, which may get another direction,
+each slew is left out. Because step track moves the beam on purpose, its settled part begins HANDOVER_SETTLING_S after
+the begin of the mode.
 """
 import numpy as np
 
+from acu_tracker.operating.command_table import ACU_COMMANDS
+from acu_tracker.program.prediction import PredictionParameters, Predictor
 from pedestal_analysis.results import tracking
 from pedestal_analysis.results.tracking import DEG_PER_RAD
+from pedestal_common.compiled import compiled
+from pedestal_common.geometry import line_of_sight
+from pedestal_common.graph.topics import AXES
+from pedestal_common.parameters import build
+from pedestal_common.wire import commands
 
-FOLLOWING_MODES = ('program', 'tle', 'preset', 'steptrack')
-"""Modes with results of their own, each with a row of _PARTS."""
+FOLLOWED_DIRECTIONS = {'program': 'true target', 'tle': 'true target', 'preset': 'requested angles',
+                       'steptrack': 'true target', 'slave': 'commanded direction', 'sun': 'direction of the sun'}
+"""{mode with results of its own, and with a row of _PARTS: the direction that it follows}."""
 SETTLING_TIME_S = 0.5
 """Time for which the error must be still before a mode counts as settled [s]."""
 MAX_DRIFT = 0.25
 """Largest motion of a still error [beamwidths/s]."""
 MAX_REFERENCE_STEP_RAD = 1e-5
-"""Largest motion of a standing reference in SETTLING_TIME_S [rad]."""
+"""Largest motion within SETTLING_TIME_S of a reference that counts as standing [rad]."""
 
 
 def read(bag, run) -> dict:
-    """Return {mode: errors (k, 2) [deg]} of the settled part of each mode of a bag.Bag and its tracking.Tracking.
+    """Return {mode: pointing errors (k, 2) [deg]} in the settled part of each mode; run: Tracking of the bag.Bag.
 
-    Columns: cross-elevation, elevation. A mode without a settled part is left out.
+    Columns: cross-elevation, elevation. An electronic beam has two rows per step: at the end and at the beginning of
+    the interval. A mode without a settled part is left out.
     """
     found = {}
-    for mode in FOLLOWING_MODES:
+    for mode, direction in FOLLOWED_DIRECTIONS.items():
         inside = run.mode == mode
         if not inside.any():
             continue
         error, on = _PARTS[mode](bag, run, inside)
         if np.isfinite(error[on]).any():
-            parts = [error[on], run.begun[on]] if run.electronic and mode != 'preset' else [error[on]]
+            parts = [error[on], run.begun[on]] if run.electronic and direction == 'true target' else [error[on]]
             found[mode] = np.concatenate(parts) * DEG_PER_RAD
     return found
 
@@ -43,30 +57,59 @@ def _window(run):
 
 
 def _moved(values, window):
-    """Return the distance (n,) that values (n, 2) moved in the window before each step; infinite without one."""
+    """Return the distance (n,) that values (n, 2) moved in the last `window` steps; infinite in the first rows."""
     out = np.full(len(values), np.inf)
     out[window:] = np.hypot(*(values[window:] - values[:-window]).T)
     return out
 
 
 def _to_target(run):
+    """Return the true pointing error (n, 2) (cross-elevation, elevation) [rad] of a tracking.Tracking."""
     return np.column_stack((run.cross_elevation, run.elevation_error))
 
 
+@compiled
+def _fill_offsets(beam, directions, error):
+    """Fill error (n, 2) [rad] with the offsets of earth directions (n, 2) from the beam (n, 2)."""
+    for k in range(len(beam)):
+        x, y, z = line_of_sight.direction(directions[k, 0], directions[k, 1])
+        error[k, 0], error[k, 1] = line_of_sight.offsets(beam[k, 0], beam[k, 1], x, y, z)
+
+
+def _to_earth_direction(run, directions):
+    """Return the error (n, 2) [rad] of the true beam against earth angles (n, 2)."""
+    error = np.empty_like(directions)
+    _fill_offsets(run.beam_earth, directions, error)
+    return error
+
+
 def _of_table(_, run, inside):
-    """Return (error (n, 2) [rad], mask (n,) of its settled steps) of a mode that follows a table."""
-    error, window = _to_target(run), _window(run)
+    """Return (error (n, 2) [rad], mask (n,) of the settled steps) of a mode that follows a table of directions.
+
+    inside (n,): mask of the steps in the mode.
+    """
+    return _after_slew(_to_target(run), run, inside)
+
+
+def _after_slew(error, run, inside):
+    """Return (error (n, 2) [rad], mask (n,) of the steps after the first slew of each stretch)."""
     on = np.zeros(run.t.size, bool)
     for first, last in tracking.stretches(inside):
-        still = _moved(error[first:last], window) < MAX_DRIFT * SETTLING_TIME_S * run.beamwidth
-        long = np.flatnonzero(np.convolve(still, np.ones(window, int))[:last - first] == window)
-        if long.size:
-            on[first + long[0]:last] = True
+        settled = np.flatnonzero(_settled(error[first:last], run))
+        if settled.size:
+            on[first + settled[0]:last] = True
     return error, on
 
 
+def _settled(error, run):
+    """Return the mask (n,) of the steps at which the error (n, 2) [rad] has been still for SETTLING_TIME_S."""
+    window = _window(run)
+    still = _moved(error, window) < MAX_DRIFT * SETTLING_TIME_S * run.beamwidth
+    return np.convolve(still, np.ones(window, int))[:len(error)] == window
+
+
 def _of_steps(_, run, inside):
-    """Return (error (n, 2) [rad], mask (n,) of its settled steps) of step track."""
+    """Return (error (n, 2) [rad], mask (n,) of the settled steps) of step track, whose steps are the mask `inside`."""
     on = np.zeros(run.t.size, bool)
     for first, last in tracking.stretches(inside):
         on[first:last] = run.t[first:last] >= run.t[first] + tracking.HANDOVER_SETTLING_S
@@ -74,7 +117,10 @@ def _of_steps(_, run, inside):
 
 
 def _of_preset(bag, run, inside):
-    """Return (error (n, 2) [rad] against the reference, mask (n,) of its settled steps) of preset angles."""
+    """Return (reference minus beam (n, 2) [rad], mask (n,) of the settled steps) of the mode `preset`.
+
+    inside (n,): mask of the steps in the mode. Columns: cross-elevation, elevation.
+    """
     columns, window = ('azimuth.position', 'elevation.position'), _window(run)
     beam = tracking.on_grid(bag, run.t, 'adu/truth' if 'adu/truth' in bag.topics else 'joint_states', columns)
     error, on = run.reference - beam, np.zeros(run.t.size, bool)
@@ -86,5 +132,31 @@ def _of_preset(bag, run, inside):
     return error, on
 
 
-_PARTS = {'program': _of_table, 'tle': _of_table, 'preset': _of_preset, 'steptrack': _of_steps}
-"""{mode: function(bag, run, steps of the mode (n,)) -> (error, settled steps)}."""
+def _of_slave(bag, run, inside):
+    """Return (error (n, 2) [rad] against the commanded direction, mask (n,) of its settled steps)."""
+    directions = np.full((run.t.size, 2), np.nan)
+    for t, command, reply in tracking.replies(bag, 'acu/command_result'):
+        if command.verb == 'slave' and reply.granted:
+            given, later = commands.values(ACU_COMMANDS, command), run.t >= t
+            moved = np.minimum(run.t[later] - t, given['moves'])
+            for i, axis in enumerate(AXES):
+                directions[later, i] = given[axis] + given[f'{axis}_rate'] * moved
+    error, on = _to_earth_direction(run, directions), np.zeros(run.t.size, bool)
+    for first, last in tracking.stretches(inside):
+        on[first:last] = _settled(error[first:last], run)
+    return error, on
+
+
+def _of_sun(bag, run, inside):
+    """Return (error (n, 2) [rad] against the sun, mask (n,) of its settled steps); NaN without recorded parameters."""
+    known = bag.configuration['parameters'].get('acu', {})
+    if not known:
+        return np.full((run.t.size, 2), np.nan), inside
+    given = {key: value for key, value in known.items() if key.startswith('prediction.')}
+    sun = Predictor(build(PredictionParameters, given, 'prediction.'), bag.start).sun_angles(run.t)
+    return _after_slew(_to_earth_direction(run, sun), run, inside)
+
+
+_PARTS = {'program': _of_table, 'tle': _of_table, 'preset': _of_preset, 'steptrack': _of_steps, 'slave': _of_slave,
+          'sun': _of_sun}
+"""{mode: function(bag, run, mask of the steps in the mode) -> (error (n, 2) [rad], mask of the settled steps)}."""

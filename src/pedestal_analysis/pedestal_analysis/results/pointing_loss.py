@@ -1,4 +1,8 @@
-"""Loss of received power by the pointing error, from the sum pattern of the beam (tracking_receiver_sim.monopulse)."""
+"""Loss of received power of a recorded run by its pointing error, from the pattern of the beam.
+
+The pattern is the sum pattern of tracking_receiver_sim.monopulse: the received voltage by the angle from the beam
+axis.
+"""
 import math
 
 import numpy as np
@@ -7,19 +11,25 @@ from pedestal_common.compiled import compiled
 from tracking_receiver_sim.monopulse import sum_pattern
 
 LEAST_POWER = 1e-12
-"""Least received power over that of the beam axis, in a null of the pattern [-]."""
+"""Smallest received power over that on the beam axis [-]. This avoids an infinite loss in a null of the pattern."""
 
 
 @compiled
 def _fill(error, beamwidth, power):
-    """Fill the received power (n,) over that of the beam axis at errors (n, 2) [rad]."""
+    """Fill power (n,): received power over that on the beam axis [-].
+
+    error (n, 2): pointing errors in cross-elevation and elevation [rad]; beamwidth [rad].
+    """
     for k in range(len(error)):
         voltage = sum_pattern(error[k, 0] / beamwidth) * sum_pattern(error[k, 1] / beamwidth)
         power[k] = voltage * voltage
 
 
 def _power(run):
-    """Return the received power (k,) over that of the beam axis in the evaluated part of a tracking.Tracking."""
+    """Return the received power (k,) over that on the beam axis [-], in the evaluated part of a tracking.Tracking.
+
+    Return an empty array without a beamwidth.
+    """
     if not math.isfinite(run.beamwidth):
         return np.zeros(0)
     error = np.concatenate((run.true, run.begun[run.tracking])) if run.electronic else run.true
@@ -36,6 +46,6 @@ def mean_db(run) -> float:
 
 
 def max_db(run) -> float:
-    """Return the largest loss [dB] of a tracking.Tracking; NaN without an evaluated part."""
+    """Return the largest loss [dB] of received power of a tracking.Tracking; NaN without an evaluated part."""
     power = _power(run)
     return -10.0 * math.log10(power.min()) if power.size else math.nan

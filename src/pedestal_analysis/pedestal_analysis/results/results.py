@@ -1,12 +1,17 @@
-"""The table of the results of a run; printed tables, --json rows, report and docs are generated from it.
+"""Table of the results of a run, such as the rms pointing error: for each its name, unit, definition and measurement.
 
-A result is measured on one part of the data of a run; without that part the result has no row:
-motors      tracking.Tracking of a drive with motors    tracking    tracking.Tracking of any drive
-encoders    tracking.Tracking with the true direction of the dish beside the encoders
-filter      consistency.Consistency                     isolation   isolation.Isolation
-attitude    known_attitude.KnownAttitude                keyholes    tracking.keyholes
-run         start.Outcome                               supervised  start.Outcome in realtime
-MODE        errors of mode_pointing.read, for each of its FOLLOWING_MODES
+The printed tables, the --json rows, the report and the documentation are generated from this table. A result is
+measured on one part of the data of a run, and has no value without that part:
+tracking    tracking.Tracking
+motors      tracking.Tracking of a drive with motors, not of an array
+encoders    tracking.Tracking of a bag that holds the true direction of the dish beside the encoders
+filter      consistency.Consistency
+keyholes    the slews through a keyhole, of tracking.keyholes
+isolation   isolation.Isolation
+attitude    known_attitude.KnownAttitude
+run         pedestal_bringup.graph.start.Outcome
+supervised  the same Outcome, of a run in realtime
+MODE        pointing errors of mode_pointing.read in this mode, one of its FOLLOWED_DIRECTIONS
 Errors are taken per axis and sample. "Both axes together" pools the samples of both axes; the result is not the angle
 between beam and target.
 """
@@ -19,12 +24,14 @@ from pedestal_analysis.results.tracking import DEG_PER_RAD, known_rms, largest
 
 
 class Result(typing.NamedTuple):
-    """A row of the table.
+    """A result: a row of the table RESULTS.
 
-    part, measure  part of the data; measure(part) -> value, NaN if not measured
-    sentence       definition
+    name, unit     name and unit of the value
+    part           name of the part of the data on which the result is measured, see the module
+    measure        measure(part) -> value, NaN if not measured
+    sentence       definition of the result
     label          name in the report, '' if the report does not show the result
-    target         text or None
+    target         required value as a text for intervals.meets, such as '<= 0.4', or None
     mark           mark(part) -> note on a value that is not as expected, else ''
     brief          True for a result that a run prints by default
     """
@@ -48,8 +55,8 @@ MARK_MEANINGS = {'too sure': 'the errors are larger than it states',
 
 
 def _of_mode(mode):
-    """Return the rows of the pointing error in a mode of mode_pointing.FOLLOWING_MODES."""
-    against = 'requested angles minus true beam' if mode == 'preset' else 'true target minus true beam'
+    """Return the two Results of the pointing error in a mode of mode_pointing.FOLLOWED_DIRECTIONS: rms, maximum."""
+    against = f'{mode_pointing.FOLLOWED_DIRECTIONS[mode]} minus true beam'
     return (Result(f'{mode}_pointing_rms_deg', 'deg', mode, known_rms,
                    f'Rms of the true pointing error ({against}), both axes together, in settled `{mode}`.'),
             Result(f'{mode}_pointing_max_deg', 'deg', mode, largest,
@@ -76,7 +83,7 @@ RESULTS = (
     Result('pointing_loss_max_db', 'dB', 'tracking', pointing_loss.max_db,
            'Largest loss of received power by the true pointing error, from the pattern of the beam, in settled '
            'autotrack.', brief=True),
-    *itertools.chain.from_iterable(map(_of_mode, mode_pointing.FOLLOWING_MODES)),
+    *itertools.chain.from_iterable(map(_of_mode, mode_pointing.FOLLOWED_DIRECTIONS)),
     Result('cross_elevation_rms_deg', 'deg', 'tracking', lambda run: run.pointing(known_rms, 0),
            'Rms of the true pointing error in cross-elevation, in settled autotrack.'),
     Result('elevation_rms_deg', 'deg', 'tracking', lambda run: run.pointing(known_rms, 1),
@@ -176,17 +183,20 @@ RESULTS = (
     Result('restarts', 'restarts', 'supervised', lambda run: float(run.restarts),
            'Number of times that `pedestal run` restarted a node that had died, in realtime.'),
 )
+"""All results, in the order in which tables show them."""
 
 RESULT_BY_NAME = {result.name: result for result in RESULTS}
 
 
 def of_tracking(run):
-    """Return the parts {part: record} that a tracking.Tracking provides."""
+    """Return the parts {name of the part: its data} that a tracking.Tracking provides, None for a missing part."""
     return {'motors': None if run.electronic else run, 'encoders': run if run.has_encoders else None, 'tracking': run}
 
 
 def of_bag(bag):
-    """Return the parts {part: record} of a bag.Bag with one beam (Bag.view); None or empty for a missing part.
+    """Return the parts {name of the part: its data} of a bag.Bag with one beam (Bag.view).
+
+    A missing part is absent, None or empty.
 
     Raises ValueError if the bag has no joint_states or no target/truth.
     """
@@ -194,14 +204,14 @@ def of_bag(bag):
 
 
 def of_run(bag, run):
-    """Return the parts {part: record} of a bag.Bag with one beam and its tracking.Tracking."""
+    """Return the parts of `of_bag`, from a bag.Bag with one beam and its tracking.Tracking `run`."""
     return {**of_tracking(run), **mode_pointing.read(bag, run), 'filter': consistency.read(bag, run),
             'keyholes': tracking.keyholes(bag), 'isolation': isolation.read(bag, run),
             'attitude': known_attitude.read(bag)}
 
 
 def measured(parts, table=RESULTS) -> dict:
-    """Return {name: (value, unit)} of the results of a table whose part exists, in the order of the table."""
+    """Return {name: (value, unit)} of the Results in a table whose part exists, in the order of the table."""
     return {result.name: (result.measure(parts[result.part]), result.unit) for result in table
             if _exists(parts, result)}
 
@@ -213,7 +223,7 @@ def _exists(parts, result):
 
 
 def marks(parts, table=RESULTS) -> dict:
-    """Return {name: note} of the results whose value is off."""
+    """Return {name: note} of the results whose value is not as expected (Result.mark)."""
     found = {result.name: result.mark(parts[result.part]) for result in table if _exists(parts, result)}
     return {name: text for name, text in found.items() if text}
 
@@ -221,8 +231,8 @@ def marks(parts, table=RESULTS) -> dict:
 def brief(columns, count=BRIEF_COUNT) -> list:
     """Return the names of the results that are printed by default, in the order of the table.
 
-    columns: {name: (value, unit)} of each beam and of the run, as from `measured`. The results with the flag `brief`
-    come first; where fewer than `count` of them were measured, others that were fill the rest.
+    columns: list of {name: (value, unit)} of `measured`, for each beam and for the run. At most `count` names are
+    returned. Results with the flag `brief` have precedence; other measured results fill the remaining places.
     """
     found = [result for result in RESULTS
              if any(name == result.name and math.isfinite(value) for values in columns
@@ -232,7 +242,7 @@ def brief(columns, count=BRIEF_COUNT) -> list:
 
 
 def remarks(noted, values) -> list:
-    """Return a line for each note on the filter; noted: {name: note} of `marks`, values: of `measured`."""
+    """Return a line for each note on the filter; noted: {name: note} of `marks`, values: as from `measured`."""
     found: dict[str, list[str]] = {}
     for name, note in noted.items():
         found.setdefault(note, []).append(f'{name} {values[name][0]:.3g}')
@@ -241,7 +251,7 @@ def remarks(noted, values) -> list:
 
 
 def row(case, metric, value, unit='', target=None):
-    """Return a row of a --json file; its value is None if it could not be measured."""
+    """Return a row of a --json file. Its value is None if the result could not be measured."""
     return {'case': case, 'metric': metric, 'value': value if math.isfinite(value) else None, 'unit': unit,
             'paper': None, 'target': target}
 

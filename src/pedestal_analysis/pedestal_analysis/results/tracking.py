@@ -1,4 +1,9 @@
-"""A recorded run on the steps of the drive: beam, encoders, estimate and receiver against the recorded truth."""
+"""Tracking of a recorded run: errors of beam, encoders, receiver and filter against the recorded truth, at each step.
+
+The results, the verdict, the report and the trials take their data from Tracking. In this module deck angles are
+azimuth (clockwise) and elevation on the deck; an attitude is the quaternion x, y, z, w of the rotation deck -> earth.
+An error is the direction to the target minus the direction of the beam, in cross-elevation and elevation.
+"""
 import contextlib
 import dataclasses
 import functools
@@ -10,11 +15,12 @@ from pedestal_common.compiled import compiled
 from pedestal_common.geometry import line_of_sight
 from pedestal_common.graph.steps import NS_PER_SECOND
 from pedestal_common.parameters import build
+from pedestal_common.wire import commands
 from tracking_receiver_sim.path import arrival
 from tracking_receiver_sim.path.params import PathParameters
 
 HANDOVER_SETTLING_S = 2.0
-"""Time after the first hand-over to autotrack that every statistic leaves out [s]."""
+"""Time after the first hand-over to autotrack that every statistic leaves out [s]. After it, autotrack is settled."""
 DEG_PER_RAD = math.degrees(1.0)
 ENCODER_BEAM_NOTE = ('the recording has no adu/truth, so the direction of the beam is taken from joint_states: errors '
                      'between encoders and dish do not show')
@@ -23,9 +29,10 @@ ENCODER_BEAM_NOTE = ('the recording has no adu/truth, so the direction of the be
 
 @compiled
 def _true_error(direction, relative, attitude, error):
-    """Fill the error (n, 2) (cross-elevation, elevation) [rad] of deck angles (n, 2) against the target.
+    """Fill error (n, 2) (cross-elevation, elevation) [rad]: target minus direction.
 
-    relative (n, 3): ENU [m] from the antenna to the target; attitude (n, 4): true attitude.
+    direction (n, 2): deck angles [rad]; relative (n, 3): ENU [m] from the antenna to the target;
+    attitude (n, 4): true attitude of the deck.
     """
     mat_ed = np.empty((3, 3))
     for k in range(len(direction)):
@@ -36,9 +43,13 @@ def _true_error(direction, relative, attitude, error):
 
 @compiled
 def _view_from_beam(beam, attitude, known_attitude, estimate, filtered, beam_earth):
-    """Fill per row: filtered error (cross-elevation, elevation) seen from the beam, earth angles of the beam.
+    """Fill filtered (n, 2): direction of the estimate minus the beam; and beam_earth (n, 2): earth angles of the beam.
 
-    attitude: true attitude; known_attitude: attitude of the INS; the estimate is in the earth angles of the INS.
+    filtered                (cross-elevation, elevation) [rad]
+    beam (n, 2)             deck angles [rad]
+    attitude (n, 4)         true attitude
+    known_attitude (n, 4)   attitude that the INS reports
+    estimate (n, 2)         earth angles [rad], computed with the attitude that the INS reports
     """
     mat_ed, known = np.empty((3, 3)), np.empty((3, 3))
     for k in range(len(beam)):
@@ -64,10 +75,15 @@ def _interval_start_error(beam, error, out):
 
 
 def interval_start_error(beam, error):
-    """Return the pointing error (n, 2) of an electronic beam (n, 2) [rad] at the beginning of each interval.
+    """Return the pointing error (n, 2) [rad] of an electronic beam at the beginning of the interval before each stamp.
 
-    The beam jumps at each step and then stands. error (n, 2): pointing error at the ends of the intervals, which are
-    the stamps. The beginning compares beam k with the target of k - 1; NaN in the first row.
+    The beam of an array jumps at each step, and stands during the interval until the next step.
+
+    beam (n, 2)    its deck angles in the interval that ends at stamp k [rad]
+    error (n, 2)   pointing error at stamp k [rad]
+
+    At the beginning of this interval the beam is already beam k, but the target is still that of stamp k - 1. The
+    first row is NaN.
     """
     out = np.full(beam.shape, np.nan)
     _interval_start_error(np.ascontiguousarray(beam), np.ascontiguousarray(error), out)
@@ -76,26 +92,29 @@ def interval_start_error(beam, error):
 
 @dataclasses.dataclass
 class Tracking:
-    """A run as arrays on the steps of the drive; angles in rad, NaN where nothing was measured.
+    """A recorded run as arrays, one row per step of the drive. Angles are in rad; NaN where nothing was measured.
 
-    Two columns are azimuth (or cross-elevation) and elevation. An electronic beam follows the reference later.
+    The two columns of an array (n, 2) are azimuth and elevation, or for errors cross-elevation and elevation. An
+    electronic beam is that of an array. Its reference is meant for a later interval than the measured beam, so it has
+    no following error.
 
-    t                               (n,) [s]
-    azimuth, elevation              (n,) encoders
-    reference                       (n, 2) deck angles of the ACU's reference; NaN in standby and of an electronic beam
+    t                               (n,) time of the step [s]
+    azimuth, elevation              (n,) deck angles of the encoders, or of an electronic beam
+    reference                       (n, 2) deck angles of the ACU's reference; NaN in standby or for an electronic beam
     cross_elevation,
-    elevation_error                 (n,) true pointing error at the stamps: target minus direction of the dish
-    encoder_error                   (n, 2) target minus direction of the encoders; NaN of an electronic beam and of a
-                                    bag without adu/truth
-    measured, cn0                   (n, 2) receiver error; (n,) [dB-Hz]
-    filtered                        (n, 2) estimate seen from the beam
-    beam_earth, target_earth, range (n, 2) earth angles of both; (n,) distance to the target [m]
-    mode                            (n,) texts
-    tracking                        (n,) bool: the evaluated part, which is settled autotrack
+    elevation_error                 (n,) true pointing error at the stamps: target minus direction of the beam
+    encoder_error                   (n, 2) target minus direction of the encoders; NaN for an electronic beam, and for
+                                    a bag without adu/truth
+    measured, cn0                   (n, 2) receiver error; (n,) C/N0 [dB-Hz]
+    filtered                        (n, 2) direction of the filter's estimate minus direction of the beam
+    beam_earth, target_earth        (n, 2) earth angles of the beam and of the target
+    range                           (n,) distance to the target [m]
+    mode                            (n,) mode of the ACU as a text, '' if unknown
+    tracking                        (n,) bool: the evaluated part of the run, which is settled autotrack
     since                           (n,) bool: all steps from the first evaluated step on, in any mode
-    beamwidth                       NaN if the bag does not state it
-    begun                           (n, 2) true error of an electronic beam at the beginning of the interval that ends
-                                    at the stamp, else NaN
+    beamwidth                       half-power beamwidth, NaN if the bag does not state it
+    begun                           (n, 2) true pointing error of an electronic beam at the beginning of the interval
+                                    that ends at the stamp, else NaN
     """
     t: np.ndarray
     azimuth: np.ndarray
@@ -123,7 +142,7 @@ class Tracking:
 
     @property
     def electronic(self):
-        """True if the beam is electronic: it stands from step to step."""
+        """True for the beam of an array, which jumps at each step and stands between two steps."""
         return np.isfinite(self.begun).any()
 
     @property
@@ -133,7 +152,7 @@ class Tracking:
 
     @functools.cached_property
     def true(self):
-        """True pointing error (k, 2) [rad] over the evaluated part."""
+        """True pointing error (k, 2) [rad] in the k steps of the evaluated part."""
         return np.column_stack((self.cross_elevation, self.elevation_error))[self.tracking]
 
     @property
@@ -148,22 +167,24 @@ class Tracking:
 
     @functools.cached_property
     def noise(self):
-        """Measured minus true error (k, 2) [deg] over the evaluated part.
+        """Receiver error minus true error (k, 2) [deg] over the evaluated part.
 
-        The receiver of an electronic beam measures the error in the middle of the interval, so that is its true error.
+        The receiver of an electronic beam measures the error in the middle of the interval between two steps. The true
+        error there is the mean of those at the beginning and at the end.
         """
         true = 0.5 * (self.true + self.begun[self.tracking]) if self.electronic else self.true
         return (self.measured[self.tracking] - true) * DEG_PER_RAD
 
     @functools.cached_property
     def filter_error(self):
-        """Filtered minus true error (k, 2) [deg] over the evaluated part."""
+        """Error of the filter, estimate minus true target (k, 2) [deg], over the evaluated part."""
         return (self.filtered[self.tracking] - self.true) * DEG_PER_RAD
 
     def pointing(self, measure, axis=slice(None)):
-        """Return measure(true error) [deg] over the evaluated part.
+        """Return a statistic of the true pointing error over the evaluated part [deg].
 
-        For an electronic beam, return the larger value of the beginnings and the ends of the intervals.
+        measure: function of the errors, such as known_rms; axis: 0 cross-elevation, 1 elevation, by default both. For
+        an electronic beam, return the larger of the two values at the beginnings and at the ends of the intervals.
         """
         errors = (self.true, self.begun[self.tracking]) if self.electronic else (self.true,)
         return max(measure(error[:, axis]) for error in errors) * DEG_PER_RAD
@@ -217,20 +238,24 @@ def beamwidth(bag):
 
 
 def on_grid(bag, t, topic, columns):
-    """Return columns of a topic at the stamps t; NaN where the topic has no message of that stamp."""
+    """Return columns (n, m) of a topic, by their m names, at the stamps t (n,) [s].
+
+    The value is NaN where the topic has no message, and in a column that the recording of an older version lacks.
+    """
     table = bag.table(topic) if topic in bag.topics else {'t': ()}
     if np.array_equal(table['t'], t) and (np.diff(t) > 1e-9).all():     # a message in every step
-        return np.column_stack([table[column] for column in columns])
+        return np.column_stack([table[column] if column in table else np.full(t.size, np.nan) for column in columns])
     out = np.full((t.size, len(columns)), np.nan)
     if len(table['t']):
         _, here, there = np.intersect1d(np.round(t * 1e9), np.round(table['t'] * 1e9), return_indices=True)
         for i, column in enumerate(columns):
-            out[here, i] = table[column][there]
+            if column in table:
+                out[here, i] = table[column][there]
     return out
 
 
 def _lever_arm(bag, attitude):
-    """Return (n, 3) ENU [m] from base_link to the antenna at attitudes (n, 4) of the deck; 0 if the bag has no arm."""
+    """Return the lever arm (n, 3) ENU [m] from base_link to the antenna at attitudes (n, 4); without one, 0."""
     parameters = bag.configuration['parameters'].get('tracking_receiver', {})
     arm = np.array([parameters.get(f'lever_arm.{axis}', 0.0) for axis in 'xyz'], float)
     enu, mat_ed = np.zeros((len(attitude), 3)), np.empty((3, 3))
@@ -242,9 +267,10 @@ def _lever_arm(bag, attitude):
 
 
 def _arriving(bag, relative, velocity):
-    """Return (n, 3) ENU [m] from the antenna to the apparent position of a target at `relative` with velocity (n, 3).
+    """Return the vector (n, 3) ENU [m] from the antenna to the apparent position of the target.
 
-    Refraction and light time are those of the parameters in the bag.
+    relative (n, 3): vector to its true position, ENU [m]; velocity (n, 3): its velocity, ENU [m/s]. Refraction and
+    light time of the signal, by the parameters in the bag, shift the apparent position.
     """
     of_receiver = bag.configuration['parameters'].get('tracking_receiver', {})
     given = {key: of_receiver[key] for key in ('path.refractivity', 'path.light_time') if key in of_receiver}
@@ -253,9 +279,10 @@ def _arriving(bag, relative, velocity):
 
 
 def by_encoders(bag):
-    """Return True if the direction of the beam is taken from the encoders of a bag (ENCODER_BEAM_NOTE).
+    """Return True if Tracking takes the direction of the beam from the encoders, for want of adu/truth in a bag.
 
-    The steering of an array is its true direction.
+    ENCODER_BEAM_NOTE is the note for this case. An array has no encoders: the angles to which it steers its beam are
+    the true direction.
     """
     return not bag.beams and 'adu/truth' not in bag.topics
 
@@ -326,8 +353,18 @@ def _first_mode(bag, change):
     return ''
 
 
+def replies(bag, topic):
+    """Yield (time [s], Command, Reply) of the replies on a topic of a bag."""
+    for _, log, _, message in bag.messages(topic) if topic in bag.topics else ():
+        with contextlib.suppress(ValueError):  # the message is no reply
+            yield ((log - bag.start) / NS_PER_SECOND, *commands.of_reply(message))
+
+
 def keyholes(bag):
-    """Return [(begin, end, loss)] [s] of the keyhole slews that the ACU predicted in its diagnostics, each once."""
+    """Return [(begin, end, loss)] of the slews through a keyhole that the ACU predicted in its diagnostics, each once.
+
+    begin, end: times of the slew [s]; loss: predicted time with the target off the beam [s].
+    """
     slews = {}
     for _, _, _, array in bag.messages('diagnostics') if 'diagnostics' in bag.topics else ():
         for status in array.status:
@@ -339,7 +376,7 @@ def keyholes(bag):
 
 
 def stretches(flags):
-    """Return the (first, last + 1) of each stretch in which flags (n,) bool are true."""
+    """Return [(first, last + 1)] of the stretches of neighbouring rows in which flags (n,) bool are true."""
     edges = np.flatnonzero(np.diff(np.concatenate(([0], flags.astype(int), [0]))))
     return list(zip(edges[::2].tolist(), edges[1::2].tolist()))
 

@@ -1,10 +1,9 @@
 """Verdict on a run: one sentence on what happened, from the recording alone.
 
-A run has failed if its drive tripped, if a command of the scenario was refused, or if a target was to be tracked and
-never was. It has not failed if no mode was to track, or if it ended on the way to the target, before the receiver
-could lock.
+A run has failed in three cases: its drive tripped, a command of the scenario was refused, or a commanded mode should
+have tracked the target and never did. A run has not failed if no commanded mode tracks, or if the run ended on the way
+to the target, before the receiver could lock.
 """
-import contextlib
 import math
 import typing
 
@@ -12,15 +11,16 @@ import numpy as np
 
 from acu_tracker.modes import REASON_TEXTS
 from acu_tracker.operating.command_table import ACU_COMMANDS
-from pedestal_analysis.results.tracking import DEG_PER_RAD
+from pedestal_analysis.results.tracking import DEG_PER_RAD, replies
 from pedestal_common.graph import modes, nodes
 from pedestal_common.graph.steps import NS_PER_SECOND
 from pedestal_common.wire import commands
 
 TRIPPED, REFUSED, NOT_LOCKED, NOT_TRACKED = 'tripped', 'refused', 'never locked', 'never tracked'
 TRACKED, ON_THE_WAY, NO_TARGET = 'tracked', 'ended on the way', 'no target'
+"""Words of the verdicts."""
 FAILURE_WORDS = TRIPPED, REFUSED, NOT_LOCKED, NOT_TRACKED
-"""Words of the verdicts on a failed run; the other words are of runs that did what was commanded."""
+"""Words of a verdict on a failed run. The other words belong to runs that did what was commanded."""
 
 TRACKING_MODES = 'autotrack', 'steptrack'
 """Modes in which the antenna tracks by the receiver."""
@@ -30,17 +30,21 @@ REPLY_TOPICS = tuple(node.replies for node in nodes.NODES if node.replies)
 
 WAITING_REASONS = tuple(REASON_TEXTS[name] for name in ('DRIVE_NOT_READY', 'INS_ALIGNING', 'ATTITUDE_INVALID',
                                                         'BEFORE_PROGRAM'))
-"""Reasons of the control unit for which a mode waits and then begins."""
+"""Reasons of the control unit that only delay a mode: the mode begins when the reason has passed."""
 
 LOCK_ALLOWANCE_S = 1.0
-"""Time for which the target must be in the beam, beside the parameters `acquire_time` and `lock_count`, before the
-receiver counts as one that cannot lock [s]."""
+"""Allowance before a run counts as failed [s].
+
+With the target in the beam, the receiver must lock within `acquire_time` plus this time. After the first lock, the
+control unit must enter autotrack within `lock_count` steps plus this time.
+"""
 APPROACH_WINDOW_S, MIN_APPROACH = 0.5, 0.1
-"""A beam is on the way while its distance to the target shrinks by this many beamwidths in this time [s]."""
+"""A beam is on the way to the target if its distance shrank by more than MIN_APPROACH beamwidths in the last
+APPROACH_WINDOW_S seconds."""
 
 
 class Verdict(typing.NamedTuple):
-    """word: one of the words above; text: the sentence."""
+    """Verdict on a run. word: one of the constants TRIPPED to NO_TARGET; text: the sentence."""
     word: str
     text: str
 
@@ -69,7 +73,7 @@ def of(bag, run) -> Verdict:
 
 
 def _trip(bag) -> str:
-    """Return the fault on which the drive tripped first, with its time, or ''."""
+    """Return the text of the first fault on which the drive tripped, with its time; '' without a trip."""
     if DRIVE_STATE_TOPIC not in bag.topics:
         return ''
     table = bag.table(DRIVE_STATE_TOPIC)
@@ -82,9 +86,7 @@ def _trip(bag) -> str:
 def _replies(bag):
     """Yield (time [s], Command, Reply) of all replies in a bag."""
     for topic in REPLY_TOPICS:
-        for _, log, _, message in bag.messages(topic) if topic in bag.topics else ():
-            with contextlib.suppress(ValueError):  # the message is no reply
-                yield ((log - bag.start) / NS_PER_SECOND, *commands.of_reply(message))
+        yield from replies(bag, topic)
 
 
 def _refusals(bag) -> list[str]:
@@ -99,7 +101,11 @@ def _reason(text):
 
 
 def _leads_to_tracking(mode, handover):
-    """Return True if a mode tracks, or hands over to a mode that does; handover: a predicted track may hand over."""
+    """Return True if a mode tracks, or hands over to a mode that leads to tracking.
+
+    handover: True if the modes of a predicted track (`program`, `tle`) may hand over, by the parameter
+    tracker.handover.
+    """
     row = next((row for row in modes.MODE_ROWS if row.name == mode), None)
     if row is None or mode in TRACKING_MODES:
         return row is not None
@@ -128,7 +134,7 @@ def _tracking(bag, run) -> tuple[str, str]:
 
 
 def _without_target(shares, acu):
-    """Return the sentence on a run that was not to track; shares: {mode: %}."""
+    """Return the sentence on a run in which no mode should track; shares: {mode: share of the steps [%]}."""
     begun = acu.get('initial_mode', 'standby')
     if not shares:
         return 'no mode is recorded'
@@ -137,7 +143,7 @@ def _without_target(shares, acu):
 
 
 def _never_began(bag, mode):
-    """Return (word, sentence) on a run in which no mode that follows a target was entered."""
+    """Return (word, sentence) on a run that never entered a mode that follows a target; mode: the initial mode."""
     values = bag.last_values(f'{bag.beam}acu')
     reason = values.get(f'refused {mode}', '')
     if not reason or reason.startswith(WAITING_REASONS):
@@ -146,9 +152,10 @@ def _never_began(bag, mode):
 
 
 def _never_tracked(bag, run, distance, near, acu):
-    """Return (word, sentence) on a run that followed a direction and never tracked.
+    """Return (word, sentence) on a run that followed a direction to the target, but never tracked by the receiver.
 
-    distance (n,): from beam to target [rad]; near (n,): target in the beam.
+    distance (n,): angle from beam to target [rad]; near (n,): True with the target within half a beamwidth; acu: the
+    parameters of the control unit.
     """
     receiver = bag.configuration['parameters'].get('tracking_receiver', {})
     count = acu.get('tracker.lock_count', 0) * run.period

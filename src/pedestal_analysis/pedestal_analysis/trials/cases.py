@@ -1,4 +1,7 @@
-"""Cases: scenarios with changed parameters, run in the closed loop without ROS."""
+"""Cases: scenarios with changed parameters, run in the closed loop without ROS.
+
+The studies describe their runs as cases.
+"""
 import dataclasses
 import math
 import shlex
@@ -9,7 +12,14 @@ from pedestal_bringup.scenario import scenario
 
 @dataclasses.dataclass(frozen=True)
 class Case:
-    """A scenario with changed parameters {'node.key': value}; duration [s] and seed None for those of the scenario."""
+    """A scenario with changed parameters.
+
+    name         name of the case in the results
+    scenario     name or path of the scenario
+    parameters   {'node.key': value} of the changed parameters
+    duration     [s]; None for that of the scenario
+    seed         None for that of the scenario
+    """
     name: str
     scenario: str
     parameters: dict = dataclasses.field(default_factory=dict)
@@ -41,8 +51,10 @@ class Case:
 
 
 def sine_case(case, w, periods):
-    """Return the Case with a sine of w [rad/s] for `periods` and up to 12 ms more, so that the last period is
-    complete."""
+    """Return the Case with a target that moves in a sine of w [rad/s] for a number of periods.
+
+    The duration is up to 12 ms longer, so that the last period is complete.
+    """
     step = 0.002
     duration = math.ceil((2.0 * math.pi * periods / w + 0.01) / step) * step
     parameters = {**case.parameters, 'tracking_receiver.target.angle.frequency': w / (2.0 * math.pi)}

@@ -1,11 +1,17 @@
-"""Comparison of scenarios, or of settings of one, trial by trial; a pair has the same seed and draws.
+"""Comparison of two sides A and B trial by trial: two scenarios, or one scenario with two settings of parameters.
 
-gain   improvement of the mean of A over that of B, [%] of B:
+A pair is trial i of A and trial i of B, with equal seed and equal draws of the varied parameters. For each result with
+the values a of A and b of B, `pedestal trials` states:
 
-           100 (1 - mean a / mean b),       for a result with larger values preferred 100 (mean a / mean b - 1),
+difference  mean of a - b, with a 95 % interval by Student's t
+gain        improvement of the mean of a over the mean of b [%], with a 95 % interval by the jackknife (Efron and
+            Stein, Annals of Statistics 9 (1981) 586):
 
-       with a 95 % interval by the jackknife (Efron and Stein, Annals of Statistics 9 (1981) 586)
-wins   share of the pairs in which A is better, with a 95 % interval by Clopper and Pearson; equal values are no win
+                100 (1 - mean a / mean b)     if smaller values are better
+                100 (mean a / mean b - 1)     if larger values are better
+
+wins        share of the pairs in which A is better [%], with a 95 % interval by Clopper and Pearson. Equal values are
+            no win.
 """
 import typing
 
@@ -17,7 +23,7 @@ from pedestal_analysis.trials import statistics
 
 
 class Sides(typing.NamedTuple):
-    """Names and table.Tables of the two compared sides."""
+    """The two compared sides: their names, and their table.Tables a and b."""
     name_a: str
     name_b: str
     a: object
@@ -25,7 +31,7 @@ class Sides(typing.NamedTuple):
 
     @property
     def case(self):
-        """Case of the rows."""
+        """Case of the rows of the comparison, as a text."""
         return f'{self.name_a} against {self.name_b}'
 
     @property
@@ -41,18 +47,31 @@ class Sides(typing.NamedTuple):
 
 
 def names(*plans) -> tuple:
-    """Return a name for each of some plan.Plans: its scenario and the parameters of --param, as far as they differ.
+    """Return a name for each of several plan.Plans.
 
-    Plans that do not differ have the name of their scenario.
+    The name states the scenario, if the plans have different scenarios, and the parameters of --param that differ
+    between the plans. Plans that do not differ have the name of their scenario.
     """
-    firsts = [plan.scenario(0) for plan in plans]
+    first_scenarios = [plan.scenario(0) for plan in plans]
     keys = dict.fromkeys(change.partition('=')[0] for plan in plans for change in plan.overrides
                          if change.partition('=')[0] not in plan.varied)
-    given = {key: [_value(chosen, key) for chosen in firsts] for key in keys}
+    given = {key: [_value(chosen, key) for chosen in first_scenarios] for key in keys}
     different = {key: values for key, values in given.items() if len(set(values)) > 1}
     several = len({plan.name for plan in plans}) > 1
     return tuple(' '.join([plan.name] * several + [f'{key}={values[i]}' for key, values in different.items()
                                                    if values[i]]) or plan.name for i, plan in enumerate(plans))
+
+
+def unchanged(first, second) -> str:
+    """Return a sentence if two plan.Plans have the same parameters in every trial, else ''."""
+    a, b = first.scenario(0), second.scenario(0)
+    members = [node for node in a.nodes if node != 'operator']  # the operator has only the parameters of the header
+    if not (a.nodes == b.nodes and a.header == b.header and first.varied == second.varied and
+            all(a.node_parameters(node) == b.node_parameters(node) for node in members)):
+        return ''
+    texts = [text for text in dict.fromkeys((*first.overrides, *second.overrides))
+             if not (text in first.overrides and text in second.overrides)]
+    return 'Both sides have the same parameters' + (f': {" ".join(texts)} changes nothing.' if texts else '.')
 
 
 def _value(chosen, key):
@@ -65,9 +84,9 @@ def _value(chosen, key):
 
 
 def ranked(tables, by) -> list:
-    """Return the places of table.Tables from the best to the worst by the mean of a result over their common trials.
+    """Return the indices of table.Tables from the best to the worst, by the mean of the result `by`.
 
-    Without a common trial the order stays.
+    Only trials count in which all tables have the result. Without such a trial the order stays.
     """
     columns = np.array([table.column(by) for table in tables])
     common = np.isfinite(columns).all(axis=0)
@@ -78,7 +97,10 @@ def ranked(tables, by) -> list:
 
 
 def gain(a, b, larger):
-    """Return (gain, low, high) [%] of a over b (n,), neither below 0; larger: True if larger values are better."""
+    """Return (gain, low, high) [%] of a (n,) over b (n,), as the module states; low, high: 95 % interval.
+
+    a and b must not contain a value below 0. larger: True if larger values are better.
+    """
     def gain_of_sums(sum_a, sum_b):
         return 100.0 * (sum_a / sum_b - 1.0 if larger else 1.0 - sum_a / sum_b)
 
@@ -90,12 +112,12 @@ def gain(a, b, larger):
 
 
 def wins(a, b, larger):
-    """Return (share, low, high) [%] of the pairs in which a is better than b (n,)."""
+    """Return (share, low, high) [%] of the pairs in which a (n,) is better than b (n,); low, high: 95 % interval."""
     return statistics.rate(int(np.sum(a > b if larger else a < b)), len(a))
 
 
 def has_gain(result, a, b):
-    """Return True if a gain in percent of b is meaningful.
+    """Return True if a gain in percent of b has a meaning for a result.
 
     A gain needs at least two pairs, and at least two values of b above 0. There is no gain for dB or negative values,
     because a ratio has no meaning on these scales.
@@ -104,7 +126,7 @@ def has_gain(result, a, b):
 
 
 def rows(sides):
-    """Return the rows of difference a - b, gain and wins of each result that both Sides have."""
+    """Return the rows of --json: difference a - b, gain and wins of each result that both sides have."""
     found = []
     for name in sides.results:
         a, b = sides.pairs(name)

@@ -1,8 +1,8 @@
-"""Distributions of varied parameters, each a row with its quantile function.
+"""Distributions by which trials vary a parameter: `pedestal trials --vary NODE.KEY=KIND(numbers)`.
 
-The text NODE.KEY=KIND(numbers) varies the value of a parameter; NODE.KEY=KIND(numbers)x varies a factor of its value
-in the scenario. Each draw is the quantile of a number u between 0 and 1. Independent draws and the points of a Sobol
-sequence therefore use the same functions.
+NODE.KEY=KIND(numbers) draws the value of the parameter. With an x at the end, NODE.KEY=KIND(numbers)x, it draws a
+factor of the value in the scenario. Each draw is the quantile of a number u between 0 and 1. The number u is random,
+or a coordinate of a point of a Sobol sequence; the functions of this module serve both.
 """
 import re
 import typing
@@ -16,12 +16,13 @@ from pedestal_common.text_files import plain_yaml
 
 
 class Kind(typing.NamedTuple):
-    """A kind of distribution.
+    """A kind of distribution: a row of DISTRIBUTION_KINDS.
 
-    usage      its text
-    arguments  number of arguments, None for one or more
+    usage      text of its syntax
+    arguments  number of its arguments, None for one or more
     quantile   quantile(u (n,), arguments) -> values (n,)
-    extremes   extremes(arguments) -> values to check against the range of a parameter, None without bounds
+    extremes   extremes(arguments) -> values that must all be in the range of the parameter: low and high, or all
+               options of a `choice`. None for a distribution without bounds.
     """
     usage: str
     arguments: int | None
@@ -39,18 +40,21 @@ DISTRIBUTION_KINDS = {
 }
 """{name of a distribution: Kind}."""
 
-_WRITTEN = re.compile(r'(\w+)\((.*)\)(x?)')
+_TEXT_PATTERN = re.compile(r'(\w+)\((.*)\)(x?)')
+"""Pattern of the text of a distribution: name, arguments, x for a factor."""
 
 
 class VaryError(ValueError):
-    """Invalid text of --vary; one line that names the text."""
+    """Error of an invalid --vary. Its text is one line that names the --vary."""
 
 
 class Distribution(typing.NamedTuple):
-    """The distribution of a parameter.
+    """The distribution of one parameter.
 
-    text: as given; kind: key of DISTRIBUTION_KINDS; arguments: numbers, or any values of a choice; factor: True for a
-    factor of the value in the scenario.
+    text       text that the user gave
+    kind       key of DISTRIBUTION_KINDS
+    arguments  numbers of the distribution, or the values of a `choice`
+    factor     True if a draw is a factor of the value in the scenario
     """
     text: str
     kind: str
@@ -58,8 +62,10 @@ class Distribution(typing.NamedTuple):
     factor: bool
 
     def draw(self, u, whole=False):
-        """Return values (n,) at u (n,) between 0 and 1; whole: True for an integer parameter, low and high
-        included."""
+        """Return values (n,) at the numbers u (n,) between 0 and 1.
+
+        whole: True for an integer parameter. A uniform distribution then includes low and high.
+        """
         if whole and self.kind == 'uniform':
             low, high = self.arguments
             return np.floor(low + u * (high - low + 1.0))
@@ -67,13 +73,13 @@ class Distribution(typing.NamedTuple):
 
     @property
     def extremes(self):
-        """Values to check against the range of the parameter, None without bounds."""
+        """Values (or factors) that bound or list all draws, see Kind.extremes; None without bounds."""
         return DISTRIBUTION_KINDS[self.kind].extremes(self.arguments)
 
 
 def parse(text) -> Distribution:
     """Return the Distribution of a text such as 'normal(1, 0.1)x'. Raises VaryError."""
-    match = _WRITTEN.fullmatch(text.strip())
+    match = _TEXT_PATTERN.fullmatch(text.strip())
     usage = ', '.join(kind.usage for kind in DISTRIBUTION_KINDS.values())
     if not match:
         raise VaryError(f'{text!r}: must be one of {usage}; a factor has an x at the end')
@@ -97,6 +103,8 @@ def parse(text) -> Distribution:
 
 
 def _number(text, value):
+    """Return a value as a float. Raises VaryError if it is not a finite number. text: of the distribution, for the
+    error."""
     try:
         number = float('nan' if isinstance(value, bool) else value)
     except (TypeError, ValueError):

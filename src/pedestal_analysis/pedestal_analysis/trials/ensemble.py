@@ -1,8 +1,9 @@
-"""Run the trials of plans and write their rows, with the same numbers for any workers and after any interruption.
+"""Execution of trials: run each trial of a plan, and write its row of results to a table.
 
-The row of a trial contains the results of `pedestal run` for each beam. They are measured on the closed loop without
-ROS, which has the same data as the lockstep recording of the trial's command. Trials ashore run side by side
-(pedestal_bringup.loop.side_by_side); trials on a ship or with an array run one after the other.
+The numbers do not depend on the number of workers, nor on an interruption. The row of a trial contains the results of
+`pedestal run` for each beam. The trial runs in the closed loop without ROS, which has the same data as the lockstep
+recording of the trial's command. Trials ashore run side by side (pedestal_bringup.loop.side_by_side). Trials on a ship
+or with an array run one after the other.
 """
 import contextlib
 import functools
@@ -17,29 +18,32 @@ from pedestal_bringup.loop import closed_loop, memory_recording, side_by_side
 from pedestal_common.wire import records
 
 MIN_BATCH_TRIALS = 4
-"""Smallest number of trials in a batch of a worker.
+"""Smallest number of trials in a batch, the work of one worker at a time.
 
-Where trials cannot run side by side, a batch has this number of trials. A killed worker then loses at most this many.
+Where trials cannot run side by side, a batch has this number of trials. A killed worker then loses no more trials.
 """
 
 TRIAL_RESULTS = tuple(result.name for result in results.RESULTS if result.part not in ('run', 'supervised'))
-"""Names of the results of a trial: those of `pedestal run` except the results on its processes."""
+"""Names of the results of a trial: all results of `pedestal run`, except those on its processes."""
 
 MEASURED_TOPICS = ('joint_states', 'adu/truth', 'tracking_receiver/angle_error', 'target/truth', 'acu/rate_command',
                    'acu/estimate', 'acu/reference', 'acu/filter', 'acu/mode', 'adu/state')
-"""Topics that the results and verdicts ashore need.
+"""Topics that the results and verdicts of trials ashore need.
 
-acu/rate_command is in the list although no result reads its numbers: a change of acu/mode has the stamp of the
-acu/rate_command of its step (pedestal_common.node.unit.announced).
+No result reads the numbers of acu/rate_command. Because a change of acu/mode has the stamp of the acu/rate_command of
+its step (pedestal_common.node.unit.announced), this topic is in the list too.
 """
 
 
 class TrialError(ValueError):
-    """A trial cannot be run; one line that names the trial."""
+    """Error of a trial that cannot be run. Its text is one line that names the trial."""
 
 
 def open_table(plan, folder, name='trials') -> Table:
-    """Return the table.Table of the trials of a plan.Plan in a folder; its context opens the files."""
+    """Return the table.Table of the trials of a plan.Plan in a folder; `with` opens its files.
+
+    name: name of the files without extension.
+    """
     prefixes = plan.scenario(0).prefixes
     heads = [f'{prefix}{result}' for prefix in prefixes for result in TRIAL_RESULTS]
     return Table(folder, name, {**plan.identity, 'sources': monte_carlo.sources()}, plan.varied, heads,
@@ -57,17 +61,17 @@ def _trial(plan, i):
 
 @functools.lru_cache(maxsize=1)
 def _memory(trials, steps):
-    """Return the memory of trials side by side, kept for all batches.
+    """Return the memory (trials, steps) of the records of trials that run side by side; all batches use it again.
 
-    Because new memory costs up to a tenth of the time of the trials, the memory is reused.
+    Because new memory costs up to a tenth of the time of the trials, one memory serves all batches.
     """
     return np.empty((trials, steps), records.of(*MEASURED_TOPICS))
 
 
 def _batch(plan):
-    """Return the results of each trial of the part of a Plan that one worker gets.
+    """Return [values of a trial] for the trials of a Plan, which is the part of a plan that one worker receives.
 
-    The order is that of TRIAL_RESULTS for each beam, None for a missing result, then the column WHY of each beam.
+    The values are the TRIAL_RESULTS of each beam, None for a missing result, then the text of WHY of each beam.
     """
     scenarios, found, whys = [], [[] for _ in range(plan.runs)], [[] for _ in range(plan.runs)]
     for i in range(plan.runs):
@@ -78,7 +82,7 @@ def _batch(plan):
         for i, chosen in enumerate(scenarios):
             with _trial(plan, i):
                 loops.append(closed_loop.Loop(chosen, beam))
-        # Single loops run one by one when `next` asks for them, so only one Run is in memory.
+        # The loops that run one after the other are lazy: each runs at its `next`, so only one Run is in memory.
         runs = (iter(side_by_side.runs(loops, MEASURED_TOPICS, _memory(len(loops), loops[0].steps)))
                 if side_by_side.can_run_parallel(loops) else (loop.run() for loop in loops))
         for i, chosen in enumerate(scenarios):
@@ -97,9 +101,10 @@ def _batch_size(plan):
 
 
 def run_missing_trials(plans, tables, pool, progress=lambda done, total: None):
-    """Run the trials of plans that their tables lack, and append the rows; several plans advance together.
+    """Run the trials of plans that are missing in their tables, and append their rows to the tables.
 
-    pool: monte_carlo.Pool. progress(trials done, all trials) is called after each batch. Raises TrialError.
+    The batches of several plans alternate, so all plans advance together. pool: monte_carlo.Pool. progress(number of
+    trials done, number of all trials) is called after each batch. Raises TrialError.
     """
     pieces, size = [], min(map(_batch_size, plans))
     for first in range(0, max(plan.runs for plan in plans), size):

@@ -1,8 +1,8 @@
-"""Parallel runs on the cores of this machine or on a Dask cluster.
+"""Pool of workers that run studies and trials in parallel, on the cores of this machine or on a Dask cluster.
 
-A study splits its runs into batches and adds their results in order. Because size and seeds of the batches do not
-depend on the workers, the numbers are equal to the last bit on any pool. To save memory, a batch returns sums and a
-few numbers of each run instead of records.
+A study splits its runs into batches, and takes the results of the batches in order. Because size and seeds of the
+batches do not depend on the workers, the numbers are equal to the last bit on any pool. To save memory, a batch
+returns sums and a few numbers of each run instead of records.
 """
 import contextlib
 import logging
@@ -19,17 +19,19 @@ from joblib.externals import loky
 from pedestal_common.law_cache import COLUMN_PACKAGES, UPPER_PACKAGES, digest
 
 SCHEDULER_TIMEOUT_S = 10.0
-"""Longest wait for a scheduler, and for its first worker [s]."""
+"""Longest wait for the Dask scheduler, and for its first worker [s]."""
 
 
 def batches(runs, size):
-    """Return the (first, count) of each batch of at most `size` runs."""
+    """Return [(number of the first run, number of runs)] of the batches of at most `size` runs."""
     return [(first, min(size, runs - first)) for first in range(0, runs, size)]
 
 
 class Pool:
-    """Workers for `map`: local processes (None: one per core), or those of a Dask scheduler, 'tcp://host:port'.
+    """Workers for `map`: local processes, or the workers of a Dask cluster.
 
+    workers: number of local processes, None for one per core; scheduler: address of a Dask scheduler, such as
+    'tcp://host:port', None for local processes.
     Use as a context; a single local worker is this process and needs no context. Raises ValueError for less than one
     worker, RuntimeError if Dask is missing or no scheduler answers.
     """
@@ -44,7 +46,7 @@ class Pool:
         self._stack = contextlib.ExitStack()
 
     def __enter__(self):
-        # After a study is stopped, joblib warns of wasted work at any later time.
+        # joblib warns of lost work, even a while after a study was stopped on purpose.
         warnings.filterwarnings('ignore', '.*tasks (which were|have been)', UserWarning, r'joblib\.parallel')
         if self.scheduler is None:
             if self.workers > 1:
@@ -61,7 +63,8 @@ class Pool:
     def map(self, function, items, progress=lambda share, text: None):
         """Yield function(item) of each item, in their order.
 
-        function: of a module, so that it can be sent to workers. progress(share done, text) is called after each item.
+        function: a function of a module, because others cannot be sent to workers. progress(share of the items that
+        are done [-], text) is called after each item.
         """
         items = list(items)
         options = {'n_jobs': -1} if self.scheduler else {'n_jobs': min(self.workers, len(items) or 1),
@@ -74,9 +77,9 @@ class Pool:
             yield result
 
     def of_cases(self, function, cases, runs, size, progress=lambda share, text: None):
-        """Return {case: values of its runs, arrays (runs, ...)}.
+        """Return {case: array (runs, ...) of the values of its runs}, for several cases of a study.
 
-        function((case, first, count)) returns the values of a batch of at most `size` runs.
+        function((case, number of the first run, number of runs)) returns the values of a batch of at most `size` runs.
         """
         pieces = batches(runs, size)
         done = self.map(function, [(case, *piece) for case in cases for piece in pieces], progress)
@@ -85,11 +88,13 @@ class Pool:
 
 @contextlib.contextmanager
 def _deferred_interrupt():
-    """Protect workers that start now from Ctrl-C, which reaches all processes of a terminal; this process ends them.
+    """Protect the workers that start inside this context from Ctrl-C, whose signal reaches all processes of a
+    terminal.
 
-    Because the resource trackers that start with the first worker unblock the signal, they are started first. In this
-    process the signal must not interrupt the start of the workers. A thread of numpy may still receive the signal, so
-    KeyboardInterrupt is raised afterwards.
+    The workers inherit the blocked signal, so only this process receives it, and ends the workers. The resource
+    trackers of Python and loky unblock the signal when they start; therefore they start first. The signal must also
+    not interrupt this process while the workers start. Because a thread of numpy may still receive it,
+    KeyboardInterrupt is raised at the end of the context.
     """
     multiprocessing.resource_tracker.ensure_running()
     loky.backend.resource_tracker.ensure_running()
@@ -107,7 +112,7 @@ def _deferred_interrupt():
 
 @contextlib.contextmanager
 def _manager_in_silence():
-    """Suppress the KeyError that the dispatch thread of loky prints if it runs while its workers are ended."""
+    """Suppress the KeyError that a thread of loky (the process pool of joblib) prints while its workers are ended."""
     before = threading.excepthook
     threading.excepthook = lambda failure: (
         None if failure.thread and failure.thread.name == 'ExecutorManagerThread' else before(failure))
@@ -122,6 +127,10 @@ def _end_local():
 
 
 def _client(address):
+    """Return the client of the Dask scheduler at an address. Raises RuntimeError.
+
+    Its workers must have equal versions of the pedestal packages and of numba, because the numbers depend on them.
+    """
     try:
         import distributed
     except ImportError:
@@ -148,5 +157,5 @@ def _client(address):
 
 
 def sources():
-    """Return a digest of the sources of the packages and the version of numba, which determine the numbers."""
+    """Return a digest of the sources of all packages and of the version of numba, which determine the numbers."""
     return digest(('pedestal_common', *COLUMN_PACKAGES, *UPPER_PACKAGES))

@@ -1,8 +1,8 @@
-"""Plan of the trials of a scenario: seed and changed parameters of each trial, all known before the first.
+"""Plan of the trials of a scenario: seed and varied parameters of each trial, all drawn before the first trial runs.
 
-Trial i has the seed first + i. Its random numbers depend on that seed alone, or are point i of a scrambled Sobol
-sequence (scipy.stats.qmc; Owen, Journal of Complexity 14 (1998) 466). A plan of more trials therefore begins with the
-same trials.
+Trial i has the seed `first + i`, where `first` is the seed of the first trial. The random numbers that determine its
+parameters depend on this seed alone, or are point i of a scrambled Sobol sequence (scipy.stats.qmc; Owen, Journal of
+Complexity 14 (1998) 466). A plan of more trials therefore begins with the trials of a plan of fewer trials.
 """
 import dataclasses
 import hashlib
@@ -20,21 +20,24 @@ from pedestal_common.graph import nodes
 from pedestal_common.text_files import csv_table, plain_yaml
 
 PLAN_HEADER_KEYS = ('seed', 'duration', 'pacing', 'beam', 'beams')
-"""Keys of the header that are equal for all trials or follow from the number of the trial; they cannot vary."""
+"""Keys of the header of a scenario that trials cannot vary.
+
+Their values are equal for all trials, or follow from the number of the trial.
+"""
 
 
 @dataclasses.dataclass(frozen=True)
 class Plan:
     """Trials of a scenario.
 
-    source         scenario in the command
-    name, content  of the scenario file
-    overrides      texts 'node.key=value' for all trials
+    source         name or path of the scenario, as the user gave it
+    name, content  name and text of the scenario file
+    overrides      texts 'node.key=value' of parameters that are changed in all trials
     duration       [s], None for that of the scenario
-    seed           of the first trial
+    seed           seed of the first trial
     runs           number of trials
-    varied         {node.key: values of the trials}
-    texts          of --vary, part of the identity
+    varied         {node.key: list of the values in the trials}
+    texts          texts of --vary, which are part of the identity
     """
     source: str
     name: str
@@ -47,7 +50,7 @@ class Plan:
     texts: tuple
 
     def changes(self, i):
-        """Return the overrides of trial i."""
+        """Return the texts 'node.key=value' of all changed and varied parameters of trial i."""
         return (*self.overrides, *(scenario.override(name, values[i]) for name, values in self.varied.items()))
 
     def scenario(self, i):
@@ -55,34 +58,36 @@ class Plan:
         return scenario.parse(self.name, self.content, self.changes(i), self.seed + i, self.duration)
 
     def command(self, i):
-        """Return the command that runs trial i in the graph."""
+        """Return the command line that runs trial i with ROS nodes."""
         duration = [] if self.duration is None else ['--duration', repr(self.duration)]
         changes = [part for change in self.changes(i) for part in ('--param', change)]
         return shlex.join(['pedestal', 'run', self.source, '--seed', str(self.seed + i), *duration, *changes])
 
     def part(self, numbers):
-        """Return the Plan of consecutive trials, a range, numbered from 0."""
+        """Return the Plan of some consecutive trials; numbers: range of their numbers, from 0 on."""
         varied = {name: values[numbers.start:numbers.stop] for name, values in self.varied.items()}
         return dataclasses.replace(self, seed=self.seed + numbers.start, runs=len(numbers), varied=varied)
 
     @property
     def identity(self):
-        """{name: text} that identifies the trials of this plan, for any number of trials."""
+        """{name: text} that distinguishes the trials of this plan from others; it does not depend on their number."""
         return {'scenario': self.name, 'content': hashlib.sha256(self.content.encode()).hexdigest(),
                 '--param': ' '.join(self.overrides), '--vary': ' '.join(self.texts), '--seed': str(self.seed),
                 '--duration': str(self.duration)}
 
 
 def plan(source, runs=None, vary=(), overrides=(), seed=None, duration=None, sobol=False) -> Plan:
-    """Return the Plan of trials of a scenario, a name or a path.
+    """Return the Plan of trials of a scenario.
 
-    runs       number of trials, None for the rows of a table, else 100
+    source     name or path of the scenario
+    runs       number of trials; None: the number of rows of the tables in `vary`, or 100 without a table
     vary       texts 'node.key=distribution', or paths of .csv tables with parameters as columns and trials as rows
-    overrides  texts 'node.key=value'
-    seed       of the first trial, None for that of the scenario
+    overrides  texts 'node.key=value' of parameters that are changed in all trials
+    seed       seed of the first trial, None for that of the scenario
+    duration   [s], None for that of the scenario
     sobol      True for the points of a Sobol sequence instead of independent draws
 
-    Raises ScenarioError, VaryError, TableError if a trial could not be run.
+    Raises ScenarioError, VaryError or TableError if a trial could not be run.
     """
     name, content = scenario.text(source)
     nominal = scenario.parse(name, content, overrides, seed, duration)
@@ -121,7 +126,7 @@ def plan(source, runs=None, vary=(), overrides=(), seed=None, duration=None, sob
 
 
 def _drawn(text):
-    """Return (node.key, Distribution) of a --vary."""
+    """Return (node.key, Distribution) of the text of a --vary. Raises VaryError."""
     column, equals, distribution = text.partition('=')
     if not equals:
         raise VaryError(f'--vary {text!r}: must be NODE.KEY=DISTRIBUTION or the path of a .csv table')
@@ -132,7 +137,7 @@ def _drawn(text):
 
 
 def _table(path):
-    """Return {node.key: values of the trials} of a CSV file with a header."""
+    """Return {node.key: values in the trials} of a CSV file. Raises TableError."""
     with csv_table.opened(path) as reader:
         columns = {column: [] for column in reader.fieldnames or ()}
         for row in reader:
@@ -146,16 +151,20 @@ def _table(path):
 
 
 def _points(first, runs, count, sobol):
-    """Return numbers between 0 and 1 (runs, count)."""
+    """Return numbers between 0 and 1 (runs, count), for `count` varied parameters; first: seed of the first trial."""
     if sobol:
         return qmc.Sobol(count, seed=first).random_base2(math.ceil(math.log2(runs)))[:runs]
-    # A separate spawn key makes the draws independent of the noise of the same seed.
+    # The noise in the run uses the same seed. The spawn key makes the draws independent of this noise.
     return np.array([np.random.default_rng(np.random.SeedSequence(first + i, spawn_key=(0,))).random(count)
                      for i in range(runs)])
 
 
 def field(nominal, column, option='--vary'):
-    """Return the dataclass field of a parameter node.key that trials can vary. Raises VaryError, ScenarioError."""
+    """Return the dataclass field of a parameter node.key, after a check that trials can vary it.
+
+    nominal: scenario.Scenario of the unvaried trials; column: 'node.key'; option: name of the option for the error.
+    Raises VaryError, ScenarioError.
+    """
     node, _, key = column.partition('.')
     scenario.parameters_of(node)
     if node == 'scenario' and key in PLAN_HEADER_KEYS:
@@ -171,18 +180,18 @@ def field(nominal, column, option='--vary'):
 
 
 def _parameters(nominal, node):
-    """Return the parameter dataclass of a node, or of the header, of a scenario."""
+    """Return the parameters (dataclass) of a node in a scenario.Scenario, for the node 'scenario' its header."""
     return nominal.header if node == 'scenario' else nominal.node_parameters(node)
 
 
 def value_in(nominal, column):
-    """Return the value of node.key in a scenario.Scenario."""
+    """Return the value of the parameter `column`, a 'node.key', in a scenario.Scenario."""
     node, _, key = column.partition('.')
     return parameters.as_dict(_parameters(nominal, node))[key]
 
 
 def _values(nominal, column, distribution, u):
-    """Return the values of a drawn parameter in the trials, at u (runs,)."""
+    """Return the values of a parameter in the trials, drawn from a Distribution at the numbers u (runs,) in 0 to 1."""
     whole = field(nominal, column).type is int
     if distribution.factor:
         value = value_in(nominal, column)
@@ -195,12 +204,18 @@ def _values(nominal, column, distribution, u):
 
 
 def _rounded(values, whole):
-    """Return values, rounded for an integer parameter; texts stay, because the check of the parameter refuses them."""
+    """Return a list of values, rounded if `whole` (for an integer parameter).
+
+    Texts stay unchanged, because the later check of the parameter refuses them.
+    """
     return [round(value) if whole and isinstance(value, float) else value for value in values]
 
 
 def _check(nominal, made, column, distribution):
-    """Raise VaryError unless each value of a varied parameter is allowed with the other parameters of the scenario."""
+    """Raise VaryError unless each value of a varied parameter is allowed with the other parameters of the scenario.
+
+    nominal: Scenario without the variation; made: the Plan; column: 'node.key'; distribution: None for a table.
+    """
     values = made.varied[column]
     numbers = all(isinstance(value, int | float) and not isinstance(value, bool) for value in values)
     extremes = [min(values), max(values)] if numbers else list(dict.fromkeys(values))

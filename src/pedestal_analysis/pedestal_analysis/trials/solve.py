@@ -1,9 +1,14 @@
 """Search for the value of a parameter at which the mean of a result over trials reaches a limit.
 
-First the trials run at values that fill the range. Where exactly one pair of neighbours has the limit between its
-means, the pair is bisected. Without such a pair the search goes to the edges of the values at which the result is
-measured, because a drive that trips may hide the limit. All values have the same seeds and draws, so the mean is a
-smooth function of the value wherever the law is.
+This is `pedestal trials --solve PARAMETER --until 'RESULT = LIMIT'`. First the trials run at GRID_COUNT values that
+fill the range of the parameter. If the limit lies between the means at exactly one pair of neighbouring values, the
+search bisects this pair.
+
+Because a drive that trips has no result, it may hide the limit. A search without such a pair therefore bisects between
+the values with a result and their neighbours without a result.
+
+The trials at all values have equal seeds and draws. Therefore the mean is a smooth function of the value, except where
+the control law itself has a jump.
 """
 import contextlib
 import itertools
@@ -21,23 +26,26 @@ from pedestal_common.graph import nodes
 DEFAULT_RUNS = 12
 """Number of trials at each value, unless the user gives another."""
 GRID_COUNT, MAX_BISECTIONS = 9, 12
-"""Number of values that fill the range, and largest number of bisections."""
+"""Number of values that fill the range; largest number of bisections."""
 BRACKET_TOLERANCE = 0.01
-"""Width of the last bracket over its upper end at which the search ends [-]."""
+"""Distance of two neighbouring values, divided by the larger absolute value, below which the search ends [-]."""
 MAX_LINEAR_RATIO = 20.0
-"""Largest ratio of the ends of a positive range that is filled evenly; a wider range is filled in equal ratios."""
+"""Largest ratio of the ends of a positive range whose values have equal differences [-].
+
+The values of a wider range have equal ratios.
+"""
 MIN_MEASURED_SHARE = 0.5
-"""Smallest share of the trials with the result at a value whose mean counts [-]."""
+"""Smallest share of the trials at a value that must have the result, so that the mean at this value counts [-]."""
 
 
 class Goal(typing.NamedTuple):
-    """Limit that a result is to reach: its name and its value."""
+    """Name of a result, and limit that its mean should reach."""
     result: str
     limit: float
 
 
 class Range(typing.NamedTuple):
-    """Parameter 'node.key' with the ends of its range; whole: True for an integer parameter; unit."""
+    """Range of the search. key: parameter 'node.key'; low, high: ends; whole: True for an integer parameter; unit."""
     key: str
     low: float
     high: float
@@ -46,8 +54,12 @@ class Range(typing.NamedTuple):
 
 
 class Tried(typing.NamedTuple):
-    """Trials at a value: the row of intervals.estimated of the mean, None if the scenario refused the value; why: the
-    text of the refusal; measured: True if the mean counts."""
+    """Trials at one value of the parameter.
+
+    row        row of --json of the mean (intervals.estimated); None if the scenario refused the value
+    why        text of the refusal, or ''
+    measured   True if the mean counts, see MIN_MEASURED_SHARE
+    """
     value: float
     row: dict | None
     why: str
@@ -55,12 +67,12 @@ class Tried(typing.NamedTuple):
 
     @property
     def mean(self):
-        """Mean of the result, NaN where it does not count."""
+        """Mean of the result, NaN if it does not count."""
         return self.row['value'] if self.measured else math.nan
 
 
 class Solution(typing.NamedTuple):
-    """value: found value, NaN without one; tried: all Tried in order of their values; sentence."""
+    """Outcome of a search. value: found value, or NaN; tried: all Tried by rising value; sentence: the outcome."""
     value: float
     tried: list
     sentence: str
@@ -77,9 +89,9 @@ def goal(text, known) -> Goal:
 
 
 def search_range(text, chosen) -> Range:
-    """Return the Range of a text NODE.KEY or NODE.KEY=LOW:HIGH in a scenario.Scenario. Raises VaryError.
+    """Return the Range of a text NODE.KEY=LOW:HIGH; `chosen`: scenario.Scenario. Raises VaryError.
 
-    Without ends the range is that of the parameter.
+    The Range of a text NODE.KEY is the range of the parameter.
     """
     key, equals, ends = text.partition('=')
     field = plans.field(chosen, key, '--solve')
@@ -94,20 +106,22 @@ def search_range(text, chosen) -> Range:
 
 
 def table_prefix(key):
-    """Return the beginning of the names of the tables of a search over the parameter `key`."""
+    """Return the prefix of the file names of the tables of trials, for a search over the parameter `key`."""
     return f'solve_{key.replace("/", "_")}_'
 
 
 def _between(low, high, ratio):
+    """Return the middle of two values: the geometric mean if `ratio` is True, else the arithmetic mean."""
     return math.sqrt(low * high) if ratio else 0.5 * (low + high)
 
 
 def _in_ratios(wanted):
+    """Return True if the values in a Range have equal ratios, see MAX_LINEAR_RATIO."""
     return wanted.low > 0.0 and wanted.high / wanted.low > MAX_LINEAR_RATIO
 
 
 def _grid(wanted):
-    """Return the values that fill a Range, in order."""
+    """Return the GRID_COUNT values that fill a Range, in order; fewer for a short range of integers."""
     fill = np.geomspace if _in_ratios(wanted) else np.linspace
     values = fill(wanted.low, wanted.high, GRID_COUNT)
     values[[0, -1]] = wanted.low, wanted.high
@@ -115,10 +129,12 @@ def _grid(wanted):
 
 
 class Search:
-    """Search over a Range for a Goal.
+    """Search over the Range `wanted` for the Goal `aim`.
 
-    make_plan(overrides) -> plan.Plan of the trials with these changes; folder: for the tables, one for each value;
-    pool: monte_carlo.Pool; progress: as of ensemble.run_missing_trials.
+    make_plan   make_plan(overrides) -> plan.Plan of the trials with these changed parameters
+    folder      folder of the tables of trials, one table for each value
+    pool        monte_carlo.Pool
+    progress    function, see ensemble.run_missing_trials
     """
 
     def __init__(self, make_plan, wanted, aim, folder, pool, progress=lambda done, total: None):
@@ -127,7 +143,7 @@ class Search:
         self.tried: list = []
 
     def _try(self, values):
-        """Run the trials at some values, all together. Return their Tried."""
+        """Run the trials at several values at once. Return the Tried of each value."""
         made, refused = {}, {}
         for value in values:
             try:
@@ -148,6 +164,7 @@ class Search:
         return f'{table_prefix(self._wanted.key)}{value!r}'
 
     def _tried(self, value, table):
+        """Return the Tried of a value from the table.Table of its trials."""
         name = next(name for name in table.results if self._aim.result in (name, nodes.plain(name)))
         values = table.column(name)
         known = np.isfinite(values)
@@ -179,12 +196,18 @@ class Search:
                         f'{statistics.coverage(low.row)} trials{self._gaps()}')
 
     def _crossings(self, tried):
-        """Return the pairs of neighbours with the limit between their means, or on the first of them."""
+        """Return the pairs of neighbouring Tried whose means lie on different sides of the limit.
+
+        A mean equal to the limit counts as above the limit.
+        """
         return [(a, b) for a, b in zip(tried, tried[1:]) if a.measured and b.measured
                 and (a.mean < self._aim.limit) != (b.mean < self._aim.limit)]
 
     def _at_edges(self):
-        """Bisect each pair of neighbours of which one has the result. Return the first crossings found."""
+        """Bisect between each value with the result and a neighbouring value without the result.
+
+        Return the first pairs of `_crossings` that appear, [] if none appears.
+        """
         for a, b in [(a, b) for a, b in zip(self.tried, self.tried[1:]) if a.measured != b.measured]:
             while (middle := self._middle(a, b)) is not None:
                 one, = self._try([middle])
@@ -194,14 +217,17 @@ class Search:
         return []
 
     def _middle(self, low, high):
-        """Return the value between two Tried, None if they are as near as BRACKET_TOLERANCE."""
+        """Return the middle value between two Tried, None if their distance is within BRACKET_TOLERANCE."""
         middle = _between(low.value, high.value, _in_ratios(self._wanted))
         middle = round(middle) if self._wanted.whole else float(f'{middle:.6g}')
         near = high.value - low.value <= BRACKET_TOLERANCE * max(abs(low.value), abs(high.value))
         return None if near or not low.value < middle < high.value else middle
 
     def _bisected(self, low, high):
-        """Return the narrowest bracket (Tried, Tried) inside a pair of neighbours; (None, None) if it has a gap."""
+        """Return the narrowest pair (Tried, Tried) around the limit, inside a pair of neighbours.
+
+        Return (None, None) if most trials at a value between them have no result.
+        """
         for _ in range(MAX_BISECTIONS):
             middle = self._middle(low, high)
             if middle is None:
@@ -225,12 +251,14 @@ class Search:
         return Solution(math.nan, self.tried, text + self._gaps())
 
     def _unsteady(self, what, crossings):
-        """Return the Solution of a result that reaches its limit at several values, or beside values without it."""
+        """Return the Solution of a result that reaches its limit at several values, or next to values without a
+        result.
+        """
         places = ', '.join(f'between {a.value:.4g} and {b.value:.4g}' for a, b in crossings)
         return Solution(math.nan, self.tried, f'{what} is not reached steadily: {places}{self._gaps()}')
 
     def _gaps(self):
-        """Return the text of the values at which fewer than half of the trials have the result, '' for none."""
+        """Return the text about the values at which most trials have no result, '' if there are none."""
         parts = []
         for measured, group in itertools.groupby(self.tried, key=lambda one: one.measured):
             values = [f'{one.value:.4g}' for one in group]
@@ -240,5 +268,5 @@ class Search:
 
 
 def reason(one):
-    """Return the text of the trials behind a Tried."""
+    """Return the text on the trials of a Tried: the refusal of its value, or the number of trials with the result."""
     return one.why or statistics.coverage(one.row)

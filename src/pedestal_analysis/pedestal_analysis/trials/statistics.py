@@ -1,20 +1,24 @@
-"""Statistics of trials: percentiles, rates and sensitivities of the results, each with its 95 % interval.
+"""Statistics over trials: percentiles, rates and sensitivities of the results, each with its 95 % interval.
 
-percentile   from order statistics (scipy.stats.quantile_test), for any distribution of the result
-rate         of a yes or no, by Clopper and Pearson (Biometrika 26 (1934) 404)
-sensitivity  of a result to a varied parameter: Spearman's rank correlation r, -1 to 1, with the interval
+percentile   Percentile of a result. The interval comes from order statistics (scipy.stats.quantile_test), and holds
+             for any distribution of the result.
+rate         Share of the trials for which a statement is true. The interval is that of Clopper and Pearson (Biometrika
+             26 (1934) 404).
+sensitivity  Dependence of a result on a varied parameter. For a parameter with numbers it is Spearman's rank
+             correlation r, from -1 to 1. Its interval is that of Bonett and Wright (Psychometrika 65 (2000) 23), for n
+             trials:
 
                  tanh(artanh r -+ 1.96 sqrt((1 + r^2 / 2) / (n - 3)))
 
-             of Bonett and Wright (Psychometrika 65 (2000) 23). A parameter whose values are texts has no order. Its
-             sensitivity is the share eta squared, 0 to 1, of the variance of the result's ranks that the texts
-             explain:
+             A parameter whose values are texts has no order. Its sensitivity is eta squared, from 0 to 1: the share of
+             the variance of the result's ranks that the texts explain (Tomczak, Tomczak, Trends in Sport Sciences 1
+             (2014) 19):
 
                  (H - k + 1) / (n - k)
 
-             H is the statistic of Kruskal and Wallis, k the number of texts, n the number of trials (Tomczak, Tomczak,
-             Trends in Sport Sciences 1 (2014) 19). The interval is that of an analysis of variance of the ranks, by
-             its noncentral F (Steiger, Psychological Methods 9 (2004) 164)
+             H is the statistic of Kruskal and Wallis, k the number of different texts, n the number of trials. The
+             interval is that of an analysis of variance of the ranks, by its noncentral F distribution (Steiger,
+             Psychological Methods 9 (2004) 164).
 """
 import collections
 import math
@@ -31,17 +35,22 @@ from pedestal_common.parameters import did_you_mean
 PERCENTILES = (1, 5, 25, 50, 75, 95, 99)
 """Reported percentiles [%]."""
 Z = float(stats.norm.ppf(0.5 + 0.5 * intervals.CONFIDENCE_LEVEL))
-"""Standard normal quantile of the confidence level [-]."""
+"""Standard normal quantile of the two-sided confidence level: 1.96 for 95 % [-]."""
 
 
 WHY = 'why'
-"""Column with the verdict on a trial that did not track, '' for a trial that tracked; of each beam."""
+"""Name of the column with the verdict on a trial that did not track, '' for a trial that tracked; one per beam."""
 
 
 class Question(typing.NamedTuple):
-    """A yes or no about a trial: name; the result that decides; holds(values (n,)) -> (n,) bool; a sentence.
+    """A statement that is true or false for each trial.
 
-    A trial without the result has the value NaN, for which `holds` is False: it counts as no.
+    name       name of the statement
+    result     name of the result that decides
+    holds      holds(values of the result (n,)) -> (n,) bool, True where the statement is true
+    sentence   the statement
+
+    A trial without the result has the value NaN, for which `holds` is False.
     """
     name: str
     result: str
@@ -63,24 +72,34 @@ TRIAL_QUESTIONS = (
 
 
 class Requirement(typing.NamedTuple):
-    """Criterion of the user on a result: text as given; name of the result; target of intervals.meets."""
+    """Criterion of the user for a result (--require).
+
+    text: the criterion; result: name of the result; target: text for intervals.meets.
+    """
     text: str
     result: str
     target: str
 
 
 _REQUIRED = re.compile(r'\s*(\S+)\s*(<=|>=|<|>)\s*(\S+)\s*')
+"""Pattern of the text of a Requirement: name of the result, sign, limit."""
 
 
 def check_result(option, name, known):
-    """Raise ValueError unless `known`, names of results, contains a name, of a beam or of any; option: as given."""
+    """Raise ValueError unless a name is in `known`, the names of the results, with or without the name of a beam.
+
+    option: option with its value, for the text of the error.
+    """
     if name not in known and name not in map(nodes.plain, known):
         raise ValueError(f'{option}: no trial has a result {name!r};{did_you_mean(name, known)} '
                          '`pedestal run --all --explain` explains the results')
 
 
 def requirement(text, known) -> Requirement:
-    """Return the Requirement of a text such as 'pointing_max_deg < 0.1'; known: results. Raises ValueError."""
+    """Return the Requirement of a text such as 'pointing_max_deg < 0.1'. Raises ValueError.
+
+    known: names of the results.
+    """
     match = _REQUIRED.fullmatch(text)
     usage = f"--require {text!r}: must be RESULT < LIMIT, with <, <=, > or >=, such as 'pointing_max_deg < 0.1'"
     if not match:
@@ -93,7 +112,7 @@ def requirement(text, known) -> Requirement:
 
 
 def number(text) -> float:
-    """Return the number in a text, NaN where there is none."""
+    """Return the number in a text, NaN if the text is no number."""
     try:
         return float(text)
     except ValueError:
@@ -101,7 +120,7 @@ def number(text) -> float:
 
 
 def of_requirements(case, table, requirements):
-    """Return the rows of the rates at which the trials of a table.Table meet some Requirements.
+    """Return the rows of --json: the rate at which the trials of a table.Table meet each of some Requirements.
 
     A trial without the result does not meet its requirement.
     """
@@ -118,19 +137,22 @@ def of_requirements(case, table, requirements):
 
 
 def percentile(values, share):
-    """Return (value, low, high) of a percentile, 0 to 100, of values (n,); NaN for a bound that n is too small for."""
+    """Return (value, low, high) of a percentile `share` [%] of values (n,); low, high: 95 % interval.
+
+    A bound is NaN if n is too small for it.
+    """
     interval = stats.quantile_test(values, p=share / 100.0).confidence_interval(intervals.CONFIDENCE_LEVEL)
     return np.percentile(values, share), interval.low, interval.high
 
 
 def rate(count, n):
-    """Return (share, low, high) [%] of `count` times yes out of n."""
+    """Return (share, low, high) [%] of `count` out of n trials; low, high: 95 % interval."""
     interval = stats.binomtest(count, n).proportion_ci(intervals.CONFIDENCE_LEVEL, method='exact')
     return 100.0 * count / n, 100.0 * interval.low, 100.0 * interval.high
 
 
 def rank_correlation(x, y):
-    """Return (r, low, high) of Spearman's correlation of x and y (n,).
+    """Return (r, low, high) of Spearman's rank correlation of x and y (n,); low, high: 95 % interval.
 
     All are NaN if x or y does not vary; low and high are NaN for n below four.
     """
@@ -145,7 +167,7 @@ def rank_correlation(x, y):
 
 
 def eta_squared(x, y):
-    """Return (eta squared, low, high) of the ranks of y (n,) over the categories x (n,).
+    """Return (eta squared, low, high) of the ranks of y (n,) over the categories x (n,); low, high: 95 % interval.
 
     All are NaN if x or y does not vary, or if each trial has a category of its own; low and high are NaN if the
     categories explain everything.
@@ -162,7 +184,7 @@ def eta_squared(x, y):
     f = (1.0 - unexplained) / (k - 1) / (unexplained / (n - k))
 
     def bound(probability):
-        """Return the share of the noncentral F that stays below f with a probability."""
+        """Return the eta squared for which the noncentral F distribution is below f with a probability."""
         def excess(noncentrality):
             return stats.ncf.cdf(f, k - 1, n - k, noncentrality) - probability
         high = 1.0
@@ -177,21 +199,22 @@ def eta_squared(x, y):
 
 
 def unit(name):
-    """Return the unit of a column of a table, such as beam_2/loss_s."""
+    """Return the unit of a result by its column in a table of trials, such as beam_2/loss_s."""
     return results.RESULT_BY_NAME[nodes.plain(name)].unit
 
 
 def case_of(case, name):
-    """Return (case, metric) of a column; the case contains the beam, as in `pedestal run`."""
+    """Return (case, metric) of the rows for a column of a table; the case contains the beam, as in `pedestal run`."""
     beam, plain = nodes.beam_of(name), nodes.plain(name)
     return f'{case}/{beam}'.rstrip('/'), plain
 
 
 def coverage_fields(table, name, known):
-    """Return the fields of a row that `coverage` reads, of a column of a table.Table.
+    """Return the fields `of` and `left_out` of a row of --json, which state how many trials have a result.
 
-    known: mask (n,) of the trials with the result. of: number of trials; left_out: {first word of `why`: count} of the
-    trials without the result.
+    table: table.Table; name: column of the result; known: mask (n,) of the trials with the result.
+    `of` is the number of all trials. `left_out` is {first word of the column `why`: number of trials}, for the trials
+    without the result.
     """
     words = collections.Counter(why.partition(':')[0] or 'not measured'
                                 for why, is_known in zip(table.text(why_column(name)), known) if not is_known)
@@ -199,7 +222,7 @@ def coverage_fields(table, name, known):
 
 
 def why_column(name):
-    """Return the column WHY of the beam of a column of results."""
+    """Return the name of the column WHY for the beam of a column of results."""
     return f'{nodes.beam_of(name)}/{WHY}'.lstrip('/')
 
 
@@ -222,8 +245,7 @@ def failures(table):
 def of_results(case, table):
     """Return the rows of mean, smallest value, percentiles and largest value of each result of a table.Table.
 
-    Each row states the number `of` trials, and of the trials without the result how many were `left_out` by the first
-    word of their column `why`.
+    Each row also has the fields of coverage_fields.
     """
     found = []
     for name in table.measured_results:
@@ -243,7 +265,10 @@ def of_results(case, table):
 
 
 def of_questions(case, table):
-    """Return the rows of the rates of TRIAL_QUESTIONS over a table.Table; a trial without the result counts as no."""
+    """Return the rows of the rates of the statements TRIAL_QUESTIONS over a table.Table.
+
+    A statement is false for a trial without its result.
+    """
     found = []
     for name in table.measured_results:
         own, metric = case_of(case, name)
@@ -258,7 +283,8 @@ def of_questions(case, table):
 def of_sensitivity(case, table):
     """Return the rows of the sensitivity of each result to each varied parameter of a table.Table.
 
-    It is eta_squared for a parameter of texts, else rank_correlation. A result that does not vary has no row.
+    The sensitivity is eta_squared for a parameter of texts, else rank_correlation. A result that does not vary has no
+    row.
     """
     found = []
     varied = {name: (eta_squared if table.categories(name) else rank_correlation, table.column(name))
@@ -276,22 +302,21 @@ def of_sensitivity(case, table):
 
 
 def larger_is_better(name):
-    """Return True if the target of a result prefers larger values."""
+    """Return True if a larger value of a result is better, by the sign of its target."""
     return (results.RESULT_BY_NAME[nodes.plain(name)].target or '').startswith('>')
 
 
 def ranking(name, values):
-    """Return the indices (n,) of the values (n,) of a result from the worst to the best; a missing value is the
-    worst."""
+    """Return the indices (n,) of the values (n,) of a result, from the worst to the best; NaN is the worst."""
     badness = -values if larger_is_better(name) else values
     return np.argsort(-np.where(np.isfinite(badness), badness, math.inf), kind='stable')
 
 
 def ranked_by(table, result=None):
-    """Return the result that ranks the trials of a table.Table: result, else pointing, else following error.
+    """Return the column of the result that ranks the trials of a table.Table.
 
-    A named result is taken even if it is missing in every trial; pointing only if a trial has measured it.
-    Raises ValueError if no trial has the result.
+    It is the column of `result`, even if all its values are NaN. With None it is the rms pointing error, or, if no
+    trial has measured that, the rms following error in azimuth. Raises ValueError if no trial has the result.
     """
     for name in (result,) if result else ('pointing_rms_deg', 'azimuth_following_rms_deg'):
         for column in table.measured_results:

@@ -1,7 +1,8 @@
 """Table of trials: a CSV file with one row for each trial, and a JSON file that describes the trials.
 
-Rows are written as their batches end. A killed process loses the rows of unfinished batches and leaves at most one
-incomplete line; the same trials later continue after the last complete row.
+The rows of a batch of trials are written when the batch ends. A killed process loses the rows of unfinished batches,
+and leaves at most one incomplete line. When the same trials are started again, they continue after the last complete
+row.
 """
 import csv
 import fcntl
@@ -18,16 +19,21 @@ LEADING_COLUMNS = ('trial', 'seed')
 
 
 class TableError(ValueError):
-    """The file of a table belongs to other trials, or another process writes the file; one line."""
+    """Error of a table whose file belongs to other trials, or is being written by another process. Its text is one
+    line.
+    """
 
 
 class Table:
     """Rows of the trials of a plan.Plan in the file FOLDER/NAME.csv; FOLDER/NAME.json describes the trials.
 
-    identity: {key: text} that distinguishes these trials from others; varied, results, texts: heads of the columns of
-    parameters, numbers and sentences.
-    Use as a context; the open file is locked against other processes. Raises TableError if the file exists and belongs
-    to other trials.
+    identity   {key: text} that distinguishes these trials from others
+    varied     heads of the columns of varied parameters
+    results    heads of the columns of results, which are numbers
+    texts      heads of the columns of sentences
+
+    Use as a context: `with` opens the file, reads its complete rows into `rows`, and locks it against other processes.
+    Raises TableError if the file exists and belongs to other trials.
     """
 
     def __init__(self, folder, name, identity, varied, results, texts=()):
@@ -39,7 +45,7 @@ class Table:
 
     @property
     def head(self):
-        """Heads of all columns."""
+        """Heads of all columns, in order."""
         return [*LEADING_COLUMNS, *self.varied, *self.results, *self.texts]
 
     def __enter__(self):
@@ -89,7 +95,7 @@ class Table:
                                  'the file')
 
     def append(self, rows):
-        """Write rows, lists of values in the order of `head`; None for a missing value."""
+        """Write rows to the file. A row is a list of values in the order of `head`, None for a missing value."""
         rows = [[_written(value) for value in row] for row in rows]
         self._write(rows)
         self.rows += rows

@@ -1,16 +1,20 @@
 """`pedestal new`: make a scenario of your own antenna from the numbers of its data sheet.
 
-Values that are missing in a data sheet are scaled from the antenna of the product (the motors of paper 000 with a load
-of 210 kg m2). The scaling keeps the resonance frequencies of gears and motors:
+Values that a data sheet does not state are scaled from the default antenna of this software. This antenna has the
+motors of paper 000 and a load of 210 kg m2. The scaling keeps the resonance frequencies of gears and motors:
 
-    motor       flux from the voltage at rated speed; resistance and inductance from their shares of the voltage at
-                rated torque; inertia with the torque to the power 5/3; friction and brake with the torque
-    gear, load  stiffness, damping and viscous friction with the load's inertia; other friction and unbalance with
-                the inertia to the power 2/3
-    structure   the data sheet's lowest frequency, or the average of antennas of this diameter (data_sheet_format)
-    loops       the design of tuning/loops.py; `pedestal tune --loops` then measures the loops
+    motor       flux: from the voltage at rated speed. Resistance and inductance: from their shares of the voltage at
+                rated torque. Inertia: proportional to the rated torque to the power 5/3. Friction and brake:
+                proportional to the rated torque.
+    gear, load  Stiffness, damping and viscous friction: proportional to the inertia of the load. Other friction and
+                unbalance: proportional to the inertia of the load to the power 2/3.
+    receiver    C/N0 of the scenario for the area of the mirror. The power of the satellite and the noise of the
+                receiver stay the same.
+    wind        the diameter of the mirror
+    structure   the lowest frequency of the data sheet, or the average of antennas of this diameter (data_sheet_format)
+    loops       the design of tuning/loops.py. `pedestal tune --loops` then measures the loops.
 
-A rate of the data sheet that the axis cannot reach becomes RATE_SHARE of the rate that it reaches.
+If an axis cannot reach the rate of the data sheet, the scenario has RATE_SHARE of the rate that the axis reaches.
 """
 import dataclasses
 import math
@@ -24,14 +28,20 @@ from pedestal_common.parameters import ParameterError, as_dict, build, flatten
 from pedestal_common.text_files import parameter_file
 
 BACK_EMF_SHARE, RESISTANCE_VOLTAGE_SHARE, INDUCTANCE_VOLTAGE_SHARE = 0.85, 0.033, 0.24
-"""Shares of the phase voltage: back-EMF at rated speed, drops over resistance and inductance at rated torque [-]."""
+"""Shares of the phase voltage of a motor [-].
+
+They are the back-EMF at rated speed, and the voltages over resistance and inductance at rated torque.
+"""
+
+KNOWN_MIRROR_M = 2.4
+"""Diameter of the mirror for which the C/N0 of the scenarios holds [m] (AntennaParameters)."""
 
 RATE_SHARE = 0.9
-"""Ratio of the rate that replaces an unreachable rate to the rate that an axis reaches [-]."""
+"""Share of the rate that an axis reaches, which replaces an unreachable rate of the data sheet [-]."""
 
 
 def motor(sheet, known):
-    """Return {key: value} of a motor from the values {key: value} of a known motor and the DataSheet."""
+    """Return {key: value} of a motor of a DataSheet, scaled from the parameters {key: value} of the default motor."""
     share, pairs, voltage = sheet.motor_torque / 30.0, known['pole_pairs'], known['voltage']
     electrical = pairs * sheet.motor_speed * math.pi / 30.0
     flux = BACK_EMF_SHARE * voltage / electrical
@@ -44,7 +54,7 @@ def motor(sheet, known):
 
 
 def axis(sheet, name):
-    """Return {key: value} of an axis of the drive, without its loops."""
+    """Return {key: value} of an axis of the drive for a DataSheet, without the gains of its loops; name: the axis."""
     known = as_dict(getattr(AduParameters(), name))
     inertia, ratio, rate = (getattr(sheet, f'{what}_{name}') for what in ('inertia', 'ratio', 'rate'))
     share = inertia / known['load.inertia']
@@ -68,9 +78,9 @@ def axis(sheet, name):
 
 
 def _softer(name, values):
-    """Return stiffness and damping of the meshes {key: value}, not above what the step of the simulated plant allows.
+    """Return {key: value} of stiffness and damping of the gear meshes, limited for the step of the simulated plant.
 
-    A gear that is scaled with a heavy load is too stiff for small motors.
+    Because the stiffness is scaled with the load, it is too large for small motors under a heavy load.
     """
     known, h = getattr(AduParameters(), name), PLANT_PERIOD_S
     J, N = values['load.inertia'], values['gear_train.reducer_ratio'] * known.gear_train.pinion_ratio
@@ -80,20 +90,24 @@ def _softer(name, values):
 
 
 def _plant(sheet, name, values):
-    """Return the loops.Plant of an axis with `values` {key: value}. Raises ParameterError, LoopError."""
+    """Return the loops.Plant of the axis `name` with parameters `values` {key: value}.
+
+    Raises ParameterError, LoopError.
+    """
     from pedestal_analysis.tuning import loops
     known = getattr(AduParameters(), name)
     try:
-        return loops.Plant(name, build(type(known), {**as_dict(known), **values}), beamwidth=sheet.theta)
+        return loops.Plant(name, build(type(known), {**as_dict(known), **values}), beamwidth=sheet.theta,
+                           noise=loops.receiver_noise(sheet.theta, _receiver(sheet).antenna.slope, cn0(sheet)))
     except ParameterError as error:
         raise ParameterError(f'adu.{name}: {error}') from None
 
 
 def attainable(sheet):
-    """Return a DataSheet with rates that its axes reach, and a line for each rate that was changed.
+    """Return (DataSheet with rates that its axes reach, [line about each changed rate]).
 
-    An axis reaches the rate that its motors have at their voltage, and must stop from it within half of its travel.
-    Raises ScenarioError, ParameterError, LoopError.
+    Two limits apply to the rate of an axis. The motors must reach it with their voltage, and they must be able to stop
+    the axis from it within half of its travel. Raises ScenarioError, ParameterError, LoopError.
     """
     from pedestal_analysis.tuning import loops
     acu, remarks = scenario.load(sheet.like).node_parameters('acu'), []
@@ -117,7 +131,7 @@ def attainable(sheet):
 
 
 def _motors(name, values):
-    """Return both MotorParameters of an axis with `values` {key: value}."""
+    """Yield both MotorParameters of an axis by its name and its parameters {key: value}. Raises ParameterError."""
     known = getattr(AduParameters(), name)
     for number in (1, 2):
         own = {key.partition('.')[2]: value for key, value in values.items() if key.startswith(f'motor_{number}.')}
@@ -128,15 +142,46 @@ def _motors(name, values):
             raise ParameterError(f'adu.{name}: motor_{number}.{error}') from None
 
 
+def cn0(sheet):
+    """Return the C/N0 [dB-Hz] on the beam axis at the reference range: of the DataSheet, else by the area of the
+    mirror."""
+    known = _receiver(sheet).receiver.cn0_dbhz
+    return sheet.cn0 or float(f'{known + 20.0 * math.log10(sheet.mirror / KNOWN_MIRROR_M):.4g}')
+
+
+def _receiver(sheet):
+    """Return the TrackingReceiverParameters of the scenario of a DataSheet."""
+    return scenario.load(sheet.like).node_parameters('tracking_receiver')
+
+
+def _assumed(sheet):
+    """Return a line for each assumed value."""
+    lines = []
+    if not sheet.cn0:
+        receiver = _receiver(sheet).receiver
+        lines.append(f'no --cn0: {cn0(sheet):.3g} dB-Hz at {1e-3 * receiver.reference_range:g} km, that of '
+                     f'{sheet.like} for the area of the mirror, is taken; the receiver locks at '
+                     f'{receiver.acquire_level_dbhz:g} dB-Hz')
+    if sheet.mode_share and not sheet.mode:
+        lines.append(f'no --mode: {sheet.structural_frequency:.3g} Hz, the average of antennas of {sheet.mirror:g} m, '
+                     'is taken for the structure')
+    return lines
+
+
 def sections(sheet, title):
-    """Return {node: {key: value}} of the scenario of a DataSheet. Raises ScenarioError, ParameterError, LoopError."""
+    """Return {node: {key: value}} of the scenario of a DataSheet; title: of the scenario.
+
+    Raises ScenarioError, ParameterError, LoopError.
+    """
     from pedestal_analysis.tuning import loops
     _, content = scenario.text(sheet.like)
     found = scenario.by_node(parameter_file.parse(content))
     found['scenario']['title'] = title
-    if 'program.time_offset' in found['scenario']:  # keeps the offset in beamwidths
-        found['scenario']['program.time_offset'] *= min(1.0, sheet.theta / 0.0175)
-    found['tracking_receiver']['antenna.beamwidth'] = sheet.theta
+    # A narrower beam needs a smaller error, equal in beamwidths.
+    for key in scenario.PROGRAM_ERRORS.keys() & set(found['scenario']):
+        found['scenario'][key] *= min(1.0, sheet.theta / 0.0175)
+    found['tracking_receiver'] |= {'antenna.beamwidth': sheet.theta, 'receiver.cn0_dbhz': cn0(sheet)}
+    found['adu']['wind.field.diameter'] = sheet.mirror
     w_s = 2.0 * math.pi * loops.DEFAULT_SPEED_CROSSOVER_HZ
     for name in AXES:
         values = axis(sheet, name)
@@ -153,13 +198,19 @@ def sections(sheet, title):
 
 
 def _at_the_target(sheet, found):
-    """Return initial angles three beamwidths from the predicted target, so that a slow antenna reaches it soon."""
+    """Return {key of adu: initial angle [rad]}, three beamwidths from the predicted target.
+
+    A slow antenna then reaches the target soon. found: {node: {key: value}} of the scenario.
+    """
     _, angles = Plan(scenario.parse(sheet.like, parameter_file.text(found))).tables['']
     return {f'initial_{name}': float(f'{angle + 3.0 * sheet.theta:.4g}') for name, angle in zip(AXES, angles[0])}
 
 
 def text(found, head):
-    """Return the scenario file of sections {node: {key: value}}, with a comment after each value; head: lines."""
+    """Return the text of a scenario file from {node: {key: value}}; head: lines of comment at its beginning.
+
+    Each value has its unit and meaning in a comment.
+    """
     lines = [f'# {line}'.rstrip() for line in head]
     for node, values in found.items():
         fields = dict(flatten(scenario.parameters_of(node)))
@@ -173,14 +224,13 @@ def text(found, head):
 
 
 def new(sheet, name, command):
-    """Return the text of the scenario file of a DataSheet, and a line for each changed or assumed value.
+    """Return (text of the scenario file of a DataSheet, [line about each changed or assumed value]).
 
-    Raises ScenarioError for values that contradict each other.
+    name: name of the scenario; command: the command line, for the head of the file. Raises ScenarioError for values
+    that contradict each other.
     """
     sheet, remarks = attainable(sheet)
-    if sheet.mode_share and not sheet.mode:
-        remarks.append(f'no --mode: {sheet.structural_frequency:.3g} Hz, the average of antennas of '
-                       f'{sheet.mirror:g} m, is taken for the structure')
+    remarks += _assumed(sheet)
     title = f'{sheet.mirror:g} m antenna, beam {math.degrees(sheet.theta):.3g} deg, on the mission of {sheet.like}'
     found = sections(sheet, title)
     content = text(found, (f'made by: {command}', 'Values that are not in the data sheet are scaled from the antenna '

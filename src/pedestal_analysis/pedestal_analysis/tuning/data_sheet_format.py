@@ -1,4 +1,4 @@
-"""Data sheet of an antenna: the options of `pedestal new`."""
+"""Data sheet of an antenna, whose fields are the options of `pedestal new`."""
 import dataclasses
 import math
 
@@ -8,17 +8,19 @@ LIGHT_SPEED_M_GHZ = 0.299792458
 """Speed of light [m GHz]."""
 
 MIN_MODE_HZ = 1.0
-"""Lowest frequency of a structure in the simulated plant [Hz]."""
+"""Smallest structural frequency that the simulated plant allows [Hz]."""
 
-TEMPLATE_SCENARIOS = ('leo_pass', 'uav_flyby', 'ship_pass')
-"""Scenarios that provide target and site."""
+TEMPLATE_SCENARIOS = ('leo_pass', 'geo_station', 'uav_flyby', 'ship_pass', 'ship_uav')
+"""Scenarios from which a new scenario takes its target and its site."""
 
 
 @dataclasses.dataclass(frozen=True)
 class DataSheet(Parameters):
-    """Data sheet of an antenna; both motors of an axis are alike."""
+    """Data sheet of an antenna. Both motors of an axis have equal data."""
     mirror: float = parameter(3.0, 0.1, 40.0, 'm', 'diameter of the mirror')
     frequency: float = parameter(2.3, 0.1, 100.0, 'GHz', 'frequency of the received signal')
+    cn0: float = parameter(0.0, 0.0, 120.0, 'dB-Hz', 'C/N0 on the beam axis at the reference range of the scenario; '
+                           '0: computed from that of the scenario for the area of the mirror')
     beamwidth: float = parameter(0.0, 0.0, 20.0, 'deg',
                                  'half-power beamwidth; 0: computed as 70 deg times wavelength divided by diameter')
     inertia_azimuth: float = parameter(210.0, 0.1, 1e6, 'kg m2', 'inertia of the load about the azimuth axis')
@@ -39,19 +41,19 @@ class DataSheet(Parameters):
     like: str = choice('leo_pass', TEMPLATE_SCENARIOS, 'scenario that provides target and site')
 
     def check(self):
-        """Raise ParameterError for a structure that the plant cannot have."""
+        """Raise ParameterError for a structural frequency that the simulated plant does not allow."""
         if 0.0 < self.mode < MIN_MODE_HZ:
             raise ParameterError(f'mode = {self.mode:g} Hz: must be {MIN_MODE_HZ:g} to 200, or 0 for the average of '
                                  'antennas of this diameter')
 
     @property
     def structural_frequency(self):
-        """Lowest frequency of the structure with locked motors [Hz]; without `mode` the average of antennas of this
-        diameter, 20 d^-0.7.
+        """Lowest frequency of the structure with locked motors [Hz].
 
-        Source: W. Gawronski, Control and Pointing Challenges of Antennas and (Radio) Telescopes, IPN Progress Report
-        42-159 (JPL, 2004), and Modeling and Control of Antennas and Telescopes (Springer, 2008). Because single
-        antennas differ from the average, a measured frequency takes precedence.
+        Without `mode` it is the average of antennas of this diameter d [m], 20 Hz d^-0.7. Source: W. Gawronski,
+        Control and Pointing Challenges of Antennas and (Radio) Telescopes, IPN Progress Report 42-159 (JPL, 2004), and
+        Modeling and Control of Antennas and Telescopes (Springer, 2008). Because single antennas differ from the
+        average, a measured frequency takes precedence.
         """
         return self.mode or 20.0 * self.mirror**-0.7
 

@@ -1,17 +1,23 @@
-"""Open-loop and closed-loop response of the current, speed and position loops to a multisine, on the simulated plant.
+"""Frequency responses of the current, speed and position loops, measured on the simulated plant.
 
-A signal is added inside a loop at its break point while the axis moves at a constant rate. At that rate friction is
-constant and the bias torque keeps the teeth closed. E is the signal after the break point, -Y the signal that returns
-to it. At the excited frequencies the open loop is L = Y / E and the closed loop T = L / (1 + L). The method needs no
-model of a controller.
+`pedestal tune --loops` and the study of the loops use this module. A multisine (a sum of sines) is added inside a loop
+while the axis moves at a constant rate. At that rate the friction is constant, and the bias torque keeps the teeth in
+contact. E is the signal after the point of the addition, and -Y is the signal that returns to this point through the
+loop. At the frequencies of the sines the open loop is L = Y / E, and the closed loop is T = L / (1 + L). The method
+needs no model of a controller.
 
-A current period of a run has two steps of the plant. With them the swing of the motors in their meshes is damped too
-well, and the margins of the speed loop are up to 0.9 dB and 3 deg too good. Because of this error, the current and the
-speed loop are measured with SUB_STEP_COUNT steps.
+    loop        added to                   period          E                        Y
+    current     current reference i_ref    100 us          i_ref - i_q              i_q
+    speed       rate command               0.5 ms          rate - mean speed / N    mean speed / N
+    position    command of ACU to drive    of the drive    rate to the drive        -(rate commanded by the ACU)
 
-    current     added to i_ref, every 100 us        E = i_ref - i_q            Y = i_q
-    speed       added to the rate command, 0.5 ms   E = rate - mean speed / N  Y = mean speed / N from the encoders
-    position    added between ACU and drive, T      E = rate to the drive      Y = -(rate commanded by the ACU)
+    i_q          motor current that makes the torque [A]
+    rate         rate command after the addition [rad/s]
+    mean speed   mean speed of both motors from their encoders [rad/s]; N: gear ratio
+
+In a run, a period of the current loop has two steps of the simulated plant. With two steps, the swing of the motors in
+their meshes is damped too well. The margins of the speed loop are then up to 0.9 dB and 3 deg too good. Because of
+this error, the current and the speed loop are measured with SUB_STEP_COUNT steps.
 """
 import dataclasses
 import math
@@ -25,18 +31,22 @@ from pedestal_common.compiled import compiled
 from pedestal_common.graph.topics import AXES
 
 MOTOR_FIELDS = ('motor_1', 'motor_2')
-"""Fields of the motors in the state of an axis."""
+"""Names of both motors in the state of an axis."""
 SWEEP_START_ANGLES_RAD = (-2.0, 0.15)
-"""Initial angles of azimuth and elevation [rad]."""
+"""Angles of azimuth and elevation at the beginning of a measurement [rad]."""
 
 SWEEP_RATES_RAD_S = (0.1, 0.03)
-"""Constant rates of the axes, far above the excitation and the Stribeck rate, with room for a whole record [rad/s].
+"""Constant rates of azimuth and elevation during a measurement [rad/s].
 
-A slow axis moves at RATE_SHARE of its largest rate. The excitation is at most PEAK_SHARE of the rate.
+They are far above the multisine and the Stribeck rate of the friction, and a whole measurement stays inside the
+travel. A slow axis moves at RATE_SHARE of its largest rate. The multisine is at most PEAK_SHARE of the rate.
 """
 
 RATE_SHARE, PEAK_SHARE = 1.0 / 3.0, 0.5
-"""Largest ratios of the rate of a measurement to the largest rate of the axis, and of excitation to rate [-]."""
+"""RATE_SHARE: largest ratio of the rate of a measurement to the largest rate of the axis [-].
+
+PEAK_SHARE: largest ratio of the peak of the multisine to the rate of the measurement [-].
+"""
 
 SUB_STEP_COUNT = 10
 """Number of plant steps in a current period while the current and the speed loop are measured."""
@@ -44,10 +54,13 @@ SUB_STEP_COUNT = 10
 
 @dataclasses.dataclass(frozen=True)
 class Sweep:
-    """A multisine with the largest value `peak`.
+    """A multisine: the sum of sines that is added to a loop.
 
-    It has `points` frequencies, logarithmically spaced from `lowest` to `highest` [Hz], each with whole periods in
-    `period` [s]. `dropped` periods settle and `kept` periods are measured.
+    period            time after which the sum repeats [s]; each sine has a whole number of periods in it
+    lowest, highest   lowest and highest frequency [Hz]
+    points            number of frequencies, logarithmically spaced
+    dropped, kept     number of periods for settling, number of measured periods
+    peak              largest value of the sum, in the unit of the signal of the loop
     """
     period: float
     lowest: float
@@ -58,18 +71,18 @@ class Sweep:
     peak: float
 
     def bins(self):
-        """Return the frequencies as integer multiples of 1 / period."""
+        """Return the frequencies as integer multiples of 1 / period [-]."""
         return np.unique(np.round(np.geomspace(self.lowest, self.highest, self.points) * self.period).astype(int))
 
     def frequencies(self):
-        """Return the excited frequencies (points,) [Hz]; less if several round to the same frequency."""
+        """Return the frequencies of the sines [Hz]: `points` of them, fewer if several round to one frequency."""
         return self.bins() / self.period
 
     def signal(self, step):
         """Return the whole record (n,) with one value per `step` [s].
 
-        The amplitudes are equal. The phases of Schroeder (IEEE Trans. Information Theory 16 (1970) 85) keep the peak
-        low.
+        All sines have equal amplitudes. The phases of Schroeder (IEEE Trans. Information Theory 16 (1970) 85) keep the
+        peak of the sum low.
         """
         n = round(self.period / step)
         k = np.arange(len(self.bins()))
@@ -83,33 +96,38 @@ CURRENT_SWEEP = Sweep(period=0.1, lowest=10.0, highest=4000.0, points=60, droppe
 """Sweep of the current loop; peak in A."""
 
 SPEED_SWEEP = Sweep(period=1.0, lowest=1.0, highest=900.0, points=120, dropped=2, kept=4, peak=0.015)
-"""Sweep of the speed loop; peak in rad/s of the load: 6 Nm of a motor, less than the bias torque."""
+"""Sweep of the speed loop; peak in rad/s at the load. It needs 6 Nm of a motor, less than the bias torque."""
 
 FLEXIBLE_SPEED_SWEEP = dataclasses.replace(SPEED_SWEEP, period=8.0, lowest=0.25, points=400, dropped=3, kept=2)
-"""Sweep of the speed loop of a flexible axis, whose swing is narrow and decays slowly."""
+"""Sweep of the speed loop of an axis with a declared structure, whose resonance is narrow and decays slowly."""
 
 POSITION_SWEEP = Sweep(period=8.0, lowest=0.25, highest=95.0, points=300, dropped=2, kept=3, peak=0.012)
-"""Sweep of the position loop, up to nearly half of 1 / 5 ms; peak in rad/s.
+"""Sweep of the position loop, up to nearly half of its sampling rate 1 / 5 ms; peak in rad/s.
 
-The peak is half of the value that opens the teeth at the 5 Nm of bias torque of the paper.
+The peak is half of the value at which the teeth lose contact with the bias torque of the paper, 5 Nm.
 """
 
 
 @dataclasses.dataclass(frozen=True)
 class Response:
-    """Open loop (n,) complex at the frequencies (n,) [Hz]; deviation (n,): relative standard deviation [-]."""
+    """Measured frequency response of a loop.
+
+    frequency   (n,) [Hz]
+    open_loop   (n,) complex open loop L [-]
+    deviation   (n,) standard deviation of L over the measured periods, divided by |L| [-]
+    """
     frequency: np.ndarray
     open_loop: np.ndarray
     deviation: np.ndarray
 
     @property
     def closed_loop(self):
-        """Closed loop T = L / (1 + L) (n,)."""
+        """Closed loop T = L / (1 + L) (n,), complex [-]."""
         return self.open_loop / (1.0 + self.open_loop)
 
 
 def response(sweep, sent, returned):
-    """Return the Response of a loop from the records (n,) of the signals after its break point and returned to it."""
+    """Return the Response of a loop from the records (n,) of its signals E (`sent`) and Y (`returned`)."""
     E, Y = (np.fft.rfft(x.reshape(sweep.dropped + sweep.kept, -1)[sweep.dropped:], axis=1)[:, sweep.bins()]
             for x in (sent, returned))
     with np.errstate(invalid='ignore'):  # a tripped drive returns no signal
@@ -119,9 +137,14 @@ def response(sweep, sent, returned):
 
 @compiled
 def _inner_loops(s, c, substeps, rate, current, speed, wanted, made):
-    """Run one axis from rest; fill speed (n,) [rad/s] of the axis and wanted (i_ref), made (i_q) (5 n, 2) [A].
+    """Run one axis from rest, and fill the records of its signals.
 
-    rate (n,) [rad/s]: command of each speed period; current (5 n,) [A]: added to both i_ref in each current period.
+    s, c            state and constants of the axis
+    substeps        number of plant steps in a period of the current loop
+    rate (n,)       rate command in each period of the speed loop [rad/s]
+    current (5 n,)  current that is added to the references i_ref of both motors, in each period of the current loop
+    [A] speed (n,)      filled: mean speed of the motors, at the load [rad/s]
+    wanted, made    filled: i_ref and i_q of both motors (5 n, 2) [A]
     """
     m1, m2, k1, k2 = s.motor_1, s.motor_2, c.motor_1, c.motor_2
     axis.begin_period(s, c, False)        # brakes off; the windings stay cold
@@ -139,14 +162,14 @@ def _inner_loops(s, c, substeps, rate, current, speed, wanted, made):
 
 
 def _rate(index, *largest):
-    """Return the rate [rad/s] at which axis `index` is measured; largest: its rate limits [rad/s]."""
+    """Return the rate [rad/s] at which the axis `index` of AXES is measured; largest: its rate limits [rad/s]."""
     return min(SWEEP_RATES_RAD_S[index], RATE_SHARE * min(largest))
 
 
 def _run_inner(drive, index, rate, current):
-    """Return (speed (n,) [rad/s], i_ref, i_q (5 n, 2) [A]) of axis `index` of a drive (AduParameters).
+    """Return (speed (n,) [rad/s], i_ref, i_q (5 n, 2) [A]) of the axis `index` of AXES, see _inner_loops.
 
-    rate (n,) [rad/s]: rate command; current (5 n,) [A]: signal added to the current references.
+    drive: AduParameters; rate (n,): rate commands [rad/s]; current (5 n,): added to the current references [A].
     """
     drive = dataclasses.replace(drive, initial_azimuth=SWEEP_START_ANGLES_RAD[0],
                                 initial_elevation=SWEEP_START_ANGLES_RAD[1])
@@ -157,7 +180,7 @@ def _run_inner(drive, index, rate, current):
 
 
 def current(drive, sweep=CURRENT_SWEEP):
-    """Return the Responses {name: Response} of the current loops of both azimuth motors."""
+    """Return {'current/MOTOR': Response} of the current loops of both azimuth motors; drive: AduParameters."""
     added = sweep.signal(axis.CURRENT_LOOP_PERIOD_S)
     rate = np.full(len(added) // axis.CURRENT_LOOP_STEP_COUNT, _rate(0, drive.azimuth.limits.rate))
     _, wanted, made = _run_inner(drive, 0, rate, added)
@@ -166,7 +189,7 @@ def current(drive, sweep=CURRENT_SWEEP):
 
 
 def speed(drive, sweep=SPEED_SWEEP, axes=AXES):
-    """Return the Responses {name: Response} of the speed loops of some axes."""
+    """Return {'speed/AXIS': Response} of the speed loops of some axes; drive: AduParameters."""
     responses = {}
     for i, name in ((AXES.index(name), name) for name in axes):
         rate = _rate(i, getattr(drive, name).limits.rate)
@@ -177,7 +200,7 @@ def speed(drive, sweep=SPEED_SWEEP, axes=AXES):
 
 
 def _at_most(sweep, *rates):
-    """Return a Sweep for axes that move at `rates` [rad/s]."""
+    """Return a Sweep whose peak is limited for axes that move at `rates` [rad/s]."""
     return dataclasses.replace(sweep, peak=min(sweep.peak, PEAK_SHARE * min(rates)))
 
 
@@ -187,16 +210,16 @@ MOVING_CASE_PARAMETERS = {
     'tracking_receiver.target.kind': 'ramp',
     'tracking_receiver.target.angle.azimuth': SWEEP_START_ANGLES_RAD[0],
     'tracking_receiver.target.angle.elevation': SWEEP_START_ANGLES_RAD[1]}
-"""Parameters for a program track of constant rates on both axes, which `position` sets."""
+"""Changed parameters of a scenario for a program track of constant rates on both axes; `position` sets the rates."""
 
 
 def case(name, scenario, parameters):
-    """Return the Case of a position loop: a scenario with changed parameters, moving at constant rates."""
+    """Return the Case for the measurement of position loops: a scenario with changed parameters, at constant rates."""
     return Case(name, scenario, {**MOVING_CASE_PARAMETERS, **parameters})
 
 
 def _moving(case):
-    """Return the Case with the rates at which its axes are measured, and these rates [rad/s]."""
+    """Return (the Case whose target moves at the rates of the measurement, these rates [rad/s] of both axes)."""
     loaded = case.loaded()
     drive, acu = (loaded.node_parameters(node) for node in ('adu', 'acu'))
     rates = [_rate(i, getattr(drive, name).limits.rate, getattr(acu, name).limits.rate,
@@ -206,7 +229,7 @@ def _moving(case):
 
 
 def position(case, axes=AXES, sweep=POSITION_SWEEP):
-    """Return the Responses {name: Response} of the position loops of a case."""
+    """Return {'position/AXIS/CASE': Response} of the position loops of a Case of the function `case`."""
     case, rates = _moving(case)
     loaded = dataclasses.replace(case, duration=(sweep.dropped + sweep.kept) * sweep.period).loaded()
     loop = closed_loop.Loop(loaded)
@@ -220,7 +243,7 @@ def position(case, axes=AXES, sweep=POSITION_SWEEP):
 def _crossings(f, y, angle):
     """Return (frequencies [Hz], angles [rad]) at the zeros of y (n,), both interpolated linearly in log f.
 
-    The angle changes by the short way round.
+    The angle between two frequencies changes by less than half a turn.
     """
     i = np.flatnonzero(y[:-1] * y[1:] <= 0.0)
     share = y[i] / (y[i] - y[i + 1])
@@ -228,14 +251,22 @@ def _crossings(f, y, angle):
     return f[i] * (f[i + 1] / f[i]) ** share, angle[i] + share * change
 
 
-def margins(measured, above=0.0):
-    """Return {metric: (value, unit)} of a Response; NaN if the band has no such frequency.
+def without_gain_margin(names):
+    """Return a line on the loops of these names, which have no gain margin; [] without a name."""
+    if not names:
+        return []
+    return [f'no gain margin of {", ".join(names)}: the open loop does not reach -180 deg in the measured band, so no '
+            'higher gain makes the loop unstable there']
 
-    crossover     first frequency from `above` [Hz] on at which |L| falls below 1
-    phase_margin  smallest phase shift, of either sign, that moves a point of |L| = 1 to -1
-    gain_margin   smallest gain that moves a point to -1
-    bandwidth     first frequency at which |T| falls below -3 dB
-    peak          largest |T|
+
+def margins(measured, above=0.0):
+    """Return {metric: (value, unit)} of a Response; NaN if the measured band has no such frequency.
+
+    crossover_hz       first frequency from `above` [Hz] on at which the open loop |L| falls below 1
+    phase_margin_deg   smallest phase shift, of either sign, that moves a point with |L| = 1 to -1
+    gain_margin_db     smallest gain that moves a point of L to -1
+    bandwidth_hz       first frequency at which the closed loop |T| falls below -3 dB
+    peak_db            largest |T|
     """
     f, L, T = measured.frequency, measured.open_loop, np.abs(measured.closed_loop)
     gain, from_minus_one = np.log(np.abs(L)), np.angle(-L)

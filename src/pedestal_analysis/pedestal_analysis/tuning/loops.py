@@ -1,29 +1,44 @@
 """`pedestal tune --loops`: design the gains of drive and control unit for the plant of a scenario.
 
-Each axis is designed as a rigid axis. The margins are then measured on the simulated plant, with its gears, lash,
-friction, structure, delays and sampling (frequency_response). A loop without the required margins is made slower until
-it has them. Per motor on its shaft, with the inertia J_m of a motor, J_L of the load, and the ratio N:
+The plant of an axis is its motors, gears and load. Each axis is first designed as a rigid axis. The margins of its
+loops are then measured on the simulated plant, with its gears, lash, friction, structure, delays and sampling
+(frequency_response). A loop without the required margins is made slower until it has them. The design of a rigid axis:
 
-    J = J_m + J_L / (2 N^2)                          inertia that one motor moves
-    K_p = w_s J,  K_i = K_p w_s / 5                  speed loop of crossover w_s
-    position loop: PI of K_p = w_s / 8               `feedforward.bandwidth`, or the requirement
-    feed-forward: J_L + 2 J_m N^2, friction of the load
-    shaper: a = 3/4 (2 T_max N - T_load) / (J_L + 2 J_m N^2), jerk a 3/4 w_s, h0 = 3.5 / w_s
-    bias torque: 0.4 of the rated torque, held up to a torque of 0.47, zero at 1.5 of the rated torque
+    J = J_m + J_L / (2 N^2)                     inertia that one motor moves, on its shaft [kg m2]
+    J_A = J_L + 2 J_m N^2                       inertia of the whole axis, at the load [kg m2]
+    K_p = w_s J,  K_i = K_p w_s / 5             gains of the speed loop, per motor [Nms/rad], [Nm/rad]
+    w_p = w_s / 8                               gain of the position loop (`feedforward.bandwidth`) [rad/s]
+    a = 3/4 (2 T_max N - T_load) / J_A          acceleration of the shaper [rad/s2]
+    j = 3/4 a w_s                               jerk of the shaper [rad/s3]
+    h0 = 3.5 / w_s                              filter step of the shaper [s]
+    T_b = 0.4 T_r                               bias torque of a motor [Nm]. It is full up to a motor torque of
+                                                0.47 T_r, and zero from 1.5 T_r on.
 
-T_load is the sum of friction, unbalance and mean wind. A quarter of the torque is a reserve for a heavier load.
+    J_m, J_L   inertia of one motor, of the load [kg m2]
+    N          gear ratio from motor to load
+    w_s        crossover of the speed loop [rad/s]
+    T_max      torque limit of a motor [Nm]
+    T_r        rated torque of a motor [Nm]
+    T_load     sum of friction, unbalance and mean wind, at the load [Nm]
 
-A declared structure (`adu.AXIS.structure`, inertia_share above 0) swings with the frequency f on locked motors. The
-receiver sees this swing as a motion of the target, and the shaper must not pass it on:
+The feed-forward takes J_A and the friction of the load. A required crossover of the position loop takes the place of
+w_s / 8. A quarter of the torque is a reserve for a heavier load.
 
-    speed loop: J without the share of the dish, because the dish does not follow above f
-    position loop: at most K_p = 2 pi f / 3
-    shaper: a that bends the structure by a / (2 pi f)^2 of at most 0.8 mrad and a tenth of the beamwidth, and needs
-            half of the torque, up to which the bias torque keeps the teeth closed; jerk a f, so that the acceleration
-            rises within one period of the swing and leaves no swing behind; h0 = 0.8 / f
+A declared structure (`adu.AXIS.structure`, inertia_share above 0) swings with the frequency f [Hz] on locked motors.
+The receiver sees this swing as a motion of the target, and the shaper must not excite it:
 
-Each of these values is the smaller one of the two designs (of h0 the larger one). The margins are then measured with
-the structure in the plant, also with the load inertia changed by 30 % and f by 20 %, and the smallest margins count.
+    speed loop      J without the share of the dish, because the dish does not follow above f
+    position loop   w_p at most 2 pi f / 3
+    shaper          a bends the structure by a / (2 pi f)^2 [rad]. The bend is at most 0.8 mrad, and at most a tenth of
+                    the beamwidth. a needs at most half of the torque limit, up to which the bias torque keeps the
+                    teeth in contact. j = a f, so that the acceleration rises within one period of the swing and leaves
+                    no swing behind. h0 = 0.8 / f.
+    filter          of the default bank only the models ca whose bandwidth (q / r)^(1/3) is at most 2 pi f / 7, because
+                    a faster model would follow the swing. q: white jerk of the model [rad/s3/sqrt(Hz)], r: root
+                    density of the noise of the receiver [rad/sqrt(Hz)].
+
+Of the two designs the smaller value counts, of h0 the larger. The margins are then measured with the structure in the
+plant. They are measured again with the load inertia changed by 30 % and f by 20 %. The smallest margins count.
 """
 import dataclasses
 import math
@@ -31,6 +46,7 @@ import pathlib
 
 import numpy as np
 
+from acu_tracker.estimation.params import FilterParameters
 from adu_drive.params import SPEED_LOOP_PERIOD_S
 from pedestal_analysis.tuning import frequency_response as frequency
 from pedestal_bringup.scenario import scenario
@@ -39,39 +55,49 @@ from pedestal_common.text_files import parameter_file
 from pedestal_recording import configuration
 
 DEFAULT_SPEED_CROSSOVER_HZ, CROSSOVER_RATIO = 28.0, 8.0
-"""Default crossover of the speed loop [Hz], and ratio of the crossovers of speed and position loop [-]."""
+"""Default crossover of the speed loop [Hz]; ratio of the crossovers of the speed loop and the position loop [-]."""
 
 TORQUE_SHARE, SHAPER_RATE_SHARE = 0.75, 0.94
-"""Shares of the shaper in the acceleration and in the rate of the axis [-]."""
+"""Acceleration and rate of the shaper, as shares of the acceleration and rate that the axis can reach [-]."""
 
 MAX_BEND_RAD, BEND_SHARE = 0.8e-3, 0.1
-"""Largest bend of a structure under the shaper's acceleration [rad], and its largest ratio to the beamwidth [-]."""
+"""Largest bend of a structure by the acceleration of the shaper [rad]; its largest ratio to the beamwidth [-]."""
 
 CLOSED_TEETH_SHARE = 0.5
-"""Share of the torque limit that the shaper uses on a flexible structure: `bias.out`, above which no bias torque keeps
-the teeth closed [-]."""
+"""Share of the torque limit that the shaper uses on a flexible structure [-].
 
-MODE_H0, MODE_RATIO = 0.8, 3.0
-"""Filter step of the shaper times the frequency of the structure, and least ratio of that frequency to the crossover
-of the position loop [-]."""
+Above this torque (`bias.out`) no bias torque keeps the teeth in contact.
+"""
+
+MODE_H0, MODE_RATIO, FILTER_RATIO = 0.8, 3.0, 7.0
+"""MODE_H0: h0 of the shaper times the frequency of the structure [-].
+
+MODE_RATIO, FILTER_RATIO: smallest ratios of the frequency of the structure to the crossover of the position loop and
+to the bandwidth of the target filter [-].
+"""
 
 PLANT_CORNERS = tuple((inertia, mode) for inertia in (0.7, 1.3) for mode in (0.8, 1.2))
-"""Factors of load inertia and frequency of the structure with which the loops must hold their margins, too [-]."""
+"""Factors (of the load inertia, of the frequency of the structure) with which the loops must also have their margins
+[-].
+"""
 
 WORST_SUFFIX = ', worst'
-"""Suffix of the name of a loop in the row with its smallest margins in all PLANT_CORNERS."""
+"""Suffix of the name of a loop in the row of the table with its smallest margins in all PLANT_CORNERS."""
+
+NEAR_SHARE = 0.95
+"""Share of a required crossover from which on a loop counts as fast enough [-]."""
 
 SLOWDOWN_FACTOR, MAX_SLOWDOWNS = 0.85, 12
-"""Factor by which a loop without its margins is made slower, and number of tried crossovers."""
+"""Factor of the crossover from one try to the next, slower one [-]; largest number of tried crossovers."""
 
 STILL_AIR_PARAMETERS = {'scenario.ship': False, 'scenario.program.source': 'target', 'acu.initial_mode': 'program',
                         'adu.initially_enabled': True, 'adu.wind.azimuth': 0.0, 'adu.wind.elevation': 0.0,
                         'adu.wind.gust.kind': 'none'}
-"""Parameters for the measurement of a plant: ashore, in still air."""
+"""Changed parameters of a scenario for the measurement of a plant: ashore, in still air, on a program track."""
 
 
 class LoopError(ValueError):
-    """The loops of a plant cannot be designed, or not closed with the required margins; one line."""
+    """Error of loops that cannot be designed, or not be closed with the required margins. Its text is one line."""
 
 
 REQUIREMENT_OPTIONS = {'speed_bandwidth': 'speed', 'position_bandwidth': 'position', 'phase_margin': 'phase_margin',
@@ -81,7 +107,12 @@ REQUIREMENT_OPTIONS = {'speed_bandwidth': 'speed', 'position_bandwidth': 'positi
 
 @dataclasses.dataclass(frozen=True)
 class LoopRequirements:
-    """Required crossovers of speed and position loop [Hz], None to derive from the other loop; margins [deg], [dB]."""
+    """Required properties of the loops.
+
+    speed, position   crossovers of speed and position loop [Hz]; None: derived from the other loop, or the default
+    phase_margin      smallest phase margin [deg]
+    gain_margin       smallest gain margin [dB]
+    """
     speed: float | None = None
     position: float | None = None
     phase_margin: float = 45.0
@@ -97,7 +128,13 @@ class LoopRequirements:
 
 @dataclasses.dataclass(frozen=True)
 class Plant:
-    """Model of one axis, from its adu_drive.params.AxisParameters, the mean wind torque [Nm] and the beamwidth [rad].
+    """Plant of one axis for the design of its loops.
+
+    name        name of the axis
+    axis        its adu_drive.params.AxisParameters
+    wind        mean wind torque at the load [Nm]
+    beamwidth   half-power beamwidth of the antenna [rad]
+    noise       root density of the receiver's noise on the beam axis [rad/sqrt(Hz)], see receiver_noise
 
     Raises LoopError if the motors cannot move the axis.
     """
@@ -105,6 +142,7 @@ class Plant:
     axis: object
     wind: float = 0.0
     beamwidth: float = math.inf
+    noise: float = math.inf
 
     def __post_init__(self):
         if self.acceleration <= 0.0:
@@ -128,7 +166,7 @@ class Plant:
 
     @property
     def mode(self):
-        """Frequency of the structure on locked motors [Hz], 0 if no structure is declared."""
+        """Frequency f of the structure on locked motors [Hz], 0 if no structure is declared."""
         structure = self.axis.structure
         return structure.frequency if structure.inertia_share > 0.0 else 0.0
 
@@ -139,30 +177,54 @@ class Plant:
 
     @property
     def gear_inertia(self):
-        """Inertia that one motor moves above the frequency of the structure, on its shaft [kg m2]."""
+        """Inertia J without the share of the dish [kg m2].
+
+        One motor moves this inertia above the frequency of the structure.
+        """
         on_gear = (1.0 - self.axis.structure.inertia_share) * self.axis.load.inertia
         return self.motor_inertia + on_gear / (2.0 * self.ratio**2)
 
     @property
     def whole_inertia(self):
-        """Inertia of load and motors, seen at the load [kg m2]."""
+        """Inertia J_A of load and motors, at the load [kg m2]."""
         return 2.0 * self.inertia * self.ratio**2
 
     @property
     def acceleration(self):
-        """Acceleration of the load at the torque limits of the motors, minus friction, unbalance and wind [rad/s2]."""
+        """Acceleration of the load by both torque limits, less friction, unbalance and wind [rad/s2]."""
         torque = (self.axis.motor_1.torque_limit + self.axis.motor_2.torque_limit) * self.ratio
         return (torque - self.axis.friction.coulomb - abs(self.axis.load.unbalance) - abs(self.wind)
                 ) / self.whole_inertia
 
 
+def receiver_noise(beamwidth, slope, cn0_dbhz):
+    """Return the root density of the noise of a receiver's error on the beam axis [rad/sqrt(Hz)].
+
+    beamwidth [rad]; slope: monopulse slope [-]; cn0_dbhz: C/N0 [dB-Hz].
+    """
+    return beamwidth / (slope * math.sqrt(2.0 * 10.0**(0.1 * cn0_dbhz)))
+
+
+def filter_gains(plant):
+    """Return {key of acu.AXIS: value} of the target filter: the number of models that do not follow the structure."""
+    if not plant.mode:
+        return {}
+    bank = FilterParameters().imm
+    fastest = plant.noise * (2.0 * math.pi * plant.mode / FILTER_RATIO)**3
+    noises = bank.ca.noise * bank.rung_ratio**np.arange(bank.rungs)
+    return {'filter.imm.rungs': max(1, int(np.sum(noises <= fastest)))}
+
+
 def rate_slope(plant):
-    """Return the largest change of the rate command [rad/s2], a quarter of the torque below the limits."""
+    """Return the largest slope of the rate command (`limits.acceleration`) [rad/s2].
+
+    It is 1.3 times the acceleration of the shaper of a rigid axis.
+    """
     return 1.3 * TORQUE_SHARE * plant.acceleration
 
 
 def drive_gains(plant, w_s):
-    """Return {key of adu.AXIS: value} for a crossover w_s [rad/s] of the speed loop."""
+    """Return {key of adu.AXIS: value} of the drive for a crossover w_s [rad/s] of the speed loop."""
     K_p, rated = w_s * plant.gear_inertia, plant.axis.thermal.rated_torque
     return {'speed_loop.proportional': K_p, 'speed_loop.integral': K_p * w_s / 5.0,
             'speed_loop.load_inertia': plant.axis.load.inertia, 'bias.torque': 0.4 * rated, 'bias.hold': 0.47 * rated,
@@ -170,7 +232,7 @@ def drive_gains(plant, w_s):
 
 
 def position_crossover(plant, w_s):
-    """Return the crossover [rad/s] of the position loop that follows from that of the speed loop and the structure."""
+    """Return the crossover w_p [rad/s] of the position loop for a crossover w_s [rad/s] of the speed loop."""
     w_p = w_s / CROSSOVER_RATIO
     return min(w_p, 2.0 * math.pi * plant.mode / MODE_RATIO) if plant.mode else w_p
 
@@ -186,36 +248,42 @@ def shaper_gains(plant, w_s):
 
 
 def control_gains(plant, w_s, w_p):
-    """Return {key of acu.AXIS: value} for crossovers w_s, w_p [rad/s] of the speed and the position loop."""
+    """Return {key of acu.AXIS: value} of the control unit; w_s, w_p: crossovers of speed and position loop [rad/s]."""
     shaper = {f'shaper.{key}': value for key, value in shaper_gains(plant, w_s).items()}
     return {'controller': 'feedforward', 'feedforward.bandwidth': w_p, 'feedforward.inertia': plant.whole_inertia,
             'feedforward.friction': plant.axis.friction.coulomb,
-            'shaper.rate': SHAPER_RATE_SHARE * plant.axis.limits.rate, **shaper,
+            'shaper.rate': SHAPER_RATE_SHARE * plant.axis.limits.rate, **shaper, **filter_gains(plant),
             'limits.rate': plant.axis.limits.rate, 'limits.acceleration': rate_slope(plant)}
 
 
 def _rounded(gains):
-    return {key: value if isinstance(value, str) else float(f'{value:.4g}') for key, value in gains.items()}
+    return {key: float(f'{value:.4g}') if isinstance(value, float) else value for key, value in gains.items()}
 
 
 def smallest(every):
-    """Return the smallest value of each metric in several frequency.margins; NaN only if no margin has the metric."""
+    """Return the smallest value of each metric in several results of frequency.margins; NaN if none has the metric."""
     return {key: (np.fmin.reduce([margins[key][0] for margins in every]), unit) for key, (_, unit) in every[0].items()}
 
 
 def meets_margins(margins, required):
-    """Return True if margins of frequency.margins meet LoopRequirements.
+    """Return True if the margins of frequency.margins meet the LoopRequirements.
 
-    A gain margin outside the band (NaN) is met; a loop that is never above 1 has no phase margin and fails.
+    A gain margin outside the measured band (NaN) meets its requirement. A loop whose gain is never above 1 has no
+    phase margin (NaN), and does not meet its requirement.
     """
     phase, gain = margins['phase_margin_deg'][0], margins['gain_margin_db'][0]
     return phase >= required.phase_margin and not gain < required.gain_margin
 
 
 class Loops:
-    """The loops of a scenario during their design: gains {'adu.azimuth.speed_loop.proportional': value}.
+    """The loops of a scenario during their design.
 
-    source: a name or a path; overrides: texts 'node.key=value'. Raises LoopError for a drive without motors.
+    source      name or path of the scenario
+    overrides   texts 'node.key=value' of changed parameters
+    plants      {axis: Plant}
+    gains       present gains, such as {'adu.azimuth.speed_loop.proportional': value}
+
+    Raises LoopError for a drive without motors.
     """
 
     def __init__(self, source, overrides=()):
@@ -224,16 +292,24 @@ class Loops:
             raise LoopError(f'scenario {chosen.name}: an electronic beam has no loops to tune')
         self.source, self.overrides, self.name = source, tuple(overrides), chosen.name
         drive = chosen.node_parameters('adu')
-        beamwidth = chosen.node_parameters('tracking_receiver').antenna.beamwidth
-        self.plants = {name: Plant(name, getattr(drive, name), getattr(drive.wind, name), beamwidth) for name in AXES}
+        known = chosen.node_parameters('tracking_receiver')
+        noise = receiver_noise(known.antenna.beamwidth, known.antenna.slope, known.receiver.cn0_dbhz)
+        self.plants = {name: Plant(name, getattr(drive, name), getattr(drive.wind, name), known.antenna.beamwidth,
+                                   noise) for name in AXES}
         self.gains = {}
 
     def set(self, node, name, gains):
-        """Set gains {key: value} of an axis of a node."""
+        """Set gains {key: value} of a node for the axis `name`, rounded to four digits."""
         self.gains |= {f'{node}.{name}.{key}': value for key, value in _rounded(gains).items()}
 
+    def designed(self, loop, name):
+        """Return the crossover [rad/s] for which the gains of a loop, speed or position, were designed."""
+        if loop == 'position':
+            return self.gains[f'acu.{name}.feedforward.bandwidth']
+        return self.gains[f'adu.{name}.speed_loop.proportional'] / self.plants[name].gear_inertia
+
     def _case(self, corner=(1.0, 1.0)):
-        """Return the Case of a measurement; corner: factors of load inertia and frequency of flexible axes."""
+        """Return the cases.Case of a measurement; corner: factors for axes with a structure, see PLANT_CORNERS."""
         given = dict(text.split('=', 1) for text in self.overrides)
         changed = {}
         for name, plant in self.plants.items():
@@ -243,24 +319,26 @@ class Loops:
         return frequency.case(self.name, self.source, {**given, **self.gains, **changed, **STILL_AIR_PARAMETERS})
 
     def _sweep(self, axis, sweep, period):
-        """Return a sweep with limited peak and frequency.
+        """Return a frequency.Sweep with limited peak and frequency; period: sampling period of the loop [s].
 
-        To keep the teeth closed, its torque stays below half of the bias torque. Its highest frequency is below half
-        of the step rate of the drive.
+        To keep the teeth in contact, the torque of the sweep stays below half of the bias torque. The highest
+        frequency stays below half of the sampling rate.
         """
         peak = 0.5 * axis.bias.torque / max(axis.speed_loop.proportional * axis.gear_train.ratio, 1e-9)
         return dataclasses.replace(sweep, peak=min(sweep.peak, peak or sweep.peak),
                                    highest=min(sweep.highest, 0.475 / period))
 
     def response(self, loop, name, corner=(1.0, 1.0)):
-        """Return the frequency.Response of a loop of an axis with the present gains, None if the drive trips.
+        """Return the frequency.Response of a loop of the axis `name` with the present gains, None if the drive trips.
 
-        loop: 'current' (of the motor with the smaller phase margin), 'speed' or 'position'; corner: see PLANT_CORNERS.
+        loop: 'current', 'speed' or 'position'; corner: factors of the plant, see PLANT_CORNERS. For the current loop
+        it is the Response of the motor with the smaller phase margin.
         """
         case = self._case(corner)
         drive = case.loaded().node_parameters('adu')
         axis = getattr(drive, name)
         if loop == 'current':
+            # frequency.current measures the azimuth, so this axis takes its place, with the travel of the azimuth.
             travel = drive.azimuth.limits
             limits = dataclasses.replace(axis.limits, lower=travel.lower, upper=travel.upper)
             found = frequency.current(dataclasses.replace(drive, azimuth=dataclasses.replace(axis, limits=limits)))
@@ -278,14 +356,17 @@ class Loops:
         found = self.response(loop, name, corner)
         if found is None:
             return None
-        # The dish holds a flexible axis at its own frequency. There |L| falls below 1 long before the crossover.
+        # At the frequency of the structure on locked motors the dish holds the axis. There the gain |L| of the open
+        # loop falls below 1 long before the crossover. The crossover is therefore searched above the free frequency.
         return frequency.margins(found, above=corner[1] * self.plants[name].free_mode if loop == 'speed' else 0.0)
 
     def close(self, loop, name, required, set_to, fastest):
-        """Return (w, rows) of the first loop, from crossover `fastest` [rad/s] down, that meets LoopRequirements.
+        """Return (w, rows) of the fastest loop that meets the LoopRequirements `required`; w: its crossover [rad/s].
 
-        rows: [(name of the loop, margins)], with the smallest values in all PLANT_CORNERS if a structure is declared.
-        set_to(w) sets the gains for w. Raises LoopError if no loop meets the requirements.
+        loop: 'speed' or 'position'; name: axis; set_to: function set_to(w) that sets the gains for a crossover;
+        fastest: first tried crossover [rad/s].
+        rows: [(name of the loop, margins)]. If a structure is declared, a second row has the smallest margins in all
+        PLANT_CORNERS. Raises LoopError if no tried loop meets the requirements.
         """
         for w in fastest * SLOWDOWN_FACTOR**np.arange(MAX_SLOWDOWNS):
             set_to(w)
@@ -306,10 +387,10 @@ class Loops:
 
 
 def design(loops, axes, required, progress):
-    """Design the loops of some axes for LoopRequirements.
+    """Design the loops of some axes for the LoopRequirements `required`; the gains are then in the Loops.
 
-    Return the rows of the table [(loop, axis, required Hz, margins)]. progress(share, text) is called for each loop.
-    Raises LoopError.
+    Return the rows of the table: [(loop, axis, required crossover or bandwidth [Hz], margins)]. progress(share of the
+    work that is done, text) is called for each loop. Raises LoopError.
     """
     speed_hz = required.speed or CROSSOVER_RATIO * (required.position or DEFAULT_SPEED_CROSSOVER_HZ / CROSSOVER_RATIO)
     wanted_s = 2.0 * math.pi * speed_hz
@@ -337,7 +418,8 @@ def design(loops, axes, required, progress):
         def set_position(w, name=name, plant=plant, w_s=w_s):
             loops.set('acu', name, control_gains(plant, w_s, w))
         _, closed = loops.close('position', name, required, set_position, w_p)
-        rows += [(loop, name, w_p / (2.0 * math.pi), margins) for loop, margins in closed]
+        wanted = required.position or w_p / (2.0 * math.pi)
+        rows += [(loop, name, wanted, margins) for loop, margins in closed]
     return rows
 
 
@@ -347,7 +429,10 @@ def refuse_outside(loops):
 
 
 def table(rows, required):
-    """Return lines: each loop with measured and required values."""
+    """Return the table of the loops as lines of text, with measured and required values.
+
+    rows: as of `design`; required: LoopRequirements.
+    """
     width = max(20, *(len(f'{name} {loop}') for loop, name, *_ in rows))
     lines = [f'{"loop":{width}} {"required":>9} {"crossover":>10} {"bandwidth":>10} {"phase margin":>21} '
              f'{"gain margin":>20}']
@@ -355,20 +440,40 @@ def table(rows, required):
         values = {key: value for key, (value, _) in margins.items()}
         limits = required.phase_margin, required.gain_margin
         floor = [f'(>= {limit:g})' for limit in limits] if loop != 'current' else ('', '')
-        lines.append(f'{f"{name} {loop}":{width}} {wanted:6.3g} Hz {_text(values["crossover_hz"]):>7} Hz '
-                     f'{_text(values["bandwidth_hz"]):>7} Hz {_text(values["phase_margin_deg"]):>9} deg {floor[0]:>7} '
-                     f'{_text(values["gain_margin_db"]):>9} dB {floor[1]:>7}')
+        lines.append(f'{f"{name} {loop}":{width}} {wanted:6.3g} Hz {_text(values["crossover_hz"], "Hz", 10)} '
+                     f'{_text(values["bandwidth_hz"], "Hz", 10)} {_text(values["phase_margin_deg"], "deg", 13)} '
+                     f'{floor[0]:>7} {_text(values["gain_margin_db"], "dB", 12)} {floor[1]:>7}'.rstrip())
     return lines
 
 
-def _text(value):
-    return f'{value:.3g}' if math.isfinite(value) else 'beyond'
+def _text(value, unit, width):
+    return f'{f"{value:.3g} {unit}" if math.isfinite(value) else "none":>{width}}'
+
+
+def remarks(loops, rows):
+    """Return lines on the rows of `design`: loops that are slower than required, with the reason, and loops without a
+    gain margin."""
+    lines = []
+    for loop, name, wanted, margins in rows:
+        got = margins['crossover_hz'][0]
+        if loop in ('speed', 'position') and got < NEAR_SHARE * wanted:
+            designed = loops.designed(loop, name) / (2.0 * math.pi)
+            speed = loops.designed('speed', name) / (2.0 * math.pi)
+            if designed > NEAR_SHARE * wanted:
+                reason = 'the gains are those of a rigid axis; gears, delays and friction make the loop slower'
+            elif loop == 'position' and designed > NEAR_SHARE * speed / CROSSOVER_RATIO:
+                reason = f'a position loop has at most 1/{CROSSOVER_RATIO:g} of the crossover of the speed loop'
+            else:
+                reason = 'a faster loop does not hold the required margins'
+            lines.append(f'{name} {loop} loop: {wanted:.3g} Hz required, {got:.3g} Hz reached: {reason}')
+    return [*lines, *frequency.without_gain_margin([f'{name} {loop}' for loop, name, _, margins in rows
+                                                    if math.isnan(margins['gain_margin_db'][0])])]
 
 
 def main(options, progress):
     """Design the loops for the options of the verb, write the parameter file and return the lines to print.
 
-    Raises LoopError.
+    progress: function, see `design`. Raises LoopError.
     """
     for name in ('filter', 'feedforward', 'runs', 'seed', 'duration'):
         if not (getattr(options, name) is None or getattr(options, name) is False):
@@ -383,7 +488,7 @@ def main(options, progress):
     rows = design(loops, axes, required, progress)
     loops.gains = {key: value for key, value in loops.gains.items() if key.split('.')[1] in axes}
     refuse_outside(loops)
-    lines = table(rows, required)
+    lines = [*table(rows, required), *remarks(loops, rows)]
     made = [f'made by: {options.command}', f'git {configuration.git_revision() or "unknown"}', *lines]
     sections = {node: {key.removeprefix(f'{node}.'): value for key, value in loops.gains.items()
                        if key.startswith(f'{node}.')} for node in ('adu', 'acu')}

@@ -1,10 +1,10 @@
-"""The procedure that tunes the parameters of a filter.
+"""Search for the parameters of a filter that minimise a criterion, for `pedestal tune --filter` and the studies.
 
-It minimises a criterion over the logarithms of the parameters of the filter kind. The criterion is the angle rms of a
-study or the negative log-likelihood of a bag's innovations. One or two parameters are first searched on their grids.
-The simplex of Nelder and Mead then starts from the best point, or from the given parameters if there are more than
-two. It ends when the parameters stay within 2 %. The result must be validated on other seeds or on another part of the
-recording.
+The criterion is the rms angle error of a study, or the negative log-likelihood of the innovations of a recording. The
+search works on the logarithms of the parameters of the filter kind. One or two parameters are first searched on their
+grids. The simplex method of Nelder and Mead then starts from the best point of the grid. With more than two parameters
+it starts from the given parameters. The simplex ends when its parameters agree within 2 %. The result must be
+validated on other seeds, or on another part of the recording.
 """
 import itertools
 import math
@@ -17,10 +17,10 @@ from acu_tracker.estimation.params import FilterParameters
 from pedestal_common import parameters
 
 LOG_TOLERANCE = 0.02
-"""Tolerance of the logarithms of the parameters [-]."""
+"""Difference between the logarithms of the parameters at which the simplex ends [-]."""
 
 FAILED_COST = 1e300
-"""Cost of a criterion that is not finite; the cost is finite because the simplex takes differences."""
+"""Cost in place of a criterion that is not finite. Because the simplex subtracts costs, this cost is finite."""
 
 
 def names(params):
@@ -31,14 +31,18 @@ def names(params):
 
 
 def _of_kind(kind):
+    """Return the names of the parameters of a filter kind that have a grid for the search."""
     return tuple(name for name, field in parameters.flatten(FilterParameters)
                  if name.startswith(f'{kind}.') and field.metadata.get('grid'))
 
 
 def tuned(params, criterion, searched=None):
-    """Return (best parameters, their criterion), searched from FilterParameters or UkfParameters.
+    """Return (best parameters, their criterion) of a search.
 
-    criterion(parameters): infinite or NaN if it has no value. searched: names, None for those of `names`.
+    params      FilterParameters or UkfParameters from which the search starts
+    criterion   criterion(parameters) -> value to minimise, infinite or NaN without a value
+    searched    names of the searched parameters, None for those of `names`
+
     Raises ValueError if no parameters give a finite criterion.
     """
     searched = names(params) if searched is None else tuple(searched)

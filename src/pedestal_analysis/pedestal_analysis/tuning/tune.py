@@ -1,15 +1,18 @@
-"""`pedestal tune`: tune the parameters of a filter, or the gains of the feed-forward, to a recording or a scenario.
+"""`pedestal tune`: tune the parameters of the target filter or the gains of the feed-forward of the control unit.
 
-recording     The recorded inputs are recomputed by the ACU's unit, as in `pedestal recompute`, with changed
-parameters.
-              The criterion maximises the mean log-density of the innovations of the angle, log N(nu; 0, S), which
-              rewards small innovations and a correct S. To limit the weight of outliers, the log-density falls
-              linearly beyond HUBER_LIMIT_SIGMAS. Every second piece of PIECE_LENGTH_S is reserved to validate the
-              result.
-scenario      The compiled closed loop runs on given seeds. The criterion minimises the rms of the true pointing error
-              of the axis (cross-elevation, elevation) in settled autotrack. Another seed validates the result.
-feed-forward  The rate loop of the drive is identified (identification.py) and gives k_v and k_a. The closed loop
-              validates the gains.
+The source is a recording or a scenario:
+
+filter, from a recording   The unit of the control unit receives the recorded inputs again, as in `pedestal recompute`,
+                           with changed parameters. The search maximises the mean log-density log N(nu; 0, S) of the
+                           innovations nu of the angle, whose variance by the filter is S. This criterion prefers small
+                           innovations and a correct S. To limit the weight of outliers, the log-density falls linearly
+                           beyond HUBER_LIMIT_SIGMAS. Every second piece of the recording, PIECE_LENGTH_S long, is
+                           reserved to validate the result.
+filter, from a scenario    The closed loop runs with given seeds. The search minimises the rms of the true pointing
+                           error of the axis (cross-elevation, elevation) in settled autotrack. A run with another seed
+                           validates the result.
+feed-forward               The rate loop of the drive is identified (identification.py), which gives the gains k_v of
+                           the rate and k_a of the acceleration. The closed loop validates the gains.
 
 The search is that of parameter_search.py. The result is a ROS 2 parameter file for nodes and for `pedestal run`.
 """
@@ -39,27 +42,29 @@ from pedestal_recording import configuration
 HUBER_LIMIT_SIGMAS = 4.0
 """Size above which an innovation is an outlier [standard deviations]."""
 CONVERGENCE_TIME_S, PIECE_LENGTH_S = 1.0, 0.5
-"""Time for the filter to converge after the first receiver error, and length of the pieces of a recording [s]."""
+"""Time for the filter to converge after the first receiver error [s]; length of the pieces of a recording [s]."""
 AXES = topics.AXES
 """Names of the axes."""
 DEFAULT_SEED_COUNT = 2
-"""Default number of seeds to tune a scenario on."""
+"""Default number of seeds with which a scenario runs for each tried set of parameters."""
 ESTIMATE_ERRORS = ('estimate_error_cross_elevation_rms_deg', 'estimate_error_elevation_rms_deg')
-"""Results of a recording in the table."""
+"""Results that the table states for a recording."""
 TUNED_UKF_PARAMETERS = ('cv_noise', 'ca_noise', 'dwell')
-"""Tuned parameters of tracker.ukf; the other parameters matter only at the start."""
+"""Tuned parameters of tracker.ukf. The other parameters of tracker.ukf have an effect only at the start."""
 
 
 class TuneError(ValueError):
-    """Options or data that do not allow tuning; one line."""
+    """Error of options or data that do not allow tuning. Its text is one line."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Score:
-    """Score of parameters, arrays (2,) of both axes.
+    """Score of a set of parameters. The arrays are (2,) for azimuth and elevation.
 
-    searched, kept: minimised criterion on the searched part and on the reserved part; nis: mean NIS of the reserved
-    part; pointing: {metric: (value, unit)}.
+    searched   criterion on the part of the data on which the search runs; smaller is better
+    kept       criterion on the part that is reserved for the validation
+    nis        mean NIS (normalised innovation squared) on the reserved part [-]
+    pointing   {metric: (value, unit)} of further results
     """
     searched: np.ndarray
     kept: np.ndarray
@@ -68,7 +73,11 @@ class Score:
 
 
 def log_density(innovation, sigma):
-    """Return log N(nu; 0, sigma^2) without its constant, linear beyond HUBER_LIMIT_SIGMAS (Huber 1964)."""
+    """Return the log-density log N(nu; 0, sigma^2) of innovations nu (n, 2), without its constant.
+
+    sigma (n, 2): standard deviations of the innovations. Beyond HUBER_LIMIT_SIGMAS the log-density is linear (Huber
+    1964).
+    """
     z = np.abs(innovation / sigma)
     return -np.where(z <= HUBER_LIMIT_SIGMAS, 0.5 * z * z, HUBER_LIMIT_SIGMAS
                      * (z - 0.5 * HUBER_LIMIT_SIGMAS)) - np.log(sigma)
@@ -81,11 +90,15 @@ def _mean(values):
 
 
 class RecordedSource:
-    """A recording on which filters are tuned. criterion: the negative mean log-density of the innovations.
+    """A recording as the source of the tuning. The criterion is the negative mean log-density of the innovations.
 
-    searched, reserved: masks of the steps of the pieces for the search and for the validation.
+    params      AcuParameters of the recording
+    searched    mask (n,) of the steps in the pieces for the search
+    reserved    mask (n,) of the steps in the pieces for the validation
+    ranged      True if the recording has a measured range
+    of_beams    True for an array with several beams. Its control units are the nodes `beam_1/acu` and so on. A
+                parameter file for `acu` then serves `pedestal run`, but not `ros2 run`.
 
-    of_beams: True for several beams. Their nodes are `beam_1/acu`, ..., so that only pedestal resolves `acu`.
     Raises TuneError for too few receiver errors.
     """
 
@@ -106,23 +119,26 @@ class RecordedSource:
             raise TuneError(f'{path}: no receiver error to compare the filter with')
         counted = compared & (t >= t[compared][0] + CONVERGENCE_TIME_S)
         even = np.floor(t / PIECE_LENGTH_S).astype(int) % 2 == 0
-        # Every second piece is searched, the others are reserved.
+        # Every second piece is for the search, the others are reserved for the validation.
         self.searched, self.reserved = counted & even, counted & ~even
         if not (self.searched.any() and self.reserved.any()):
             raise TuneError(f'{path}: receiver errors span {np.ptp(t[compared]):.3g} s; must be at least '
                             f'{CONVERGENCE_TIME_S + 2.0 * PIECE_LENGTH_S:g} s')
 
     def _innovations(self, steps):
-        """Return innovation, its sigma and NIS (3, n, 2) of both axes in steps (n,)."""
+        """Return (3, n, 2): innovation [rad], its standard deviation [rad] and NIS [-] of both axes.
+
+        steps (n,): records of the outputs of the control unit.
+        """
         return np.array([layouts.of_filter(steps, name) for name in ('innovation', 'innovation_sigma', 'nis')])
 
     def _run(self, params):
-        """Return (unit, its outputs of each step) for these parameters."""
+        """Return (unit of the control unit, its outputs at each step (n,)) for AcuParameters."""
         unit = recompute.unit_of(self.recording, 'acu', params)
         return unit, recompute.compute(self.recording, unit, self.feed, requests=self.requests)[0]
 
     def criterion(self, params):
-        """Return the criterion (2,) of AcuParameters on the searched pieces."""
+        """Return the criterion (2,) of both axes for AcuParameters, on the pieces for the search."""
         innovation, sigma, _ = self._innovations(self._run(params)[1])
         return _mean(-log_density(innovation, sigma)[self.searched])
 
@@ -142,17 +158,22 @@ class RecordedSource:
 
 
 class SimulatedSource:
-    """A scenario on whose closed loop parameters are tuned.
+    """A scenario as the source of the tuning. The criterion is the rms pointing error [deg] in the closed loop.
 
-    criterion: rms pointing error [deg] in settled autotrack, or in any mode except standby. Raises TuneError if the
-    run is never in such a mode.
+    The criterion counts the steps in settled autotrack, or with any_mode in any mode except standby. The fields
+    params, ranged and of_beams are as in RecordedSource. Raises TuneError if the run is never in such a mode.
     """
 
     criterion_name, unit, kept = 'pointing error rms', 'deg', 'on the reserved seed'
 
     def __init__(self, load, seed, runs, any_mode):
-        """Load the scenarios; load(seed) -> Scenario; seed: None for its own; any_mode: True for all modes except
-        standby."""
+        """Load the scenarios, one for each seed.
+
+        load       load(seed) -> Scenario
+        seed       first seed, None for that of the scenario
+        runs       number of seeds for the search; the next seed validates
+        any_mode   True for all modes except standby
+        """
         chosen = load(seed)
         self.any_mode = any_mode
         self.of_beams = chosen.prefixes != ('',)
@@ -166,7 +187,10 @@ class SimulatedSource:
             raise TuneError(f'scenario {chosen.name}: never {mode} for more than {HANDOVER_SETTLING_S:g} s')
 
     def runs(self, params, seeds):
-        """Return (steps, truth) of the settled parts of all runs, records of closed_loop.STEP and TRUTH."""
+        """Return (steps, truth) of the settled parts of the runs with these AcuParameters and seeds.
+
+        They are records of closed_loop.STEP and of closed_loop.TRUTH, of all runs one after the other.
+        """
         parts = []
         for seed in seeds:
             run = closed_loop.Loop(self._scenarios[seed], changed={'acu': params}).run()
@@ -177,7 +201,7 @@ class SimulatedSource:
         return tuple(map(np.concatenate, zip(*parts)))
 
     def criterion(self, params):
-        """Return the criterion (2,) [deg] of AcuParameters on the searched seeds."""
+        """Return the criterion (2,) [deg] of both axes for AcuParameters, with the seeds for the search."""
         _, truth = self.runs(params, self.seeds)
         return np.degrees(np.sqrt(_mean(truth['error']**2)))
 
@@ -193,20 +217,22 @@ class SimulatedSource:
 
 
 def _with_filter(params, axis, changed):
+    """Return AcuParameters with other FilterParameters of an axis."""
     return dataclasses.replace(params, **{axis: dataclasses.replace(getattr(params, axis), filter=changed)})
 
 
 def filters(source, kind, axes, progress):
-    """Return (AcuParameters with the tuned filter, {parameter: value} of the filter).
+    """Return (AcuParameters with the tuned filter, {name: value} of the tuned parameters).
 
-    source: RecordedSource or SimulatedSource. Raises TuneError.
+    source: RecordedSource or SimulatedSource; kind: kind of the filter; axes: names of the tuned axes; progress:
+    progress(share of the work that is done, text). Raises TuneError.
     """
     count = 0
 
     def counted(criterion, part):
         nonlocal count
         count += 1
-        # The number of trials is not known in advance, so the bar of an axis approaches its end ever slower.
+        # Because the number of tries is not known in advance, the progress bar of an axis slows down toward its end.
         progress((part + 1.0 - math.exp(-count / 40.0)) / len(axes), f'{axes[part]}: {count} tried')
         return criterion
 
@@ -245,13 +271,16 @@ def filters(source, kind, axes, progress):
 
 
 def _rounded(params, names):
-    """Return the parameters, rounded to four digits for these names."""
+    """Return parameters, in which those of some names are rounded to four digits."""
     values = parameters.as_dict(params)
     return parameters.build(type(params), {**values, **{name: float(f'{values[name]:.4g}') for name in names}})
 
 
 def feedforward(chosen, source, axes, progress):
-    """Return (AcuParameters with identified feed-forward gains, {parameter: value} of the gains); chosen: Scenario."""
+    """Return (AcuParameters with identified feed-forward gains, {name: value} of the gains).
+
+    chosen: scenario.Scenario whose drive is identified; source: SimulatedSource; axes: names of the tuned axes.
+    """
     progress(0.1, 'identifying the rate loop')
     loops, params, settings = identification.identify(chosen), source.params, {}
     for axis in axes:
@@ -285,9 +314,13 @@ def main(options, command, progress):
         params, settings = feedforward(load(options.seed), source, axes, progress)
     else:
         params, settings = filters(source, options.filter, axes, progress)
+    whole = 0.0 if is_bag else scenario.load(options.source, options.param).header.duration
     progress(0.98, 'validating')
     old, new = source.score(source.params), source.score(params)
     lines = [*_table(source, old, new, axes), *_remarks(source, old, new, axes, settings)]
+    if options.duration and options.duration < whole:
+        lines.append(f'tuned on the first {options.duration:g} s of the {whole:g} s of the scenario: the parameters '
+                     'may be worse in the rest; without --duration the whole scenario counts')
     made = [f'made by: {" ".join(command.split())}', f'git {configuration.git_revision() or "unknown"}', *lines]
     file.write_text(''.join(f'# {line}\n' for line in made) + parameter_file.text({'acu': settings}))
     values = [f'{name:48} {value}' for name, value in settings.items()]
@@ -342,7 +375,7 @@ def _remarks(source, old, new, axes, settings):
     fields = dict(parameters.flatten(AcuParameters))
     for name, value in settings.items():
         meta = fields[name].metadata
-        # Within 5 % of an end of its range; 0 switches a parameter off and is no end of a search.
+        # Doubtful within 5 % of an end of the range. The value 0 switches a parameter off, and is no doubt.
         if 'low' in meta and not 1.05 * meta['low'] < value < 0.95 * meta['high'] and value > 0.0:
             doubts.append(f'{name} is at the end of its range: the optimum may be outside the range')
     return doubts

@@ -1,1 +1,1 @@
-"""Scenario as a graph: its nodes as processes, started, watched and ended."""
+"""Graph of a scenario: its nodes as processes, which are started, watched and ended."""

@@ -1,16 +1,16 @@
-"""Node as a child of this process, with its log as output: a copy of this process where possible, else a new
-interpreter.
+"""Child process of `pedestal run` in which a node runs, with the log of the node as its output. The child is a copy of
+`pedestal run` where possible, otherwise a new Python interpreter.
 
 A copy (os.fork without exec) already has the imports of every node, which take half a second of a core. A fork copies
-only the thread that calls it, so a copy is possible only while this process has no other thread that is needed.
+only the thread that calls it, so a copy is possible only while `pedestal run` needs no other thread:
 
 - Threads of Python: threading.active_count() counts them.
-- Threads of rclpy: its libraries start threads in C++, which Python does not count. Because of these threads no copy
-  is made after the import of rclpy.
+- Threads of rclpy: its libraries start threads in C++, which Python does not count. Because these threads would be
+  missing in a copy, no copy is made after the import of rclpy.
 - Threads of OpenBLAS (numpy): OpenBLAS ends its own threads at a fork, so they need no care.
 
-A held child has its process, its imports and its laws, but runs only after `begin`. The nodes of a run therefore load
-at the same time, and start together.
+A child is held: it loads its imports and its laws, then waits for `begin`. The nodes of a run therefore load at the
+same time, and start together.
 """
 import contextlib
 import ctypes
@@ -38,23 +38,26 @@ arg_start, arg_end (command line), env_start, env_end (environment), auxv (auxil
 """
 
 NO_AUXILIARY_VECTOR, NO_AUXILIARY_SIZE, NO_FILE = 0, 0, -1
-"""Values of a PRCTL_MM_MAP that leave the auxiliary vector and the executable as they are."""
+"""Values in a PRCTL_MM_MAP with which the kernel keeps the auxiliary vector and the executable of the process."""
 
 CODE_FIELDS, STACK_FIELDS, DATA_AND_HEAP_FIELDS, ENVIRONMENT_FIELDS = (26, 28), (28, 29), (45, 48), (50, 52)
-"""Ranges [first, end) of the fields of /proc/self/stat with these addresses, numbered from 1 as in proc(5)."""
+"""Ranges [first, end) of the fields of /proc/self/stat that hold these addresses, numbered from 1 as in proc(5)."""
 
 BLOCKED_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+"""Signals that are blocked during the fork, so that the child does not run a handler of its parent."""
+
 _libc = ctypes.CDLL(None)
 _libc.sbrk.restype = _libc.malloc.restype = ctypes.c_void_p
 
 
 class Child:
-    """Process that is held until `begin` and then runs as `python -m` would; otherwise like a subprocess.Popen.
+    """Child process that is held until `begin` and then runs a module like `python -m`. Its methods are like those of
+    subprocess.Popen. It heads a session of its own, and the kernel sends it SIGTERM when its parent ends.
 
-    command: [interpreter, '-m', module, arguments ...]; output: descriptor of its log; rehearse: function that a copy
-    calls while it is held, to load what the node needs later (its laws). Its errors are ignored, because the node
-    meets the same error again and reports it. The child heads a session of its own, and the kernel sends it SIGTERM
-    when this process ends.
+    command   [interpreter, '-m', module, arguments ...]
+    output    file descriptor of its log
+    rehearse  function that a copy calls while it is held, to load the laws of the node. Errors of this function are
+              ignored, because the node meets the same error later and reports it.
     """
 
     def __init__(self, command, output, rehearse):
@@ -63,7 +66,9 @@ class Child:
         self.returncode = None
         parent = os.getpid()
         if copy:
-            gc.freeze()     # this avoids that a garbage collection in the child writes to, and so copies, shared pages
+            # This avoids that a garbage collection in the child writes to memory pages that it shares with its parent,
+            # which would copy the pages.
+            gc.freeze()
         mask = signal.pthread_sigmask(signal.SIG_BLOCK, BLOCKED_SIGNALS)
         try:
             self.pid = os.fork()
@@ -83,13 +88,13 @@ class Child:
             os.close(gate)
 
     def begin(self):
-        """Release the process."""
+        """Release the held process, so that it runs its module."""
         with contextlib.suppress(BrokenPipeError):
             os.write(self._begin, b'.')
         os.close(self._begin)
 
     def poll(self):
-        """Return its exit code, -N after an end by signal N; None while it runs."""
+        """Return the exit code of the process, -N after an end by signal N; None while the process runs."""
         if self.returncode is None:
             pid, status = os.waitpid(self.pid, os.WNOHANG)
             if pid:
@@ -97,7 +102,8 @@ class Child:
         return self.returncode
 
     def wait(self, timeout=None):
-        """Return its exit code after its end. timeout [s]; raises subprocess.TimeoutExpired."""
+        """Wait for the end of the process and return its exit code. timeout: longest wait [s], None without limit.
+        Raises subprocess.TimeoutExpired."""
         end = math.inf if timeout is None else time.monotonic() + timeout
         while self.poll() is None:
             if time.monotonic() > end:
@@ -116,7 +122,8 @@ class Child:
 
 
 def _run_child(run):
-    """Call run(), and end the process with its exit code: no error lets the child return into the parent's code."""
+    """Call run(), and end the child with the exit code that run() returns. An error in run() ends the child with code
+    1, because the child must never return into the code of its parent."""
     code = 1
     try:
         code = run() or 0
@@ -132,8 +139,13 @@ def _run_child(run):
 
 
 def _settle(parent, output, gate, mask):
-    """Detach the child from the resources of its parent; return the new descriptor of the gate."""
-    # Move both above 2: where the parent has no standard input, a descriptor may have the number of a standard stream.
+    """Detach the child from the resources of its parent, and return the new descriptor of the gate.
+
+    parent: its process number; output: descriptor of the log; gate: pipe on which the parent releases the child; mask:
+    signal mask of the parent before the fork.
+    """
+    # Both descriptors are moved above 2. If the parent has no standard input, one of them may have the number of a
+    # standard stream (0, 1, 2).
     output, gate = (fcntl.fcntl(descriptor, fcntl.F_DUPFD, 3) for descriptor in (output, gate))
     os.setsid()
     _libc.prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
@@ -154,25 +166,27 @@ def _settle(parent, output, gate, mask):
 
 
 def _wait(gate):
-    """Wait for the parent's release; end the process if the parent has ended."""
+    """Wait at the gate until the parent releases this process; end this process if the parent has ended."""
     if not os.read(gate, 1):
         os._exit(0)
     os.close(gate)
 
 
 def _as_interpreter(command, gate, _):
+    """Wait for the release, then replace this process by a new interpreter that runs the command."""
     _wait(gate)
     os.execv(command[0], command)
 
 
 def _as_copy(command, gate, rehearse):
+    """Import the module of the command and rehearse, wait for the release, then run main() of the module."""
     sys.stdout, sys.stderr = (open(descriptor, 'w', buffering, errors='backslashreplace', closefd=False)
                               for descriptor, buffering in ((1, -1), (2, 1)))
     module = command[2]
     sys.argv = [importlib.util.find_spec(module).origin, *command[3:]]
-    # The module of the node imports `entry` first, which sets the signal handlers if sys.argv[0] is a node. The parent
-    # may have imported `entry` under its own name. Because an import executes a module only once, `entry` is removed
-    # so that it is executed again.
+    # The module of the node first imports pedestal_common.entry, which sets the signal handlers if sys.argv[0] is a
+    # node. The parent may have imported `entry` with another sys.argv[0]. Because an import executes a module only
+    # once, `entry` is removed here, so that the next import executes it again.
     sys.modules.pop('pedestal_common.entry', None)
     main = importlib.import_module(module).main
     with contextlib.suppress(Exception):
@@ -196,8 +210,8 @@ def _try_to_set_command_line(command):
     begin = _libc.malloc(len(line))
     ctypes.memmove(begin, line, len(line))
     with open('/proc/self/stat') as stream:
-        # proc(5) counts its fields from 1, so a place for field 0 is added. Field 2, a name in brackets, may contain
-        # any character, so the fields are counted from the last bracket on.
+        # proc(5) counts its fields from 1. The fields are counted from the last bracket on, because field 2, a name in
+        # brackets, may contain any character. Three zeros stand for the fields 0, 1 and 2.
         fields = [0, 0, 0, *stream.read().rpartition(')')[2].split()]
     code, stack, data_and_heap, environment = (map(int, fields[first:end]) for first, end in (
         CODE_FIELDS, STACK_FIELDS, DATA_AND_HEAP_FIELDS, ENVIRONMENT_FIELDS))

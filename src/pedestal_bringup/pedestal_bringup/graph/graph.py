@@ -1,4 +1,8 @@
-"""Run of a scenario from its files to its end. `watch` starts and watches its nodes."""
+"""Run of a scenario as a graph of nodes, from its files to its end, for `pedestal run`.
+
+The class processes.Graph makes a process for each node and holds it. The module `watch` then lets the held nodes
+begin, and watches them.
+"""
 import pathlib
 
 from pedestal_bringup.graph.processes import Graph
@@ -6,7 +10,10 @@ from pedestal_bringup.graph.start import START_LEAD_TIME_S
 
 
 def _free_bag(scenario):
-    """Return bags/runs/SCENARIO-N with the first N that is free."""
+    """Return the path bags/runs/SCENARIO-N with the smallest N for which nothing exists there.
+
+    scenario: name of the scenario.
+    """
     number = 1
     while True:
         bag = pathlib.Path('bags') / 'runs' / f'{scenario}-{number}'
@@ -16,8 +23,8 @@ def _free_bag(scenario):
 
 
 def new_bag(given, scenario):
-    """Return the folder of the recording: as given, else bags/runs/SCENARIO-N. Raises ValueError where it exists
-    already."""
+    """Return the folder for the recording: `given`, or bags/runs/SCENARIO-N if `given` is empty. scenario: name of the
+    scenario. Raises ValueError if the folder exists already."""
     bag = pathlib.Path(given) if given else _free_bag(scenario)
     if bag.exists():
         raise ValueError(f'bag {bag} exists already; a recording is never overwritten')
@@ -27,7 +34,8 @@ def new_bag(given, scenario):
 def read_files(plan):
     """Read the files of ship and target of a program.Plan before any node is started.
 
-    Return (lines on the run, program tracks). Raises ValueError, OSError for an invalid file.
+    Return (lines of text that announce the run to the user, {topic: program track}). Raises ValueError, OSError for an
+    invalid file.
     """
     return plan.announced(), plan.tracks
 
@@ -35,9 +43,9 @@ def read_files(plan):
 def run(plan, bag, progress, servers=None):
     """Run the scenario of a program.Plan to its end, or until Ctrl-C, and return its Outcome.
 
-    servers: {name: processes.ServerProcess} beside the nodes.
-    progress: a context with a function of the time of the run [s], which is called during the run. Raises RunError
-    when the run cannot continue. The recording up to then stays readable.
+    bag: folder for the recording. progress: context manager that gives a function; this function is called during
+    the run with the time of the run [s]. servers: {name: processes.ServerProcess} beside the nodes. Raises RunError if
+    the run cannot continue. The recording up to that moment stays readable.
     """
     _, tracks = read_files(plan)
     with Graph(plan.scenario, bag, servers) as graph:
@@ -45,7 +53,8 @@ def run(plan, bag, progress, servers=None):
         if servers:
             print(f'the servers are usable as soon as the antenna runs, in {START_LEAD_TIME_S:g} s at the soonest',
                   flush=True)
-        # This import loads rclpy. It must wait until the nodes have been forked from this process (child).
+        # This import loads rclpy, which starts threads. Because a copy of this process would lack these threads, Graph
+        # has made the processes of the nodes before the import (see the module child).
         from pedestal_bringup.graph import watch
         with progress as advance:
             return watch.run(graph, tracks, advance)

@@ -1,4 +1,5 @@
-"""Arguments and actions of pedestal.launch.py, without the package `launch`, which only a ROS 2 machine has."""
+"""Arguments of the launch file pedestal.launch.py, and the functions that turn them into a scenario. This module does
+not import the ROS 2 package `launch`, because only a machine with ROS 2 has it."""
 import typing
 
 from pedestal_bringup.graph import graph, operator_servers, supervisor
@@ -35,14 +36,19 @@ ARGUMENTS = (
 
 
 def misspelt_arguments(names):
-    """Return a line on each given name that looks like a misspelt argument, because launch accepts any name."""
+    """Return a line on each of the given names that looks like a misspelt argument. Because launch accepts any name,
+    it reports no error itself."""
     known = [argument.name for argument in ARGUMENTS]
     return [f'no argument {name}:=;{meant}' for name in names
             if name not in known and (meant := parameters.did_you_mean(name, known))]
 
 
 def _number(given, name, number_type, description):
-    """Return a number among the given texts; None where it is empty. Raises ValueError."""
+    """Return the number of the argument `name`; None if its text is empty.
+
+    given: {argument: text}; number_type: int or float; description: of an allowed value, for the error. Raises
+    ValueError.
+    """
     try:
         return number_type(given[name]) if given[name] else None
     except ValueError:
@@ -50,7 +56,7 @@ def _number(given, name, number_type, description):
 
 
 def load_scenario(given):
-    """Return the Scenario of the texts {argument: value}. Raises ValueError."""
+    """Return the Scenario that the arguments select and change. given: {argument: text}. Raises ValueError."""
     from pedestal_common.node import middleware  # loads rclpy, which --show-args does not need
     namespace = middleware.namespace('namespace:=', given['namespace'])
     changes = scenario.file_overrides(given['params_file'], namespace) if given['params_file'] else ()
@@ -60,7 +66,8 @@ def load_scenario(given):
 
 
 def servers(given, chosen):
-    """Return [(Server, its parameters)] of the requested servers. Raises ValueError, see operator_servers.check."""
+    """Return [(Server, its parameters)] of the requested servers. given: {argument: text}; chosen: Scenario. Raises
+    ValueError, see operator_servers.check."""
     ports = {name: _port(name, given[name]) for name in operator_servers.SERVERS if given[name].lower() != SERVER_OFF}
     operator_servers.check(ports, chosen.header, '{}:=')
     return [(operator_servers.SERVERS[name], {'graph.beams': chosen.header.graph_beams,
@@ -77,9 +84,11 @@ def _port(name, text):
 
 
 def prepare(given, chosen):
-    """Compile the laws of a Scenario for realtime, and make the folder of its logs.
+    """Prepare the run of a Scenario `chosen`: in realtime compile its laws, then write its files to the folder of the
+    logs. given: {argument: text}.
 
-    Return (lines on the run, ROS 2 parameter file of all nodes, the scenario as a file). Raises ValueError, RunError.
+    Return (lines on the run, path of the ROS 2 parameter file of all nodes, path of the scenario file). Raises
+    ValueError, RunError.
     """
     lines, _ = graph.read_files(Plan(chosen))
     bag = graph.new_bag(given['bag'], chosen.name)

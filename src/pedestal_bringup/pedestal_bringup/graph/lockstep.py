@@ -1,5 +1,5 @@
-"""Watch of a lockstep run: every node is needed for the next step, so a node that dies or is silent ends the run with
-its name."""
+"""Watch of a lockstep run by `pedestal run`. In lockstep every node is needed for the next step, so a node that dies
+or is silent ends the run. The error names this node."""
 import time
 
 from rclpy.executors import SingleThreadedExecutor
@@ -8,14 +8,19 @@ from pedestal_bringup.graph.processes import RunError, exit_description
 from pedestal_common.graph import nodes
 
 ACCUSATION_TIME_S = 0.5
-"""Time in which the other nodes can end and name the node that they waited for [s]."""
+"""Time between a failure and the error message [s]. In this time the other nodes end, and name (accuse) the node for
+which they waited."""
 
 SELF_ENDING_NODES = (nodes.DRIVE_NODE, 'recorder')
 """Nodes that end by themselves at the end of the run."""
 
 
 def watch(graph, operator, tracks, progress):
-    """Watch the nodes from their start to their end. progress(the drive's time [s]). Raises RunError."""
+    """Watch the nodes from their start to their end.
+
+    graph: processes.Graph; operator: operator_node.Operator; tracks: {topic: program track}, sent once all nodes that
+    read them are present; progress: function of the drive's time [s]. Raises RunError.
+    """
     header = graph.scenario.header
     sent = False
     executor = SingleThreadedExecutor()
@@ -30,23 +35,26 @@ def watch(graph, operator, tracks, progress):
         progress(operator.time)
         if any(code != 0 or node not in SELF_ENDING_NODES for node, code in graph.ended().items()):
             raise failure(graph, stuck_nodes, operator.silent(header.deadline))
-        # Twice the deadline, because a node that waits in vain ends by itself after one deadline and names the node
-        # that it waits for.
+        # The limit is twice the deadline. A node that waits in vain for another node ends by itself after one deadline
+        # and names the other node, which is the better error.
         silent = operator.silent(2.0 * header.deadline)
         if silent:
             raise failure(graph, stuck_nodes, silent)
     progress(header.duration)
-    if not graph.stop():
+    if not graph.stop():     # a node did not end with exit code 0
         raise failure(graph, stuck_nodes)
 
 
 def failure(graph, stuck_nodes, without_diagnostics=None):
-    """Return the error of a run in which a node has ended too early, or a node is without diagnostics for too long.
+    """Return the RunError of a run in which a node has ended too early, or is without diagnostics for too long.
 
-    stuck_nodes(names) -> nodes that do not answer. A node may accuse a node that itself waits for the stuck node. Once
-    the drive has ended, all other nodes get a signal to end, so only an exit code other than 0 counts as too early.
-    The node that the error names is found in this order: a node killed by a signal, the stuck or accused node, a node
-    that ended.
+    stuck_nodes: function that returns which of the named nodes do not answer a request. without_diagnostics: node
+    whose diagnostics are too old, or None.
+
+    The error names the first node found in this order: a node killed by a signal, a stuck or accused node, a node that
+    ended. A node that ends because it waited in vain accuses the node that it waited for. The accused node may itself
+    wait for the stuck node. Once the drive has ended without error, all other nodes get a signal to end, so an end
+    with exit code 0 is then not too early.
     """
     time.sleep(ACCUSATION_TIME_S)
     ended = graph.ended()
@@ -55,17 +63,18 @@ def failure(graph, stuck_nodes, without_diagnostics=None):
     lines = {node: graph.last_lines(node) for node in graph.processes}
     accused = {name for node in early for name in graph.result(node).get('silent', ())}
     killed = [node for node, code in early.items() if code < 0]
-    silent = [node for node in graph.processes if node in accused and node not in early] or [
+    suspects = [node for node in graph.processes if node in accused and node not in early] or [
         node for node in (without_diagnostics,) if node is not None and node not in early]
-    if silent and not killed:
+    if suspects and not killed:
         stuck = stuck_nodes([node for node in graph.processes if node not in early])
-        # A node that waits for the recorder's acknowledgement does not answer either; the recorder waits for no node.
-        silent = [node for node in stuck if node == 'recorder'] or [
-            node for node in silent if node in stuck] or stuck or silent
-    culprit = (killed or silent or list(early))[0]
+        # A node that waits for the acknowledgement of the recorder does not answer either. Because the recorder waits
+        # for no node, a stuck recorder is the cause and is named first.
+        suspects = [node for node in stuck if node == 'recorder'] or [
+            node for node in suspects if node in stuck] or stuck or suspects
+    culprit = (killed or suspects or list(early))[0]
     if culprit in killed:
         reason = exit_description(early[culprit])
-    elif culprit in silent:
+    elif culprit in suspects:
         reason = 'has fallen silent'
     else:
         reason = f'ended before the run did, with exit code {early[culprit]}'

@@ -1,4 +1,5 @@
-"""Operator inside `pedestal run` and `pedestal program`: sends the program tracks, receives the diagnostics."""
+"""Node `operator` inside the processes `pedestal run` and `pedestal program`: it sends the program tracks to the
+control units, and receives the diagnostics of the other nodes."""
 import contextlib
 import socket
 import time
@@ -19,11 +20,13 @@ SERVICE_TIMEOUT_S = 2.0
 
 
 class Operator(Shell):
-    """Node that sends the program tracks to a graph of `beams` (nodes.links), and receives its diagnostics.
+    """Node that sends the program tracks to a graph and receives the diagnostics of the graph.
 
-    names: nodes whose diagnostics count. on_diagnostics(status, monotonic time [s]) is called for each of their
-    DiagnosticStatus. time: of the graph, by the newest diagnostics [s]; latest: {node: monotonic time of its newest
-    diagnostics [s]}.
+    beams           number of beams of an array, 0 for a drive with motors (as of nodes.links)
+    names           nodes whose diagnostics are used; others are ignored
+    on_diagnostics  function (DiagnosticStatus, monotonic time [s]), called for each status of these nodes
+    time            time of the graph, by the newest diagnostics [s]
+    latest          {node: monotonic time at which its newest diagnostics arrived [s]}
     """
 
     def __init__(self, beams=0, names=()):
@@ -37,14 +40,18 @@ class Operator(Shell):
         self.message_reader('diagnostics', self._note_diagnostics)
 
     def send(self, tracks):
-        """Publish the program tracks {topic: message}, latched."""
+        """Publish the program tracks {topic: message} on latched topics, which also deliver them to late joiners."""
         self._open_publishers(tracks)
         for topic, message in tracks.items():
             self._publish_by_topic[topic](messages.serialize(message))
 
     def send_to(self, names, tracks):
-        """Publish the program tracks once all their subscribers are present, and return True if they are published.
-        Otherwise a short run might end before its recorder receives them."""
+        """Publish the program tracks {topic: message} if all their subscribers are present. Return True if the tracks
+        are published.
+
+        names: nodes of the graph. Because a short run may end before a late recorder receives a track, this method
+        publishes nothing while a subscriber is missing.
+        """
         self._open_publishers(tracks)
         if any(self._missing(publisher, nodes.readers(link, names))
                for link, publisher in self.publishers_by_link.items()):
@@ -53,13 +60,14 @@ class Operator(Shell):
         return True
 
     def _open_publishers(self, names):
+        """Open a publisher for each of these topics, unless it is open."""
         for name in names:
             if name not in self._publish_by_topic:
                 self._publish_by_topic[name] = self.writer(name)
 
     def check_domain_free(self):
-        """Raise RunError when the nodes of another graph are on this domain, because they would receive the messages
-        of this one."""
+        """Raise RunError if nodes of another graph are on this ROS domain, because those nodes would receive the
+        messages of this graph."""
         deadline = time.monotonic() + DISCOVERY_TIME_S
         while time.monotonic() < deadline:
             names = self.get_node_names()
@@ -68,6 +76,7 @@ class Operator(Shell):
             time.sleep(0.02)
 
     def _note_diagnostics(self, array):
+        """Take a DiagnosticArray: keep its time, and call on_diagnostics for each status of the watched nodes."""
         for status in array.status:
             if status.name in self._names:
                 self.time = max(self.time, messages.nanoseconds(array.header.stamp) * 1e-9)
@@ -75,20 +84,22 @@ class Operator(Shell):
                 self.on_diagnostics(status, self.latest[status.name])
 
     def silent(self, limit):
-        """Return the node with the oldest diagnostics, if they are older than limit [s]; else None."""
+        """Return the node with the oldest diagnostics if these are older than limit [s], otherwise None."""
         last = min(self.latest, key=self.latest.get, default=None)
         return last if last is not None and time.monotonic() - self.latest[last] > limit else None
 
     def stuck(self, names, executor):
-        """Return the nodes among these whose process does not even answer a parameter service.
+        """Return those of the named nodes that do not answer a request for parameters.
 
-        rclpy answers this service in the same thread as the steps, so a node without an answer is stuck in its code.
+        rclpy answers this request in the thread that also runs the steps of the node. A node without an answer is
+        therefore stuck in its code. executor: rclpy executor of this node.
         """
         answers = self._get_parameters(names, GetParameters.Request(), executor)
         return [node for node in names if node not in answers]
 
     def graph_start(self, node, executor):
-        """Return graph.start [ns UTC] of a running node. Raises RunError where it does not answer."""
+        """Return graph.start of a running node: the UTC at which its time is 0 [ns]. executor: rclpy executor of this
+        node. Raises RunError if the node does not answer."""
         answers = self._get_parameters([node], GetParameters.Request(names=['graph.start']), executor)
         if node not in answers or not answers[node].values:
             raise RunError(f'{node} does not answer with graph.start, the beginning of its time: is it running on '
@@ -96,7 +107,7 @@ class Operator(Shell):
         return answers[node].values[0].integer_value
 
     def _get_parameters(self, names, request, executor):
-        """Return {node: its answer to a request for parameters} of the nodes that answer in time."""
+        """Return {node: its answer to a GetParameters request} of the named nodes that answer in time."""
         clients = {node: self.create_client(GetParameters, f'{node}/get_parameters') for node in names}
         calls = {}
         deadline = time.monotonic() + SERVICE_TIMEOUT_S
@@ -116,9 +127,10 @@ def another_graph(domain_id):
 
 @contextlib.contextmanager
 def sole_run(domain_id):
-    """Hold a ROS domain for one run on this machine, by an abstract socket that ends with its process in any case.
+    """Reserve a ROS domain for one run on this machine, as a context. The reservation is an abstract Unix socket,
+    which the kernel closes however this process ends.
 
-    Raises RunError when another run holds it; discovery alone is too slow for this on a busy machine.
+    Raises RunError if another run holds the domain. Discovery alone is too slow for this check on a busy machine.
     """
     with socket.socket(socket.AF_UNIX) as holder:
         try:

@@ -1,5 +1,8 @@
-"""Servers beside a realtime run, for other programs: each is a node of its own that uses only the topics of the
-graph."""
+"""Servers that connect other programs to the antenna: rotctld, EasyComm, the operator's page, Foxglove, RViz.
+
+`pedestal run` starts the requested servers beside a realtime run. Each server is a node of its own that uses only the
+topics of the graph.
+"""
 import contextlib
 import importlib.util
 import sys
@@ -10,17 +13,19 @@ from pedestal_operator import tcp_port
 from pedestal_operator.page.page_security import PAGE_ROLES
 
 SERVER_ADDRESS = '127.0.0.1'
-"""Address of the servers of a run, their default."""
+"""Address on which the servers of a run accept connections (this machine only), the default of each server."""
 
 
 class Server(typing.NamedTuple):
-    """Row of SERVERS.
+    """Server, a row of SERVERS.
 
-    module       module of the node; executable: its name for ROS 2
-    port         default port; 0: it has none
-    does         its task, for the help
-    first_lines  number of lines that it prints for the user when it serves, each with its name
-    library      Python package that it needs; extra: its name for pip
+    module       Python module of the node
+    executable   name of the node's executable in ROS 2
+    port         default TCP port; 0: the server has none
+    does         task of the server, for the help texts
+    first_lines  number of lines that the server prints for the user when it begins to serve; each begins with its name
+    library      Python package that the server needs, beyond those of every node; '': none
+    extra        name of the pip requirement that installs the library
     """
     module: str
     executable: str
@@ -32,7 +37,7 @@ class Server(typing.NamedTuple):
 
     @property
     def package(self):
-        """ROS package of its node."""
+        """Name of the ROS package that contains the node."""
         return self.module.partition('.')[0]
 
 
@@ -49,7 +54,7 @@ SERVERS = {'rotctld': Server('pedestal_operator.rotctld_node', 'rotctld_node', 4
 
 
 def add_arguments(parser):
-    """Add an option of each server to a parser, as --rotctld [PORT]."""
+    """Add an option for each server to an argparse parser, such as --rotctld [PORT]."""
     for name, server in SERVERS.items():
         if server.port:
             parser.add_argument(f'--{name}', nargs='?', type=port, const=server.port, metavar='PORT',
@@ -59,7 +64,7 @@ def add_arguments(parser):
 
 
 def port(text):
-    """Return a TCP port of an option. Raises ValueError."""
+    """Return the TCP port that the text of an option states. Raises ValueError outside 1 to 65535."""
     port = int(text)
     if not 1 <= port <= 65535:
         raise ValueError(text)
@@ -67,9 +72,10 @@ def port(text):
 
 
 def check(ports, header, option='--{} '):
-    """Raise ValueError where servers are requested in lockstep, a library is missing, or a port is in use.
+    """Raise ValueError if servers are requested in lockstep, if a library is missing, or if a port is in use.
 
-    ports: {server: port, 0 without one}; option: format of an option with a value.
+    ports: {name of the server: its port, 0 without one}; header: ScenarioParameters; option: format of an option in
+    the error, '--{} ' for the command line or '{}:=' for a launch file.
     """
     with contextlib.ExitStack() as probes:
         for name, number in ports.items():
@@ -87,7 +93,8 @@ def check(ports, header, option='--{} '):
 
 
 def selected(options, header) -> dict:
-    """Return {name: ServerProcess} of the servers of the options. Raises ValueError, see `check`."""
+    """Return {name: ServerProcess} of the servers that the options request. options: as argparse returns them; header:
+    ScenarioParameters. Raises ValueError, see `check`."""
     ports = {name: getattr(options, name) for name in SERVERS if getattr(options, name) is not None}
     check(ports, header)
     return {name: ServerProcess(

@@ -1,4 +1,5 @@
-"""Nodes of a run as processes: direct children with their logs, ended in order, never left behind."""
+"""Processes of the nodes of a run: `pedestal run` starts each node as its direct child with a log of its own, ends the
+nodes in order, and leaves none behind."""
 import contextlib
 import ctypes
 import functools
@@ -15,24 +16,25 @@ from pedestal_bringup.graph.child import Child
 from pedestal_common.graph import nodes
 
 SHOWN_LOG_LINES = 8
-"""Number of log lines in an error."""
+"""Largest number of log lines in an error."""
 NODE_STOP_TIMEOUT_S = 20.0
-"""Grace period of a node at its end [s]."""
+"""Grace period of a node from SIGTERM to SIGKILL [s]."""
 
 RESERVED_LOG_BYTES = 64 * 1024
-"""Disk space that a log reserves in advance, so that the cause of an end is stored even on a full disk [bytes]."""
+"""Disk space that a log reserves in advance [bytes]. A node can then log the cause of its end even on a full disk."""
 
 FALLOC_FL_KEEP_SIZE = 1
 """Flag of fallocate(2): the reserved space does not count in the size of the file."""
 
 SERVER_START_TIMEOUT_S = 60.0
-"""Longest time from the start of a server to its announcement [s]."""
+"""Longest time from the start of a server to its announcement, the lines that state its address [s]."""
 
 SERVER_POLL_PERIOD_S = 0.02
 """Period of the check for announcements at the start of a run [s]."""
 
 SERVER_LOG_MODE = 0o600
-"""Access to the log of a server: its user only, because the announcement of the page holds its tokens."""
+"""File mode of the log of a server: only its user may read it, because the announcement of the page holds the access
+tokens."""
 
 _libc = ctypes.CDLL(None)
 
@@ -42,14 +44,18 @@ class RunError(RuntimeError):
 
 
 class ServerProcess(typing.NamedTuple):
-    """Server beside the nodes. first_lines: number of lines that it prints for the user when it serves."""
+    """Process of a server beside the nodes (operator_servers).
+
+    command: [interpreter, '-m', module, arguments ...]; first_lines: number of lines that the server prints for the
+    user when it begins to serve.
+    """
     command: list
     first_lines: int
 
 
 def command_line(node, module, file):
-    """Return the command that starts the module of a node, 'beam_2/acu' in the namespace of its beam, with a parameter
-    file."""
+    """Return the command that starts a node with a parameter file. node: its name; the node beam_2/acu starts in the
+    namespace beam_2. module: its Python module; file: path of the parameter file."""
     beam = nodes.beam_of(node)
     return [sys.executable, '-m', module, '--ros-args', *(['-r', f'__ns:=/{beam}'] if beam else []),
             '--params-file', str(file)]
@@ -57,7 +63,8 @@ def command_line(node, module, file):
 
 @contextlib.contextmanager
 def uninterrupted():
-    """Ignore the signals that end `pedestal`, as a second Ctrl-C, during the clean stop."""
+    """Ignore the signals that end `pedestal` in this context, which is the clean stop of the nodes. A second Ctrl-C
+    thus does not interrupt the stop."""
     before = {number: signal.signal(number, signal.SIG_IGN)
               for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
     try:
@@ -68,7 +75,7 @@ def uninterrupted():
 
 
 def _load_laws(scenario, node):
-    """Load the laws of a node, unless they are not compiled."""
+    """Load the laws of a node from the law cache; do nothing if the cache lacks them."""
     from pedestal_common.compiled import is_compiled  # imported late, because only a run needs numba
     if scenario.row(node).unit:
         unit = scenario.unit(node)
@@ -77,15 +84,17 @@ def _load_laws(scenario, node):
 
 
 class Graph:
-    """Processes of one run and their logs, beside the bag.
+    """Processes of the nodes and servers of one run, with their logs.
 
-    Use it as a context, in which the nodes are held until `begin` (child.Child). The end of the context stops all
-    processes that still run. No process outlives `pedestal run`, however `pedestal run` ends: the kernel sends the
-    processes SIGTERM, and a reaper process kills any node that ignores SIGTERM.
+    Use a Graph as a context. The nodes are held (child.Child) from the beginning of the context until `begin`. The end
+    of the context stops all processes that still run. No process outlives `pedestal run`, however `pedestal run` ends:
+    the kernel sends the processes SIGTERM, and the reaper, a process of its own, kills any node that ignores SIGTERM.
 
-    Beside the bag, the folder `log` holds NODE.log for each process, parameters.yaml, and NODE.state files with the
-    last angles of a drive. The logs and states of an earlier run of the same name are deleted. Raises RunError when
-    the folder cannot be written.
+    The folder BAG.log beside the bag (attribute `log`) holds NODE.log for each process, parameters.yaml, and
+    NODE.state with the last angles of a drive. The logs and states of an earlier run of the same name are deleted.
+    Raises RunError if the folder cannot be written.
+
+    scenario: scenario.Scenario; bag: folder of the recording; servers: {name: ServerProcess}.
     """
 
     def __init__(self, scenario, bag, servers=None):
@@ -103,6 +112,7 @@ class Graph:
 
     @contextlib.contextmanager
     def _disk_errors_named(self):
+        """Turn the OSErrors in this context into a RunError that names the bag and the file."""
         try:
             yield
         except OSError as error:
@@ -122,9 +132,9 @@ class Graph:
         self._reaper.wait()
 
     def start_servers(self):
-        """Start the servers, and wait until each is announced. Raises RunError for a server that ends instead.
+        """Start the servers, and wait until each has announced itself. Raises RunError for a server that ends instead.
 
-        A server announces that it serves by the lines `NAME: address` at the beginning of its log.
+        The announcement of a server are the lines `NAME: address` or `NAME, ...` in its log.
         """
         for name in self.servers:
             self.start(name)
@@ -140,7 +150,7 @@ class Graph:
                     raise RunError(f'--{name}: no announcement within {SERVER_START_TIMEOUT_S:g} s')
 
     def announce(self):
-        """Print the announcements of the servers that have begun to serve since the last call."""
+        """Print the announcements of the servers that have announced themselves since the last call."""
         for name in sorted(self._unannounced):
             lines = [line for line in self._lines(name) if line.startswith((f'{name}:', f'{name},'))]
             if len(lines) >= self.servers[name].first_lines:
@@ -148,24 +158,25 @@ class Graph:
                 print(*lines, sep='\n', flush=True)
 
     def write(self, parameters):
-        """Write the text of the ROS 2 parameter file with which every node starts."""
+        """Write the parameter file with which every node starts. parameters: text of a ROS 2 parameter file."""
         with self._disk_errors_named():
             self.file.write_text(parameters)
 
     def begin(self, parameters):
-        """Start the nodes with the text of their parameter file."""
+        """Start all held nodes. parameters: text of the ROS 2 parameter file with which every node starts."""
         self.write(parameters)
         for node, process in self.processes.items():
             if node not in self.servers:
                 process.begin()
 
     def start(self, node):
-        """Start a server, or start a node again; the process appends to its log."""
+        """Start a server, or start a node again. The new process appends to the log of the earlier process."""
         self._hold(node)
         self.processes[node].begin()
 
     def _hold(self, node):
-        """Make the process of a node or server, held until its `begin`, and report it to the reaper."""
+        """Make the process of a node or server, which is held until its `begin`, and report its number to the
+        reaper."""
         with open(self._log_of(node), 'ab') as output:
             self._log_starts[node] = size = output.seek(0, os.SEEK_END)
             _libc.fallocate(output.fileno(), FALLOC_FL_KEEP_SIZE, ctypes.c_long(size),
@@ -188,20 +199,25 @@ class Graph:
         self.processes[node].wait()
 
     def stop(self):
-        """Stop the nodes that still run; return True if each ends with exit code 0. The recorder ends last. In
-        realtime the drive ends first, because it stops its axes while the other nodes are present."""
+        """Stop the processes that still run, and return True if every process has ended with exit code 0.
+
+        The recorder ends last. In realtime the drive ends first, so that it stops its axes while the other nodes are
+        still present.
+        """
         first = [nodes.DRIVE_NODE] if self.scenario.header.pacing == 'realtime' else []
         others = [node for node in self.processes if node not in (*first, 'recorder')]
         with uninterrupted():
             return not any([code for group in (first, others, ['recorder']) for code in self._stop(group)])
 
     def _stop(self, names):
-        """Stop these nodes and return their exit codes; a node that ignores SIGTERM is killed."""
+        """Stop the processes of these names together, and return their exit codes. A process that ignores SIGTERM is
+        killed after NODE_STOP_TIMEOUT_S."""
         processes = [self.processes[node] for node in names if node in self.processes]
         for process in processes:
             if process.poll() is None:
                 process.send_signal(signal.SIGTERM)
-                process.send_signal(signal.SIGCONT)     # because a suspended process receives SIGTERM only after it
+                # A suspended process acts on SIGTERM only after SIGCONT.
+                process.send_signal(signal.SIGCONT)
         deadline = time.monotonic() + NODE_STOP_TIMEOUT_S
         for process in processes:
             try:
@@ -211,21 +227,22 @@ class Graph:
         return [process.wait() for process in processes]
 
     def _log_of(self, node):
+        """Return the path of the log of a node or server."""
         return self.log / f'{node.replace("/", ".")}.log'
 
     def _lines(self, node):
-        """Return the log of a node since its last start."""
+        """Return the lines of the log of a node or server since its last start."""
         with open(self._log_of(node), 'rb') as log:
             log.seek(self._log_starts[node])
             return log.read().decode(errors='replace').strip().splitlines()
 
     def last_lines(self, node):
-        """Return the end of a node's log, without its result."""
+        """Return the last lines of a node's log, at most SHOWN_LOG_LINES, without the JSON line of its result."""
         return [line for line in self._lines(node) if not line.startswith('{')][-SHOWN_LOG_LINES:]
 
     def result(self, node):
-        """Return the last JSON object in a node's log: its result, or the reason of its end (shell.main); {} without
-        one."""
+        """Return the last JSON object in a node's log: the result of the node or the reason of its end, as shell.main
+        prints it; {} if the log has none."""
         for line in reversed(self._lines(node)):
             if line.startswith('{'):
                 with contextlib.suppress(ValueError):
@@ -233,7 +250,7 @@ class Graph:
         return {}
 
     def outcome(self, node):
-        """Return the result of a node that has ended well. Raises RunError where it left none."""
+        """Return the result of a node that has ended without error. Raises RunError if its log has no result."""
         result = self.result(node)
         if not result:
             raise RunError(f'{node} ended without its result; its log is {self._log_of(node)}')
@@ -244,23 +261,27 @@ class Graph:
         return {node: process.returncode for node, process in self.processes.items() if process.poll() is not None}
 
     def exit_report(self, node, reason):
-        """Return a text with the reason of a node's end and the last lines of its log."""
+        """Return the text of an error: the node, the reason of its end, and the last lines of its log."""
         log = '\n'.join(f'  | {line}' for line in self.last_lines(node)) or '  | (it logged nothing)'
         return f'{node} {reason}; its last log lines ({self._log_of(node)}):\n{log}'
 
     def cause(self, node, code):
-        """Return the last log line of a node that ended by itself with this exit code, in brackets; '' of a killed
-        node."""
+        """Return the last log line of a node, in brackets, if the node ended by itself with an error. code: its exit
+        code. Return '' for a node that a signal has ended."""
         lines = self.last_lines(node)
         return f' ({lines[-1]})' if lines and code > 0 else ''
 
 
 def exit_description(code):
-    """Return how a process with this exit code ended, in words."""
+    """Return a text that states how a process with this exit code ended, for example `died by signal SIGKILL`."""
     return f'died by signal {signal.Signals(-code).name}' if code < 0 else f'ended with exit code {code}'
 
 
 def log_folder(bag):
-    """Return the folder of the logs of a run, beside its bag."""
+    """Return the folder of the logs of a run beside its bag: BAG.log, or BAG.logs where BAG.log is a file.
+
+    `pedestal run --bag dish > dish.log` makes such a file.
+    """
     bag = pathlib.Path(bag)
-    return bag.with_name(bag.name + '.log')
+    folder = bag.with_name(bag.name + '.log')
+    return bag.with_name(bag.name + '.logs') if folder.is_file() else folder

@@ -1,10 +1,12 @@
-"""End nodes that a killed `pedestal run` left behind and that ignore SIGTERM, because they hang or are suspended
-(SIGSTOP).
+"""Reaper: a process beside `pedestal run` that kills nodes which a dead `pedestal run` has left behind.
 
-When `pedestal run` dies, the kernel sends each node SIGTERM (processes.Graph), and the node ends in order, the drive
-with a ramp. This process reads the process numbers of the nodes from its standard input, one per line, and holds a
-pidfd of each. A pidfd avoids that a signal reaches another process with the same number. When the input ends, the
-grace period begins. Without pidfds (Linux before 5.3) this process does nothing.
+When `pedestal run` dies, the kernel sends each node SIGTERM (child.Child). The node then ends in order; the drive
+first stops its axes by a ramp. A node that hangs or is suspended (SIGSTOP) ignores SIGTERM, so the reaper kills it.
+
+The reaper reads the process numbers of the nodes from its standard input, one per line, and holds a pidfd (process
+file descriptor) of each. A pidfd avoids that a signal reaches a later process with the same number. When
+`pedestal run` ends, the input ends, and the grace period begins. Without pidfds (Linux before 5.3) the reaper does
+nothing.
 """
 import contextlib
 import os
@@ -14,11 +16,12 @@ import sys
 import time
 
 GRACE_PERIOD_S = 20.0
-"""Time in which the nodes must end by themselves [s]."""
+"""Time from the end of `pedestal run` in which the nodes must end by themselves [s]."""
 
 
 def main():
-    """Read the process numbers of the nodes, wait for the end of the input, kill the nodes that remain."""
+    """Read the process numbers of the nodes until the input ends, wait for the grace period, and kill the nodes that
+    remain."""
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)
     nodes = []
@@ -27,7 +30,7 @@ def main():
         with contextlib.suppress(OSError, AttributeError):
             nodes.append(os.pidfd_open(int(line)))
     deadline = time.monotonic() + GRACE_PERIOD_S
-    _signal(nodes, signal.SIGCONT)     # because a suspended node receives the SIGTERM of the kernel only after it
+    _signal(nodes, signal.SIGCONT)     # A suspended node acts on the kernel's SIGTERM only after SIGCONT.
     while nodes and time.monotonic() < deadline:
         ended, _, _ = select.select(nodes, (), (), deadline - time.monotonic())
         nodes = [node for node in nodes if node not in ended]
@@ -35,6 +38,7 @@ def main():
 
 
 def _signal(nodes, number):
+    """Send a signal to the nodes, a list of pidfds."""
     for node in nodes:
         with contextlib.suppress(OSError):
             signal.pidfd_send_signal(node, number)

@@ -1,4 +1,5 @@
-"""Rules of restarts: the time of a restart, and the limit of the number of deaths. No processes here, and no clock.
+"""Rules for the restart of dead nodes in a realtime run: when a node is started again, and how often it may die. The
+supervisor uses these rules. This module starts no process and reads no clock.
 
 The death of a node is the end of its process before the end of the run, for any cause.
 """
@@ -7,10 +8,11 @@ import math
 
 
 class Restarts:
-    """Restarts of nodes that died. Times are those of one steady clock [s].
+    """Schedule of the restarts of nodes that died. All times are those of one monotonic clock [s].
 
-    attempts: number of restarts of a node within `within` [s]; 0: none. The first restart follows at once. The delay
-    between death and restart grows by `delay` [s] with each further restart within that time.
+    attempts  largest number of restarts of a node in the time `within`; 0: no restart
+    within    length of the window in which the deaths of a node are counted [s]
+    delay     the first restart in the window follows at once; each further restart waits longer by this time [s]
     """
 
     def __init__(self, attempts, within, delay):
@@ -20,8 +22,8 @@ class Restarts:
         self._due = {}
 
     def note_death(self, node, now):
-        """Note the death of a node. Return the number of its next restart within the window, 0 where it has died too
-        often."""
+        """Note the death of a node at the time now [s]. Return the number of its next restart in the window, from 1
+        on; 0 if the node has died too often."""
         deaths = self._deaths[node]
         while deaths and deaths[0] <= now - self.within:
             deaths.popleft()
@@ -33,7 +35,7 @@ class Restarts:
         return len(deaths)
 
     def due(self, now):
-        """Return the nodes to be started now, each only once."""
+        """Return the nodes that are to be started at the time now [s]. Each restart is returned only once."""
         ready = [node for node, time in self._due.items() if time <= now]
         for node in ready:
             del self._due[node]
@@ -41,9 +43,8 @@ class Restarts:
 
 
 class Losses:
-    """Number of steps that the drive lost outside the recovery time after a death, on the same clock.
-
-    The drive publishes the number of steps that it has lost since its start.
+    """Count of the steps that the drive lost outside the recovery time after a death. All times are those of one
+    monotonic clock [s]. The drive itself publishes the number of steps that it has lost since its start.
     """
     RECOVERY_TIME_S = 5.0
     """Time after a death in which lost steps count as an effect of the death [s]. A graph recovers within 2.3 s
@@ -54,11 +55,12 @@ class Losses:
         self._last_number, self._recovered_at = 0, -math.inf
 
     def note_death(self, now):
-        """Note the death of a node."""
+        """Note the death of any node at the time now [s]."""
         self._recovered_at = now + self.RECOVERY_TIME_S
 
     def note(self, number, now):
-        """Note the number of steps that the drive has lost; a restarted drive begins at 0."""
+        """Note the number of steps that the drive has published as lost, at the time now [s]. A restarted drive begins
+        at 0."""
         if now > self._recovered_at:
             restarted = number < self._last_number
             self.count += number - (0 if restarted else self._last_number)
@@ -66,10 +68,11 @@ class Losses:
 
 
 class Silence:
-    """Times since the last diagnostics of the nodes, on the same clock.
+    """Times at which the last diagnostics of each node arrived, to find silent nodes. All times are those of one
+    monotonic clock [s].
 
-    A gap longer than `gap` [s] between two calls of `note_check` is a stall of this process. Because this process
-    could not receive diagnostics in that time, the gap does not count as silence.
+    A pause longer than `gap` [s] between two calls of `note_check` is a stall of `pedestal run` itself. Because
+    `pedestal run` could not receive diagnostics in that time, the pause does not count as silence.
     """
 
     def __init__(self, gap=1.0):
@@ -78,19 +81,19 @@ class Silence:
         self._last_check = None
 
     def note(self, node, now):
-        """Note diagnostics of a node at the time now [s]."""
+        """Note that diagnostics of a node arrived at the time now [s]."""
         self._latest[node] = now
 
     def remove(self, node):
-        """Remove a node that has died, until its next diagnostics."""
+        """Remove a node that has died. Its next diagnostics add it again."""
         self._latest.pop(node, None)
 
     def longer_than(self, limit, now):
-        """Return the nodes whose last diagnostics are older than limit [s]."""
+        """Return the nodes whose last diagnostics are older than limit [s] at the time now [s]."""
         return [node for node, time in self._latest.items() if now - time > limit]
 
     def note_check(self, now):
-        """Note a check at the time now [s]; called before `longer_than`."""
+        """Note that nodes are checked at the time now [s]. Call this method before `longer_than`."""
         if self._last_check is not None and now - self._last_check > self._gap:
             stall = now - self._last_check
             self._latest = {node: time + stall for node, time in self._latest.items()}

@@ -1,6 +1,7 @@
-"""Send the program track of a scenario beside its nodes: python -m pedestal_bringup.graph.send_program SCENARIO.
+"""Program that sends the program track of a scenario to its running nodes.
 
-pedestal.launch.py starts this module; users call `pedestal program`. watch.send_program does the work.
+The launch file pedestal.launch.py starts it as `python -m pedestal_bringup.graph.send_program SCENARIO`. Users call
+`pedestal program` instead. The function watch.send_program does the work.
 """
 import sys
 

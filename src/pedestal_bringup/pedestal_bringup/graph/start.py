@@ -1,4 +1,5 @@
-"""Start of a run: the time at which it begins, the parameters of its nodes, and its outcome."""
+"""Start and outcome of a run of the graph: the time at which the run begins, the parameters of its nodes, and the data
+that the run leaves."""
 import dataclasses
 import time
 
@@ -9,17 +10,18 @@ from pedestal_common.text_files import parameter_file
 from pedestal_recording import configuration
 
 START_LEAD_TIME_S = 5.0
-"""Time from the start of the nodes of a realtime run to the beginning of its time [s]. A warm start takes 2 s; a later
-node only loses steps."""
+"""Time from the start of the processes of a realtime run to time 0 of the run [s]. A start with compiled laws takes
+2 s. A node that is ready only after time 0 loses steps, but does no other harm."""
 
 
 @dataclasses.dataclass
 class Outcome:
     """Outcome of a run.
 
-    drive     last JSON line of the drive, {} without one; recorder: that of the recorder
+    drive     result of the drive: the last JSON line of its log; {} without one
+    recorder  result of the recorder, likewise
     restarts  number of restarts of nodes
-    losses    number of steps that the drive lost apart from restarts
+    losses    number of steps that the drive lost, without those lost because of restarts
     stopped   True if the user stopped the run
     """
     drive: dict
@@ -30,13 +32,17 @@ class Outcome:
 
 
 def begins(scenario):
-    """Return graph.start of a run whose nodes start now [ns UTC]; 0 in lockstep, where time is that of the steps."""
+    """Return graph.start of a run whose nodes start now: the UTC at which its time is 0 [ns]. In lockstep, where the
+    steps alone determine the time, return 0."""
     return time.time_ns() + round(START_LEAD_TIME_S * NS_PER_SECOND) if scenario.header.pacing == 'realtime' else 0
 
 
 def parameters_of_all(scenario, bag, start):
-    """Return the scenario as a ROS 2 parameter file, in which every node has the parameters of its graph. start:
-    graph.start [ns UTC]."""
+    """Return the text of the ROS 2 parameter file of a run: the values of a Scenario for each node, and the parameters
+    `graph.` that all its nodes share.
+
+    bag: folder of the recording; start: graph.start, see `begins`.
+    """
     names = ','.join(dict.fromkeys(map(nodes.plain, scenario.nodes)))
     shared = {'graph.pacing': scenario.header.pacing, 'graph.nodes': names, 'graph.beams': scenario.header.graph_beams,
               'graph.deadline': scenario.header.deadline, 'graph.start': start,

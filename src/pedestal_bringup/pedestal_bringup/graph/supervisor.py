@@ -1,5 +1,5 @@
-"""Supervisor of a realtime run: the antenna must go on, so a node that dies is started again, and a silent node is
-killed first."""
+"""Supervisor of the nodes of a realtime run, inside `pedestal run`. Because the antenna must continue, the supervisor
+starts a dead node again. It kills a node that was silent for too long, and then starts this node again."""
 import contextlib
 import os
 import signal
@@ -23,12 +23,12 @@ SHUTDOWN_GRACE_S = 20.0
 """Grace period of the drive after the end of the run [s]."""
 
 MAX_SILENCE_S = 5.0
-"""Time without diagnostics, which are published every second, after which a node is reported as silent [s]."""
+"""Time without diagnostics after which a node is reported as silent [s]. A node publishes diagnostics every second."""
 
 
 def prepare(scenario):
-    """Compile the laws that are not cached, of each node in a process of its own, so that the nodes start warm. Raises
-    RunError."""
+    """Compile the laws of the nodes of a Scenario that are not in the law cache, so that the nodes start without
+    delay. The laws of each node are compiled in a process of their own. Raises RunError."""
     units = {nodes.plain(node): node for node in scenario.nodes
              if scenario.row(node).unit and not is_compiled(scenario.unit(node))}
     processes = {node: subprocess.Popen([sys.executable, '-m', 'pedestal_bringup.loop.prepare', node, scenario.name],
@@ -47,14 +47,19 @@ def prepare(scenario):
     finally:
         for process in processes.values():
             if process.poll() is None:
-                # Because a second process of its group compiles too (prepare.compile_unit), the whole group is killed.
+                # The compilation of a node uses a second process (prepare.compile_unit), so its process group is
+                # killed.
                 os.killpg(process.pid, signal.SIGKILL)
             process.wait()
             process.stderr.close()
 
 
 class Supervisor:
-    """Supervisor of the processes of a graph whose time is 0 at start [ns UTC]."""
+    """Supervisor of the processes of a running graph.
+
+    graph: processes.Graph; operator: operator_node.Operator, which receives the diagnostics; start: UTC at which the
+    time of the graph is 0 [ns]. restarts, losses: see the module restarts.
+    """
 
     def __init__(self, graph, operator, start):
         header = graph.scenario.header
@@ -69,9 +74,10 @@ class Supervisor:
         operator.on_diagnostics = self._note
 
     def watch(self, tracks, progress):
-        """Watch the nodes until the end of the run in UTC, which no restart prolongs. progress(time of the run [s]).
+        """Watch the nodes until the end of the run. The end is a UTC, and a restart does not move it.
 
-        Raises RunError when a node has died too often.
+        tracks: {topic: program track}; progress: function of the time of the run [s]. Raises RunError if a node has
+        died too often.
         """
         executor = SingleThreadedExecutor()
         executor.add_node(self._operator)
@@ -82,39 +88,41 @@ class Supervisor:
             self.check_processes(time.monotonic())
 
     def _is_running(self):
-        """Return True until the drive ends at the end of the run, at the latest until SHUTDOWN_GRACE_S after it. A
-        missing drive ends the run at its end."""
+        """Return True while the run continues. The run is over when the drive has ended at the end of the run, at the
+        latest SHUTDOWN_GRACE_S after it. A drive that is dead shortly before the end, and that is therefore not
+        started again, also ends the run."""
         now, drive_runs = time.time_ns(), self._graph.processes[nodes.DRIVE_NODE].poll() is None
         if now < self._end:
             return drive_runs or not self._is_nearly_over()
         return drive_runs and now < self._end + SHUTDOWN_GRACE_S * NS_PER_SECOND
 
     def _is_nearly_over(self):
+        """Return True if a dead node is no longer started again, because the end of the run is near."""
         return time.time_ns() > self._end - RESTART_CUTOFF_S * NS_PER_SECOND
 
     def check_processes(self, now):
-        """Start dead nodes again, and kill nodes that were silent for too long. now: monotonic [s]."""
+        """Start dead nodes again when their restart is due, and kill nodes that were silent for too long. now:
+        monotonic time [s]."""
         self._silence.note_check(now)
         for node in self._silence.longer_than(min(MAX_SILENCE_S, self._limits.silence or MAX_SILENCE_S), now):
             if node not in self._reported_silent:
                 self._reported_silent.add(node)
                 report(f'{node} is silent')
-        if self._limits.silence:     # 0: a silent node is reported, but not killed
+        if self._limits.silence:     # With the parameter silence = 0 a silent node is reported, but not killed.
             for node in self._silence.longer_than(self._limits.silence, now):
                 self._graph.kill(node)
         for node, code in self._graph.ended().items():
             if node not in self._dead and not self._is_nearly_over():
                 self._handle_exit(node, code, now)
-        with contextlib.suppress(OSError):     # because a closed terminal does not end the run
+        with contextlib.suppress(OSError):     # A closed terminal must not end the run.
             self._graph.announce()
         for node in (*self.restarts.due(now), *self._server_restarts.due(now)):
             self._dead.discard(node)
             self._graph.start(node)
 
     def _handle_exit(self, node, code, now):
-        """Schedule the restart of a node that has died, or end the run. Raises RunError.
-
-        A server that died too often stays off.
+        """Schedule the restart of a node or server that has died. Raises RunError, which ends the run, if a node has
+        died too often. A server that has died too often stays off. code: exit code; now: monotonic time [s].
         """
         limits = self._limits
         reason = ('was silent and was killed' if node in self._reported_silent and code == -signal.SIGKILL
@@ -137,7 +145,7 @@ class Supervisor:
                f'within {limits.within:g} s')
 
     def _note(self, status, now):
-        """Note a DiagnosticStatus that arrived at the time now [s]."""
+        """Note a DiagnosticStatus of a node that arrived at the monotonic time now [s]."""
         node = status.name
         self._silence.note(node, now)
         if node == nodes.DRIVE_NODE:
@@ -150,6 +158,6 @@ class Supervisor:
 
 
 def report(line):
-    """Print a line for people; a closed terminal does not end the run."""
+    """Print a line for the user on stderr. A closed terminal does not end the run."""
     with contextlib.suppress(OSError):
         print(f'pedestal: {line}', file=sys.stderr, flush=True)

@@ -1,6 +1,8 @@
-"""This process as a node of the graph, the operator: it watches the other nodes and sends the program track.
+"""Watch of a run by the process `pedestal run`, which takes part in the graph as the node `operator`: it sends the
+program track and watches the other nodes.
 
-In lockstep a node that dies or is silent ends the run with its name; in realtime it is started again (supervisor).
+In lockstep a node that dies or is silent ends the run with an error that names the node (module lockstep). In realtime
+such a node is started again (module supervisor).
 """
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
@@ -14,9 +16,11 @@ from pedestal_common.wire import messages
 
 
 def run(graph, tracks, progress):
-    """Start the held nodes of a graph (child.Child), watch them to their end or until Ctrl-C, and return the Outcome.
+    """Let the held nodes (child.Child) of a graph begin, watch the nodes to their end or until Ctrl-C, and return the
+    Outcome.
 
-    tracks: {topic: program track}. Raises RunError.
+    graph: processes.Graph; tracks: {topic: program track}; progress: function of the time of the run [s]. Raises
+    RunError.
     """
     middleware.initialise([])
     try:
@@ -33,6 +37,7 @@ def run(graph, tracks, progress):
 
 
 def _in_lockstep(graph, operator, tracks, progress):
+    """Run a graph in lockstep and return its Outcome; arguments as of `run`, operator: Operator."""
     graph.begin(parameters_of_all(graph.scenario, graph.bag, 0))
     try:
         lockstep.watch(graph, operator, tracks, progress)
@@ -43,6 +48,7 @@ def _in_lockstep(graph, operator, tracks, progress):
 
 
 def _in_realtime(graph, operator, tracks, progress):
+    """Run a graph in realtime and return its Outcome; arguments as of `run`, operator: Operator."""
     supervisor.prepare(graph.scenario)
     start = begins(graph.scenario)
     for track in tracks.values():
@@ -63,8 +69,8 @@ def _in_realtime(graph, operator, tracks, progress):
 def send_program(plan, start=None, ros_arguments=()) -> int:
     """Send the program track of a program.Plan to a running ACU and keep it latched until Ctrl-C.
 
-    start: UTC at which its time is 0 [ns]; None: graph.start of the ACU. ros_arguments: for the node that sends it, in
-    the namespace of the graph.
+    start: UTC at which the time of the track is 0 [ns]; None: the graph.start of the ACU, which is requested from it.
+    ros_arguments: arguments of ROS for the sending node, such as the namespace of the graph.
     """
     beams = plan.scenario.header.graph_beams
     middleware.initialise(ros_arguments)

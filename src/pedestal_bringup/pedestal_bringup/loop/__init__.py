@@ -1,1 +1,1 @@
-"""Closed loop of a scenario without ROS: one run, several side by side, the compilation of its laws."""
+"""Closed loop of a scenario in one process without ROS: one run, runs side by side, and the compilation of laws."""

@@ -1,9 +1,10 @@
-"""Closed loop of a scenario without ROS: the units of its nodes in the graph's order, in compiled calls.
+"""Closed loop of a scenario without ROS: the units of all nodes run in one process, in compiled calls. Studies and
+trials use it instead of the graph of nodes.
 
-In step k the drive moves to t_k by the commands of step k - 1 and publishes its position; then ship, INS, receiver and
-control unit answer. All units read and write one record that holds every topic, so a run equals a lockstep recording
-of the scenario to the last bit. Each of several beams is a loop of its own. The loops share ship, INS and time, and do
-not act on each other.
+In step k the drive moves to its time t_k by the commands of step k - 1 and publishes its position. Then ship, INS,
+receiver and control unit answer in this order. All units read and write one record that holds every topic. A run
+equals a lockstep recording of the scenario to the last bit. If an array has several beams, each beam is a loop of its
+own. These loops have equal ship, INS and time, and do not act on each other.
 """
 import dataclasses
 
@@ -29,16 +30,18 @@ STEP_DTYPE = records.of(*(topic.name for topic in topics.TOPICS
 """Record of one step: every topic except the program track, commands and the diagnostics."""
 
 TRUTH_DTYPE = np.dtype([('bias', 'f8', 2), ('error', 'f8', 2)])
-"""Numbers of t_k that no topic holds: bias torques [Nm], true error of the beam (cross-elevation, elevation) [rad]."""
+"""Numbers of the time t_k that no topic holds: bias torques (azimuth, elevation) [Nm], true error of the beam
+(cross-elevation, elevation) [rad]."""
 
 # Compiled code finds the law of a unit by the type of its Memory, which holds state, inputs and outputs of its step.
 _LAWS = {memory: law for node in nodes.UNIT_NODES for memory, (law, _) in node.unit_type().LAWS.items()}
 
 
 def step(memory, stamp, inputs, outputs):
-    """Make the step of any unit, selected by the type of its memory; without a unit do nothing.
+    """Make the step of any unit, selected by the type of its memory. memory None: no unit, so do nothing.
 
-    Only compiled code calls it; `by_type` below gives it the law of each memory.
+    Only compiled code calls this function. `by_type` below gives compiled code the law of each type of memory. stamp:
+    of the step [ns]; inputs, outputs: records of STEP_DTYPE.
     """
     raise NotImplementedError
 
@@ -47,7 +50,8 @@ by_type(step, lambda memory: None if isinstance(memory, types.NoneType) else _LA
 
 
 def true_bias(drive, truth):
-    """Fill the bias of a TRUTH_DTYPE from the memory of the drive; a beam has none. Compiled code calls it."""
+    """Write the bias torques of the drive into the record `truth` of TRUTH_DTYPE; an array has none. drive: memory of
+    its unit. Only compiled code calls this function."""
     raise NotImplementedError
 
 
@@ -62,11 +66,15 @@ def _true_bias(drive, truth):
 
 @compiled
 def loop(units, first, period_ns, before, injected, steps, truth):
-    """Make the steps first, first + 1 ... into steps (n,) of STEP_DTYPE and truth (n,) of TRUTH_DTYPE.
+    """Make n steps, from the step number `first` on.
 
-    units     memories of drive, ship, INS (both None ashore), receiver and control unit
-    before    (1,): the step before, from which the drive takes its commands
-    injected  (n, 2): added to the rate commands [rad/s] and to the angles [rad] on their way to the drive
+    units      memories of drive, ship, INS, receiver and control unit; ship and INS are None ashore
+    period_ns  time of one step [ns]
+    before     (1,) of STEP_DTYPE: the previous step, from which the drive takes its commands; changed to the last step
+    injected   (n, 2) for azimuth and elevation: added to the commands on their way to the drive. A drive follows the
+               rates [rad/s], the beam of an array follows the angles [rad]; the number is added to both.
+    steps      (n,) of STEP_DTYPE, filled
+    truth      (n,) of TRUTH_DTYPE, filled
     """
     drive, ship, ins, receiver, acu = units
     for k in range(len(steps)):
@@ -86,18 +94,18 @@ def loop(units, first, period_ns, before, injected, steps, truth):
 
 
 UNIT_ORDER = ('adu', 'ship_motion', 'ins', 'tracking_receiver', 'acu')
-"""Order of the units in a step."""
+"""Nodes in the order in which their units run in a step."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Run:
-    """Run in memory, which `table` reads like a recording of the run.
+    """Result of a run of the closed loop, kept in memory; memory_recording gives it the interface of a recording.
 
     steps      (n,) of STEP_DTYPE, or of some of its topics
-    truth      (n,) of TRUTH_DTYPE
+    truth      (n,) of TRUTH_DTYPE; empty for one of several runs that the module side_by_side computes together
     stamps     stamps of the steps (n,) [ns]
-    units      {name: Unit}
-    forecasts  [(stamp [ns], announcement.numbers)] at every whole second, as in the control unit's diagnostics
+    units      {node: Unit} after the run
+    forecasts  [(stamp [ns], announcement.numbers)] at every whole second: the keyhole forecasts of the control unit
     replies    {topic of replies: [(stamp [ns], Command, Reply)]} to the scheduled commands
     """
     steps: np.ndarray
@@ -117,23 +125,23 @@ class Run:
         return self.steps[topic]
 
     def where(self, steps):
-        """Return the Run of some steps, a mask (n,)."""
+        """Return the Run of some of its steps, which a mask (n,) selects."""
         return dataclasses.replace(self, steps=self.steps[steps], truth=self.truth[steps], stamps=self.stamps[steps])
 
     @property
     def topics(self):
-        """{name: type} of the topics with a message."""
+        """{name: type} of the topics with at least one message in this run."""
         written = [name for unit in self.units.values() for name in unit.writes]
         kept = [topic for topic in topics.TOPICS if topic.name in written and topic.name in self.steps.dtype.names]
         return {topic.name: topic.type for topic in kept
                 if records.is_text(topic.name) or (self.steps[topic.name]['stamp'] != records.NO_STAMP).any()}
 
     def table(self, topic):
-        """Return {column: array (n,)} of a topic, a row per message, as of a bag (columns.table)."""
+        """Return {column: array (n,)} of a topic with a row per message, like columns.table of a bag."""
         if records.is_text(topic):
             unit = next(unit for unit in self.units.values() if topic in unit.NODE.writes)
             if topics.TOPIC_BY_NAME[topic].type != 'std_msgs/msg/String':
-                # Of a topic with a list (alarms), a run keeps only the times of its changes.
+                # A message of this topic is a list, such as the alarms. The run keeps only the times of its changes.
                 return {'t': self.t[np.flatnonzero(np.diff(self.steps[topic], prepend=topics.NO_TEXT_CODE))]}
             stamps, texts = announced(unit, topic, self.stamps, self.steps)
             return {'t': stamps / NS_PER_SECOND, 'data': texts}
@@ -146,9 +154,10 @@ class Run:
 
 
 class Loop:
-    """Units of a scenario, ready for one run.
+    """Closed loop of a scenario: the units of its nodes, ready for one run.
 
-    beam: one of several, '' for the first; changed: {node: parameters} that replace those of the scenario.
+    beam: name of one beam of several, such as beam_2; '': the first beam. changed: {node: parameter dataclass} that
+    replaces the scenario's.
     """
     units: dict[str, Unit]
 
@@ -165,11 +174,12 @@ class Loop:
         self.replies = {}
         period = self.units[nodes.DRIVE_NODE].parameters.period
         self.period_ns = round(period * NS_PER_SECOND)
+        # steps: number of steps of the run
         self.steps = round(scenario.header.duration / period) + 1
 
     def before_step(self, first, forecasts):
-        """Prepare step `first`: add to forecasts where a second begins, execute the scheduled commands of the
-        units and keep the replies."""
+        """Prepare the step number `first`: execute the scheduled commands that are due, and keep their replies. If a
+        second of the run begins, append the forecast to the list `forecasts`."""
         stamp = first * self.period_ns
         if stamp // NS_PER_SECOND > (stamp - self.period_ns) // NS_PER_SECOND:
             forecasts.append((stamp, announcement.numbers(self.units['acu'].parts['state']['guidance']['lookahead'])))
@@ -179,17 +189,17 @@ class Loop:
                 self.replies.setdefault(unit.NODE.replies, []).append((stamp, *unit.pending_replies.popleft()))
 
     def next_event_step(self, first):
-        """Return the first step after `first` that needs `before_step`."""
+        """Return the number of the first step after `first` that needs `before_step`, at most the number of steps."""
         due = min((first * self.period_ns // NS_PER_SECOND + 1) * NS_PER_SECOND,
                   *(unit.next_due for unit in self.units.values()))
         step_not_before_due = -(-due // self.period_ns)
         return min(step_not_before_due, self.steps)
 
     def run(self, injected=None, watch=None) -> Run:
-        """Make every step of the scenario; to be called once.
+        """Make every step of the scenario and return the Run. Call this method only once.
 
-        injected (steps, 2): see `loop`. watch(steps made): called between blocks, to look at the units; returns the
-        number of steps until its next call.
+        injected: (steps, 2), see `loop`; None: zeros. watch(number of steps made): a function that is called between
+        blocks of steps and may read or command the units. It returns the largest number of steps until its next call.
         """
         if injected is None:
             injected = np.zeros((self.steps, 2))

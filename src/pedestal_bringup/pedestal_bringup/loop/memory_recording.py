@@ -1,4 +1,5 @@
-"""Run in memory with the interface of bag.Bag that pedestal_analysis uses: a recording without a file."""
+"""Recording without a file: a run of the closed loop, kept in memory, with the methods of bag.Bag that
+pedestal_analysis uses. Trials and studies compute their results from it."""
 import functools
 
 import numpy as np
@@ -7,23 +8,25 @@ from pedestal_bringup.loop import closed_loop
 from pedestal_common.graph.steps import NS_PER_SECOND
 from pedestal_common.parameters import as_dict
 from pedestal_common.wire import commands, messages
+from pedestal_recording import columns
 
 DIAGNOSTICS_TOPIC = 'diagnostics'
 
 KEYHOLE_ENTRY = 'keyhole', 'keyhole'
-"""(key, value) of a forecast of a keyhole."""
+"""(key, value) among the diagnostics of the control unit that marks the forecast of a keyhole."""
 
 
 def record(scenario, beam=''):
-    """Return the MemoryRecording of a scenario.Scenario run in memory; beam: one of several, '' for the first."""
+    """Run a scenario.Scenario in memory and return its MemoryRecording. beam: name of one beam of several, such as
+    beam_2; '': the first beam."""
     return MemoryRecording(scenario, closed_loop.Loop(scenario, beam).run())
 
 
 class MemoryRecording:
-    """closed_loop.Run of a scenario.Scenario, as the view of one beam of its recording.
+    """Recording of one beam of a scenario.Scenario, made from its closed_loop.Run.
 
-    Of the diagnostics it holds the keyhole forecasts of the control unit and the last values, because no result uses
-    anything else of them.
+    From the diagnostics it holds only the keyhole forecasts of the control unit and the last values of each node,
+    because no result uses anything else.
     """
 
     def __init__(self, scenario, run):
@@ -39,19 +42,18 @@ class MemoryRecording:
 
     @functools.cached_property
     def topics(self):
-        """{name: type} of its topics."""
+        """{name: type} of the topics in this recording."""
         of_diagnostics = {DIAGNOSTICS_TOPIC: messages.DiagnosticArray.__msgtype__} if self._keyholes else {}
         of_replies = dict.fromkeys(self._run.replies, messages.DiagnosticStatus.__msgtype__)
         return {**self._run.topics, **of_replies, **of_diagnostics}
 
     def table(self, topic):
-        """Return {column: array (n,)} of a topic, as of a bag (columns.table)."""
+        """Return {column: array (n,)} of a topic with a row per message, like columns.table of a bag."""
         if topic == DIAGNOSTICS_TOPIC:
             return {'t': np.array([stamp for stamp, _ in self._keyholes]) / NS_PER_SECOND}
         if topic in self._run.replies:
-            replies = self._run.replies[topic]
-            return {'t': np.array([stamp for stamp, *_ in replies]) / NS_PER_SECOND,
-                    'level': np.array([float(not reply.granted) for *_, reply in replies])}
+            return columns.table([messages.serialize(message) for *_, message in self.messages(topic)],
+                                 self.topics[topic], [stamp for stamp, *_ in self._run.replies[topic]])
         if topic not in self._tables:
             self._tables[topic] = self._run.table(topic)
         return self._tables[topic]
@@ -61,11 +63,12 @@ class MemoryRecording:
         return np.arange(len(self.table(topic)['t']))
 
     def last_values(self, node):
-        """Return {key: value} of the diagnostics of a node at the end of the run, as of a bag."""
+        """Return {key: value} of the diagnostics of a node at the end of the run."""
         return dict(self._run.units[node].diagnose().values)
 
     def messages(self, topic):
-        """Yield (topic, log time, publish time [ns], message) of the diagnostics or of a topic of replies."""
+        """Yield (topic, log time [ns], publish time [ns], message) of the topic `diagnostics` or of a topic of
+        replies."""
         for stamp, command, reply in self._run.replies.get(topic, ()):
             yield topic, stamp, stamp, commands.reply_message(command, reply)
         if topic != DIAGNOSTICS_TOPIC:

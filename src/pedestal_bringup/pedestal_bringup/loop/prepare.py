@@ -1,8 +1,11 @@
-"""Compile laws that are not in the law cache, so that the processes that use the laws start at once.
+"""Compile laws that are not yet in the law cache, so that the processes that use these laws start at once. `make` and
+the supervisor of a realtime run start this module as a program.
 
-`python -m pedestal_bringup.loop.prepare` compiles the laws of every node on all cores, then those of the closed loop;
-`... NAME` those of the nodes of COMPILED_UNITS in the scenario NAME; `... NODE NAME` those of one node of the scenario
-NAME, which it reads as YAML from the standard input.
+`python -m pedestal_bringup.loop.prepare ...` compiles, by its arguments:
+
+    (none)       the laws of every node on all cores, then those of the closed loop
+    NAME         the laws of the nodes that COMPILED_UNITS lists for the scenario NAME
+    NODE NAME    the laws of one node of the scenario NAME, whose YAML text is read from the standard input
 """
 import concurrent.futures
 import multiprocessing
@@ -16,19 +19,19 @@ from pedestal_common.compiled import compiled_once, done_file, is_compiled
 
 COMPILED_UNITS = (('leo_pass', 'acu'), ('leo_pass', 'adu'), ('leo_pass', 'tracking_receiver'), ('ship_pass', 'ins'),
                   ('ship_pass', 'ship_motion'), ('phased_array_sway', 'adu'))
-"""(scenario, node) that together use the laws of every unit, the slowest first."""
+"""(scenario, node): units that together use every law of a node, those with the longest compilation first."""
 
 COMPILED_LOOPS = (('leo_pass', side_by_side.MIN_PARALLEL_LOOPS), ('ship_pass', 1), ('leo_pass', 1))
-"""(scenario, number of parallel loops) of closed loops that use the laws on lanes, on a ship and ashore, the slowest
-first."""
+"""(scenario, number of parallel loops): closed loops that together use the laws on lanes, on a ship and ashore, those
+with the longest compilation first."""
 
 COMPILE_RUN_S = 0.1
-"""Length of the run that compiles a closed loop [s]."""
+"""Duration of the scenario that is run to compile a closed loop [s]."""
 
 
 def compile_unit(unit):
-    """Compile the laws of a unit, in two processes, which is faster than in one."""
-    # compiled_once lets only one process compile the same unit, also where several runs start at the same time.
+    """Compile the laws of a unit in two processes, which is faster than in one."""
+    # Several runs may start at the same time. compiled_once lets only one of them compile a given unit.
     with compiled_once(unit):
         ahead = multiprocessing.get_context('fork').Process(target=unit.prepare_ahead)
         ahead.start()
@@ -37,21 +40,25 @@ def compile_unit(unit):
 
 
 def _unit_of_scenario(name, node):
+    """Return the unit of a node of the scenario `name`."""
     return scenario.load(name).unit(node)
 
 
 def _compile_unit(name, node):
+    """Compile the laws of a node of the scenario `name`. Return (text that names them, time that this took [s])."""
     begun = time.perf_counter()
     compile_unit(_unit_of_scenario(name, node))
     return f'{node} of {name}', time.perf_counter() - begun
 
 
 def _loop_done(name, count):
-    """Return the path of the file that marks a closed loop as compiled; None if laws are not cached."""
+    """Return the path of the file that marks `count` closed loops of a scenario as compiled; None without a law
+    cache."""
     return done_file(closed_loop.Loop, f'.{name}.{count}')
 
 
 def _compile_loop(name, count):
+    """Compile `count` parallel closed loops of the scenario `name`. Return (text that names them, time taken [s])."""
     begun = time.perf_counter()
     loops = [closed_loop.Loop(scenario.load(name, duration=COMPILE_RUN_S)) for _ in range(count)]
     if count > 1:
@@ -65,8 +72,8 @@ def _compile_loop(name, count):
 
 
 def compile_cold(units, loops):
-    """Compile the laws that are not cached, of parts of COMPILED_UNITS and COMPILED_LOOPS, and print a line for
-    each."""
+    """Compile the laws that are not cached, and print a line for each unit and closed loop. units: rows of
+    COMPILED_UNITS; loops: rows of COMPILED_LOOPS."""
     units = [part for part in units if not is_compiled(_unit_of_scenario(*part))]
     loops = [part for part in loops if (mark := _loop_done(*part)) is None or not mark.exists()]
     if not units and not loops:

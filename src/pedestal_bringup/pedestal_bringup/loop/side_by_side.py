@@ -1,8 +1,9 @@
-"""Closed loops of trials of one scenario side by side: their drives on lanes, in one compiled call.
+"""Closed loops of several trials, run side by side in one compiled call, so that trials take less time. The processor
+computes the drives of all trials together, each drive in one lane (adu_drive.lanes).
 
-The drive takes two thirds of the time of a closed loop; on lanes (adu_drive.lanes) it takes a quarter of that.
-Receivers and control units run one after the other, with the records and laws of a single loop. Every number therefore
-equals that of closed_loop.Loop to the last bit.
+In a single closed loop the drive takes two thirds of the computing time. On lanes it takes a quarter of that.
+Receivers and control units run one after the other, with the records and laws of a single loop. Every number equals
+that of closed_loop.Loop to the last bit.
 """
 import typing
 
@@ -19,13 +20,13 @@ from pedestal_common.wire import records
 from tracking_receiver_sim import unit as receiver_unit
 
 LANE_UNIT_TYPES = {'adu': drive_unit.Adu, 'tracking_receiver': receiver_unit.TrackingReceiver, 'acu': acu_unit.Acu}
-"""Units of a loop ashore; each trial has its own."""
+"""{node: class of its unit} of the loops that can run side by side: ashore, with motors."""
 
 MIN_PARALLEL_LOOPS = 8
-"""Smallest number of loops for lanes; with fewer, most lanes would be idle."""
+"""Smallest number of loops that run side by side; with fewer, most lanes would be idle."""
 
 MAX_STEPS_PER_CALL = 200
-"""Largest number of steps of one call, for which the noise is drawn at once."""
+"""Largest number of steps of one compiled call. The noise of all its steps is drawn before the call."""
 
 MAX_MEMORY_BYTES = 2**30
 """Largest memory for the records of parallel trials [bytes]."""
@@ -33,7 +34,8 @@ MAX_MEMORY_BYTES = 2**30
 
 @compiled
 def _receiver_law(receivers, i, stamp, step):
-    """Make the step of receiver i."""
+    """Make the step of receiver i. receivers: as of `_loop`; stamp: of the step [ns]; step: its record of
+    STEP_DTYPE."""
     r = receivers
     receiver_unit.law(receiver_unit.Memory(r.record[i:i + 1], r.breaks[i], r.coefficients[i], r.normals[i]), stamp,
                       step, step)
@@ -41,13 +43,17 @@ def _receiver_law(receivers, i, stamp, step):
 
 @compiled
 def _track(rows, ends, i):
-    """Return track i of `_joined_tracks`."""
+    """Return ProgramTrack i of those that `_joined_tracks` has joined into rows, with their ends."""
     return ProgramTrack(rows.times[ends[i]:ends[i + 1]], rows.angles[ends[i]:ends[i + 1]])
 
 
 class ControlUnits(typing.NamedTuple):
-    """Control units, run one after the other. tables: those of all units as one, with ends (tables, n + 1), as
-    `_joined_tracks` gives them."""
+    """Control units of n trials, which run one after the other.
+
+    record  (n,): their records
+    tables  Tables in which each track is the tracks of all units, joined by `_joined_tracks`
+    ends    (3, n + 1): for each of the three tracks, the ends of the rows of each unit
+    """
     record: np.ndarray
     tables: Tables
     ends: np.ndarray
@@ -55,19 +61,19 @@ class ControlUnits(typing.NamedTuple):
 
 @compiled
 def _acu_law(acus, i, stamp, step):
-    """Make the step of control unit i."""
+    """Make the step of control unit i. acus: ControlUnits; stamp: of the step [ns]; step: its record of STEP_DTYPE."""
     of_all, ends = acus.tables, acus.ends
     tables = Tables(_track(of_all.program, ends[0], i), _track(of_all.tle, ends[1], i), _track(of_all.sun, ends[2], i))
     acu_unit.law(acu_unit.Memory(acus.record[i:i + 1], tables), stamp, step, step)
 
 
 class KeptSteps(typing.NamedTuple):
-    """Part of the steps that is kept.
+    """Part of each step that is kept after it, as 8-byte words. Words are used because `_loop` would otherwise be
+    compiled again for each choice of topics.
 
-    words  (m,): indices of the kept 8-byte words of a STEP_DTYPE
-    steps  the steps as `_words`
-    rows   (trials, n, m): the kept words of all steps, because `_loop` would be compiled again for a part of the
-           columns
+    words  (m,): indices of the kept words in a record of STEP_DTYPE
+    steps  (2, trials, words of a STEP_DTYPE): the steps of `_loop`, as `_words` gives them
+    rows   (trials, n, m): the kept words of all n steps, filled
     """
     words: np.ndarray
     steps: np.ndarray
@@ -76,12 +82,15 @@ class KeptSteps(typing.NamedTuple):
 
 @compiled
 def _loop(drives, receivers, acus, first, last, period_ns, steps, kept):
-    """Make the steps first ... last - 1 of every trial, of which KeptSteps keeps a part.
+    """Make the steps first ... last - 1 of every trial.
 
-    drives     as of lanes.beside
-    receivers  a memory whose arrays have the trials as a further first dimension
+    drives     flat array of the drives on lanes, as lanes.to_lanes gives it
+    receivers  receiver_unit.Memory whose arrays have the trials as their first dimension
     acus       ControlUnits
-    steps      (2, trials) of STEP_DTYPE: of the even and of the odd steps, in turn the present and the previous step
+    period_ns  time of one step [ns]
+    steps      (2, trials) of STEP_DTYPE: the last even step and the last odd step, in turn the present and the
+               previous step
+    kept       KeptSteps, which keeps a part of each step
     """
     moving = drive_unit.DRIVE_LANES(drives)
     for k in range(first, last):
@@ -100,8 +109,8 @@ def _words(records):
 
 
 def max_parallel_trials(scenario, names):
-    """Return the largest number of trials of a scenario.Scenario side by side, which keep the topics named; 0 where
-    that is not possible."""
+    """Return the largest number of trials of a scenario.Scenario that can run side by side; 0 for a scenario with a
+    ship or an array. names: topics that are kept, whose records determine the memory needed."""
     if scenario.header.ship or scenario.header.beam:
         return 0
     steps = scenario.header.duration / scenario.node_parameters('adu').period
@@ -109,8 +118,8 @@ def max_parallel_trials(scenario, names):
 
 
 def can_run_parallel(loops):
-    """Return True if closed_loop.Loops can run side by side: drives with motors ashore, with equal period, length and
-    shapes of their memories."""
+    """Return True if these closed_loop.Loops can run side by side: drives with motors ashore, with equal period and
+    number of steps, and memories of equal shapes."""
     ours = all({name: type(unit) for name, unit in loop.units.items()} == LANE_UNIT_TYPES
                and loop.units['adu'].fits_lanes
                for loop in loops)
@@ -118,6 +127,7 @@ def can_run_parallel(loops):
 
 
 def _shape(loop):
+    """Return the numbers that must be equal for loops that run side by side: times, counts and array shapes."""
     receiver = loop.units['tracking_receiver'].memory
     constants = loop.units['adu'].parts['constants']
     return (loop.period_ns, loop.steps, int(constants['speed_ticks']), int(constants['substeps']),
@@ -125,7 +135,8 @@ def _shape(loop):
 
 
 def _stacked(units):
-    """Join the records of units into one; each unit continues with its part. Return the record."""
+    """Join the records of units into one array (units,) and return it; each unit continues with its part of the
+    array."""
     record = np.empty(len(units), units[0].memory.record.dtype)
     for i, unit in enumerate(units):
         record[i:i + 1] = unit.memory.record
@@ -134,15 +145,18 @@ def _stacked(units):
 
 
 def _joined_tracks(tracks):
-    """Return (the rows of ProgramTracks as one, their ends (n + 1,), 0 first); the tracks may differ in length."""
+    """Return (one ProgramTrack with the rows of n ProgramTracks, their ends); the tracks may differ in length.
+
+    ends: (n + 1,), 0 first: track i has the rows ends[i] ... ends[i + 1] - 1.
+    """
     return ProgramTrack(*map(np.concatenate, zip(*tracks))), np.cumsum([0, *(len(track.times) for track in tracks)])
 
 
 def runs(loops, names, kept=None):
-    """Return the Run of each of some closed_loop.Loops that can run parallel, with the topics named, and without
-    truth.
+    """Run closed_loop.Loops side by side (see can_run_parallel), and return the Run of each, without truth.
 
-    kept: memory (trials, steps) of records.of(names) for the Runs, which the next call overwrites; None: new.
+    names: topics that the Runs keep. kept: memory (trials, steps) of records.of(*names) for the Runs, which the next
+    call overwrites; None: new memory.
     """
     drives, receivers, acus = ([loop.units[name] for loop in loops] for name in LANE_UNIT_TYPES)
     drive_record, receiver_record, acu_record = _stacked(drives), _stacked(receivers), _stacked(acus)

@@ -1,4 +1,5 @@
-"""Program track that an operator sends before a pass: the predicted target as time-tagged azimuth and elevation."""
+"""Program track that an operator sends to the control unit (ACU) before a pass: a table of times, azimuths and
+elevations, predicted for the target of a scenario."""
 import dataclasses
 import datetime
 import functools
@@ -15,36 +16,43 @@ from tracking_receiver_sim.path import arrival
 
 @dataclasses.dataclass(frozen=True)
 class Plan:
-    """scenario.Scenario with its targets and its program tracks; each is built once, at its first use."""
+    """Scenario (scenario.Scenario) together with its targets and its program tracks, which are built once, at their
+    first use."""
     scenario: Scenario
 
     @functools.cached_property
     def targets(self):
-        """{prefix of the beam: true target.Target}."""
+        """{prefix of the beam ('' for a single beam): the target.Target that the simulation moves}."""
         return {prefix: self._built(prefix, self._parameters(prefix)) for prefix in self.scenario.prefixes}
 
     def _parameters(self, prefix):
+        """Return the TargetParameters of the receiver of a beam."""
         return self.scenario.node_parameters(prefix + 'tracking_receiver').target
 
     def _built(self, prefix, parameters):
+        """Return the target.Target of TargetParameters for the run of this scenario."""
         mask = self.scenario.node_parameters(prefix + 'tracking_receiver').receiver.horizon_mask
         return target.build(parameters, self.scenario.header.duration, mask)
 
     def _nominal_target(self, prefix):
-        """Return the target of a beam as the operator knows it, with UT1 equal to UTC."""
+        """Return the target of a beam as the operator predicts it: with the time UT1 of the earth's rotation equal to
+        UTC."""
         true = self._parameters(prefix)
         nominal = dataclasses.replace(true, leo_pass=dataclasses.replace(true.leo_pass, ut1_offset=0.0))
         return self.targets[prefix] if nominal == true else self._built(prefix, nominal)
 
     @functools.cached_property
     def tables(self):
-        """{prefix of the beam: (times (n,) s, angles (n, 2) earth azimuth (unwrapped), elevation [rad])} of the
-        prediction. It contains neither UT1 nor the travel time of the signal, and of the refraction only
-        `refractivity`.
+        """Predicted tables {prefix of the beam: (times, angles)}.
 
-        The table begins at stamp 0 and ends two intervals after the run, so that the end of the run is inside. Outside
-        its known path the target is at its first or last known place. The times equal those that the ACU reads from
-        the message, to the last bit.
+        times   (n,) s, from stamp 0 to two intervals after the run, so that the end of the run is inside; equal to the
+                last bit to the times that the ACU reads from the message
+        angles  (n, 2) rad: earth azimuth (unwrapped), elevation
+
+        The prediction omits two effects of the true target: UT1 - UTC and the travel time of the signal. It includes
+        refraction only if `program.refractivity` of the header is above 0. `program` may also add an intended error of
+        time, azimuth and elevation. Before or after its known path the target stays at
+        the first or last known place.
         """
         program, duration = self.scenario.header.program, self.scenario.header.duration
         nanoseconds = np.round(np.arange(0.0, duration + 2.0 * program.interval, program.interval) * 1e9)
@@ -69,16 +77,17 @@ class Plan:
 
     @functools.cached_property
     def ship_summary(self):
-        """Lines on the file of the ship's motion, see motion.summary."""
+        """Lines on the file of a recorded ship motion (motion.summary); () without such a file or without a ship."""
         if 'ship_motion' not in self.scenario.nodes:
             return ()
         return motion.summary(self.scenario.node_parameters('ship_motion').ship)
 
     def announced(self):
-        """Return lines on changed values, on the file of the ship and on the targets of the beams, each once.
+        """Return the lines that a user reads before the run: the notes of the scenario, the file of the ship motion,
+        and the targets.
 
-        The lines of a target state what a flight is, when the target is highest, and when it rises and sets. Raises
-        csv_table.TableError for a file that cannot be used.
+        The lines of a target describe a recorded flight, and state when the target is highest, rises and sets. Equal
+        lines of several beams appear once. Raises csv_table.TableError for a file that cannot be used.
         """
         lines = [*self.scenario.notes, *self.ship_summary]
         for prefix, built in self.targets.items():
@@ -86,7 +95,8 @@ class Plan:
         return list(dict.fromkeys(lines))
 
     def begins(self):
-        """Return the UTC [ns] of the time 0 by the target. Raises ValueError where the target has no date."""
+        """Return the UTC [ns] at which the time of the run is 0, by the date of the first beam's target. Raises
+        ValueError if the target has no date."""
         start_time = self.targets[self.scenario.prefixes[0]].start_time
         if not start_time:
             raise ValueError(f'--start file: the target of {self.scenario.name} has no date; give a UTC instead')
@@ -95,8 +105,11 @@ class Plan:
 
 
 def _sky(built, kind, duration):
-    """Return lines on a target of a kind: its rise and set if they are within a run of `duration` [s], and the highest
-    place of a target that has a date and no summary."""
+    """Return lines on a Target `built`: its rise and set if they are within the run, and its highest place if it has a
+    date and no summary. (The summary of a recorded flight already states the highest place.)
+
+    kind: name of its kind, as in target.kind; duration: length of the run [s].
+    """
     name = 'satellite' if kind == 'leo_pass' else 'target'
     times = np.linspace(0.0, duration, 1 + int(min(1e5, 10.0 * duration)))
     elevation = np.degrees(target.look_angles(built, times)[1])
@@ -117,7 +130,7 @@ def _sky(built, kind, duration):
 
 
 def program_message(times, angles):
-    """Return the JointTrajectory of a table: times (n,) s, angles (n, 2) rad."""
+    """Return the JointTrajectory of a table: times (n,) s, angles (n, 2) rad (earth azimuth, elevation)."""
     points = []
     for time, positions in zip(times, angles):
         point = messages.trajectory_point(len(positions))

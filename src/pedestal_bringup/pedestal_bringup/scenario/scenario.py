@@ -1,8 +1,9 @@
-"""Scenarios: a ROS 2 parameter file, one section per node, and a section `scenario` as its header.
+"""Scenarios: the description of a run as a ROS 2 parameter file, with one section per node and the header `scenario`.
+This module reads, checks and completes a scenario for `pedestal run`, the launch file and the closed loop.
 
-`ros2 run PACKAGE EXECUTABLE --ros-args --params-file SCENARIO.yaml` loads the same file unchanged. For a
-namespace, name the sections /**/NODE. Parameters that several nodes share (_share_parameters) are missing then. They
-are in the file parameters.yaml that `pedestal run` writes beside the bag.
+A single node also loads the file unchanged: `ros2 run PACKAGE EXECUTABLE --ros-args --params-file SCENARIO.yaml`. For
+a node in a namespace, name the sections /**/NODE. The node then lacks the parameters that it shares with other nodes
+(_share_parameters). The file parameters.yaml, which `pedestal run` writes beside the bag, contains these too.
 """
 import contextlib
 import dataclasses
@@ -38,8 +39,8 @@ _P = typing.TypeVar('_P', bound=parameters.Parameters)
 
 @dataclasses.dataclass(frozen=True)
 class ProgramParameters(parameters.Parameters):
-    """Program track that the operator sends to the ACU before the run: the predicted target, with the error of the
-    prediction."""
+    """Parameters of the program track that the operator sends to the control unit (ACU) before the run: the predicted
+    target with the errors of the prediction."""
     source: str = parameters.choice('target', ('target', 'none'), 'source of the program track; none: no track')
     interval: float = parameters.parameter(1.0, 0.002, 60.0, 's', 'time between two points')
     time_offset: float = parameters.parameter(0.0, -60.0, 60.0, 's', 'delay of the prediction')
@@ -49,9 +50,14 @@ class ProgramParameters(parameters.Parameters):
                                                'refraction is added to the prediction; 0: no refraction')
 
 
+PROGRAM_ERRORS = {'program.time_offset': 's', 'program.azimuth_offset': 'rad', 'program.elevation_offset': 'rad'}
+"""{error of the prediction in the header of a scenario: its unit}."""
+
+
 @dataclasses.dataclass(frozen=True)
 class RestartParameters(parameters.Parameters):
-    """Restarts of nodes that die in a realtime `pedestal run`; in lockstep a dead node ends the run."""
+    """Parameters of the restarts of nodes whose process dies in a realtime `pedestal run`. In lockstep a dead node
+    ends the run."""
     attempts: int = parameters.parameter(5, 0, 1_000_000, '', 'largest number of restarts of a node in the time '
                                          '`within`; 0: no restart')
     within: float = parameters.parameter(60.0, 1.0, 86400.0, 's', 'time in which the restarts of a node are counted')
@@ -62,14 +68,14 @@ class RestartParameters(parameters.Parameters):
 
 
 def _of_graph(name: str) -> typing.Any:
-    """Return the parameter graph.NAME, which a scenario gives to every node."""
+    """Return a field of the header for the parameter graph.NAME, which the header gives to every node."""
     field = GraphParameters.__dataclass_fields__[name]
     return dataclasses.field(default=field.default, metadata=field.metadata)
 
 
 @dataclasses.dataclass(frozen=True)
 class ScenarioParameters(parameters.Parameters):
-    """Header of a scenario."""
+    """Header of a scenario: its section `scenario`, the parameters that belong to no single node."""
     title: str = parameters.text('', 'description in one line')
     duration: float = parameters.parameter(60.0, 0.1, 86400.0, 's', "length of the run in the drive's time")
     pacing: str = parameters.choice('lockstep', ('lockstep', 'realtime'), 'pacing of the steps: by the '
@@ -91,7 +97,8 @@ class ScenarioParameters(parameters.Parameters):
 
     @property
     def graph_beams(self) -> int:
-        """Number of beams of the graph as in nodes.links: 0 for a drive with motors."""
+        """Number of beams of an electronically steered array, 0 for a drive with motors (the convention of
+        nodes.links)."""
         return self.beams if self.beam else 0
 
 
@@ -102,7 +109,7 @@ OPTIONAL_NODES = tuple(node.name for node in nodes.NODES if node.optional)
 """Nodes that take part only on a ship."""
 
 BEAM_NODES = tuple(node.name for node in nodes.NODES if node.of_beam)
-"""Nodes that each beam of an array has of its own."""
+"""Nodes of which each beam of an array has its own."""
 
 SHARED_PARAMETERS = (
     ('adu', 'period', 'acu', 'tracker.receiver.integration'),
@@ -126,20 +133,23 @@ not set it."""
 
 MEASUREMENT_FLAGS = tuple((node.name, topic.measured, topic.flag) for node in nodes.NODES if node.name != 'acu'
                           for topic in map(topics.TOPIC_BY_NAME.__getitem__, node.writes) if topic.measured)
-"""(node, its parameter `measured`, the subscribers' parameter `flag`) of each optional topic; both are true if the
-topic exists (topics.Topic)."""
+"""(publisher, its parameter `measured`, the subscribers' parameter `flag`) of each optional topic. Both are names of
+parameters, which are true if the topic exists (topics.Topic)."""
 
 
 class ScenarioError(ValueError):
-    """Error of a scenario that is unknown or has an invalid value; one line with file, node, key and value."""
+    """Error of a scenario that is unknown or has an invalid value. Its text is one line with file, node, key and
+    value."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Scenario:
     """Checked scenario: its header and, for each node that takes part, the values that differ from the defaults.
 
-    With several beams the values of `acu` hold for each `beam_2/acu`; its own values replace them. notes: lines on
-    values that were changed.
+    With several beams the section `acu` holds for the control unit of each beam. The section of one beam, such as
+    `beam_2/acu`, replaces its values. The receivers have sections of the same form.
+
+    values: {node: {dotted name: value}}; notes: lines on limits that `checked` has changed.
     """
     name: str
     header: ScenarioParameters
@@ -157,7 +167,7 @@ class Scenario:
 
     @property
     def prefixes(self) -> tuple[str, ...]:
-        """Prefix of the names of each beam's nodes; ('',) for a single beam."""
+        """Prefix of the names of each beam's nodes, ('beam_1/', 'beam_2/', ...); ('',) for a single beam."""
         return nodes.prefixes(self.header.graph_beams)
 
     def row(self, node: str) -> Node:
@@ -173,7 +183,7 @@ class Scenario:
         return _built(self.row(node).parameters_type(), parameters.without_ros(self.given(node)))
 
     def unit(self, node: str, parameters: parameters.Parameters | None = None) -> 'Unit':
-        """Return the unit of one of its nodes; parameters: they replace those of the scenario."""
+        """Return the unit of one of its nodes. parameters: parameter dataclass in place of that of the scenario."""
         row, chosen = self.row(node), parameters or self.node_parameters(node)
         flags = [flag for flag in topics.TOPIC_FLAGS if getattr(chosen, flag, False)]
         return row.unit_type()(chosen, nodes.reads(row, self.nodes, flags))
@@ -185,6 +195,7 @@ class Scenario:
 
 
 def _folder() -> 'Traversable':
+    """Return the folder of the scenarios that come with the product."""
     return importlib.resources.files('pedestal_bringup') / 'scenarios'
 
 
@@ -216,11 +227,13 @@ def text(name_or_path: str | pathlib.Path) -> tuple[str, str]:
 
 
 def _values_of(sections: Sections, node: str) -> dict[str, typing.Any]:
-    """Return the values of a node: values for every beam (section `acu`), replaced by its own."""
+    """Return the values of a node such as beam_2/acu: those of the section `acu` for every beam, replaced by those of
+    its own section."""
     return {**sections.get(nodes.plain(node), {}), **sections.get(node, {})}
 
 
 def _is_node(name: str) -> bool:
+    """Return True if a name is that of a node with a section in a scenario, such as acu or beam_2/acu."""
     return nodes.plain(name) in (BEAM_NODES if nodes.beam_of(name) else SECTION_NODES)
 
 
@@ -234,7 +247,8 @@ def _sections(name: str, content: str) -> Sections:
 
 def by_node(sections: Sections, namespace: str = '') -> Sections:
     """Return {node or `scenario`: {dotted name: value}} of the sections of a parameter file, for a graph in a
-    namespace such as '/ship_1'. Raises ScenarioError, without the file, for a section of none of its nodes."""
+    namespace such as '/ship_1'. Raises ScenarioError for a section that is for no node of the graph; the caller adds
+    the name of the file."""
     found: Sections = {}
     for section, values in sections.items():
         node = parameter_file.node_of(section, namespace)
@@ -246,7 +260,7 @@ def by_node(sections: Sections, namespace: str = '') -> Sections:
 
 
 def _not_of_the_graph(section: str, namespace: str) -> str:
-    """Return why a section is for no node of a graph, and the section that would be."""
+    """Return the text why a section is for no node of a graph, with a name of the section that would be correct."""
     _, name = parameter_file.divided(section)
     if name == 'scenario' or _is_node(name):
         graph = f'in the namespace {namespace}' if namespace else 'without a namespace'
@@ -255,7 +269,8 @@ def _not_of_the_graph(section: str, namespace: str) -> str:
 
 
 def _every_node(section: str, values: Mapping[str, typing.Any]) -> tuple[str, ...]:
-    """Return the nodes of a section such as /**, which may hold the parameters of every ROS 2 node only."""
+    """Return the nodes of a section for every node, such as /**. Raises ScenarioError if the section has any parameter
+    other than those that every ROS 2 node has."""
     for key in parameters.without_ros(values):
         owners = [node for node in SECTION_NODES if key in parameters.defaults(nodes.row(node).parameters_type())]
         sections = ' or '.join(parameter_file.ANY_NAMESPACE + node for node in owners)
@@ -275,12 +290,13 @@ def parameters_of(node: str) -> type[parameters.Parameters]:
 
 
 def parse_override(text: str) -> tuple[str, str, typing.Any]:
-    """Return (node, key, value) of 'node.key=value'; the value is read as YAML. Raises ScenarioError."""
+    """Return (node, key, value) of a text 'node.key=value' of the option --param; the value is read as YAML. Raises
+    ScenarioError."""
     left, equals, right = text.partition('=')
     node, dot, key = left.partition('.')
     if not (equals and dot and key):
         raise ScenarioError(f'--param {text!r}: must be node.key=value, as in '
-                            'acu.azimuth.feedforward.bandwidth=20')
+                            'acu.azimuth.feedforward.bandwidth=12')
     parameters_of(node)
     try:
         return node, key, plain_yaml.parse(right)
@@ -289,7 +305,8 @@ def parse_override(text: str) -> tuple[str, str, typing.Any]:
 
 
 def override(name: str, value: typing.Any) -> str:
-    """Return 'node.key=value' of a value; a text is without quotes where YAML reads it as the same text."""
+    """Return the text 'name=value', the inverse of parse_override; name: 'node.key'. A text stands without quotes if
+    YAML reads the same text from it."""
     with contextlib.suppress(yaml.YAMLError):
         if isinstance(value, str) and plain_yaml.parse(value) == value:
             return f'{name}={value}'
@@ -315,7 +332,8 @@ def file_overrides(path: str | pathlib.Path, namespace: str = '') -> list[str]:
 
 
 def _check_each(node: str, values: Mapping[str, typing.Any]) -> None:
-    """Raise ParameterError for the first of some values that no scenario would accept."""
+    """Raise ParameterError for the first value of a node that no scenario accepts. The section `adu` accepts the
+    parameters of a drive with motors and those of an array."""
     own = values if node == 'scenario' else parameters.without_ros(values)
     try:
         parameters.check_each(parameters_of(node), own)
@@ -329,17 +347,24 @@ def _check_each(node: str, values: Mapping[str, typing.Any]) -> None:
 
 @dataclasses.dataclass(frozen=True)
 class Draft:
-    """Scenario before the check of the whole: sections {node or `scenario`: {dotted name: value}}."""
+    """Scenario whose values were read but not yet checked together; `checked` makes a Scenario of it.
+
+    sections: {node or `scenario`: {dotted name: value}}.
+    """
     name: str
     sections: Sections
 
     def changed(self, overrides: Iterable[str]) -> 'Draft':
-        """Return the Draft changed by texts 'node.key=value'. Raises ScenarioError, also for a node that takes no
-        part."""
+        """Return a new Draft with the values of texts 'node.key=value'. Raises ScenarioError, also for a node that
+        takes no part."""
         sections = {node: dict(values) for node, values in self.sections.items()}
         changes = [parse_override(override) for override in overrides]
         for node, key, value in changes:
             sections.setdefault(node, {})[key] = value
+        given = {f'{node}.{key}': value for node, key, value in changes}
+        if given.get('ship_motion.ship.motion') == 'recorded' and 'ship_motion.ship.heading_deg' not in given:
+            # The recording holds the heading, so that of the scenario ends.
+            sections['ship_motion'].pop('ship.heading_deg', None)
         for node, key, value in changes:
             absent = node in OPTIONAL_NODES and not sections['scenario'].get('ship')
             if absent and parameters.without_ros({key: value}):
@@ -349,25 +374,26 @@ class Draft:
 
     @property
     def header(self) -> ScenarioParameters:
-        """ScenarioParameters of the draft."""
+        """Header of the draft as ScenarioParameters."""
         return _checked(self.name, 'scenario', ScenarioParameters, self.sections['scenario'])
 
     @property
     def target(self) -> typing.Any:
-        """Target of a single receiver."""
+        """Target parameters of the section `tracking_receiver`."""
         return _checked(self.name, 'tracking_receiver', nodes.row('tracking_receiver').parameters_type(),
                         self.sections.get('tracking_receiver', {})).target
 
 
 def draft(name_or_path: str | pathlib.Path) -> Draft:
-    """Return the Draft of a name or a YAML path. Raises ScenarioError."""
+    """Return the Draft of a scenario, from its name or the path of its .yaml file. Raises ScenarioError."""
     name, content = text(name_or_path)
     return Draft(name, _sections(name, content))
 
 
 def load(name_or_path: str | pathlib.Path, overrides: Iterable[str] = (), seed: int | None = None,
          duration: float | None = None, pacing: str | None = None) -> Scenario:
-    """Return the Scenario of a name or a YAML path; see checked."""
+    """Return the Scenario of a name or of the path of a .yaml file. overrides: texts 'node.key=value'; for the other
+    arguments see `checked`."""
     return checked(draft(name_or_path).changed(overrides), seed, duration, pacing)
 
 
@@ -375,16 +401,18 @@ def parse(name: str, content: str, overrides: Iterable[str] = (), seed: int | No
           duration: float | None = None, pacing: str | None = None) -> Scenario:
     """Return the Scenario of a YAML text; parse(name, Scenario.as_yaml()) returns the same scenario.
 
-    overrides: texts 'node.key=value'; see checked.
+    overrides: texts 'node.key=value'; for the other arguments see `checked`.
     """
     return checked(Draft(name, _sections(name, content)).changed(overrides), seed, duration, pacing)
 
 
 def checked(new_draft: Draft, seed: int | None = None, duration: float | None = None,
             pacing: str | None = None) -> Scenario:
-    """Return the Scenario of a new Draft. The Draft is changed; use it once.
+    """Return the Scenario of a Draft: check each value, and add the parameters that follow from others. This call
+    changes the Draft, so use the Draft only once.
 
-    seed, duration and pacing replace the values of the header where given.
+    seed, duration [s], pacing: values that replace those of the header; None: no change. A given seed also replaces
+    the seeds of the nodes.
 
     Raises ScenarioError for an unknown name or a value out of range.
     """
@@ -423,13 +451,15 @@ def checked(new_draft: Draft, seed: int | None = None, duration: float | None = 
 
 
 LIMIT_ENDS = (('low', 'lower', 1.0), ('high', 'upper', -1.0))
-"""(name of the end in the control unit, in the drive, sign of the direction into the travel)."""
+"""The two ends of the travel of an axis: (name of the limit in the control unit, its name in the drive, sign of the
+direction into the travel)."""
 
 
 def _narrow(sections: Sections, header: ScenarioParameters) -> tuple[str, ...]:
-    """Set each limit of a control unit to that of the drive where the drive's is narrower. Return a line for each.
+    """Set each limit of travel of a control unit to that of the drive if the drive's limit is narrower. Return a line
+    for each limit changed.
 
-    The defaults of both agree, so a scenario that gives no limit is not changed.
+    Control unit and drive have equal default limits, so a scenario that sets no limit is not changed.
     """
     if header.beam:
         return ()
@@ -449,8 +479,8 @@ def _narrow(sections: Sections, header: ScenarioParameters) -> tuple[str, ...]:
 
 def _derive_from_flight(name: str, receiver_values: dict[str, typing.Any],
                         header_values: dict[str, typing.Any]) -> None:
-    """Derive station, reference range and duration from the file of a recorded flight, where the scenario does not
-    give them. Raises ScenarioError, TableError."""
+    """Set the parameters that the scenario lacks and that the file of a target's path gives: station, reference range,
+    duration, and the start in the file of an orbit. Raises ScenarioError, TableError."""
     target = _checked(name, 'tracking_receiver', nodes.row('tracking_receiver').parameters_type(),
                       receiver_values).target
     if target.track_file.path and target.kind != 'track_file':
@@ -467,9 +497,10 @@ def _derive_from_flight(name: str, receiver_values: dict[str, typing.Any],
 
 
 def _share_parameters(name: str, sections: Sections, header: ScenarioParameters, seed: int | None) -> None:
-    """Give every node the parameters that several share: length and period of the run, seeds, ship, latencies, beam.
+    """Give every node the parameters that several nodes share: duration of the run, period of a step, seeds, ship,
+    latencies, beam.
 
-    Raises ScenarioError where the section of a node has another value.
+    name: of the scenario; seed: as of `checked`. Raises ScenarioError if the section of a node has another value.
     """
     def share(node: str, key: str, value: typing.Any) -> None:
         sections[node].setdefault(key, value)
@@ -497,14 +528,15 @@ def _share_parameters(name: str, sections: Sections, header: ScenarioParameters,
 
     for node in ('acu', 'tracking_receiver'):
         share(node, 'period', value_of('adu', 'period'))
-    # The flag is set where the topic exists, or where the scenario sets the flag.
+    # A flag is given to the subscribers if its topic exists. It is also checked if the scenario itself sets it.
     for owner, key, flag in MEASUREMENT_FLAGS:
         measured = (header.ship or not nodes.row(owner).optional) and value_of(owner, key, False)
         for node in ('acu', 'recorder'):
             if measured or any(flag in values for section, values in sections.items()
                                if nodes.plain(section) == node):
                 share(node, flag, measured)
-    # With ins_error the INS publishes its errors, so the parameters tracker.attitude have no effect.
+    # With the flag ins_error the control unit takes the errors of the attitude from the INS, so its own parameters
+    # tracker.attitude have no effect.
     modelled = [(section, key) for section in sections for key in sections[section]
                 if key.startswith('tracker.attitude.')]
     if modelled and sections['acu'].get('ins_error'):
@@ -528,7 +560,8 @@ def _share_parameters(name: str, sections: Sections, header: ScenarioParameters,
 
 
 def _share_with_beam(name: str, node: str, sections: Sections, header: ScenarioParameters, seed: int | None) -> None:
-    """Give a node of one beam the parameters of its own receiver, and a seed for its own noise."""
+    """Give a node of one beam, such as beam_2/acu, the parameters that it shares with the other nodes of this beam.
+    The receiver of the beam gets a seed of its own for its noise."""
     values, beam = sections[node], nodes.beam_of(node)
     own_receiver = f'{beam}/tracking_receiver'
     if node == own_receiver and (seed is not None or 'seed' not in values):
@@ -546,6 +579,7 @@ def _share_with_beam(name: str, node: str, sections: Sections, header: ScenarioP
 
 
 def _checked(name: str, section: str, parameters_type: type[_P], values: Mapping[str, typing.Any]) -> _P:
+    """Return the parameter dataclass of a section of the scenario `name`. Raises ScenarioError."""
     with _errors_named(f'scenario {name}, {section}'):
         return _built(parameters_type, values if section == 'scenario' else parameters.without_ros(values))
 
@@ -566,7 +600,8 @@ def _built_once(parameters_type: type[_P], key: tuple[tuple[str, type, typing.An
 
 @contextlib.contextmanager
 def _errors_named(origin: str) -> Iterator[None]:
-    """Make any refusal a ScenarioError that names its origin, the scenario or file and its section."""
+    """Turn the errors of a check into a ScenarioError that begins with their origin: the scenario or file, and the
+    section."""
     try:
         yield
     except (ScenarioError, parameters.ParameterError, parameter_file.ParameterFileError) as error:

@@ -1,4 +1,5 @@
-"""Sectors of the deck where the superstructure hides the target; azimuth clockwise from the bow."""
+"""Hidden sectors: ranges of deck azimuth (clockwise from the bow) and elevation in which the superstructure of the
+ship hides the target."""
 import math
 
 import numpy as np
@@ -15,8 +16,11 @@ BLOCKAGE_DOC = ("sectors hidden by the superstructure, at most 8: 'azimuth_low a
 
 
 def sectors(text) -> np.ndarray:
-    """Return the table (MAX_SECTORS, 3) [rad] for `blocked`, of a text as in BLOCKAGE_DOC. ParameterError names the
-    sector and its allowed range."""
+    """Return the table (MAX_SECTORS, 3) [rad] that `blocked` reads, from a text as in BLOCKAGE_DOC.
+
+    A row has the lowest and the highest azimuth and the highest elevation of a sector. Raises ParameterError, which
+    names the sector and the allowed range.
+    """
     table = np.full((MAX_SECTORS, 3), -math.inf)
     parts = [part.split() for part in text.split(';') if part.strip()]
     if len(parts) > MAX_SECTORS:
@@ -37,7 +41,8 @@ def sectors(text) -> np.ndarray:
 
 @compiled
 def blocked(table, azimuth, elevation):
-    """Return True if a direction of the deck is in a sector; False where it is NaN."""
+    """Return True if a direction, in deck angles [rad], is in a hidden sector; False if an angle is NaN. table: from
+    `sectors`."""
     for i in range(MAX_SECTORS):
         low, high, top = table[i, 0], table[i, 1], table[i, 2]
         if elevation <= top:

@@ -1,4 +1,4 @@
-"""WGS84: earth-fixed positions and the east-north-up frame of a station."""
+"""Geodesy on the WGS84 ellipsoid: the place of the pedestal, earth-fixed positions, the east-north-up frame."""
 import dataclasses
 import math
 
@@ -11,7 +11,8 @@ EARTH_RADIUS_M, EARTH_FLATTENING = 6378137.0, 1.0 / 298.257223563
 """Equatorial radius of the WGS84 ellipsoid [m], and its flattening [-]."""
 
 EARTH_RATE = 7.29211514670698e-5
-"""Rate of the earth against TEME, per UT1 second [rad/s]; Vallado et al., AIAA 2006-6753, appendix C."""
+"""Rate of the earth against TEME, the frame of SGP4, per second of UT1 [rad/s]; Vallado et al., AIAA 2006-6753,
+appendix C."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -34,7 +35,8 @@ def geocentric(latitude, longitude, height):
 
 
 def station_frame(station):
-    """Return the earth-fixed position (3,) [m] and the rotation (3, 3) earth-fixed -> ENU of a StationParameters."""
+    """Return the earth-fixed position (3,) [m] of a station, and the rotation (3, 3) earth-fixed -> ENU. station:
+    StationParameters."""
     latitude, longitude = math.radians(station.latitude_deg), math.radians(station.longitude_deg)
     # sp, cp: sine and cosine of the latitude (phi); sl, cl: of the longitude (lambda).
     sp, cp, sl, cl = math.sin(latitude), math.cos(latitude), math.sin(longitude), math.cos(longitude)
@@ -43,8 +45,11 @@ def station_frame(station):
 
 
 def destination(latitude_deg, longitude_deg, bearing, distance):
-    """Return (latitude, longitude) [deg] of the place at a distance [m] along the great circle that leaves with a
-    bearing [rad, clockwise from north], on a sphere: the distance is right to 0.6 %."""
+    """Return (latitude, longitude) [deg] of the place at a distance [m] and a bearing [rad, clockwise from north].
+
+    The place is on the great circle that leaves the first place with this bearing. Because the earth is taken as a
+    sphere, the distance is right to 0.6 %.
+    """
     phi, delta = math.radians(latitude_deg), distance / EARTH_RADIUS_M
     sin_there = math.sin(phi) * math.cos(delta) + math.cos(phi) * math.sin(delta) * math.cos(bearing)
     east = math.atan2(math.sin(bearing) * math.sin(delta) * math.cos(phi),

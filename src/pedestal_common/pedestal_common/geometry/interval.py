@@ -1,11 +1,11 @@
-"""Search for the interval of a table of increasing times that holds an instant."""
+"""Search in a table of increasing times for the interval that holds a time."""
 from pedestal_common.compiled import compiled
 
 
 @compiled
 def interval(breaks, t):
-    """Return the row i with breaks[i] <= t < breaks[i + 1] of two or more breaks; outside them the first or last
-    interval."""
+    """Return the index i with breaks[i] <= t < breaks[i + 1]. breaks: increasing array (n,), n at least 2. Return 0
+    for a t before the first break, and n - 2 for a t after the last."""
     low, high = 0, len(breaks) - 1
     while high - low > 1:
         middle = (low + high) // 2

@@ -1,8 +1,8 @@
-"""Place of the antenna on the deck.
+"""Lever arm: parameters of the place of the antenna on the deck.
 
-The simulated receiver and the control unit each have a copy of this parameter. The copies must agree: the receiver
-computes the direction from the antenna, and the control unit corrects this direction. `pedestal run` gives the control
-unit the value of the receiver, where the scenario does not set that of the control unit.
+The simulated receiver and the control unit each have a copy of these parameters. The copies must agree: the receiver
+computes the direction from the antenna, and the control unit corrects this direction. If a scenario does not set the
+lever arm of the control unit, `pedestal run` gives the control unit that of the receiver.
 """
 import dataclasses
 

@@ -1,7 +1,10 @@
-"""Line-of-sight geometry between beam, deck and earth. Angles in rad; frames as in the package docstring.
+"""Line-of-sight geometry: directions in the frames of beam, deck and earth.
 
-b, c, e are the components of a vector along the beam, in cross-elevation and in elevation; db, dc, de are their time
-derivatives. A leading s or c of an angle is its sine or cosine: sa, ca of the azimuth, se, ce of the elevation.
+All angles are in rad. The docstring of the package pedestal_common defines the frames. Symbols:
+
+    b, c, e         components of a vector along the beam, in cross-elevation and in elevation
+    db, dc, de      time derivatives of b, c, e
+    sa, ca, se, ce  sine and cosine of the azimuth, sine and cosine of the elevation
 """
 import math
 
@@ -24,15 +27,16 @@ def cross(ax, ay, az, bx, by, bz):
 
 @compiled
 def direction(azimuth, elevation):
-    """Return the unit vector (FLU, or north-west-up for earth angles) of an azimuth, which turns clockwise, and an
-    elevation."""
+    """Return the unit vector of an azimuth (clockwise) and an elevation: FLU for deck angles, north-west-up for earth
+    angles."""
     cos_el = math.cos(elevation)
     return cos_el * math.cos(azimuth), -cos_el * math.sin(azimuth), math.sin(elevation)
 
 
 @compiled
 def angles(x, y, z):
-    """Return azimuth (clockwise) and elevation of a vector (FLU or north-west-up) of any length."""
+    """Return azimuth (clockwise) and elevation of a vector of any length: deck angles if the vector is FLU, earth
+    angles if it is north-west-up."""
     return math.atan2(-y, x), math.atan2(z, math.hypot(x, y))
 
 
@@ -67,10 +71,14 @@ def to_deck(mat_ed, east, north, up):
 
 @compiled
 def offsets(azimuth, elevation, x, y, z):
-    """Return the offset (dX, dE) of a direction from the beam, in the frame of the beam's angles.
+    """Return the offset (dX, dE) of a direction from the beam.
 
-    dX is cross-elevation, positive in the direction of growing azimuth, dE elevation. Azimuthal equidistant: the
-    length hypot(dX, dE) is the angle between beam and direction, exact up to 180 deg.
+    azimuth, elevation: of the beam
+    x, y, z: vector of the direction, of any length, in the frame of these angles
+
+    The cross-elevation dX is positive in the direction of growing azimuth, the elevation dE is positive upwards. The
+    offset is azimuthal equidistant: its length hypot(dX, dE) is the angle between beam and direction, exact up to
+    180 deg.
     """
     sa, ca, se, ce = math.sin(azimuth), math.cos(azimuth), math.sin(elevation), math.cos(elevation)
     b = ce * ca * x - ce * sa * y + se * z
@@ -88,8 +96,9 @@ def offsets(azimuth, elevation, x, y, z):
 def offset_rates(beam, beam_rate, r, v):
     """Return the time derivative of `offsets`, (d dX/dt, d dE/dt) [rad/s].
 
-    beam: (azimuth, elevation) [rad], beam_rate: its rates [rad/s]; r: vector of the direction, of any length, in the
-    frame of these angles, v: its time derivative.
+    beam: (azimuth, elevation) [rad]
+    beam_rate: rates of these angles [rad/s]
+    r: vector of the direction, of any length, in the frame of these angles; v: time derivative of r
     """
     azimuth, elevation = beam
     azimuth_rate, elevation_rate = beam_rate
@@ -97,7 +106,8 @@ def offset_rates(beam, beam_rate, r, v):
     dx, dy, dz = v
     sa, ca, se, ce = math.sin(azimuth), math.cos(azimuth), math.sin(elevation), math.cos(elevation)
     b, c, e = ce * ca * x - ce * sa * y + se * z, -sa * x - ca * y, -se * ca * x + se * sa * y + ce * z
-    # The beam's axes turn: azimuth about the deck's vertical (along ce, up -se), elevation about cross-elevation.
+    # The axes of the beam turn: the azimuth rate couples c with b (factor ce) and with e (factor se), the elevation
+    # rate couples b with e.
     db = ce * ca * dx - ce * sa * dy + se * dz + azimuth_rate * ce * c + elevation_rate * e
     dc = -sa * dx - ca * dy + azimuth_rate * (se * e - ce * b)
     de = -se * ca * dx + se * sa * dy + ce * dz - azimuth_rate * se * c - elevation_rate * b
@@ -114,8 +124,11 @@ def offset_rates(beam, beam_rate, r, v):
 
 @compiled
 def displaced(azimuth, elevation, cross_elevation, elevation_error):
-    """Return azimuth and elevation of a direction with these `offsets`, their inverse; the azimuth is within pi of the
-    beam's."""
+    """Return azimuth and elevation of the direction at an offset from the beam: the inverse of `offsets`.
+
+    azimuth, elevation: of the beam; cross_elevation, elevation_error: the offset (dX, dE). The returned azimuth is
+    within pi of the azimuth of the beam.
+    """
     theta = math.hypot(cross_elevation, elevation_error)
     sinc = math.sin(theta) / theta if theta > 0.0 else 1.0
     b, c, e = math.cos(theta), sinc * cross_elevation, sinc * elevation_error
@@ -127,13 +140,17 @@ def displaced(azimuth, elevation, cross_elevation, elevation_error):
 @compiled
 def displaced_motion(azimuth, elevation, azimuth_rate, elevation_rate, cross_elevation, elevation_error,
                      cross_elevation_rate, elevation_error_rate):
-    """Return the unit vector of a direction with these `offsets` and `offset_rates`, and its time derivative [1/s]:
-    six floats (FLU, or north-west-up for earth angles)."""
+    """Return the unit vector of the direction at an offset from the beam, and its time derivative [1/s]: six floats.
+
+    The first four arguments are the angles of the beam and their rates, the others the offset (dX, dE) and its rates
+    [rad, rad/s]. The vectors are FLU for deck angles, north-west-up for earth angles. See `offsets`, `offset_rates`.
+    """
     theta2 = cross_elevation * cross_elevation + elevation_error * elevation_error
     theta = math.sqrt(theta2)
     cos_theta = math.cos(theta)
     sinc = math.sin(theta) / theta if theta > 0.0 else 1.0
-    # d sinc / d theta / theta; near 0, where it would lose digits, the first two terms of its series.
+    # bend: derivative of sinc by theta, divided by theta. Near 0 this quotient would lose digits, so the first two
+    # terms of its series replace it.
     bend = (cos_theta - sinc) / theta2 if theta2 > 1e-4 else -1.0 / 3.0 + theta2 / 30.0
     along = cross_elevation * cross_elevation_rate + elevation_error * elevation_error_rate
     b, c, e = cos_theta, sinc * cross_elevation, sinc * elevation_error
@@ -167,8 +184,8 @@ def rotation(qx, qy, qz, qw, mat):
 
 @compiled
 def quaternion(roll, pitch, yaw):
-    """Return the unit quaternion (x, y, z, w) deck -> earth of fixed-axis roll, pitch, yaw (REP 103: yaw 0 is
-    east)."""
+    """Return the unit quaternion (x, y, z, w) deck -> earth of roll, pitch and yaw about fixed axes (REP 103). At yaw
+    0 the bow points east."""
     cr, sr = math.cos(0.5 * roll), math.sin(0.5 * roll)
     cp, sp = math.cos(0.5 * pitch), math.sin(0.5 * pitch)
     cy, sy = math.cos(0.5 * yaw), math.sin(0.5 * yaw)

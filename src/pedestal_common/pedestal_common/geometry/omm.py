@@ -1,7 +1,7 @@
-"""Mean elements of a CCSDS Orbit Mean-Elements Message (OMM, 502.0-B) for SGP4, as the texts of its keywords.
+"""Reader of an Orbit Mean-Elements Message (OMM, CCSDS 502.0-B): it checks the elements of a satellite for SGP4.
 
-The digits of a TLE limit neither the numbers of the orbit nor the catalogue number. Element set and revolution number
-take no part in SGP4.
+Unlike a TLE, an OMM does not limit the number of digits of its elements and of the catalogue number. SGP4 uses
+neither the number of the element set nor the number of the revolution.
 """
 import datetime
 import json
@@ -14,7 +14,8 @@ NUMBER_LIMITS = {'MEAN_MOTION': (0.05, 18.0), 'ECCENTRICITY': (0.0, 0.9999999), 
                  'RA_OF_ASC_NODE': (-360.0, 360.0), 'ARG_OF_PERICENTER': (-360.0, 360.0),
                  'MEAN_ANOMALY': (-360.0, 360.0), 'BSTAR': (-1e3, 1e3),
                  'MEAN_MOTION_DOT': (-1e3, 1e3), 'MEAN_MOTION_DDOT': (-1e3, 1e3)}
-"""{keyword: (lowest, highest)} [rev/day], [deg], [1/earth radii], [rev/day^2 / 2], [rev/day^3 / 6]."""
+"""{keyword: (lowest, highest)}. Angles are in deg, BSTAR in 1/earth radii, MEAN_MOTION in rev/day; MEAN_MOTION_DOT is
+half of its derivative [rev/day^2], MEAN_MOTION_DDOT a sixth of its second derivative [rev/day^3]."""
 ANGLE_KEYWORDS = ('RA_OF_ASC_NODE', 'ARG_OF_PERICENTER', 'MEAN_ANOMALY')
 MAX_CATALOGUE_NUMBER = 999_999_999
 """Largest catalogue number."""
@@ -26,7 +27,7 @@ ALLOWED_VALUES = {'CENTER_NAME': ('EARTH',), 'REF_FRAME': ('TEME',), 'TIME_SYSTE
 BSTAR_OPTIONAL_THEORIES = ALLOWED_VALUES['MEAN_ELEMENT_THEORY']
 """Theories that an OMM must name in order to omit BSTAR, which is then 0."""
 SGP4_TYPES = ('', '0', '2')
-"""Ephemeris types of elements of SGP4."""
+"""Ephemeris types that mean elements of SGP4; '': no type is given."""
 OTHER_TYPES = {'1': 'SGP', '3': 'PPT3', '4': 'SGP4-XP', '6': 'numerical propagation'}
 """{ephemeris type: theory of its elements}."""
 OTHER_KEYWORDS = ('BTERM', 'AGOM')
@@ -37,7 +38,7 @@ KEYWORDS = ('OBJECT_NAME', 'OBJECT_ID', 'EPOCH', 'EPHEMERIS_TYPE', 'NORAD_CAT_ID
 
 
 def require_sgp4(ephemeris_type):
-    """Raise ValueError if an ephemeris type, '' if the elements have none, is that of another theory than SGP4."""
+    """Raise ValueError if an ephemeris type means another theory than SGP4. '': the elements state no type."""
     kind = str(ephemeris_type).strip()
     if kind not in SGP4_TYPES:
         theory = f'; type {kind} needs {OTHER_TYPES[kind]}' if kind in OTHER_TYPES else ''
@@ -45,8 +46,10 @@ def require_sgp4(ephemeris_type):
 
 
 def catalogue_number(text):
-    """Return the digits of a catalogue number, of which the first of five may be a letter (Alpha-5); '' of an empty
-    text. Raises ValueError."""
+    """Return a catalogue number as digits, '' for an empty text. Raises ValueError.
+
+    The first of five characters may be a letter (Alpha-5).
+    """
     text = text.strip()
     try:
         number = from_alpha5(text) if len(text) == 5 else int(text or 0)
@@ -58,8 +61,10 @@ def catalogue_number(text):
 
 
 def checked(fields):
-    """Return {keyword: text} of valid elements with every number that SGP4 needs. Raises ValueError, with keyword,
-    value and range."""
+    """Return {keyword: text} of valid elements, with every number that SGP4 needs, from the fields of an OMM.
+
+    Raises ValueError, which names keyword, value and range.
+    """
     fields = {**DEFAULT_FIELDS, **{key: str(value).strip() for key, value in fields.items() if key in KEYWORDS}}
     for keyword, allowed in ALLOWED_VALUES.items():
         if fields.get(keyword, allowed[0]).upper() not in allowed:
@@ -73,7 +78,7 @@ def checked(fields):
         fields['BSTAR'] = '0'
     for keyword, (low, high) in NUMBER_LIMITS.items():
         try:
-            value = float(fields.get(keyword, '').replace('_', ' '))  # float() passes over _ between digits
+            value = float(fields.get(keyword, '').replace('_', ' '))  # float() alone would accept _ between digits
         except ValueError:
             raise ValueError(f'{keyword} = {fields.get(keyword)!r:.60}: must be a number') from None
         if not low <= value <= high:
@@ -84,8 +89,8 @@ def checked(fields):
 
 
 def initialize(satrec, text):
-    """Fill a Satrec with the elements of an OMM in JSON; return the catalogue number, or the name if there is none.
-    Raises ValueError."""
+    """Fill a Satrec with the elements of an OMM in JSON. Return the catalogue number, or the name of the satellite if
+    there is no number. Raises ValueError."""
     try:
         fields = json.loads(text, parse_int=str, parse_float=str)
     except (json.JSONDecodeError, RecursionError) as error:

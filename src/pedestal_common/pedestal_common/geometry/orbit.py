@@ -1,6 +1,7 @@
-"""Satellite by SGP4: its TLE or OMM, its position over a station, and Julian dates.
+"""Orbit of a satellite: its elements from a TLE or an OMM, its position over a station by SGP4, and Julian dates.
 
-Without a ut1_offset UT1 equals UTC; tracking_receiver_sim.target gives the resulting error.
+The earth turns with UT1. Without a ut1_offset, UT1 is taken as equal to UTC; tracking_receiver_sim.target states the
+resulting error.
 """
 import datetime
 import re
@@ -19,13 +20,13 @@ TLE_NUMBER_COLUMNS = (
     {'epoch year': (18, 20), 'epoch day': (20, 32)},
     {'inclination': (8, 16), 'ascending node': (17, 25), 'eccentricity': (26, 33), 'argument of perigee': (34, 42),
      'mean anomaly': (43, 51), 'mean motion': (52, 63)})
-"""{field: columns} of the numbers of both TLE lines."""
+"""For each TLE line, {number: (its first column, the column behind it)}, counted from 0."""
 
 TLE_TYPE_COLUMN = 62
 """Column of the ephemeris type in line 1, counted from 0."""
 
 ORDINAL_ZERO_JULIAN_DATE = 1721424.5
-"""Julian date of midnight of the day before 0001-01-01, day 0 of datetime."""
+"""Julian date of day 0 of datetime, the midnight at which the day before 0001-01-01 begins."""
 
 LEAP_SECOND_PATTERN = re.compile(r'(T\d\d:59:)60\b')
 
@@ -34,7 +35,8 @@ MAX_TLE_AGE_DAYS = 30.0
 
 
 class TargetError(ValueError):
-    """Error of a target that cannot be built; one line with file or TLE line, row, field and value."""
+    """Error of a target that cannot be built. Its text is one line that names the file or TLE line, row, field, value.
+    """
 
 
 class Satellite(Satrec):
@@ -45,8 +47,10 @@ class Satellite(Satrec):
 
 
 def satellite(leo_pass) -> Satellite:
-    """Return the SGP4 record of the `omm` of parameters, or of their `line_1` and `line_2` if `omm` is empty. Raises
-    TargetError."""
+    """Return the SGP4 record of a satellite. Raises TargetError.
+
+    leo_pass: an object with the texts `omm`, and `line_1` and `line_2` of a TLE, which are used if `omm` is empty.
+    """
     if leo_pass.omm:
         satrec = Satellite()
         satrec.form = 'OMM'
@@ -84,8 +88,11 @@ def satellite(leo_pass) -> Satellite:
 
 
 def earth_fixed(julian, fractions, ut1_offset=0.0):
-    """Return rotations (n, 3, 3) from TEME, the true equator and mean equinox of date, to the earth at julian +
-    fractions (n,), UTC. ut1_offset: UT1 - UTC [s]."""
+    """Return rotations (n, 3, 3) from TEME, the frame of SGP4 (true equator and mean equinox of date), to the
+    earth-fixed frame.
+
+    The times are the Julian dates julian + fractions (n,), in UTC. ut1_offset: UT1 - UTC [s].
+    """
     theta = gstime(julian) + EARTH_RATE * SECONDS_PER_DAY * fractions + EARTH_RATE * ut1_offset
     c, s = cos(theta), sin(theta)
     to_fixed = np.zeros((len(fractions), 3, 3))
@@ -94,10 +101,10 @@ def earth_fixed(julian, fractions, ut1_offset=0.0):
 
 
 def enu(satrec, station, julian, fraction, times, ut1_offset=0.0):
-    """Return ENU position [m] and velocity against the earth [m/s], each (n, 3), at times [s] past julian + fraction,
-    UTC.
+    """Return position [m] and velocity against the earth [m/s] of a satellite, each (n, 3), ENU of a station.
 
-    ut1_offset: UT1 - UTC [s].
+    satrec: from `satellite`; station: StationParameters; times: (n,) [s] after the Julian date julian + fraction, UTC;
+    ut1_offset: UT1 - UTC [s]. Raises TargetError where SGP4 fails.
     """
     fractions = fraction + times / SECONDS_PER_DAY
     error, position, velocity = satrec.sgp4_array(np.full(len(times), julian), fractions)
@@ -113,13 +120,13 @@ def enu(satrec, station, julian, fraction, times, ut1_offset=0.0):
 
 
 def elevations(satrec, station, julian, fraction, times):
-    """Return the elevation [deg] (n,) at times [s] past julian + fraction."""
+    """Return the elevations [deg] (n,) of a satellite at a station; arguments as in `enu`."""
     east, north, up = enu(satrec, station, julian, fraction, times)[0].T
     return np.degrees(arctan2(up, np.hypot(east, north)))
 
 
 def calendar(julian, fraction):
-    """Return the calendar time of a Julian date, to the millisecond."""
+    """Return the Julian date julian + fraction as a datetime, to the millisecond."""
     since_2000 = datetime.timedelta(days=julian - 2451544.5) + datetime.timedelta(days=fraction)
     return datetime.datetime(2000, 1, 1) + datetime.timedelta(milliseconds=round(since_2000.total_seconds() * 1e3))
 
@@ -132,9 +139,10 @@ def julian_date(when):
 
 
 def instant(name, text):
-    """Return UTC as a datetime without a zone, from ISO 8601. Raises TargetError, which calls the text `name`.
+    """Return the time in an ISO 8601 text as a datetime in UTC without a zone.
 
-    The leap second 23:59:60 counts as the first second of the next day.
+    name: name of the text in the TargetError that a wrong text raises. The leap second 23:59:60 counts as the first
+    second of the next day.
     """
     leap = LEAP_SECOND_PATTERN.sub(r'\g<1>59', text)
     try:
@@ -145,5 +153,5 @@ def instant(name, text):
 
 
 def iso(julian, fraction):
-    """Return a Julian date as ISO 8601 to the millisecond."""
+    """Return the Julian date julian + fraction as ISO 8601 text, to the millisecond."""
     return calendar(julian, fraction).isoformat(timespec='milliseconds') + 'Z'

@@ -23,7 +23,7 @@ MIN_CULMINATION_DEG = 10.0
 SEARCH_DAYS = 5.0
 """Time that is searched [days]."""
 MAX_PASS_DAYS = 30.0
-"""Time before and after the search in which the rise and the set of a pass under way are found [days]."""
+"""Longest time before and after the search in which the rise and the set of a pass under way are searched [days]."""
 PASS_CHUNK_STEPS = 540
 """Number of steps computed at once on the way to a rise or set: three hours."""
 MAX_RUN_S = float(SECONDS_PER_DAY)
@@ -34,9 +34,9 @@ class Pass(typing.NamedTuple):
     """Pass of a satellite.
 
         rise, set                   UTC as datetime; None if it is more than MAX_PASS_DAYS outside the search
-        top                         UTC of the highest place
+        top                         UTC of the highest elevation, the culmination
         rise_azimuth, set_azimuth   [deg]; NaN without rise or set
-        elevation                   at the top [deg]
+        elevation                   highest elevation [deg]
         begin                       UTC of the beginning of the search
     """
     rise: datetime.datetime | None
@@ -115,8 +115,11 @@ def passes_after(satrec, station, begin, days=SEARCH_DAYS) -> list[Pass]:
 
 
 def _until_below(elevation, start, step):
-    """Return (times, elevations) after `start` [s] in steps [s], which may be negative, up to the first below the
-    horizon, at most MAX_PASS_DAYS away, and ending where SGP4 fails."""
+    """Return (times [s], elevations [deg]) after `start` [s], in steps [s], up to the first below the horizon.
+
+    A negative step goes back in time. The series ends at most MAX_PASS_DAYS away, or where SGP4 fails. elevation:
+    function of times, which returns elevations.
+    """
     times, heights = np.zeros(0), np.zeros(0)
     while len(times) * abs(step) < MAX_PASS_DAYS * SECONDS_PER_DAY:
         chunk = start + step * np.arange(len(times) + 1, len(times) + 1 + PASS_CHUNK_STEPS)
@@ -133,7 +136,8 @@ def _until_below(elevation, start, step):
 
 
 def search_start(satrec, now):
-    """Return (beginning of the search, reason): now and '', or the epoch of elements that are too old and why."""
+    """Return (beginning of the search, reason). These are `now` and '', or the epoch of the elements and the reason,
+    if the elements are too far from `now`."""
     epoch = orbit.calendar(satrec.jdsatepoch, satrec.jdsatepochF)
     age = (now - epoch).total_seconds() / SECONDS_PER_DAY
     if abs(age) <= orbit.MAX_TLE_AGE_DAYS:
@@ -143,8 +147,14 @@ def search_start(satrec, now):
 
 
 def chosen_pass(satrec, station, which, now) -> Pass:
-    """Return the pass that `which` names: 'next' after now, 'N' of the passes after `search_start`, or the pass at or
-    after a UTC. now: datetime, UTC. Raises TargetError."""
+    """Return the pass that `which` names. now: datetime, UTC. Raises TargetError.
+
+    The values of `which` are:
+
+    next    the pass under way, or the next pass
+    N       a number: the Nth pass after `search_start`
+    UTC     a time in ISO 8601: the pass under way at that time, or the next pass
+    """
     begin, old = search_start(satrec, now)
     if which == 'next' or which.isdecimal():
         if which == 'next' and old:

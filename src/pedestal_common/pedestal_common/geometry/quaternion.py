@@ -1,10 +1,10 @@
-"""Quaternions (x, y, z, w)."""
+"""Product of quaternions in the order (x, y, z, w)."""
 from pedestal_common.compiled import compiled
 
 
 @compiled
 def product(a, b):
-    """Return the Hamilton product a (x) b: the rotation b, then the rotation a."""
+    """Return the Hamilton product of a and b, which stands for the rotation b followed by the rotation a."""
     ax, ay, az, aw = a[0], a[1], a[2], a[3]
     bx, by, bz, bw = b[0], b[1], b[2], b[3]
     return (aw * bx + ax * bw + ay * bz - az * by, aw * by - ax * bz + ay * bw + az * bx,

@@ -9,7 +9,8 @@ from pedestal_common.graph.steps import NS_PER_SECOND
 
 
 def topic_flags(names: Iterable[str]) -> type[parameters.Parameters]:
-    """Return the base of a parameter dataclass with the flag of each of these topics that has one."""
+    """Return a base class for a parameter dataclass. It has a field for the flag (Topic.flag) of each of these topics.
+    """
     flagged: dict[str, list[str]] = {}
     for topic in map(topics.TOPIC_BY_NAME.__getitem__, names):
         if topic.flag:

@@ -1,6 +1,6 @@
-"""Names, units and tolerances of the numbers of a message, by its type.
+"""Layouts of the messages: names, units and tolerances of the numbers in a message of each type.
 
-A column is one number of the messages of a topic, 'azimuth.velocity' of joint_states for example. The records of the
+A column is one number in the messages of a topic, for example 'azimuth.velocity' of joint_states. The records of the
 nodes, the tables of a bag, the comparison of recordings and the export all take their columns from here.
 """
 import math
@@ -22,7 +22,7 @@ class Field(typing.NamedTuple):
     column      name of a column, with {} for the component (or the name of the joint)
     unit        unit of the numbers where the topic gives none
     tolerance   largest accepted difference between recorded and recomputed numbers, in that unit
-    recorded    True if it is in the record of our topics
+    recorded    True if the field is part of the records of the graph's topics
     """
     name: str
     path: str
@@ -63,15 +63,15 @@ LAYOUTS = {
               'orientation_variance.{}', 'rad2')),
     'rosgraph_msgs/msg/Clock': (),
 }
-"""{message type: its Fields}. The diagonal of an Imu's orientation_covariance is the variance of the attitude of an
-INS."""
+"""{message type: its Fields}. The orientation_variance of an Imu is the variance of the attitude that an INS
+states."""
 
 
 class NoDataMark(typing.NamedTuple):
     """The convention by which a message states that it has no data for a field.
 
     field   name of the field
-    paths   of the numbers in the message that state it
+    paths   paths of the numbers in the message that state whether there is data
     absent  function of these numbers, scalars or arrays: True where there is no data
     """
     field: str
@@ -95,14 +95,15 @@ NO_DATA_MARKS = {
                                  for field in ('orientation', 'angular_velocity', 'linear_acceleration')),
     'sensor_msgs/msg/Range': (NoDataMark('range', ('range', 'min_range', 'max_range'), _out_of_range),),
 }
-"""{type: marks}. sensor_msgs/Imu and REP 145: element 0 of the covariance is -1. No variance is negative, so every
-negative number counts as this mark. sensor_msgs/Range: a range outside min_range to max_range must be discarded."""
+"""{message type: its NoDataMarks}. By the definition of Imu and REP 145, element 0 of a covariance is -1 without data.
+Because no variance is negative, every negative number counts as this mark. By the definition of Range, a range outside
+min_range to max_range must be discarded."""
 
 
 def no_data(type_name: str, numbers: list, texts: dict) -> list:
-    """Return [(names of the columns of a field, [(start, dtype)] of its mark, function absent)] for a message.
+    """Return [(names of the columns of a field, [(first byte, dtype)] of the numbers of its mark, function absent)].
 
-    numbers, texts: as in cdr.Places.
+    numbers, texts: places in a message of the type, as in cdr.Places; absent: as in NoDataMark.
     """
     places = {path: (start, dtype) for path, start, dtype in numbers}
     marks = NO_DATA_MARKS.get(type_name, ())
@@ -114,7 +115,7 @@ def no_data(type_name: str, numbers: list, texts: dict) -> list:
 def blank_no_data(type_name: str, table: dict) -> dict:
     """Return a table {column: array (n,)} with NaN where its messages mark the numbers of a field as no data.
 
-    A mark counts where all its numbers are columns of the table.
+    A mark is applied only if all its numbers are columns of the table.
     """
     for mark in NO_DATA_MARKS.get(type_name, ()):
         numbers = [column(type_name, path, {}) for path in mark.paths]
@@ -176,7 +177,7 @@ def column(type_name: str, path: str, texts: Mapping[str, str]) -> str | None:
 
 
 def unit(topic: str, type_name: str, column: str) -> str:
-    """Return the unit of a column of a topic of this type, '' without or with an unknown unit."""
+    """Return the unit of a column of a topic with messages of this type; '' if there is no unit, or none is known."""
     row = topics.TOPIC_BY_NAME.get(topic)
     if row is None or row.type != type_name:
         return ''
@@ -190,6 +191,9 @@ def unit(topic: str, type_name: str, column: str) -> str:
 
 
 def of_filter(steps: np.ndarray, name: str) -> np.ndarray:
-    """Return (n, 2): a number of topics.FILTER_UNITS for both axes, in records (n,) that hold acu/filter."""
+    """Return one number of the filters of both axes, (n, 2), from records (n,) with the topic acu/filter.
+
+    name: key of topics.FILTER_UNITS.
+    """
     numbers = steps['acu/filter']['position'].reshape(len(steps), len(topics.AXES), len(topics.FILTER_UNITS))
     return numbers[:, :, list(topics.FILTER_UNITS).index(name)]

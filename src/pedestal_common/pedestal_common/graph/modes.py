@@ -1,6 +1,6 @@
-"""Modes of the control unit, a row each.
+"""Table of the modes of the control unit, with one row for each mode.
 
-The commands, the services, the buttons of the page, the faults study and the documentation follow from the rows.
+The commands, the services, the buttons of the page, the faults study and the documentation are made from these rows.
 """
 import typing
 
@@ -14,12 +14,12 @@ class Row(typing.NamedTuple):
     needs      field of acu_tracker.modes.Conditions without which the mode cannot be entered; '' for none
     ends       field of acu_tracker.modes.Conditions without which the mode ends; '' for none
     follows    the mode follows a target through the sky, for which the attitude of the deck must be known
-    by_level   the mode uses the signal level about the expected place of the target
-    fallback   mode after the end of the target, '' for none; `program` stands for the table that was followed last
+    by_level   the mode uses the signal level around the expected place of the target
+    fallback   mode after the loss of the target, '' for none; `program` stands for the table that was followed last
     handover   mode that replaces this one as soon as it can be entered, '' for none
     table      the mode follows a table of directions
-    pinned     the stow pins may be in
-    predicted  method of prediction.Predictor that makes the table
+    pinned     the stow pins may lock the axes
+    predicted  method of acu_tracker.program.prediction.Predictor that makes the table; '' for none
     button     the page has a button for the mode
     """
     name: str
@@ -86,7 +86,8 @@ MODE_ROWS = (
         ends='level', follows=True, by_level=True, fallback='search'))
 """Rows of all modes; a new mode is a new row.
 
-A new condition also needs a field of acu_tracker.modes.Conditions; the axes' reference is in acu_tracker.guidance.
+A new condition also needs a field of acu_tracker.modes.Conditions. acu_tracker.guidance computes the reference of the
+axes.
 """
 
 MODES = tuple(row.name for row in MODE_ROWS)

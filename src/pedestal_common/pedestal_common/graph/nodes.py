@@ -1,4 +1,5 @@
-"""Nodes of the graph as a table: their executables, and the topics that they read and write; and the resulting graph.
+"""Table of the nodes of the graph: their executables, and the topics that they read and write. The functions below the
+table return the graph that results from it.
 
 In an electronic array of several beams the nodes `of_beam` and their topics exist once per beam, with the prefix
 `beam_1/` ... `beam_N/`; all other nodes and topics are shared. No ROS here.
@@ -12,6 +13,7 @@ from collections.abc import Collection, Iterable
 from pedestal_common.graph.topics import TOPIC_BY_NAME, TOPICS
 
 MAX_BEAMS = 16
+"""Largest number of beams of an electronic array."""
 
 REPLAY_NODE = 'replay'
 """Name of the node that replays a recording to the other nodes."""
@@ -28,7 +30,7 @@ class Node(typing.NamedTuple):
     parameters    module and name of its parameter class
     unit          module and name of its unit (unit.Unit); '' for a node without a law
     reads         topics that it subscribes to; the first topic of a unit is its trigger, which begins its steps
-    writes        topics that it publishes; other nodes wait for the first
+    writes        topics that it publishes; other nodes wait for the first of these
     answer        topic with which it answers every step, with the same stamp; '' for a node that answers late
     obeys         topic of its commands, from any client; replies: topic of its replies
     doc           its task; stands_for: the equipment that replaces it on a real antenna
@@ -130,6 +132,7 @@ ARRAY_DRIVE = Node(DRIVE_NODE, 'adu_drive.beam_steering_node', 'adu_drive.params
 
 NODE_NAMES = tuple(node.name for node in NODES)
 UNIT_NODES = (*(node for node in NODES if node.unit), ARRAY_DRIVE)
+"""Nodes that run a unit."""
 
 BEAM_TOPICS = frozenset(('joint_states', 'adu/truth', 'acu/program_track',
                          *(topic for node in NODES if node.of_beam
@@ -152,7 +155,7 @@ def of_executable(module: str) -> Node:
 
 
 def beam_of(name: str) -> str:
-    """Return 'beam_2' of a node or topic 'beam_2/...'; '' of a name without a beam."""
+    """Return the beam in the name of a node or topic, 'beam_2' for 'beam_2/acu'; '' for a name without a beam."""
     match = re.match(r'beam_[1-9]\d*(?=/)', name)
     return match[0] if match else ''
 
@@ -203,20 +206,23 @@ def links(beams: int = 0) -> dict[str, Link]:
 
 
 def recorded(names: Collection[str], flags: Collection[str] = (), beams: int = 0) -> list[Link]:
-    """Return the Links that have a publisher in a graph of these nodes, or that any client may publish; flags: those
-    of topics.TOPIC_FLAGS that are set."""
+    """Return the Links that have a publisher in a graph of these nodes, or to which any client may publish. These are
+    recorded. flags: those of topics.TOPIC_FLAGS that are set."""
     return [link for link in links(beams).values()
             if any(name in names for name in (link.readers if link.rate == 'command' else link.writers))
             and (not link.flag or link.flag in flags)]
 
 
 def held(names: Iterable[str]) -> frozenset[str]:
-    """Return the topics among these of a graph whose messages hold (see Topic)."""
+    """Return those of these topics whose messages stay valid until the next message (Topic.holds)."""
     return frozenset(name for name in names if TOPIC_BY_NAME[plain(name)].holds)
 
 
 def readers(link: Link, names: Iterable[str]) -> list[str]:
-    """Return the nodes of a graph that must read a topic before it may start; the recorder reads every topic."""
+    """Return the nodes among `names`, those of a graph, that must subscribe to a topic before the graph may start.
+
+    The recorder subscribes to every topic.
+    """
     return [name for name in names if name in link.readers or name == 'recorder']
 
 

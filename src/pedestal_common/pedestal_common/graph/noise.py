@@ -1,4 +1,5 @@
-"""Seeded noise: one independent stream per node and purpose, the same on every machine and in every caller."""
+"""Seeded noise of the simulated nodes: one independent stream for each node, the same on every machine and in every
+caller."""
 import numpy as np
 
 from pedestal_common.graph import nodes

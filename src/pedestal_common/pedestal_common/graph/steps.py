@@ -1,7 +1,8 @@
-"""Step matching: the messages that belong to step t_k. No ROS here: a recorded run is matched as in its nodes.
+"""Step matching: selection of the messages that belong to the step t_k of a node. No ROS here: the messages of a
+recording are matched in the same way.
 
-Each message of the trigger begins a step. A follower with a latency L contributes its message of the newest trigger
-stamp <= t_k - L. Example with the period T and L = 2 T:
+One input of a node is the trigger: each of its messages begins a step. The other inputs are followers. A follower with
+a latency L contributes its message of the newest trigger stamp <= t_k - L. Example with the period T and L = 2 T:
 
     trigger           t_0    t_1    t_2    t_3    t_4
     due message       none   none   t_0    t_1    t_2
@@ -20,7 +21,8 @@ SECONDS_PER_DAY = 86_400
 
 
 class GraphError(RuntimeError):
-    """Defect of the graph around a node; one line that names topic, stamp or node. silent: the silent nodes."""
+    """Error in the graph around a node. Its text is one line that names topic, stamp or node. silent: names of the
+    silent nodes."""
 
     def __init__(self, message: str, silent: Iterable[str] = ()) -> None:
         super().__init__(message)
@@ -33,15 +35,15 @@ class GraphError(RuntimeError):
 class Steps:
     """Matcher of a node's inputs: the trigger stamped t_k and, of each follower, the message due at t_k.
 
-    followers  {topic: latency in ns}; the message due has the newest trigger stamp <= t_k - latency, none at the
-               start
+    followers  {topic: latency [ns]}; the message due has the newest trigger stamp <= t_k - latency. At the start no
+               message is due
     answer     answer(stamp_ns, trigger_message, {topic: message or None}), called once per step, in order
-    prompt     True if a realtime step is answered at once
+    prompt     True if a realtime step is answered at once, without waiting for followers
     held       followers for which a realtime step does not wait, because their last message stays valid
 
     In lockstep a step waits for exactly the messages due. Triggers that arrive before the answer are queued. In
-    realtime the step t_k is answered at the latest when the trigger of the next step arrives, with the newest
-    messages, and None for a follower without a new message.
+    realtime the step t_k is answered at the latest when the trigger of the next step arrives. Its answer receives the
+    newest messages, and None for a follower without a new message.
 
     _ahead     triggers (stamp, message) whose step has not begun
     _pending   trigger of the step that waits for its inputs, or None
@@ -69,7 +71,8 @@ class Steps:
         self.refusal = ''
 
     def take(self, topic: str, stamp: int, message: typing.Any) -> None:
-        """Take one input; stamp in ns. Raises GraphError in lockstep when the stamp is not the next one."""
+        """Take a message of an input, with its stamp [ns]. Raises GraphError in lockstep if the stamp is not the next.
+        """
         last = self._last[topic]
         if last is not None and stamp <= last:
             self._refuse(f'{topic} stamp went back from {last / NS_PER_SECOND:.6f} to {stamp / NS_PER_SECOND:.6f} s')
@@ -95,7 +98,7 @@ class Steps:
             self._close()
 
     def _begin(self, stamp: int, message: typing.Any) -> None:
-        """Make a trigger the pending step, and determine the message due of each follower."""
+        """Make the step of a trigger the pending step, and determine the message due of each follower."""
         self._pending = (stamp, message)
         for name, awaited in self._awaited.items():
             awaited.append(stamp)
@@ -104,8 +107,8 @@ class Steps:
                 self._due[name] = awaited.popleft()
 
     def reset_after_gap(self, topic: str) -> None:
-        """Reset the state of a topic whose next message does not continue the earlier ones. The trigger resets all
-        topics."""
+        """Reset the state of a topic whose next message does not continue the earlier ones. If the topic is the
+        trigger, reset the state of all topics."""
         for name in (topic,) if topic != self.trigger else self._last:
             self._last[name] = None
             if name in self._due:
@@ -124,7 +127,8 @@ class Steps:
         self.refusal = reason
 
     def _ready(self, topic: str) -> bool:
-        """Return True if the pending step does not wait for a follower. Drop its older messages, except the last one.
+        """Return True if the pending step does not wait for a follower. Drop messages of the follower that are older
+        than the message due, except the last one.
 
         Raises GraphError in lockstep if the next message is not the message due.
         """
@@ -147,7 +151,8 @@ class Steps:
             self._close()
 
     def _close(self) -> None:
-        """Answer the pending step: in lockstep with the messages due, in realtime with the newest up to its stamp."""
+        """Answer the pending step. In lockstep the answer receives the messages due, in realtime the newest messages
+        whose stamp is not later than that of the step."""
         assert self._pending is not None
         stamp, message = self._pending
         self._pending = None

@@ -1,20 +1,20 @@
-"""Topics of the graph as a table: type, rate, and meaning of every number. The publishers and subscribers are in
-`nodes`.
+"""Table of the topics of the graph: type, rate, and meaning of every number. The module `nodes` has their publishers
+and subscribers.
 
 Rate
     step    one message per drive step, stamped with the step (or with the measured step, where latency is modelled)
     once    one message before the first step
-    second  one message per publisher at every whole second of the drive's time
+    second  one message of each publisher at every whole second of the drive's time
     change  a message at each change; it belongs to the next step that its publisher answers
-    command a message at each command; the reply states the result, and the step before which the command acted
-    reply   a message at each command that the node accepted or refused
+    command a message for each command; the reply states the result, and the step before which the command took effect
+    reply   a message for each command that the node accepted or refused
 The rate determines the quality of service: see QOS_BY_RATE.
 """
 import typing
 
 AXES = ('azimuth', 'elevation')
 MOTOR_NAMES = tuple(f'{axis}_motor_{i}' for axis in AXES for i in (1, 2))
-MOTION_MODELS = ('cv', 'ca', 'singer', 'current_statistical')
+MOTION_MODELS = ('cv', 'ca', 'singer', 'current_statistical', *(f'ca_{rung}' for rung in range(2, 9)))
 """Motion models of the target in the ACU's filters."""
 
 FILTER_UNITS = {'innovation': 'rad', 'rate_innovation': 'rad/s', 'nis': '', 'sigma': 'rad', 'rate_sigma': 'rad/s',
@@ -35,7 +35,7 @@ NO_TEXT_CODE = -1
 
 
 class Qos(typing.NamedTuple):
-    """Quality of service of a rate: a row of QOS_BY_RATE. Publishers are reliable, and in lockstep subscribers too.
+    """Quality of service of a rate: a row of QOS_BY_RATE. Publishers are reliable, and so are subscribers in lockstep.
 
     latched     True if a late joiner receives the last message
     lockstep    queue depth of publishers and subscribers in lockstep; 0: all messages
@@ -43,7 +43,7 @@ class Qos(typing.NamedTuple):
     read        queue depth of a subscriber in realtime, a few steps. It keeps the newest messages, so a late node
                 skips stale data. It is deep enough that a second, faster publisher cannot evict the messages of the
                 first.
-    reliable    True if this subscriber has lost messages sent again
+    reliable    True if a subscriber in realtime is reliable: a message that it lost is sent again
     recorded    queue depth of a recorder, some seconds, because its disk may delay it
     unlatched   True if realtime subscribers also accept volatile publishers (`ros2 topic pub`), by a second
                 subscription
@@ -74,13 +74,14 @@ class Topic(typing.NamedTuple):
     doc      content of its messages
     names    joints of a JointState or JointTrajectory, in the order of its numbers
     frame    header.frame_id; child: child_frame_id
-    units    {column: unit} where the type alone does not give it (see layouts)
+    units    {column: unit} where the type of the message does not determine the unit (see layouts)
     texts    texts that subscribers distinguish, in the order of their codes
-    measured  parameter of its publisher that is true if the topic exists; flag: that of its subscribers; '': always
-    holds    True if a message is valid until the next: in realtime no step waits for it
+    measured  name of a parameter of its publisher that is true if the topic exists; '': the topic always exists
+    flag     name of the parameter of its subscribers with the same meaning
+    holds    True if a message is valid until the next one: in realtime no step waits for it
     only     fields of its layout that it uses; (): all
-    inputs   {field of its record: name of the control unit's input, or a name for each number}; see inputs
-    latency  parameter of the control unit with the age of the data at a step
+    inputs   {field of its record: name of the control unit's input, or a name for each number}; see wire.inputs
+    latency  parameter of the control unit with the age of the data at a step; '': age 0
     """
     name: str
     type: str
@@ -211,3 +212,4 @@ TOPICS = (
 
 TOPIC_BY_NAME = {topic.name: topic for topic in TOPICS}
 TOPIC_FLAGS = tuple(dict.fromkeys(topic.flag for topic in TOPICS if topic.flag))
+"""Names of the parameters that state whether the graph has a topic (Topic.flag)."""

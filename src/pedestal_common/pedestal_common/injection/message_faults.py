@@ -1,4 +1,4 @@
-"""Faults of a message of any kind: dropped, or its numbers frozen, NaN, noisy.
+"""Injected faults that every simulated node can have: its message is dropped, or the numbers are frozen, NaN or noisy.
 
 In each step a node first calls `clear`, then `apply` for each fault in force. It adds `noise` to the numbers of its
 message, and then calls `numbers`, so that frozen numbers contain the noise of the first frozen step. The node itself
@@ -17,7 +17,7 @@ MAX_HELD_NUMBERS = 32
 MESSAGE_FAULT_DTYPE = np.dtype([('drop', 'i8'), ('freeze', 'i8'), ('nan', 'i8'), ('holds', 'i8'),
                                 ('held', 'f8', (MAX_HELD_NUMBERS,)),
                                 ('sigma', 'f8'), ('seed', 'i8')], align=True)
-"""Faults in force.
+"""Record of the message faults of a node that are in force.
 
     drop, freeze, nan    1 while in force
     held                 numbers of the first frozen step; holds: 1 once they are stored
@@ -27,9 +27,10 @@ MESSAGE_FAULT_DTYPE = np.dtype([('drop', 'i8'), ('freeze', 'i8'), ('nan', 'i8'),
 
 @compiled
 def clear(e):
-    """End every fault of the message. `apply` sets the faults that are still in force again.
+    """End every fault of the message. Afterwards `apply` sets the faults that are still in force.
 
-    holds is 1 if there was a freeze in the step before: a freeze that continues then uses the same held numbers.
+    e: MESSAGE_FAULT_DTYPE of the node. e.holds becomes 1 if the step before had a freeze: a freeze that continues then
+    uses the same held numbers.
     """
     e.holds = e.freeze
     e.drop, e.freeze, e.nan, e.sigma = 0, 0, 0, 0.0
@@ -42,7 +43,10 @@ def codes(node):
 
 @compiled
 def apply(e, codes, fault, values):
-    """Apply a fault with its `values` if it is one of `codes`; other faults change nothing here."""
+    """Apply a fault if it is one of `codes`; other faults change nothing here.
+
+    e: as in `clear`; codes: result of the function `codes`; fault: code of the fault; values: its arguments.
+    """
     drop, freeze, nan, noise = codes
     if fault == drop:
         e.drop = 1
@@ -56,9 +60,9 @@ def apply(e, codes, fault, values):
 
 @compiled
 def numbers(e, values, first):
-    """Freeze values (n,) or make them NaN, in place; e.held stores them from number `first` on.
+    """Freeze values (n,) or make them NaN, in place, as the faults in force require.
 
-    first + n must be at most MAX_HELD_NUMBERS.
+    e.held stores the values from its element `first` on; first + n must be at most MAX_HELD_NUMBERS.
     """
     for i in range(len(values)):
         if e.freeze != 0:
@@ -90,6 +94,7 @@ def _uniform(seed, stamp, i):
 
 @compiled
 def noise(e, stamp, i):
-    """Return white noise number i of a step: e.sigma times a standard normal (Box and Muller 1958)."""
+    """Return the white noise of number i of a message: e.sigma times a standard normal number (Box and Muller 1958).
+    stamp: of the step [ns]."""
     u, v = _uniform(e.seed, stamp, 2 * i), _uniform(e.seed, stamp, 2 * i + 1)
     return e.sigma * math.sqrt(-2.0 * math.log(u)) * math.cos(2.0 * math.pi * v)

@@ -1,12 +1,12 @@
-"""Injected faults in force: a record that a law checks once per step.
+"""Schedule of the injected faults of a simulated node: a record of the faults in force.
 
-A law begins with
+The law of the node checks the record once per step. It begins with these lines, where m is the memory of the law:
 
     if schedule.pending(m.schedule, stamp):
         injected.take(m, stamp)
 
-so that a node without a fault is unchanged. `take` clears all faults, then applies the fault of every row that is in
-force again. A fault therefore has no state to restore.
+A node without a fault therefore behaves as if faults did not exist. `take` clears all faults, then applies again the
+fault of every row that is in force. No state must be restored after a fault.
 """
 import numpy as np
 
@@ -23,10 +23,10 @@ FAULT_DTYPE = np.dtype([('used', 'i8'), ('fault', 'i8'), ('end', 'i8'), ('durati
 """Row of a fault.
 
 used      1 for a fault in force
-fault     table.code
+fault     code of the fault, see table.code
 end       stamp [ns] of the first step without the fault, NO_STAMP before its first step
-duration  duration [ns]
-values    its arguments, an option as its index
+duration  time for which the fault is in force [ns]
+values    its arguments; an option is stored as its index
 """
 
 SCHEDULE_DTYPE = np.dtype([('stamp', 'i8'), ('pending', 'i8'), ('row', FAULT_DTYPE, (MAX_ACTIVE_FAULTS,))], align=True)

@@ -1,4 +1,4 @@
-"""Unit of simulated equipment, with faults that can be injected."""
+"""Base class of the units of simulated equipment, which accepts the commands to inject faults."""
 from pedestal_common.graph.steps import NS_PER_SECOND
 from pedestal_common.injection import schedule, table
 from pedestal_common.node.unit import Unit
@@ -7,8 +7,8 @@ from pedestal_common.wire.records import NO_STAMP
 
 
 class Simulated(Unit):
-    """Unit whose record holds a schedule.SCHEDULE_DTYPE, `schedule`, for its law, and whose parameters have
-    `inject`."""
+    """Unit of simulated equipment. Its record has a field `schedule` (schedule.SCHEDULE_DTYPE), which its law reads.
+    Its parameters have the field `inject`."""
 
     def schedule(self):
         """Return [(at [ns], Command)] of the parameter `inject`."""

@@ -1,4 +1,4 @@
-"""Faults that can be injected, as a table. No ROS here, nothing compiled.
+"""Table of the faults that can be injected into simulated nodes. No ROS here, nothing compiled.
 
 A fault is a command that a simulated node accepts on its topic `NODE/inject` and in its parameter `inject`, for
 example '12 encoder_jump axis=azimuth size=0.01 duration=5'.

@@ -1,4 +1,8 @@
-"""Diagnostics of a node: its own diagnosis, and in realtime the findings of its shell."""
+"""Publisher of a node's diagnostics on the topic `diagnostics`; each node (shell.Shell) has one.
+
+The diagnostics contain the diagnosis of the node itself. In realtime they also contain the findings of the shell:
+stalls, steps of the host's clock, and dropped messages.
+"""
 import time
 
 from pedestal_common.graph.steps import NS_PER_SECOND
@@ -15,7 +19,7 @@ STALL_LIMIT_NS = 1_500_000_000
 """Gap between two diagnostics above which the node reports a stall [ns]."""
 
 MIN_URGENT_PERIOD_NS = 100_000_000
-"""Shortest time between two diagnostics that are published before their second [ns]."""
+"""Shortest time from the last diagnostics to diagnostics that are published early, because of a change [ns]."""
 
 CLOCK_STEP_REPORT_NS = 60 * NS_PER_SECOND
 """Time for which the diagnostics report a step of the system's clock [ns]."""
@@ -36,8 +40,8 @@ class Diagnostics:
         self._send(self._diagnose(), stamp)
 
     def publish_urgent(self):
-        """Publish the diagnostics in realtime before their second. Return False, without publishing, less than
-        MIN_URGENT_PERIOD_NS after the last diagnostics."""
+        """Publish the diagnostics in realtime at once, except within MIN_URGENT_PERIOD_NS after the last diagnostics.
+        Return True if they were published."""
         due = time.monotonic_ns() - self._published > MIN_URGENT_PERIOD_NS
         if due:
             self._publish_now()

@@ -1,4 +1,5 @@
-"""Settings of the middleware: quality of service, discovery on this machine, the executor."""
+"""Settings of the middleware (rclpy and DDS) of every node: quality of service, discovery, parameter files, the
+executor."""
 import importlib
 import os
 import pathlib
@@ -20,8 +21,11 @@ DDS_PROFILES = {'LOCALHOST': 'fastdds.xml', 'SUBNET': 'fastdds_subnet.xml'}
 
 
 def qos(rate, role='lockstep') -> QoSProfile:
-    """Return the profile of topics of a rate: in lockstep for publishers and subscribers, in realtime for a role
-    `written`, `read` or `recorded` (see topics.Qos)."""
+    """Return the quality of service of the topics of a rate.
+
+    role: `lockstep` for publishers and subscribers in lockstep; `written`, `read` or `recorded` in realtime (see
+    topics.Qos).
+    """
     row = topics.QOS_BY_RATE[rate]
     depth, reliable = getattr(row, role), role != 'read' or row.reliable
     return QoSProfile(history=HistoryPolicy.KEEP_LAST if depth else HistoryPolicy.KEEP_ALL, depth=depth or 1,
@@ -90,8 +94,10 @@ def parameter_files(arguments):
 
 
 def _as_read(path):
-    """Return the path of a copy of a parameter file in memory, written as parameter_file reads the file: rcl takes 010
-    for 8 and `on` for true. Raises ParameterFileError."""
+    """Return the path of a copy of a parameter file in memory, which states the values as parameter_file reads them.
+
+    Without the copy, rcl would read 010 as 8 and `on` as true. Raises ParameterFileError.
+    """
     copy = os.memfd_create('parameters')
     with open(copy, 'w', closefd=False) as stream:
         stream.write(parameter_file.dumped(parameter_file.read(path)))

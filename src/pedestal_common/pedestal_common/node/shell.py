@@ -1,4 +1,8 @@
-"""Shell of every node: parameters, clock, topics of the table, the wait for its graph, `main`."""
+"""Shell: base class of every ROS node of the project, and `main`, which runs the process of a node.
+
+The shell declares the parameters, reads the clock, opens topics of the table graph.topics, and waits for the other
+nodes of the graph.
+"""
 import array
 import contextlib
 import gc
@@ -44,7 +48,7 @@ ACKNOWLEDGE_TIMEOUT_S = 1.0
 """Longest time that a node waits at its end for the acknowledgement of its messages [s]."""
 
 EXIT_DELAY_S = 0.1
-"""Time that a process stays after its endpoints have left the graph [s]."""
+"""Time for which a process stays after its publishers and subscribers have left the graph [s]."""
 
 
 class Stopped(BaseException):  # noqa: N818  not an error: a signal stops the node
@@ -66,20 +70,21 @@ STOP_SIGNALS = signal.SIGINT, signal.SIGTERM, signal.SIGALRM
 """Signals that stop a node; the last is sent only by the node itself, see _on_signal."""
 
 STOP_RETRY_S = 0.02
-"""Time after which a node that could not stop at once retries [s]."""
+"""Time after which a node that could not stop at once tries to stop again [s]."""
 
 _HOOKS = '_raw_object_cache_getbuffer', '_raw_object_cache_notify'
 """Functions of llvmlite that LLVM calls before and after it makes machine code; it ignores exceptions from them."""
 
 
 def _on_signal(_number, frame):
+    """Note the signal, so that `main` stops the node. Raise Stopped if the process compiles laws."""
     _stop.append(True)
     if not _compiling:
         return
     while frame is not None:
         if frame.f_code.co_name in _HOOKS:
             # While machine code is made, Python runs its signal handlers only in these functions. An exception there
-            # would become a message on stderr, and the code would be lost. This avoids both by a retry.
+            # would become a message on stderr, and the code would be lost. The later signal of a timer avoids both.
             signal.setitimer(signal.ITIMER_REAL, STOP_RETRY_S)
             return
         frame = frame.f_back
@@ -87,7 +92,8 @@ def _on_signal(_number, frame):
 
 
 def readings():
-    """Return the (steady, system) clock [ns] at one moment, read again after an interruption."""
+    """Return a pair of readings (steady clock, system clock) [ns]. The pair is read again, at most twice, if more than
+    0.1 ms passed between the two readings."""
     for _ in range(3):
         steady, system = time.monotonic_ns(), time.time_ns()
         if time.monotonic_ns() - steady < 100_000:
@@ -96,8 +102,11 @@ def readings():
 
 
 def node_of(info, root='/'):
-    """Return the name in the graph of the node of an endpoint, 'beam_2/acu' for example. root: namespace of the graph,
-    with a '/' at its end."""
+    """Return the name in the graph of the node that owns a publisher or subscriber, 'beam_2/acu' for example.
+
+    info: rclpy's TopicEndpointInfo of the publisher or subscriber; root: namespace of the graph, with a '/' at its
+    end.
+    """
     return f'{info.node_namespace.rstrip("/")}/{info.node_name}'.removeprefix(root)
 
 
@@ -118,9 +127,13 @@ def _descriptor(field, read_only):
 class Shell(Node):
     """Node of the graph.
 
-    parameters_type: the node's dataclass; its fields become ROS parameters of the same dotted names. live: prefixes of
-    parameters that may change while the node runs; the node then implements `reconfigure()`. Raises
+    parameters_type: the parameter dataclass of the node; its fields become ROS parameters of the same dotted names.
+    live: prefixes of parameters that may change while the node runs; the node then implements `reconfigure()`. Raises
     parameters.ParameterError for an unknown or refused parameter.
+
+    finished    True ends the node in `main`
+    failure     error that ends the node, None without one
+    result      {name: value} that `main` prints at the end
     """
 
     def __init__(self, name, parameters_type, live=()):
@@ -143,14 +156,15 @@ class Shell(Node):
         self.listeners = []
 
     def _place(self, name):
-        """Return (namespace of the graph, prefix of this node's beam in it, '' without one), both with a '/' at their
-        end."""
+        """Return (namespace of the graph, prefix of this node's beam in the graph), each with a '/' at its end. The
+        prefix is '' for a node without a beam."""
         namespace = self.get_namespace().rstrip('/') + '/'
         prefix = next((prefix for prefix in nodes.prefixes(self.graph.beams) if name in nodes.NODE_NAMES
                        and nodes.row(name).of_beam and namespace.endswith('/' + prefix)), '')
         return namespace.removesuffix(prefix), prefix
 
     def _declare(self, live):
+        """Check the given ROS parameters, store them in `parameters` and `graph`, and declare them in ROS."""
         given = {name: given.value for name, given in self._parameter_overrides.items()}
         given = parameters.without_ros({name: list(value) if isinstance(value, array.array) else value
                                         for name, value in given.items()})
@@ -170,18 +184,20 @@ class Shell(Node):
             self.add_post_set_parameters_callback(self._post_set)
 
     def _declare_all(self, values, fields, live):
-        """Declare ROS parameters of (name, field) with their values, those that begin with one of `live` writable."""
+        """Declare a ROS parameter for each (name, field), with its value in `values`. A parameter whose name begins
+        with one of `live` is writable."""
         for name, field in fields:
             self.declare_parameter(name, values[name], _descriptor(field, not name.startswith(tuple(live))),
                                    ignore_override=True)
 
     def _typed(self, changes):
-        """Return the changes with a whole number as a float where the parameter is one."""
+        """Return changed ROS parameters, in which a whole number has become a float if the parameter is a float."""
         fields = dict(parameters.flatten(self._parameters_type))
         return [Parameter(change.name, value=parameters.typed(fields[change.name], change.value))
                 if change.name in fields else change for change in changes]
 
     def _changed(self, changes):
+        """Return the parameters of the node with changed ROS parameters. Raises ParameterError."""
         values = parameters.as_dict(self.parameters)
         values.update({change.name: change.value for change in changes if change.name in values})
         changed = parameters.build(self._parameters_type, values)
@@ -189,6 +205,7 @@ class Shell(Node):
         return changed
 
     def _on_set(self, changes):
+        """Accept or refuse changed ROS parameters, for rclpy."""
         try:
             self._changed(changes)
         except parameters.ParameterError as error:
@@ -196,6 +213,7 @@ class Shell(Node):
         return SetParametersResult(successful=True)
 
     def _post_set(self, changes):
+        """Store accepted changes, for rclpy."""
         self.parameters = self._changed(changes)
         self.reconfigure()
 
@@ -203,19 +221,22 @@ class Shell(Node):
         """Take the changed `self.parameters`; overridden by a node with live parameters."""
 
     def _link(self, name):
-        """Return (Link, its ROS name) of a topic of the graph; a node of a beam gives its own topics without the
-        prefix."""
+        """Return (nodes.Link, ROS name) of a topic of the graph. A node of a beam names the topics of its beam without
+        the prefix of the beam."""
         link = self.links.get(self.beam + name) or self.links[name]
         return link, self._root + link.name if self.beam else link.name
 
     def clock(self):
-        """Return (steady clock, UTC) of now [ns]."""
+        """Return (time of the steady clock, UTC) now [ns]."""
         steady, system = readings()
         return steady, self.utc.at(steady, system)
 
     def epoch(self, stamp):
-        """Return the stamp [ns] at which the time of the units is 0: 0 in lockstep, else `graph.start`, or without it
-        the beginning of the day of the first `stamp`."""
+        """Return the stamp [ns] at which the time of the units is 0.
+
+        In lockstep this is 0. In realtime it is the parameter `graph.start`. If that is 0, it is the beginning of the
+        UTC day of the first `stamp`.
+        """
         if self._epoch is None:
             self._epoch = stamp // (SECONDS_PER_DAY * NS_PER_SECOND) * SECONDS_PER_DAY * NS_PER_SECOND
         return self._epoch
@@ -229,10 +250,12 @@ class Shell(Node):
         return publisher.publish
 
     def reader(self, name, decode, take):
-        """Call take(message, after_gap) for every message on a topic of the graph. decode(CDR bytes) -> (stamp [ns] or
-        None, message) raises ValueError for other bytes. From a node of the graph they end a lockstep node. In all
-        other cases they are dropped, like the messages that a PublisherGate refuses. after_gap: True for a message
-        that does not continue the one before."""
+        """Subscribe to a topic of the graph, and call take(message, after_gap) for every message.
+
+        decode(CDR bytes) returns (stamp [ns] or None, message). It raises ValueError for bytes that are no such
+        message. In lockstep such bytes from a node of the graph end this node. In all other cases they are dropped, as
+        are the messages that a PublisherGate refuses. after_gap: True if messages may be missing before this message.
+        """
         link, ros_name = self._link(name)
 
         if self.graph.lockstep:
@@ -246,7 +269,7 @@ class Shell(Node):
             listener.open(lambda: subscribe(self, link, ros_name, self._guarded(listener.callback), 'read'))
 
     def warn_of_foreign(self, link, data):
-        """Log the first foreign message of a topic in lockstep. The recording has all of them."""
+        """Log the first foreign message of a topic in lockstep. The recording has all foreign messages."""
         self.get_logger().warning(f'{link.name}: a foreign message of {len(data)} bytes dropped at '
                                   f'{self._stamp / NS_PER_SECOND:.6f} s')
 
@@ -255,7 +278,7 @@ class Shell(Node):
         return [node_of(info, self._root) for info in self.get_publishers_info_by_topic(ros_name)]
 
     def message_reader(self, name, take):
-        """Call take(message) for every message on a topic."""
+        """Subscribe to a topic of the graph, and call take(message) for every message."""
         type_name = self._link(name)[0].type
         self.reader(name, lambda data: (None, messages.deserialize(data, type_name)),
                     lambda message, after_gap: take(message))
@@ -265,8 +288,8 @@ class Shell(Node):
         return self.create_timer(period, self._guarded(function), clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def _guarded(self, function):
-        """Return the same callback, with an expected error kept for `main`: rclpy would print a traceback of its own
-        first."""
+        """Return a callback that calls `function` and stores an expected error for `main`. Without this, rclpy would
+        print a traceback first."""
         def call(*args):
             try:
                 function(*args)
@@ -277,18 +300,21 @@ class Shell(Node):
         return call
 
     def diagnose_with(self, diagnose):
-        """Publish diagnose() -> (level, message, [(key, value text)]) at every whole second of the drive's time; in
-        realtime at every second of the wall clock, and when its urgent part changes."""
+        """Publish the diagnostics that diagnose() returns, (level, message, [(key, value text)]).
+
+        In lockstep they are published at every whole second of the drive's time. In realtime they are published once a
+        second of the wall clock, and in `diagnose_now`.
+        """
         self.diagnostics = Diagnostics(self, diagnose)
 
     def diagnose_now(self):
-        """Publish the diagnostics in realtime before their second, because of a change. Return False in lockstep, and
-        too soon after the last diagnostics."""
+        """Publish the diagnostics at once in realtime, because of a change. Return True if they were published. They
+        are not published in lockstep, or too soon after the last diagnostics."""
         return self.diagnostics is not None and not self.graph.lockstep and self.diagnostics.publish_urgent()
 
     def begin_step(self, stamp):
-        """Note the step t_k [ns] before any message of step k is published. In lockstep the first call waits for the
-        graph, and diagnostics are published at every whole second; in realtime there is no wait."""
+        """Note the stamp t_k [ns] of a step, before any message of the step is published. In lockstep the first call
+        waits for the graph, and diagnostics are published at every whole second. In realtime there is no wait."""
         self._stamp = stamp
         if not self._started:
             self._started = True
@@ -301,7 +327,7 @@ class Shell(Node):
             self.diagnostics.publish(stamp)
 
     def restart(self):
-        """Await the next step as the first step."""
+        """Treat the next step as the first step."""
         self._started, self._stamp, self._next_second = False, 0, 0
 
     def prepare(self, unit):
@@ -318,8 +344,10 @@ class Shell(Node):
             _compiling.clear()
 
     def await_acknowledged(self):
-        """Wait until every subscriber has received all messages of this node. Raises GraphError after the deadline. In
-        lockstep the silent subscriber is then the recorder, because all other nodes have answered the step before."""
+        """Wait until every subscriber has received all messages of this node. Raises GraphError after graph.deadline.
+
+        The error names the recorder as silent: in lockstep all other nodes have answered the step before.
+        """
         for link, publisher in self.publishers_by_link.items():
             if not publisher.wait_for_all_acked(Duration(seconds=self.graph.deadline)):
                 raise GraphError(f'a subscriber of {link.name} took no message in {self.graph.deadline:g} s',
@@ -335,7 +363,7 @@ class Shell(Node):
             self.await_acknowledged()
 
     def await_graph(self):
-        """Wait until every topic of this node has all its subscribers of the run.
+        """Wait until every topic that this node publishes has all its subscribers among the nodes of the graph.
 
         Raises GraphError after START_DEADLINE_S, or when another graph publishes the same topics.
         """
@@ -355,8 +383,8 @@ class Shell(Node):
                                  f'{self.context.get_domain_id()}; set a free one')
 
     def _missing(self, publisher, wanted):
-        """Return the wanted subscribers that a topic lacks, by name: no other subscriber replaces them, except a
-        replay."""
+        """Return the names of the wanted subscribers that a topic lacks. No other subscriber replaces a wanted one,
+        except a replay."""
         if not wanted:
             return []
         subscribers = self.get_subscriptions_info_by_topic(publisher.topic_name)
@@ -371,7 +399,7 @@ class Shell(Node):
 
     @property
     def awaits(self):
-        """Awaited inputs of a node that is ready, in words; overridden by a node with other inputs."""
+        """Text that names the inputs for which a ready node waits; overridden by a node with other inputs."""
         return 'messages'
 
     def draining(self):
@@ -395,12 +423,12 @@ def _write_line(stream, line):
 
 
 def _end_process(node, code):
-    """End the process with an exit code as soon as the endpoints of its node have left the graph.
+    """End the process with an exit code as soon as the publishers and subscribers of its node have left the graph.
 
-    The participant is not destroyed. Fast DDS 2.14 may hang in its destructor while other participants leave, in 1 of
-    100 ends of a graph: DomainParticipant::set_listener waits for a callback with the mutex that the callback needs.
-    The process stays for EXIT_DELAY_S, because a node that misses the departure of a subscriber waits for it for the
-    20 s of its lease.
+    The DDS participant of the process is not destroyed. In 1 of 100 ends of a graph, Fast DDS 2.14 hangs in the
+    destructor while other participants leave. DomainParticipant::set_listener then waits for a callback and holds the
+    mutex that the callback needs. The process stays for EXIT_DELAY_S, so that the other nodes notice its departure. A
+    node that misses the departure of a subscriber waits for the subscriber until its DDS lease ends, 20 s.
     """
     with node.handle, contextlib.suppress(OSError):
         node.destroy_node()
@@ -412,8 +440,8 @@ def _end_process(node, code):
 def main(make_node, args=None):
     """Run the node of make_node() until it is finished or a signal stops it, and end the process.
 
-    Exit code 0; 1 with one line on stderr. The node's `result`, if any, is printed on stdout as a JSON object; an
-    error adds {'error': the line, 'silent': the silent nodes}.
+    The exit code is 0, or 1 after an error, which is one line on stderr. The node's `result`, if any, is printed on
+    stdout as a JSON object; an error adds {'error': the line, 'silent': the silent nodes}.
     """
     for number in STOP_SIGNALS:
         signal.signal(number, _on_signal)
@@ -425,7 +453,7 @@ def main(make_node, args=None):
         name = node.get_name()
         executor = middleware.make_executor()
         executor.add_node(node)
-        # This avoids that each garbage collection, in the middle of a step, visits all imported modules.
+        # This avoids that a garbage collection in the middle of a step visits all imported modules.
         gc.freeze()
         node.get_logger().info(f'ready, waits for {node.awaits}')
         while not (_stop or node.finished) or node.draining():

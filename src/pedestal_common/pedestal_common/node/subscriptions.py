@@ -1,4 +1,7 @@
-"""Subscriptions of a node in a realtime graph: the messages that it takes, and its report of the dropped messages."""
+"""Subscriptions of a node: the messages of a topic that it accepts, and its report of the dropped messages.
+
+LockstepSubscriber is for a lockstep graph, TopicSubscriber for a realtime graph.
+"""
 import collections
 import inspect
 
@@ -41,11 +44,11 @@ def two_argument_callback(function):
 
 
 def subscribe(node, link, ros_name, take, role):
-    """Return the subscriptions of a node to the topic of a nodes.Link, named ros_name in ROS; they call take(data,
-    info) once for each message. role: in realtime, `read` or `recorded`.
+    """Return the subscriptions of a node in realtime to the topic of a nodes.Link, named ros_name in ROS.
 
-    A latched subscriber does not match a volatile publisher. Where topics.Qos has `unlatched` there is therefore a
-    second subscription. A latched publisher matches both; the second copy of its message is dropped.
+    The subscriptions call take(CDR bytes, rclpy's message info) once for each message. role: `read` or `recorded`. A
+    latched subscriber does not match a volatile publisher. Where topics.Qos has `unlatched` there is therefore a
+    second, volatile subscription. A latched publisher matches both; the second copy of its message is dropped.
     """
     def open_with(profile, callback, **events):
         return node.create_subscription(middleware.message_class(link.type), ros_name,
@@ -62,7 +65,7 @@ def subscribe(node, link, ros_name, take, role):
             take(data, info)
     volatile = middleware.qos(link.rate, role)
     volatile.durability = DurabilityPolicy.VOLATILE
-    # Because rclpy's default callback would warn of each volatile publisher.
+    # The default callback of rclpy is off, because it would warn of each volatile publisher.
     unmatched = SubscriptionEventCallbacks(use_default_callbacks=False)
     return [open_with(latched, take_once, event_callbacks=unmatched), open_with(volatile, take_once)]
 
@@ -70,7 +73,8 @@ def subscribe(node, link, ros_name, take, role):
 def foreign_publishers(node, link, ros_name):
     """Return the names of the nodes that publish a topic and are no publisher of its nodes.Link.
 
-    Return None in a graph without a publisher of the link. An undiscovered node may be foreign.
+    Return None if no node of the graph publishes the link. A node before its discovery counts, because it may be
+    foreign.
     """
     if not any(writer in node.graph.members for writer in link.writers):
         return None
@@ -78,7 +82,7 @@ def foreign_publishers(node, link, ros_name):
 
 
 class SoleNumbers:
-    """Sequence numbers of the graph's publisher of a topic in lockstep, which rise by 1.
+    """Check of the sequence numbers of a topic in lockstep: those of the publisher in the graph rise by 1.
 
     node: the shell.Shell that subscribes; link: nodes.Link of the topic, named ros_name in ROS
     next: number of the next message, None if any number may follow
@@ -96,17 +100,17 @@ class SoleNumbers:
         self.next = None if number is None else number + 1
 
     def shows_foreign(self):
-        """Return True if the graph shows a foreign publisher of a topic with one publisher."""
+        """Return True if ROS lists a foreign publisher of the topic, and the topic has one publisher in the table."""
         return len(self._link.writers) == 1 and bool(foreign_publishers(self._node, self._link, self._ros_name))
 
 
 class LockstepSubscriber:
     """Subscriber to one topic in lockstep, which passes the messages of the graph to take(message, False).
 
-    A message with another number than the next (see SoleNumbers) is foreign if the graph shows a foreign publisher, or
-    if the message is unreadable. Foreign messages are dropped.
+    False states that no gap precedes the message. A message whose number is not the next (see SoleNumbers) is foreign
+    if ROS lists a foreign publisher, or if the message is unreadable. Foreign messages are dropped.
 
-    node, link, ros_name, decode: see TopicSubscriber. An unreadable message of the graph raises its ValueError.
+    node, link, ros_name, decode: see TopicSubscriber. An unreadable message of the graph raises ValueError.
     """
 
     def __init__(self, node, link, ros_name, decode, take):
@@ -163,6 +167,7 @@ class TopicSubscriber:
         self._subscriptions = subscribe()
 
     def _hold(self, data, info):
+        """Hold a text until every publisher of its topic has a name."""
         self._held.append((self._node.clock()[0], data, info))
         self._take_held()
 
@@ -182,6 +187,7 @@ class TopicSubscriber:
         return any(UNDISCOVERED_NODE_NAME in name for name in self._node.publishers_of(self._ros_name))
 
     def _receive(self, data, info):
+        """Pass a message on if the PublisherGate accepts it; otherwise publish diagnostics for a serious reason."""
         gate = self.gate
         now, utc = self._node.clock()
         message = gate.take(data, info['publication_sequence_number'], info['source_timestamp'], now, utc)
@@ -201,7 +207,8 @@ class TopicSubscriber:
         return len(self.unexpected_publishers()) if self._expected else None
 
     def finding(self, now):
-        """Return (level, text) of the messages dropped lately; None without any."""
+        """Return (level, text) for the diagnostics, about messages dropped within DROP_REPORT_NS; None without any.
+        now: steady clock [ns]."""
         gate = self.gate
         if gate.dropped_at is None or now - gate.dropped_at > DROP_REPORT_NS:
             return None

@@ -1,8 +1,8 @@
-"""Unit: the law of one node between its messages.
+"""Unit: the steps of one node with their state, without ROS.
 
-Drive, beam, receiver, control unit, ship and INS are units. The same unit runs in its node, in the closed loop, in a
-recomputed recording and in many trials. Its caller gives it a record of the content of its topics (see records) and
-receives another record. No ROS here.
+Drive, electronic array, receiver, control unit, ship and INS are units. The same unit runs in its node, in the closed
+loop, in a recomputed recording and in many trials. The caller passes a record with the numbers of the input topics
+(see wire.records), and receives a record with the numbers of the output topics.
 """
 import collections
 import typing
@@ -21,7 +21,7 @@ NEVER_DUE_NS = 2**63 - 1
 """Time of the next command of a unit without further commands [ns]."""
 
 MAX_BLOCK_STEPS = 2000
-"""Largest number of steps for which a unit holds noise ready."""
+"""Largest number of steps in one call of a law; a unit with noise generates the noise of so many steps in advance."""
 
 
 class Diagnosis(typing.NamedTuple):
@@ -32,7 +32,7 @@ class Diagnosis(typing.NamedTuple):
 
 
 def joined(record_type: np.dtype, **parts: np.ndarray) -> np.ndarray:
-    """Return a record (1,) of these parts, arrays (1,)."""
+    """Return a record (1,) whose fields are these parts, {name: record (1,)}."""
     record = np.zeros(1, record_type)
     for name, part in parts.items():
         record[name] = part
@@ -40,32 +40,33 @@ def joined(record_type: np.dtype, **parts: np.ndarray) -> np.ndarray:
 
 
 class Unit(typing.Protocol):
-    """Protocol of a unit. A subclass adds its memory and its compiled law
+    """Protocol of a unit. A subclass adds its memory and the compiled law of one step:
 
         law(memory, stamp, inputs, outputs)
 
-    of one step: its memory, the stamp t_k [ns] of the step, a record with its inputs, a record for its outputs. These
-    records may hold further topics. In the closed loop both are the record of the step, except for the drive, which
-    reads the record of the step before.
+    stamp is the time t_k of the step [ns]. inputs and outputs are records of topics, and may hold further topics. In
+    the closed loop both are one record, which holds all topics of the step. The drive is the exception: its inputs are
+    the record of the step before.
 
-    NODE         row of nodes.NODES, or nodes.ARRAY_DRIVE, whose law this is
-    LAWS         {type of its memory: (law, the same over arrays of stamps and records)}, compiled
+    NODE         row of nodes.NODES, or nodes.ARRAY_DRIVE, of the node that runs this unit
+    LAWS         {type of its memory: (law of one step, law of many steps)}, compiled. The second law takes arrays (n,)
+                 of stamps and records
     LIVE         prefixes of the parameters that may change while it runs
     REQUESTS     names of its services
-    VERBS        commands.CommandDefinition of each command on NODE.obeys
+    VERBS        commands.CommandDefinition of each command that it accepts on the topic NODE.obeys
     CALLS        names of services of other nodes that it may call
-    MOMENTARY    text outputs that `encode` can make only in the step that produced them; a recomputation of many
-                 steps omits them
+    MOMENTARY    text topics whose text `encode` can make only directly after the step that changed it; a recomputation
+                 makes many steps at once and therefore omits them
 
     parameters   instance of the parameter class of NODE
     reads        topics that it reads in its graph, a part of NODE.reads
     writes       topics that it writes with these parameters, a part of NODE.writes
-    memory       named tuple of arrays, with all data that a step reads or changes beside its records: `record` (1,)
-                 with the records of its law, then data that are no record (noise, a track)
+    memory       named tuple of arrays with all data that a step reads or changes, except inputs and outputs. The array
+                 `record` (1,) holds the records of the law; further arrays hold noise or a track
     inputs, outputs     records (1,) of one step in a node
-    messages     {topic: message} of its stamped topics, of which only the numbers change
+    messages     {topic: message} of its stamped output topics; in each step only the numbers of a message change
     epoch        UTC [ns] of stamp 0, 0 where stamps are not UTC; set by its node
-    silent       True while its trigger is absent; set by a realtime node
+    silent       True while its trigger, the topic that begins its steps, is absent; set by a realtime node
     lockstep     True if its graph runs in lockstep; set by its node
     pending_replies    (Command, Reply) of the last commands, the newest last; its node publishes and removes them
     """
@@ -102,12 +103,12 @@ class Unit(typing.Protocol):
 
     @classmethod
     def inputs_type(cls) -> np.dtype:
-        """Return the record of its inputs, without the topics of rate `once` (see `decode`)."""
+        """Return the type of the record of its inputs, without the topics of rate `once` (see `decode`)."""
         return records.of(*(name for name in cls.NODE.reads if topics.TOPIC_BY_NAME[name].rate != 'once'))
 
     @classmethod
     def outputs_type(cls) -> np.dtype:
-        """Return the record of its outputs."""
+        """Return the type of the record of its outputs."""
         return records.of(*cls.NODE.writes)
 
     @property
@@ -117,25 +118,27 @@ class Unit(typing.Protocol):
 
     @property
     def latencies(self) -> dict[str, float]:
-        """{topic: s} of the topics that a step waits for beside its trigger: their age at the step."""
+        """{topic: age of its data at the step [s]} of the topics for which a step waits in addition to its trigger."""
         return {name: self.latency(name) for name in self.reads
                 if name != self.trigger and topics.TOPIC_BY_NAME[name].rate == 'step'}
 
     def latency(self, topic: str) -> float:
-        """Return the age of a topic at the step [s]."""
+        """Return the age of the data of a topic at the step [s], from the parameter named Topic.latency; 0 without."""
         return getattr(self.parameters, topics.TOPIC_BY_NAME[topic].latency, 0.0)
 
     @property
     def parts(self) -> np.void:
-        """Records of its law by name, views: self.parts['outputs']['status']."""
+        """Views of the records of its law by name, for example self.parts['outputs']['status']."""
         return self.memory.record[0]
 
     def block(self, steps: int) -> tuple:
-        """Return the memory for the next `steps` (at most MAX_BLOCK_STEPS); overridden by a unit with noise."""
+        """Return the memory for this number of next steps, at most MAX_BLOCK_STEPS; overridden by a unit with
+        noise."""
         return self.memory
 
     def step(self, stamps: np.ndarray, inputs: np.ndarray, outputs: np.ndarray) -> None:
-        """Make the steps of stamps (n,) [ns], from inputs (n,) to outputs (n,), with the commands due before each."""
+        """Make the steps of stamps (n,) [ns], from inputs (n,) to outputs (n,). Scheduled commands are executed before
+        the step at which they are due."""
         _, law_of_many = self.LAWS[type(self.memory)]
         first = 0
         while first < len(stamps):
@@ -165,8 +168,8 @@ class Unit(typing.Protocol):
         self._last = stamp
 
     def command(self, command: commands.Command) -> Reply:
-        """Return the Reply to a Command between two steps, which acts in the next. The Reply is also added to
-        `pending_replies`."""
+        """Execute a Command between two steps and return the Reply. The Command takes effect in the next step. The
+        Reply is also added to `pending_replies`."""
         try:
             self.admit(command)
             if command.verb in self.REQUESTS:
@@ -204,12 +207,12 @@ class Unit(typing.Protocol):
         self.parameters = parameters
 
     def request(self, name: str) -> Reply:
-        """Execute one of REQUESTS between two steps, which acts in the next, and return the Reply. Clients use
-        `command`."""
+        """Execute one of REQUESTS between two steps and return the Reply. The request takes effect in the next step.
+        Clients call `command` instead."""
         raise KeyError(name)
 
     def requests_for(self, topic: str, text: str) -> list[str]:
-        """Return the requests after which it publishes `text` on a text topic."""
+        """Return the names among REQUESTS after which the unit publishes `text` on a text topic."""
         return []
 
     def diagnose(self) -> Diagnosis:
@@ -222,14 +225,14 @@ class Unit(typing.Protocol):
 
     @property
     def calls(self) -> tuple[str, ...]:
-        """Services among CALLS that it calls now."""
+        """Services among CALLS that the unit needs now; its node calls them."""
         return ()
 
     @staticmethod
     def idle(numbers: Mapping[str, typing.Any]) -> str:
-        """Return why a recording did not exercise it, '' if it did.
+        """Return the reason why a recording does not exercise this unit, '' if it does.
 
-        numbers: {topic: (n, columns)} of its stamped topics, {topic: texts} of the others, as far as recorded.
+        numbers: the recorded topics, {topic: numbers (n, columns)} for stamped topics, {topic: texts} for the others.
         """
         return ''
 
@@ -245,16 +248,18 @@ class Unit(typing.Protocol):
             array[...] = values
 
     def prepare_ahead(self) -> None:
-        """Compile the last laws of `prepare`, in a process beside the one that runs `prepare`, which then finds them
-        in the cache. The unit cannot be used afterwards. Overridden where a second process saves time."""
+        """Compile the laws that `prepare` compiles last. A second process calls this method while the first process
+        runs `prepare`, which then finds these laws in the cache. The unit cannot be used afterwards. Overridden where
+        the second process saves time."""
 
 
 def announced(unit: Unit, topic: str, stamps: np.ndarray,
               outputs: np.ndarray) -> tuple[np.ndarray, list[typing.Any]]:
-    """Return (stamps [ns] (m,), texts) of a text topic of a unit at its changes in outputs (n,), for steps of stamps
-    (n,).
+    """Return (stamps (m,) [ns], texts) of a text topic of a unit: a text for each change in outputs (n,).
 
-    A text belongs to the step that its publisher answers with it, by the answer's stamp where the answer is late.
+    stamps: of the steps (n,) [ns]. A text has the stamp of the first stamped message that the unit writes in the same
+    step. This stamp is earlier than the step where the unit answers late. Without this message the text has the stamp
+    of the step.
     """
     answers = next(outputs[name]['stamp'] for name in unit.NODE.writes if not records.is_text(name))
     stamps = np.where(answers != records.NO_STAMP, answers, stamps)

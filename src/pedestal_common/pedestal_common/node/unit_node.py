@@ -1,8 +1,8 @@
-"""Node of a unit: the content of its topics becomes a record, the unit answers the record, the answer becomes
-messages.
+"""ROS node that runs a unit (node.unit): it decodes the messages of a step, lets the unit make the step, and publishes
+the results.
 
-One class runs every unit. A node of its own kind adds tasks that are no law: the drive owns the time
-(adu_drive.timekeeper_node), the ship publishes NMEA.
+The class UnitNode runs every unit. Subclasses add tasks that are no law: the drive owns the time
+(adu_drive.timekeeper_node), and the ship publishes NMEA sentences.
 """
 import collections
 import collections.abc
@@ -20,7 +20,7 @@ from pedestal_common.realtime import priority
 from pedestal_common.wire import commands, messages, records
 
 REPLAY_POLL_S = 0.2
-"""Time between two searches for another replay [s]."""
+"""Time between two checks whether another replay publishes the inputs [s]."""
 
 LOCKSTEP_POLL_S, TRIGGER_POLL_S = 0.2, 0.05
 """Time between two checks for a step that waits too long in lockstep, and for a silent trigger in realtime [s]."""
@@ -31,14 +31,15 @@ SETTLING_POLL_S = 0.001
 
 @dataclasses.dataclass
 class LastText:
-    """Last published text of a text topic: its code, its text, and the function that publishes the next."""
+    """Last published text of a text topic: its code, the text, and the function that publishes the next text."""
     publish: collections.abc.Callable
     code: int = topics.NO_TEXT_CODE
     text: object = ''
 
 
 class Port:
-    """Unit and its topics. prefix: of its beam in a node that serves several beams, else ''."""
+    """Connection of a unit to its topics. prefix: prefix of the unit's beam in a node that serves several beams, else
+    ''."""
 
     def __init__(self, node, unit, prefix=''):
         self.prefix = prefix
@@ -53,7 +54,7 @@ class Port:
         self.use(unit)
 
     def use(self, unit):
-        """Run a unit from its first step on."""
+        """Connect a new unit, whose first step is the next step."""
         self.unit = unit
         self.decoders = {self.named(name): records.Decoder(name, unit.inputs)
                          for name in (unit.trigger, *unit.latencies)}
@@ -64,12 +65,15 @@ class Port:
         self._epoch, self._last = 0, None
 
     def named(self, topic):
-        """Return the name of the topic in the graph."""
+        """Return the name in the graph of a topic of the unit, with the prefix of the beam for a topic of a beam."""
         return self.prefix + topic if topic in nodes.BEAM_TOPICS else topic
 
     def step(self, stamp, values):
-        """Make the step of a stamp [ns]. values: {topic: (stamp, numbers), None where nothing arrived}. The unit
-        counts its time from the epoch, so its numbers keep their resolution at any stamp."""
+        """Make the step of a stamp [ns]. values: {topic: (stamp [ns], numbers), or None if no message arrived}.
+
+        The unit receives stamps that count from the epoch (Shell.epoch), so that times in seconds keep their
+        resolution as floating-point numbers.
+        """
         self._epoch, self._last = self._epoch_of(stamp), stamp
         self.unit.epoch = self._epoch
         for name, decoder in self.decoders.items():
@@ -79,7 +83,7 @@ class Port:
         self.unit.step(self.stamps, self.unit.inputs, self.unit.outputs)
 
     def reset_after_gap(self):
-        """Reset the state of the unit's steps; texts, and messages of rate `once`, stay."""
+        """Reset the memory of the unit to its initial values. Received texts and messages of rate `once` stay."""
         self.unit.memory.record[...] = self._initial
         self.unit.configure(self.unit.parameters)
 
@@ -128,7 +132,7 @@ class UnitNode(shell.Shell):
     """Node that runs the unit of a module (nodes.Node.module)."""
 
     PRECEDENCE = 0
-    """Priority of this node above graph.priority."""
+    """Amount by which the scheduling priority of this node exceeds graph.priority."""
 
     def __init__(self, module, serves_beams=False):
         self.row = nodes.of_executable(module)
@@ -146,7 +150,7 @@ class UnitNode(shell.Shell):
         self.unit = self.ports[0].unit
         self.steps = None
         self.refused = ''
-        # Topics of rate `once` without a message, and the first steps, which wait for these messages.
+        # _waiting_for_once: topics of rate `once` without a message; _held: the first steps, which wait for them.
         self._waiting_for_once, self._held = set(), collections.deque()
         self._settled, self._settling = not self.graph.lockstep, None
         self._urgent = [port.unit.urgent for port in self.ports]
@@ -182,6 +186,7 @@ class UnitNode(shell.Shell):
                     self._waiting_for_once.add(name)
 
     def _command_taker(self, port):
+        """Return take(message), which passes a command to the unit."""
         def take(message):
             try:
                 port.command(commands.of_message(message))
@@ -191,12 +196,14 @@ class UnitNode(shell.Shell):
         return take
 
     def _text_taker(self, port, name):
+        """Return take(message), which passes a text to the unit."""
         def take(message):
             self._look_for_replay()
             port.unit.take_text(name, message.data)
         return take
 
     def _once_taker(self, port, name):
+        """Return take(message), which passes a message of rate `once` to the unit."""
         def take(message):
             self._look_for_replay()
             stamp = messages.nanoseconds(message.header.stamp)
@@ -217,7 +224,7 @@ class UnitNode(shell.Shell):
         self._release()
 
     def _release(self):
-        """Answer the first steps once nothing holds them."""
+        """Answer the held first steps as soon as no message of rate `once` is awaited."""
         while self._held and self._settled and not self._waiting_for_once:
             self.answer(*self._held.popleft())
 
@@ -227,14 +234,14 @@ class UnitNode(shell.Shell):
         return ', '.join((self.unit.trigger, *sorted(self._waiting_for_once)))
 
     def begin(self):
-        """Start to follow the trigger of the unit; overridden by the node that makes the time."""
+        """Start to follow the trigger of the unit; overridden by the drive, which owns the time."""
         self.follow(self.unit.trigger, self.unit.latencies)
 
     def follow(self, trigger, latencies):
-        """Match the inputs of each step (see Steps) and `answer` it. latencies: {topic: s}.
+        """Subscribe to the inputs of the steps, match the messages of each step (see Steps), and `answer` each step.
 
-        In lockstep a step whose inputs are absent for the deadline ends the node with the names of the silent
-        publishers.
+        trigger: topic that begins a step; latencies: {other topic: age of its data at the step [s]}. In lockstep a
+        step whose inputs are absent for graph.deadline ends the node with the names of the silent publishers.
         """
         self.steps = Steps(trigger, {name: round(latency * NS_PER_SECOND) for name, latency in latencies.items()},
                            self.graph.lockstep, self._answer, held=nodes.held(latencies))
@@ -252,7 +259,7 @@ class UnitNode(shell.Shell):
             self.every(TRIGGER_POLL_S, self._watch_trigger)
 
     def _look_for_replay(self):
-        """Begin again if another replay than the one before publishes the first input of the steps."""
+        """Begin again if a new replay, which was not seen before, publishes the first input of the steps."""
         if self.steps is None:
             return
         replays = {bytes(info.endpoint_gid) for info in
@@ -280,6 +287,8 @@ class UnitNode(shell.Shell):
         self.restart()
 
     def _step_taker(self, name):
+        """Return take(message, after_gap), which passes the messages of one input to the Steps. After a gap it first
+        resets the state that depends on earlier messages."""
         steps = self.steps
 
         def take(message, after_gap):
@@ -294,8 +303,9 @@ class UnitNode(shell.Shell):
         return take
 
     def _answer(self, stamp, trigger, values):
-        """Answer a complete step. In lockstep the first step waits for the topics of rate `once`, and for the texts
-        that arrived before the executor began, because the executor takes the queued messages in any order."""
+        """Answer a complete step. In lockstep the first steps wait for the topics of rate `once`, and for the texts
+        that arrived before the executor began. Because the executor takes queued messages in any order, these texts
+        may come after the first step."""
         values[self.steps.trigger] = trigger
         if self._settled and not self._waiting_for_once:
             self.answer(stamp, values)
@@ -342,8 +352,8 @@ class UnitNode(shell.Shell):
         stalled, self._watched = now - self._watched > limit, now
         silent = now - self._answered > limit and not stalled
         if silent and self.steps.pending_stamp is not None:
-            # Its trigger was the last before the silence. If the step waited for its inputs, it would be answered with
-            # messages from after the silence.
+            # The pending step has the last trigger before the silence. If it waited longer for its inputs, it would be
+            # answered with messages from after the silence.
             answered = self._answered
             self.steps.answer_incomplete()
             self._answered = answered
@@ -355,7 +365,7 @@ class UnitNode(shell.Shell):
                 self.diagnose_now()
 
     def _watch_pending_step(self):
-        """Raise GraphError in lockstep if the same step has waited for its inputs for the deadline."""
+        """Raise GraphError in lockstep if one step has waited for its inputs longer than graph.deadline."""
         pending = self.steps.pending_stamp
         if pending is None or self._watched_step != pending or self._replay_left:
             self._watched_step, self._watched_since = pending, time.monotonic()
@@ -366,7 +376,8 @@ class UnitNode(shell.Shell):
                                    f'{self.graph.deadline:g} s', silent)
 
     def _service(self, name):
-        """Return the callback of a service, which commands every unit between two steps and answers with the reply."""
+        """Return the callback of a service. The callback passes the request to every unit between two steps, and
+        answers with the Reply of the units."""
         def serve(_request, response):
             # Each port receives the same commands, so all give the same reply.
             [reply] = {port.command(commands.Command(name, commands.SERVICE_CLIENT)) for port in self.ports}
@@ -382,12 +393,12 @@ class UnitNode(shell.Shell):
             port.unit.configure(self.parameters)
 
     def diagnosed(self):
-        """Return the Diagnosis of the unit; overridden by a node that runs several."""
+        """Return the Diagnosis of the unit; overridden by a node that runs several units."""
         return self.unit.diagnose()
 
     def diagnose(self):
-        """Return the Diagnosis, in which a silent trigger and a refused input precede everything except an error of
-        the unit."""
+        """Return the Diagnosis of the node: a silent trigger comes first, with an error of the unit behind it. A
+        refused input replaces the message of the unit, except an error."""
         diagnosis = self.diagnosed()
         if self.unit.silent:
             since = (time.monotonic_ns() - self._answered) * 1e-9

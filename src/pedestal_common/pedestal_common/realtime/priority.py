@@ -1,12 +1,15 @@
-"""Priority of a process with a deadline in every step: the kernel runs it before all processes without one
-(sched(7))."""
+"""Scheduling priority of a node, whose steps have deadlines: the kernel runs a process with such a priority before all
+processes without one (sched(7))."""
 import contextlib
 import os
 
 
 def take(priority):
-    """Set SCHED_RR at a priority (1 to 99) for every thread of this process, including those of the middleware; new
-    threads inherit it. Return '' or why the system refuses."""
+    """Set the scheduling policy SCHED_RR at a priority (1 to 99) for every thread of this process. Return '', or the
+    reason why the system refuses.
+
+    The threads of the middleware are included, and new threads inherit the priority.
+    """
     try:
         for thread in os.listdir('/proc/self/task'):
             with contextlib.suppress(ProcessLookupError):

@@ -1,14 +1,19 @@
-"""Gate of a topic in a realtime graph: it accepts messages of the active publisher, valid and newer than the last.
+"""Gate of a topic in a realtime graph: it accepts the messages of one publisher only, the active publisher.
 
-first publisher      becomes active at once
-restarted publisher  counts its numbers from the beginning; becomes active once the active publisher was silent for
-                     SILENCE_LIMIT_NS
-different node       overlapped with the active publisher, or has sequence numbers that are too high for a restart in
-                     this silence; becomes active after it was the only publisher for CONFIRMED_TAKEOVER_NS, while the
-                     graph shows no unexpected publisher
-unclear publishers   every message is dropped, so the motion that the topic commands stops
+An accepted message is valid and newer than the last one. Messages of all other publishers are dropped and reported.
+The table states when a publisher becomes active:
 
-Messages of a publisher that is not active are dropped and reported. The module uses neither ROS nor a clock.
+first publisher      at once
+restarted publisher  once the active publisher was silent for SILENCE_LIMIT_NS
+different node       after it was the only publisher for CONFIRMED_TAKEOVER_NS, while the graph shows no unexpected
+                     publisher
+unclear publishers   never
+
+The sequence numbers of a restarted publisher begin again. A publisher is a different node if it overlapped with the
+active publisher: both sent at the same time. It is also a different node if its numbers are too high for a restart in
+this silence. Publishers are unclear if a message may be of several of them. Because these messages are dropped, the
+motion that the topic commands stops. An unexpected publisher is a node that should not publish the topic, according to
+the table of nodes. The module uses neither ROS nor a clock.
 """
 import collections
 
@@ -19,8 +24,8 @@ SILENCE_LIMIT_NS = 200_000_000
 are accepted [ns]."""
 
 CONFIRMED_TAKEOVER_NS, UNCONFIRMED_TAKEOVER_NS = 1_000_000_000, 5_000_000_000
-"""Silence of the active publisher after which a publisher that overlapped with it may become active, as the only
-publisher [ns]. The first applies where the graph shows no unexpected publisher, the second where the graph is
+"""Silence of the active publisher after which a publisher that overlapped with it may become active [ns], if no other
+publisher sends. The first value applies if the graph shows no unexpected publisher, the second if the graph is
 unknown."""
 
 PUBLISHER_POLL_NS = 50_000_000
@@ -31,7 +36,7 @@ DROP_UNDECODABLE, DROP_STALE, DROP_FUTURE, DROP_OTHER_PUBLISHER, DROP_UNCLEAR_PU
 """Reasons to drop a message."""
 
 WARNING_DROP_REASONS = DROP_OTHER_PUBLISHER, DROP_UNCLEAR_PUBLISHER
-"""Reasons that an operator should look after."""
+"""Reasons that need the attention of the operator."""
 
 
 class PublisherGate:
@@ -41,14 +46,15 @@ class PublisherGate:
     future      largest accepted lead of a stamp over this node's UTC [ns]
     unexpected  unexpected() -> number of unexpected publishers in the graph, None where it is unknown. It is called
                 when a candidate may become active. The candidate may itself be an unexpected publisher. It becomes
-                active only if at least as many other streams overlapped: then these are the unexpected
-                publishers. `unexpected=None`: every publisher is accepted.
+                active only if at least as many other streams overlapped as there are unexpected publishers: then the
+                other streams are the unexpected publishers. `unexpected=None`: every publisher is accepted.
     paced       True if the messages come at a steady rate, by which publishers are distinguished. Otherwise every
                 message is dropped while the graph shows an unexpected publisher; the last accepted message stays
                 valid.
     oldest      largest accepted time from sending to reception [ns]; None: any
 
-    dropped     {reason: count}; reason: of the last dropped message, detail: in numbers; dropped_at: its time [ns]
+    dropped     {reason: count}
+    reason, detail, dropped_at    of the last dropped message: its reason, details as text, time of reception [ns]
     after_gap   True if messages may be missing before the last accepted message, because the publisher changed or
                 the stamps went back
     offset      smallest time from sending to reception since the publisher became active [ns]
@@ -72,8 +78,11 @@ class PublisherGate:
         self._back_since = self._back = None    # since when earlier stamps arrive [ns], and the newest of these
 
     def take(self, data, number, source, now, utc):
-        """Return the decoded message, None for a dropped message. number: its sequence number; source: its time of
-        sending [ns UTC]; now, utc: this moment [ns], steady and UTC."""
+        """Return the decoded message, None for a dropped message.
+
+        data: CDR bytes; number: sequence number; source: time of sending [ns, UTC]; now, utc: time of reception [ns],
+        by the steady clock and in UTC.
+        """
         self.after_gap = False
         if not self._paced:
             if self._unexpected():
@@ -115,8 +124,11 @@ class PublisherGate:
         return False
 
     def _may_be_another(self, stream, now):
-        """Return True if the active publisher was silent, its numbers then jumped, and the graph shows an unexpected
-        publisher without messages. Because this node may have stalled, the message may be of that publisher."""
+        """Return True if a message of the active stream may be of another publisher.
+
+        The active publisher was silent, its numbers then jumped, and the graph shows an unexpected publisher that has
+        no stream of its own. Because this node may have stalled, the message may be of that publisher.
+        """
         return (now - self._active_at >= SILENCE_LIMIT_NS and stream.skipped[1] == stream.last
                 and (self._unexpected() or 0) > sum(other.overlapped for other in self._other_active(stream, now)))
 
@@ -142,7 +154,7 @@ class PublisherGate:
         return free
 
     def _other_active(self, stream, now):
-        """Return the other streams that are active."""
+        """Return the streams except `stream` that had a message within SILENCE_LIMIT_NS before now [ns]."""
         return [other for other in self.streams.streams
                 if other is not stream and now - other.arrival < SILENCE_LIMIT_NS]
 
@@ -168,5 +180,6 @@ class PublisherGate:
         self.offset = offset if self.offset is None else min(self.offset, offset)
 
     def _drop(self, reason, detail, now):
+        """Count a dropped message, and note its reason and time. Return None, the result of `take`."""
         self.dropped[reason] += 1
         self.reason, self.detail, self.dropped_at = reason, detail, now

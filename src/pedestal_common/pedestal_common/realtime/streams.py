@@ -1,9 +1,9 @@
-"""Assignment of messages to publishers: the messages of each publisher of a topic have consecutive sequence numbers.
+"""Streams: the messages of a topic, assigned to its publishers by their sequence numbers.
 
-rclpy names no publisher, so a message belongs to the stream that it continues: with a higher number, by no more than
-the elapsed time permits. Two streams that a message could both continue are unclear. Once their numbers have moved
-apart, both are identified by their pace, if the paces differ. Otherwise both stay unclear until only one of them is
-active.
+rclpy does not state the publisher of a message, but the messages of one publisher have consecutive numbers. A message
+therefore belongs to the stream that it continues: its number is higher, by no more than the elapsed time permits. Two
+streams are unclear if a message could continue both. Once their numbers have moved apart, the two are identified by
+their pace, the time per number, if the paces differ. Otherwise both stay unclear until only one of them is active.
 """
 import collections
 
@@ -11,32 +11,34 @@ DEFAULT_INTERVAL_NS = 5_000_000
 """Assumed time between two messages of a stream with only one message [ns]."""
 
 NUMBER_SLACK = 4
-"""Numbers that a stream may gain above twice its pace and its backlog."""
+"""Numbers by which a stream may grow in addition to its backlog and to twice the numbers of its pace."""
 
 MAX_BACKLOG_NS = 1_000_000_000
-"""Largest backlog of a stream, as time of its messages [ns]. A publisher that stalled catches up in a burst, of which
-some messages are lost."""
+"""Largest backlog of a stream, as time at its mean interval [ns]. The backlog is the number of messages by which the
+stream is behind its pace. A publisher that stalled sends its backlog in a burst, of which some messages are lost."""
 
 MAX_PAUSE_INTERVALS = 4.0
 """Longest time between two messages that counts for the mean interval of their stream [intervals]."""
 
 CLOSE_NUMBER_GAP = 20
-"""Largest difference of the numbers of two active streams that are unclear."""
+"""Difference of the numbers of two active streams up to which both streams are unclear."""
 
 PACE_WINDOW_MESSAGES, PACE_STRIDE_MESSAGES = 40, 8
-"""Number of messages, and stride, of a stream's pace: the median time per number over PACE_STRIDE_MESSAGES messages. A
-message that is held up, and a burst of a few, do not change it."""
+"""Number of last messages that give the pace of a stream, and distance between the two messages of a pair. The pace is
+the median of the time per number in all pairs. A late message, or a burst of a few, does not change it."""
 
 MAX_PACE_RATIO = 0.85
-"""Largest ratio of the paces of two unclear streams that are identified by pace, the faster one over the slower one
-[time per number]. The pace of each must also stay within the square root of this ratio."""
+"""Largest ratio of the paces (times per number) of two unclear streams that are identified by pace, the smaller over
+the larger. Each pace must also equal its value before the streams became unclear, within the square root of this
+ratio."""
 
 ACTIVE_LIMIT_NS = 200_000_000
-"""Time since its last message within which a stream is active [ns]. Of two unclear streams one has left when the
-numbers were those of one stream for this time."""
+"""Time since its last message within which a stream is active [ns]. Of two unclear streams one has left when all
+messages continued a single stream for this time."""
 
 RECENT_LIMIT_NS = 1_000_000_000
-"""Silence after which a stream is continued only by one of its next few numbers [ns]."""
+"""Silence up to which a stream takes part in the first comparison with a message [ns]. An inactive stream takes part
+only if the number is at most CLOSE_NUMBER_GAP ahead. All other streams are compared if no stream fits."""
 
 EXPIRY_LIMIT_NS = 30_000_000_000
 """Silence after which a stream is deleted [ns]."""
@@ -48,8 +50,8 @@ class Stream:
     last      sequence number of the last message; source: its time of sending, arrival: its time of arrival [ns]
     begun     time of arrival of the first message [ns]
     interval  mean time between two messages [ns]
-    owed      backlog against its pace [messages]
-    lost      number of messages left out; skipped: (before, after) the last gap
+    owed      backlog: messages by which the stream is behind its pace
+    lost      count of numbers without a message; skipped: numbers (before, after) the last gap
     unclear   True if the stream cannot be distinguished from another
 
     A PublisherGate adds:
@@ -78,12 +80,12 @@ class Stream:
         return NUMBER_SLACK + 2.0 * elapsed / (self.interval or DEFAULT_INTERVAL_NS)
 
     def near(self, other):
-        """Return True if the next message of this stream could be of the other stream, or the reverse."""
+        """Return True if the next message of one of the two streams could also be of the other."""
         behind, ahead = (self, other) if self.last < other.last else (other, self)
         return ahead.last - behind.last <= CLOSE_NUMBER_GAP or behind.fits(ahead.last, ahead.source)
 
     def follow(self, number, source, now):
-        """Add a message to this stream and return how many were left out before it."""
+        """Add a message to this stream, and return the number of messages that are missing before it."""
         gap, elapsed = number - self.last, source - self.source
         if elapsed > 0:
             interval = self.interval or DEFAULT_INTERVAL_NS
@@ -111,14 +113,14 @@ class Stream:
         return paces[len(paces) // 2]
 
     def revive(self, stream):
-        """Continue as a stream that turned out to be this one."""
+        """Take over the messages of `stream`, which turned out to be of the publisher of this stream."""
         self._messages = stream._messages
         self.last, self.source, self.arrival = stream.last, stream.source, stream.arrival
         self.interval, self.owed, self.skipped = stream.interval, stream.owed, stream.skipped
 
 
 class Streams:
-    """Streams of one topic. lost: messages that were left out in all of them."""
+    """Streams of one topic. lost: count of missing messages in all streams."""
 
     def __init__(self):
         self.streams = []
@@ -140,7 +142,7 @@ class Streams:
             self.lost += stream.follow(number, source, now)
             close = []
         else:
-            # A number that a stream left out: the stream was that of two publishers.
+            # If a recent stream left out this number, the messages of that stream were of two publishers.
             close = fitting or [other for other in recent if other.skipped[0] < number < other.skipped[1]]
             stream = self._begun(number, source, now)
         if len(self.streams) > 1:
@@ -157,12 +159,13 @@ class Streams:
         return sum(now - stream.arrival < ACTIVE_LIMIT_NS for stream in self.streams) > 1
 
     def _silent(self, number, source):
-        """Return [the stream with the latest message] of the inactive streams that the message can continue."""
+        """Return [the stream with the latest message] among all streams that the message can continue; [] without
+        one."""
         return sorted((stream for stream in self.streams if stream.fits(number, source)),
                       key=lambda stream: stream.arrival)[-1:]
 
     def _begun(self, number, source, now):
-        """Add a new stream. It is marked `overlapped` if its publisher may have been close to another publisher."""
+        """Add a new stream and return it. It is `overlapped` if its numbers may have been those of unclear streams."""
         self.streams = [other for other in self.streams if now - other.arrival < EXPIRY_LIMIT_NS]
         stream = Stream(number, source, now)
         stream.unclear = bool(self._close)
@@ -184,7 +187,7 @@ class Streams:
             stream.arrival = now
         active = [stream for stream in self.streams if stream.unclear and now - stream.arrival < ACTIVE_LIMIT_NS]
         if len(active) == 1 and now - active[0].begun >= ACTIVE_LIMIT_NS:
-            active[0].overlapped = True    # because this may be the publisher that was active beside the active one
+            active[0].overlapped = True    # because its publisher may have sent at the same time as the active one
             self._cleared(active)
         elif len(active) == len(self._close) == 2:
             before, after = (_by_pace(pair) for pair in (self._close, active))

@@ -1,26 +1,28 @@
-"""UTC for stamps that never go back: a steady clock with a bounded, slewed offset to the system's clock. No clock is
-read here; the caller passes pairs of readings.
+"""UTC for the stamps of a node (shell.Shell): a time that follows the system's clock and never goes back.
 
     t = steady + offset,    |d offset / d steady| <= MAX_SLEW_RATE
 
-The offset follows the system's clock, which NTP or PTP slews, at no more than MAX_SLEW_RATE. A difference beyond
-MIN_CLOCK_STEP_NS is a step of the system's clock and is reported. A step forward is followed at once. After a step
-back the time continues and is slewed, because otherwise a stamp would occur twice. The time is then ahead of nodes
-that start later, by `ahead`; a restart of the reporting node mends this.
+t is the UTC of this module, steady the reading of the steady clock, and offset their difference. The module reads no
+clock; its caller passes pairs of readings. NTP or PTP corrects the system's clock, and the offset follows this clock
+at no more than MAX_SLEW_RATE.
+
+A change beyond MIN_CLOCK_STEP_NS is a step of the system's clock and is reported. After a step forward, t is at once
+set to the system's clock. After a step back, t runs slower than the system's clock, because otherwise a stamp would
+occur twice. Meanwhile t is ahead of the time of nodes that start later, by `ahead`; a restart of this node ends this.
 """
 MAX_SLEW_RATE = 500e-6
-"""Largest slew rate of the offset, that of adjtime(3) [s/s]."""
+"""Largest rate of change of the offset, equal to that of adjtime(3) [s/s]."""
 
 MIN_CLOCK_STEP_NS = 10_000_000
-"""Difference between two readings above which the system's clock was stepped [ns]; MAX_SLEW_RATE would need 20 s for
-it."""
+"""Change of the system's clock against the steady clock, from one reading to the next, that counts as a step [ns]. At
+MAX_SLEW_RATE this change takes 20 s."""
 
 
 class Utc:
-    """Slewed UTC. steady, system: one pair of readings [ns] at the beginning.
+    """UTC that never goes back. steady, system: the first pair of readings of the two clocks [ns].
 
-    steps: number of steps of the system's clock, last_step: size of the last [ns, forward is positive]; ahead: lead of
-    this time over the system's clock [ns]
+    steps: number of steps of the system's clock; last_step: size of the last step [ns, forward is positive]; ahead:
+    lead of this time over the system's clock [ns]
     """
 
     def __init__(self, steady, system):
@@ -29,7 +31,7 @@ class Utc:
         self.steps = self.last_step = 0
 
     def at(self, steady, system) -> int:
-        """Return UTC [ns] at a pair of readings. A steady clock that went back gives the last time again."""
+        """Return UTC [ns] at a pair of readings. If the steady clock went back, the last time is returned again."""
         elapsed = max(steady - self._steady, 0)
         self._steady += elapsed
         jump = system - steady - self._system_offset

@@ -1,7 +1,9 @@
-"""Columns of a table by their names: the quantity, and the unit behind it, as in time_s, `az [deg]`, `Azimuth (rad)`.
+"""Search for the columns of a table by their names, for csv_table and the readers of tracks.
 
-The whole name is read. A name of a quantity and a known unit is a candidate; `az_rate` or `time_local` is another
-quantity, because `rate` and `local` are no units. Two candidates are refused by both names.
+The name of a column has a quantity and behind it a unit, as in time_s, `az [deg]`, `Azimuth (rad)`. A column is a
+candidate for a quantity if its name consists of this quantity and a known unit. `az_rate` or `time_local` is no
+candidate, because `rate` and `local` are no units. Two candidates are refused, by an error that names both. If there
+is no candidate, the error names a column that begins with the quantity and has no known unit.
 """
 import math
 import re
@@ -10,12 +12,13 @@ import typing
 from pedestal_common.graph.steps import SECONDS_PER_DAY
 
 METRES_PER_FOOT = 0.3048
-"""International foot [m]."""
+"""Length of the international foot [m]."""
 
 UTC, JULIAN_DATE, MODIFIED_JULIAN_DATE = 'UTC', 'JD', 'MJD'
 """Units of a time with a date: a calendar date (or seconds since 1970), a Julian date, a modified Julian date."""
 
 _UNIT_NAMES = {
+    # {unit of the reader, in lower case: {unit: its names in a file}}
     's': {'s': ('s', 'sec', 'secs', 'second', 'seconds'),
           'ms': ('ms', 'msec', 'millis', 'millisecond', 'milliseconds'),
           'us': ('us', 'µs', 'μs', 'usec', 'micros', 'microsecond', 'microseconds'),
@@ -31,33 +34,36 @@ _UNIT_NAMES = {
     'hz': {'hz': ('hz',), 'rad/s': ('rad/s', 'radpers')},
     'm2_per_hz': {'m2/Hz': ('m2/hz', 'm^2/hz', 'm2perhz', 'm²/hz', 'm**2/hz'),
                   'm2 s/rad': ('m2s/rad', 'm^2s/rad', 'm²s/rad', 'm2/rad/s', 'm^2/rad/s', 'm²/rad/s')}}
-_SIZES = {'s': 1.0, 'ms': 1e-3, 'us': 1e-6, 'ns': 1e-9, 'min': 60.0, 'h': 3600.0, 'd': SECONDS_PER_DAY,
-          'deg': 1.0, 'rad': math.degrees(1.0), 'mrad': math.degrees(1e-3),
-          'm': 1.0, 'km': 1000.0, 'cm': 0.01, 'mm': 1e-3, 'ft': METRES_PER_FOOT,
-          'hz': 1.0, 'rad/s': 0.5 / math.pi, 'm2/Hz': 1.0, 'm2 s/rad': 2.0 * math.pi,
-          UTC: 1.0, JULIAN_DATE: SECONDS_PER_DAY, MODIFIED_JULIAN_DATE: SECONDS_PER_DAY}
+_UNIT_SIZES = {'s': 1.0, 'ms': 1e-3, 'us': 1e-6, 'ns': 1e-9, 'min': 60.0, 'h': 3600.0, 'd': SECONDS_PER_DAY,
+               'deg': 1.0, 'rad': math.degrees(1.0), 'mrad': math.degrees(1e-3),
+               'm': 1.0, 'km': 1000.0, 'cm': 0.01, 'mm': 1e-3, 'ft': METRES_PER_FOOT,
+               'hz': 1.0, 'rad/s': 0.5 / math.pi, 'm2/Hz': 1.0, 'm2 s/rad': 2.0 * math.pi,
+               UTC: 1.0, JULIAN_DATE: SECONDS_PER_DAY, MODIFIED_JULIAN_DATE: SECONDS_PER_DAY}
+"""Size of each unit, in the first unit of its row in _UNIT_NAMES: s, deg, m, Hz or m2/Hz."""
 _UTC_PATTERN = re.compile(r'(ut|utc|utcg|gmt|z|zulu|utciso8601|iso8601|iso)?(hrmn(ss|sc)?(fff)?)?')
 """Words behind the name of a time in UTC; HR:MN:SS.fff is of JPL Horizons, UTCG of STK."""
 _APPARENT_NAMES = ('aapp', 'aappr', 'rapp')
-"""Words of JPL Horizons behind an apparent angle in degrees."""
+"""Words that JPL Horizons writes behind an apparent angle in degrees."""
 _BETWEEN_PATTERN = re.compile(r'[\s_\[\](){}<>|,:;.\-"\']+')
 _CAMEL_CASE_PATTERN = re.compile(r'(?<=[a-z])(?=[A-Z])')
 _DERIVED_WORDS = ('rate', 'vel', 'speed', 'acc', 'err', 'sigma', 'std', 'qual', 'valid')
-"""Beginnings of words that make another quantity of the quantity before them."""
+"""If the word behind a quantity begins with one of these, the column holds something else, such as the rate or the
+error of the quantity."""
 MAX_LISTED_NAMES = 20
 """Number of names of columns that an error lists."""
 
 
 class ColumnError(ValueError):
-    """The columns of a table do not give a quantity; one line that names the columns."""
+    """The columns of a table do not give a quantity. The message is one line that names the columns."""
 
 
 class Quantity(typing.NamedTuple):
     """A quantity of a table.
 
         label       its name in errors
-        names       {name: unit of a column without one}; '' for a column that must name its unit
-        unit        unit in which the reader takes the values, a key of the known units
+        names       {name of the quantity in a file: unit that is assumed if the column states none}; '': the column
+                    must state its unit
+        unit        unit in which the reader takes the values
     """
     label: str
     names: dict
@@ -65,7 +71,8 @@ class Quantity(typing.NamedTuple):
 
 
 class Column(typing.NamedTuple):
-    """A column that was taken: its name in the file, the unit of its values, and the size of this unit."""
+    """A column that was found: its name in the file, and the unit of its values. size: factor from this unit to
+    the unit of the Quantity."""
     name: str
     unit: str
     size: float
@@ -84,14 +91,14 @@ def quantity(name):
 def find(names, wanted, required=True):
     """Return the Column of a Quantity among the names of a table; None if no name begins with the quantity.
 
-    Raises ColumnError for two candidates, and for names with the quantity of which none has a known unit. The rate or
-    the error of a quantity that is not required is no such name.
+    Raises ColumnError for two candidates. Also raises ColumnError if names begin with the quantity, but none has a
+    known unit. The name of the rate or the error of a quantity is ignored if the quantity is not required.
     """
     found, others = [], []
     for name in names:
         unit = unit_of(name, wanted)
         if unit:
-            found.append(Column(name, unit, _SIZES[unit]))
+            found.append(Column(name, unit, _UNIT_SIZES[unit]))
         elif unit == '' and (required or not _known(name, wanted)[1].startswith(_DERIVED_WORDS)):
             others.append(name)
     if len(found) > 1:
@@ -126,7 +133,8 @@ def listed(names):
 
 
 def _known(name, wanted):
-    """Return (known name of the quantity, rest without blanks and brackets) of a column; None for another quantity."""
+    """Return (name of the quantity, rest without blanks and brackets) of a column's name; None if the name does not
+    begin with the quantity."""
     for spaced in (name, _CAMEL_CASE_PATTERN.sub(' ', name)):
         text = ' '.join(spaced.lower().replace('_', ' ').split())
         for known in sorted(wanted.names, key=len, reverse=True):
@@ -136,7 +144,8 @@ def _known(name, wanted):
 
 
 def unit_of(name, wanted):
-    """Return the unit of a column, '' if the name has none that is known, None if it is another quantity."""
+    """Return the unit of a column; '' if the words behind the quantity are no known unit; None if the name does not
+    begin with the quantity."""
     match = _known(name, wanted)
     if not match:
         return None

@@ -1,10 +1,10 @@
-"""Content of a file by its first bytes: the encoding of a text, and the name of a format that is no text."""
+"""Recognition of the content of a file by its first bytes: the encoding of a text, or a format that is no text."""
 import codecs
 from xml.parsers import expat
 
 ENCODINGS_BY_MARK = ((codecs.BOM_UTF8, 'utf-8-sig'), (codecs.BOM_UTF32_LE, 'utf-32'), (codecs.BOM_UTF32_BE, 'utf-32'),
                      (codecs.BOM_UTF16_LE, 'utf-16'), (codecs.BOM_UTF16_BE, 'utf-16'))
-"""(byte order mark, encoding); the mark of UTF-32 begins with that of UTF-16."""
+"""(byte order mark, encoding). UTF-32 comes before UTF-16, because one mark of UTF-32 begins with a mark of UTF-16."""
 FALLBACK_ENCODING = 'cp1252'
 """Encoding of a text without a mark that is not UTF-8: Windows-1252, with all letters of latin-1."""
 
@@ -21,7 +21,7 @@ PACKED_FORMATS = (
     (b'%PDF', 'a PDF document: save its table as CSV'),
     (b'7z\xbc\xaf\x27\x1c', 'a 7z archive: unpack it with 7z x'),
     (b'\xd0\xcf\x11\xe0', 'an Excel workbook (.xls): export it as CSV'))
-"""(first bytes, name and remedy) of files that hold a text in another form."""
+"""(first bytes, name of the format and remedy) of files that are no plain text but may contain a table."""
 MAX_MARK_BYTES = 6
 """Largest number of bytes that name a format."""
 
@@ -49,9 +49,10 @@ def beginning(content):
 
 
 def decode(content):
-    """Return the text of the bytes of a file: by its mark, else UTF-8, else FALLBACK_ENCODING.
+    """Return the text of the bytes of a file. Raises UnicodeDecodeError.
 
-    Raises UnicodeDecodeError; a byte 0 without the mark of UTF-16 or UTF-32 is no text.
+    The encoding is that of the byte order mark. Without a mark it is UTF-8, or FALLBACK_ENCODING if the bytes are not
+    UTF-8. Bytes with a 0 and without a mark are no text.
     """
     encoding = marked_encoding(content)
     if encoding:

@@ -1,8 +1,8 @@
-"""Tables of numbers in CSV files: named columns, each with its range, the first of them increasing.
+"""Reader of tables of numbers in CSV files: named columns, each with an allowed range, the first of them increasing.
 
-Separators are comma, semicolon, tab, bar and blanks; with another separator than the comma, numbers may have a decimal
-comma. Blank lines, titles and lines that begin with a comment mark are passed over, `sep=` is read, the case of a name
-does not matter. Of a file of JPL Horizons, the rows between $$SOE and $$EOE are read.
+A separator is a comma, a semicolon, a tab, a bar or blanks. If it is not a comma, numbers may have a decimal comma.
+Blank lines, titles and lines that begin with a comment mark are skipped. A line `sep=;` for example states the
+separator. The case of a name does not matter. In a file of JPL Horizons, the rows between $$SOE and $$EOE are read.
 """
 import array
 import contextlib
@@ -37,7 +37,7 @@ SNIFFED_LINES = 10
 """Number of lines by which the separator is found."""
 
 REPEATED_ROW = 'row that repeats the row before'
-"""Name of the rows that are passed over because they repeat the row before them."""
+"""Name of the rows that are skipped because they repeat the row before them."""
 
 _DIGIT_FIRST_PATTERN = re.compile(r'[-+]?\.?\d', re.ASCII)
 _DATE_PATTERN = re.compile(r'\d{1,2}:|\d{4}[-/]\d|\d{1,2}[-/ .]\w+[-/ .]\d|\d{8}T', re.ASCII)
@@ -47,22 +47,23 @@ _DECIMAL_COMMA_PATTERN = re.compile(r'[-+]?\d+,\d+(?:[eE][-+]?\d+)?', re.ASCII)
 
 
 class TableError(ValueError):
-    """Error of a file that is no such table; one line with file, line, column, value and allowed range."""
+    """Error of a file that is no valid table. Its text is one line that names file, line, column, value and allowed
+    range."""
 
 
 class Rows(typing.NamedTuple):
-    """Rows of a table: numbers (n, k), and a line that names the columns that were taken and counts the rows."""
+    """Rows of a table: numbers (n, k), and a line of text that names the columns taken and the number of rows."""
     numbers: np.ndarray
     description: str
 
 
 def read(path, columns, least_rows=2, max_step=np.inf, step_name='its greatest step', optional=None) -> Rows:
-    """Return the Rows of a CSV file with a header: numbers (n, k) in the order of columns {name: (low, high)}, then of
-    the optional columns, which are 0 where the file has none.
+    """Return the Rows of a CSV file with a header. Raises TableError.
 
-    A name ends with the unit of the values, as in time_s; the file may have another known unit, as in `time [min]`.
-    The first column grows from row to row, by at most max_step (called step_name in the error). A row that repeats
-    the row before is passed over. Columns of other names are ignored. Raises TableError.
+    columns, optional: {name: (low, high)}; the numbers (n, k) have the columns in this order. An optional column that
+    the file lacks is 0. A name ends with the unit of the values, as in time_s; the file may have another known unit,
+    as in `time [min]`. The first column grows from row to row, by at most max_step, which the error calls step_name.
+    A row that repeats the row before is skipped. Columns of other names are ignored.
     """
     first, *_ = columns
     unit = first.partition('_')[2]
@@ -121,7 +122,7 @@ def text(path):
 
 
 READ_ERRORS = (TableError, csv.Error)
-"""Errors of a text that is no table."""
+"""Errors that mean that a text is no table."""
 
 
 @contextlib.contextmanager
@@ -139,7 +140,7 @@ class Table:
         fieldnames      names of the columns, without the blanks around them
         head_line       line of the names in the file
         line_num        line of the last row
-        bare            names of the columns of a text without names, whose first line is a row of as many numbers
+        bare            names of the columns for a text without names: its first line is a row with as many cells
     """
 
     def __init__(self, path, content, bare=()):
@@ -185,8 +186,11 @@ class Table:
         return None
 
     def column(self, quantity, required=True, without=''):
-        """Return the columns.Column of a columns.Quantity, other than the column `without`; None if there is none and
-        it is not required. Raises TableError."""
+        """Return the columns.Column of a columns.Quantity. None if there is none and it is not required. Raises
+        TableError.
+
+        without: name of a column that is not considered, '' for none.
+        """
         try:
             column = _columns.find([name for name in self.fieldnames if name != without], quantity, required)
         except _columns.ColumnError as error:
@@ -207,9 +211,9 @@ class Table:
         return f'{_columns.listed(self.fieldnames)} (separator {self.separator!r})'
 
     def number(self, column, cell, low, high):
-        """Return the number in a cell of a columns.Column, in the unit of its quantity, between low and high.
+        """Return the number in a cell of a columns.Column, in the unit of its quantity. Raises TableError.
 
-        cell: None if the row ends before the column. Raises TableError.
+        cell: None if the row ends before the column; low, high: allowed range, in the unit of the quantity.
         """
         if cell is None:
             raise TableError(f'{self.path}: line {self.line_num}: the row ends before the column {column.name!r:.60}')
@@ -235,9 +239,9 @@ class Table:
 
 
 def _beginning(lines):
-    """Return (lines before the names of the columns, line of the names, separator that the file names or '').
+    """Return (lines before the names of the columns, line of the names, separator that the file states or '').
 
-    lines: stream of the text. The last comment before the names stays the last line before them.
+    lines: stream of the text, which is left behind the line of the names.
     """
     before, separator, horizons = [], '', None
     for line in itertools.islice(lines, MAX_HEAD_LINES):
@@ -263,7 +267,7 @@ def _beginning(lines):
 def _names_above(before, separator, bare):
     """Return the cells of the last line with text before the first row, which may be names in a comment.
 
-    Names between blanks count if one of them begins like one of `bare`, the names of a text without names.
+    Names that are separated by blanks count if one of them begins like one of `bare` (see Table).
     """
     line = next((line.strip().lstrip('#%/ \t') for line in reversed(before) if line.strip()), '')
     cells, words = next(csv.reader([line], delimiter=separator, skipinitialspace=True), []), line.split()
@@ -289,7 +293,7 @@ def _separator(begin, sample):
 
 
 def _is_row(cells):
-    """Return True if cells are those of a row and not names: the first begins with a digit, another is a number."""
+    """Return True if cells are a row and no names: the first cell begins with a digit, and another is a number."""
     return bool(cells) and bool(_DIGIT_FIRST_PATTERN.match(cells[0])) and any(map(_is_number, cells[1:]))
 
 
@@ -310,7 +314,7 @@ def require(table, names):
 def number(path, line, name, cell, low, high):
     """Return the number in a cell of text, between low and high. Raises TableError."""
     try:
-        value = float(str(cell).replace('_', ' '))  # float() passes over _ between digits
+        value = float(str(cell).replace('_', ' '))  # float() alone would accept _ between digits
     except ValueError:
         raise TableError(f'{path}: line {line}: {name} = {cell!r:.60}: must be a number') from None
     if not low <= value <= high:

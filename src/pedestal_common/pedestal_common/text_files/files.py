@@ -1,4 +1,4 @@
-"""Opening of files of other programs.
+"""Safe opening of files that other programs have written.
 
 A pipe, a device or a file of enormous length is refused, because it would block the process or fill its memory.
 """
@@ -8,15 +8,14 @@ import os
 import stat
 
 SPARSE_FILE_LIMITS = 16_000_000, 100
-"""Length [bytes] above which a file may be refused as sparse, and the ratio of its length to its blocks on the disk
-above which it is refused."""
+"""Limits above which a file is refused as sparse, if it exceeds both: its length [bytes], and the ratio of its length
+to the bytes that it has on the disk."""
 
 
 def open_regular(path, largest=None):
-    """Return a regular file as an open binary stream: no device, no pipe, no directory, at most `largest` bytes where
-    given.
+    """Return a regular file (no device, pipe or directory) as an open binary stream.
 
-    Raises OSError, whose strerror is the reason.
+    largest: largest accepted length [bytes], None for any. Raises OSError, whose strerror is the reason.
     """
     descriptor = os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK)
     try:

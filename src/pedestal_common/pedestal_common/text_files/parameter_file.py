@@ -1,6 +1,8 @@
-"""ROS 2 parameter files: those of a graph name its nodes /**/acu, which is acu in any namespace.
+"""Reader and writer of ROS 2 parameter files. `pedestal run`, the launch file and every node use this one reader, so
+that all accept and refuse the same files.
 
-One reader for `pedestal run`, the launch file and every node, so that all take and refuse the same files.
+A section of a file is for one node. In the files of a graph the name of a section is /**/acu for example, which means
+the node acu in any namespace.
 """
 import re
 
@@ -12,34 +14,34 @@ from pedestal_common.text_files import files, plain_yaml
 ANY_NAMESPACE = '/**/'
 
 EVERY_NODE = '*'
-"""`node_of` a section for every node of a namespace, such as /**."""
+"""Result of `node_of` for a section that is for every node of a namespace, such as /**."""
 
 
 class ParameterFileError(ValueError):
-    """Error of a parameter file that cannot be read; one line with the file and the section."""
+    """Error of a parameter file that cannot be read. Its text is one line with the file and the section."""
 
 
 def text(sections):
-    """Return the file of {node: {name: value}}; a node of a beam is named as 'beam_2/acu'."""
+    """Return the text of a parameter file of {node: {name: value}}; a node of a beam is named 'beam_2/acu'."""
     return dumped({ANY_NAMESPACE + node: values for node, values in sections.items()})
 
 
 def dumped(sections):
-    """Return the file of {section: {name: value}}."""
+    """Return the text of a parameter file of {section: {name: value}}."""
     return plain_yaml.dump({section: {'ros__parameters': values} for section, values in sections.items()},
                            sort_keys=False)
 
 
 def divided(section):
-    """Return (namespace, node) of a section, of a beam 'beam_2/acu'."""
+    """Return (namespace, node) of the name of a section. A node of a beam is 'beam_2/acu' for example."""
     return re.fullmatch(r'(.*?)/?((?:beam_[1-9]\d*/)?[^/]*)', section, re.DOTALL).groups()
 
 
 def node_of(section, namespace=''):
-    """Return the node, as 'acu' or 'beam_2/acu', that a section is for in a graph in a namespace such as '/ship_1'.
+    """Return the node for which a section is, 'acu' or 'beam_2/acu', in a graph in a namespace such as '/ship_1'.
 
-    EVERY_NODE: each node of the namespace. None: no node of this namespace. A section such as acu, without a slash, is
-    for the node of the graph in any namespace; rcl has the rules for the others.
+    Return EVERY_NODE for each node of the namespace, None for no node of this namespace. A section without a slash,
+    such as acu, is for the node of the graph in any namespace. For all other sections the rules are those of rcl.
     """
     place, node = divided(section)
     if node in ('*', '**'):
@@ -50,7 +52,7 @@ def node_of(section, namespace=''):
 
 
 def dotted(tree, prefix=''):
-    """Return {dotted name: value} of nested values. Raises ParameterFileError for a name with two values or none."""
+    """Return {dotted name: value} of nested dicts. Raises ParameterFileError for a name with two values or none."""
     flat = {}
     for key, value in tree.items():
         name = f'{prefix}{key}'
@@ -65,7 +67,7 @@ def dotted(tree, prefix=''):
 
 
 def _found(tree, place=''):
-    """Yield (section, its body) of a file: a namespace may hold its nodes as sections."""
+    """Yield (name of a section, its body) of a file. A namespace may contain the sections of its nodes."""
     for name, body in tree.items():
         section = f'{place.rstrip("/")}/{name.lstrip("/")}' if place else name
         if isinstance(body, dict) and body and 'ros__parameters' not in body and all(
@@ -76,7 +78,8 @@ def _found(tree, place=''):
 
 
 def parse(content):
-    """Return {section: {dotted name: value}} of the text of a file. Raises ParameterFileError, without the file."""
+    """Return {section: {dotted name: value}} of the text of a file. Raises ParameterFileError, which does not name the
+    file."""
     try:
         tree = plain_yaml.parse(content)
     except yaml.YAMLError as error:
@@ -98,7 +101,7 @@ def parse(content):
 
 
 def read(path):
-    """Return {section: {dotted name: value}} of a file. Raises ParameterFileError."""
+    """Return {section: {dotted name: value}} of a file. Raises ParameterFileError, which names the file."""
     try:
         return parse(files.read_text(path, plain_yaml.MAX_YAML_BYTES))
     except (OSError, UnicodeDecodeError) as error:

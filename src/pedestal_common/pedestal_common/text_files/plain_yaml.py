@@ -1,8 +1,9 @@
-"""YAML as parameter files use it: sections, lists, numbers, true, false and texts, each as it is written.
+"""Reader and writer of the part of YAML that parameter files use: sections, lists, numbers, true, false and texts.
 
 YAML 1.1 reads 1:30 as 90, 010 as 8, 1_0 as 10, 2024-01-01 as a date and `on` as true. Here they are texts, so that a
-parameter which is a number refuses them. A section has each key once. Tags are refused, and in a parameter file
-aliases, as rcl refuses them. Where aliases are accepted, a few lines cannot stand for billions of values.
+parameter which is a number refuses them. A section has each key once. Tags are refused. Aliases are refused in a
+parameter file, because rcl refuses them. Where aliases are accepted, MAX_VALUES counts them with all their values. A
+few lines can therefore not stand for billions of values.
 """
 import re
 import typing
@@ -25,7 +26,7 @@ _Base: typing.Any = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
 
 
 class _Loader(_Base):
-    """Loader of the plain values. Its own resolvers and constructors replace the rules of YAML 1.1."""
+    """Loader of the values of this module. Its own resolvers and constructors replace the rules of YAML 1.1."""
 
     yaml_implicit_resolvers: dict = {}
     yaml_constructors = {tag: _Base.yaml_constructors[tag] for tag in (*(_TAG + name for name in _PLAIN), None)}
@@ -63,7 +64,7 @@ for _name, _pattern, _first in (
 
 
 class _Dumper(yaml.SafeDumper):
-    """A dumper that quotes each text that `parse` or rcl would take for a number or a flag."""
+    """Writer that quotes each text that `parse` or rcl would take for a number or a flag."""
 
 
 _Dumper.add_implicit_resolver(_TAG + 'quoted', re.compile(

@@ -1,7 +1,8 @@
-"""Places of the numbers of a message in its CDR bytes.
+"""Places (byte positions) of the numbers of a message in its bytes, for the Decoder and the Encoder of `records`.
 
-Messages of a topic that differ only in their numbers have them at the same places. One message is therefore parsed by
-the definition of its type, and the others are read at the places found.
+The bytes are in CDR, the format of DDS. Messages of a topic that differ only in their numbers have their numbers at
+the same places. One message is therefore parsed by the definition of its type, and the others are read at the places
+found.
 """
 import struct
 
@@ -17,21 +18,23 @@ _DTYPES = {'bool': 'u1', 'byte': 'u1', 'char': 'u1', **{name: f'{name[0]}{size}'
 STAMPED_TYPES = {'rosgraph_msgs/msg/Clock'}
 STAMPED_TYPES.update(name for name, (_, fields) in ROS_TYPESTORE.fielddefs.items()
                      if fields and fields[0] == ('header', (Nodetype.NAME, 'std_msgs/msg/Header')))
-"""Types whose first field is their stamp."""
+"""Message types that begin with their stamp."""
 
 MAX_MESSAGE_NUMBERS = 400_000
 """Largest number of numbers in one message; a program track of a whole day has 350,000."""
 
 PADDING_LIMIT_BYTES = 4
-"""Limit of the padding that DDS adds behind a message: always less than this [bytes]."""
+"""The padding that DDS adds behind a message is always less than this [bytes]."""
 
 
 class Places:
-    """Places in one message, given as CDR bytes of a type.
+    """Places in one message, given as CDR bytes of a type. Raises ValueError when the bytes are no such message.
 
-    numbers [(path, start, dtype)], texts {path: text}, fixed [(start, stop)]: bytes that must be equal in another
-    message for its numbers to be at these places; stop: end of the message. Raises ValueError when the bytes are no
-    message of the type.
+    numbers     [(path of the number in the message, its first byte, dtype)]
+    texts       {path: text}
+    fixed       [(start, stop)] of the bytes that must be equal in another message, so that its numbers are at these
+                places
+    stop        end of the message
     """
 
     def __init__(self, data, type_name):
@@ -47,11 +50,15 @@ class Places:
             raise ValueError(f'{len(data)} bytes are no {type_name}: {error}') from None
 
     def _fields(self, type_name, prefix):
+        """Find the places in the next bytes, which hold a value of this type. prefix: beginning of the paths of its
+        fields."""
         for name, node in ROS_TYPESTORE.fielddefs[type_name][1]:
             self._node(node, prefix + name)
 
     def _take(self, size, alignment, path):
-        """Return the start of the next `size` bytes."""
+        """Return the start of the next `size` bytes, and move `stop` behind them. path: path of the field, for an
+        error.
+        """
         self.stop += -(self.stop - CDR_HEADER_BYTES) % alignment     # CDR aligns numbers from the end of the header
         start, self.stop = self.stop, self.stop + size
         if self.stop > len(self.data):
@@ -59,11 +66,13 @@ class Places:
         return start
 
     def _length(self, path):
+        """Return the length of a text or a list, which stands before its content."""
         start = self._take(4, 4, path)
         self.fixed.append((start, self.stop))
         return struct.unpack_from(self.order + 'I', self.data, start)[0]
 
     def _node(self, node, path):
+        """Find the places in the next bytes, which hold one field. node: type of the field, by rosbags."""
         kind, what = node
         if kind == Nodetype.NAME:
             self._fields(what, path + '.')

@@ -16,7 +16,7 @@ SERVICE_CLIENT, SCHEDULE_CLIENT = 'service', 'scenario'
 """Clients of a command by service, whose caller is unknown, and of a command by schedule."""
 
 RESERVED_KEYS = ('granted', 'reply')
-"""Keys of a reply beside the arguments."""
+"""Keys of a reply in addition to the arguments of its command."""
 
 HELD_REFUSAL, LIMITS_REFUSAL, RANGE_REFUSAL = 'control is held by', 'outside limits', 'must be'
 """Parts of the texts of refusals by which a program distinguishes them: another client has control; the angles are
@@ -82,8 +82,10 @@ class CommandDefinition(typing.NamedTuple):
 
 
 def values(definitions, command) -> dict:
-    """Return {argument: number or text} of a command by its CommandDefinition, defaults included. Raises
-    ValueError."""
+    """Return {argument: number or text} of a Command, with the defaults of left-out arguments. Raises ValueError.
+
+    definitions: CommandDefinitions of the node, one of which must have the name of the command.
+    """
     definition = next((row for row in definitions if row.name == command.verb), None)
     if definition is None:
         names = [row.name for row in definitions]
@@ -116,8 +118,19 @@ def _value(definition, argument, text):
     except ValueError:
         raise refused from None
     if not argument.low <= number <= argument.high:
-        raise refused
+        raise ValueError(f'{refused}{_in_degrees(number, argument)}')
     return number
+
+
+def _in_degrees(number, argument):
+    """Return a refused angle or rate and its range in degrees, '' for an Argument with another unit or for NaN.
+
+    `pedestal mode rate --az 500` gives degrees, and a client of the topic gives radians.
+    """
+    if argument.unit not in ('rad', 'rad/s') or math.isnan(number):
+        return ''
+    given, low, high = (f'{math.degrees(value):.4g}' for value in (number, argument.low, argument.high))
+    return f' ({given} {argument.unit.replace("rad", "deg")}: must be {low} to {high})'
 
 
 def of_message(status) -> Command:

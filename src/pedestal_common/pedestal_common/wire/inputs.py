@@ -1,8 +1,10 @@
-"""Inputs of a unit that follow from the rows of its topics: their record, and the copy into it.
+"""Inputs of the control unit, made from the table of topics: the fields of their record, and the copy into this
+record.
 
-Topic.inputs names them by the fields of the record of the topic. A name that stands for several numbers is an array.
-Beside the fields of its layout a message has `stamp`, here in seconds, and `came`: 1 in a step in which it arrived,
-else 0. The other inputs keep the values of the last message. A text has `code`.
+Topic.inputs gives the name of an input for each field of the topic. A name that stands for several numbers is an
+array. In addition to the fields of its layout, a message has the fields `stamp` and `came`. `stamp` is in seconds.
+`came` is 1 in a step in which the message arrived, else 0. The other inputs keep the values of the last message. A
+text has the field `code` only.
 """
 import itertools
 
@@ -13,7 +15,7 @@ from pedestal_common.wire.records import NO_STAMP
 
 
 def _numbers(topic):
-    """Yield (input, [its numbers in the record of a topic as source text]) of the fields of its layout."""
+    """Yield (name of an input, [source text that reads each of its numbers from the record of a topic])."""
     given, row = topics.TOPIC_BY_NAME[topic].inputs, topics.TOPIC_BY_NAME[topic]
     for field in layouts.fields(topic):
         if field.name in given:
@@ -32,7 +34,7 @@ def fields(names) -> list:
 
 
 def _lines(topic):
-    """Yield the source lines of the copy of one topic."""
+    """Yield the source lines that copy the record of one topic, `m`, into the inputs `u`."""
     given = topics.TOPIC_BY_NAME[topic].inputs
     yield f'    m = inputs[{topic!r}]'
     if 'code' in given:

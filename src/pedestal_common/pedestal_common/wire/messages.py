@@ -1,8 +1,9 @@
-"""Messages as rosbags builds them: the same classes in a node, a bag and a test.
+"""Messages of the topics, as objects of the library rosbags: the same classes in a node, a bag and a test.
 
-Nodes publish bytes that rosbags serialised. Because rclpy's own serialiser leaves the alignment padding of CDR
-undefined, its recordings are never identical (measured: stale bytes of earlier messages, in 297 of 300 diagnostics).
-The serialiser of rosbags writes zeros there. It also reads a JointState in half the time.
+Nodes publish bytes that rosbags serialised. The serialiser of rclpy leaves the alignment padding of CDR, the byte
+format of DDS, undefined. Two recordings would then never be identical: in 297 of 300 diagnostics, the padding had
+bytes of earlier messages. The serialiser of rosbags writes zeros there. rosbags also reads a JointState in half the
+time.
 """
 import struct
 
@@ -46,7 +47,7 @@ Vector3Stamped = _TYPES['geometry_msgs/msg/Vector3Stamped']
 
 
 def serialize(message) -> bytes:
-    """Return the CDR bytes of a message, padding zeroed, because equal runs must give equal bytes."""
+    """Return the CDR bytes of a message. The padding is zero, because equal runs must give equal bytes."""
     return bytes(ROS_TYPESTORE.serialize_cdr(message, message.__msgtype__))
 
 
@@ -88,7 +89,8 @@ def put_stamp(stamp, ns):
 
 
 def since(message, epoch):
-    """Return the message with its header's stamp, changed in place, counted from an epoch [ns]; a stamp 0 stays 0."""
+    """Change the stamp in the header of a message so that it counts from an epoch [ns]; a stamp 0 stays 0. Return the
+    message."""
     stamp = nanoseconds(message.header.stamp)
     put_stamp(message.header.stamp, stamp - epoch if stamp else 0)
     return message
@@ -128,7 +130,8 @@ def _vector3_stamped(row):
 def _range(row):
     """Return a Range measured by radio, at any distance.
 
-    The type has codes for ultrasound (0) and infrared (1) and none for radio. 0 is taken, because radio is no light.
+    The type has a code for ultrasound (0) and for infrared (1), but none for radio. The code is 0, because radio is no
+    light.
     """
     return Range(header=header(row.frame), radiation_type=0, field_of_view=0.0, min_range=0.0, max_range=float('inf'),
                  range=0.0, variance=0.0)

@@ -1,4 +1,5 @@
-"""Numbers of messages as records: of one message in a node, of a whole run in the closed loop, of many in a bag.
+"""Records: numpy records with the numbers of messages. A node has one record for a step; the closed loop and the
+reader of a bag have an array of records for many steps.
 
 A unit reads and writes one record that has a field for each of its topics:
 
@@ -6,8 +7,8 @@ A unit reads and writes one record that has a field for each of its topics:
                         that is not to be published
     text, list of texts an integer, its code; topics.NO_TEXT_CODE before the first
 
-A Decoder reads the numbers from the CDR bytes of a message, an Encoder writes numbers into them, both by their places
-(cdr.Places). Neither builds a message object.
+A Decoder reads the numbers from the CDR bytes of a message, and an Encoder writes numbers into such bytes. Both use
+the places of the numbers (cdr.Places), and neither builds a message object.
 """
 import struct
 
@@ -57,7 +58,7 @@ def empty(record_type, count) -> np.ndarray:
 
 def numbers(records, topic) -> np.ndarray:
     """Return a view (n, columns) of the numbers of a stamped topic in records (n,)."""
-    # In words of 8 bytes; the first word of the topic is its stamp.
+    # Positions are in words of 8 bytes. The first word of the topic is its stamp.
     offset = records.dtype.fields[topic][1]
     start = offset // 8 + 1
     return records.view('f8').reshape(len(records), -1)[:, start:start + len(layouts.columns(topic))]
@@ -70,10 +71,11 @@ def code_of(topic, text) -> int:
 
 
 class _Shape:
-    """Places of the columns of a topic, from one message, valid for messages that differ only in their numbers.
+    """Places of the columns of a topic, found in one message, and valid for messages that differ only in their
+    numbers.
 
-    fields: [(column, start, dtype)]; reader: the Struct that reads these numbers at once. marks: [(columns, Structs
-    with their starts, function absent)] of layouts.no_data.
+    fields: [(index of the column, first byte, dtype)]; reader: the Struct that reads these numbers at once. marks:
+    [(columns, [(Struct, first byte)], function absent)] of layouts.no_data.
     """
 
     def __init__(self, topic, data):
@@ -103,7 +105,7 @@ class _Shape:
 
 
 def _joined(fixed):
-    """Return the list of (start, stop) with neighbours merged."""
+    """Return a list of (start, stop) in which adjacent ranges are merged."""
     joined = []
     for start, stop in sorted(fixed):
         if joined and joined[-1][1] == start:
@@ -114,7 +116,8 @@ def _joined(fixed):
 
 
 def _runs(fields):
-    """Return [(columns as a slice, dtype, count, start)] of numbers [(column, start, dtype)], neighbours merged."""
+    """Return [(columns as a slice, dtype, count, start)] of numbers [(column, start, dtype)], in which adjacent
+    numbers are merged."""
     runs = []
     for column, start, dtype in fields:
         dtype = np.dtype(dtype)
@@ -186,11 +189,12 @@ class Encoder:
         return self._stamp[0] != NO_STAMP
 
     def encoded(self, epoch=0) -> bytes:
-        """Return the message with the numbers of the record, its stamp counted from the epoch [ns]."""
+        """Return the CDR bytes of the message with the numbers of the record. Its stamp is that of the record plus the
+        epoch [ns]."""
         return self.bytes_of(self._stamp.item() + epoch, self._numbers)
 
     def bytes_of(self, stamp, values) -> bytes:
-        """Return the message with a stamp [ns] and numbers (columns,)."""
+        """Return the CDR bytes of the message with a stamp [ns] and numbers (columns,)."""
         _STAMP.pack_into(self._buffer, messages.CDR_HEADER_BYTES, *divmod(stamp, 1_000_000_000))
         for columns, view in self._views:
             view[:] = values[columns]

@@ -9,7 +9,7 @@ JOG_VERB, NEW_JOG_PAUSE_S = 'rate', 2.0
 
 
 class Log:
-    """The newest lines, `most` at most.
+    """The newest lines of the event log. most: largest number of lines.
 
     lines      [{'t': UTC [s], 'who': name, 'text': line, 'bad': True for a refusal or an alarm}]
     revision   number of lines added
@@ -25,7 +25,7 @@ class Log:
         self.revision += 1
 
     def replied(self, t, command, reply):
-        """Log the commands.Reply to a commands.Command, a repeated jog once."""
+        """Log the commands.Reply to a commands.Command at a time t, UTC [s]. A repeated jog is logged once."""
         # The time is stored first. A command that is no jog then deletes it, because the next jog is a new line.
         before, self._last_jogs[command.who] = self._last_jogs.get(command.who, -NEW_JOG_PAUSE_S), t
         if command.verb != JOG_VERB:

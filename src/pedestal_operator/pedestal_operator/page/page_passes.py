@@ -1,4 +1,4 @@
-"""Next passes of the satellite of the antenna, after the loaded program track. No ROS here.
+"""Search for the next passes of the satellite that the antenna follows, for the sky plot of the page. No ROS here.
 
 A separate thread finds the passes, so the page does not wait for them.
 """
@@ -24,8 +24,10 @@ MIN_UTC_S = 1e8
 class PassQuery(typing.NamedTuple):
     """Satellite, station and day of a search.
 
-    ahead: UTC of the elements minus time of the graph [s], 0 except in a simulation of another day; day: number of the
-    interval of SEARCH_VALIDITY_DAYS.
+    line_1, line_2, omm   elements of the satellite
+    ahead                 UTC for which the satellite is computed, minus the time of the graph [s]; 0 except in a
+                          simulation of another day
+    day                   number of the interval of SEARCH_VALIDITY_DAYS since 1970
     """
     line_1: str
     line_2: str
@@ -58,8 +60,9 @@ def pass_query(antenna):
 
 
 def upcoming_passes(query):
-    """Return [{aos, los: [s] in the time of the graph, highest, from, to: [deg]}] from the day of a PassQuery on.
+    """Return a list of the passes from the day of a PassQuery on, each a dict.
 
+    aos, los: rise and set [s], in the time of the graph; highest: elevation, from, to: azimuth at rise and set [deg].
     The list is empty if the elements are too old for the day, or if the satellite does not rise and set.
     """
     begin = datetime.datetime(1970, 1, 1) + datetime.timedelta(days=query.day * SEARCH_VALIDITY_DAYS)

@@ -1,8 +1,9 @@
-"""Commands of pages to the control unit, and the replies: roles, jog timeouts. No ROS here.
+"""Commands from the open pages to the control unit, and the replies; roles and timeouts are checked. No ROS here.
 
-A jog has three timeouts. The page repeats it while its button is held. Each repetition is forwarded once, if the last
-state that the page received is at most MAX_STATE_AGE_S old. If a page that jogs is silent for JOG_TIMEOUT_S or has
-left, this module stops the axes. The control unit itself stops them 0.5 s after the last jog.
+A jog is a command of axis rates while a button of the page is held. The page repeats the jog, and three timeouts end
+it. Each repetition is forwarded once, if the last state that the page received is at most MAX_STATE_AGE_S old. If a
+page that jogs is silent for JOG_TIMEOUT_S or has left, this module stops the axes. The control unit itself stops the
+axes 0.5 s after the last jog.
 """
 import math
 
@@ -28,10 +29,10 @@ MAX_ARGUMENTS = 20
 
 
 class PageRequests:
-    """Commands of all pages.
+    """Commands of all pages. The arguments are functions:
 
-    request(who, verb, {argument: value})   send a command, return the number of the request
-    replied(number)                         return its Reply, or None
+    request(who, verb, {argument: value})   send a command to the control unit, return the number of the request
+    replied(number)                         return the Reply to a request, or None
     send(client, message)                   send a message to a page
     is_jogging()                            return True while the antenna follows a jog
     """
@@ -53,6 +54,7 @@ class PageRequests:
             self._send(client, {'error': 'unknown message: must have jog or ask'})
 
     def _forward(self, client, message, now):
+        """Check a command of a page, and forward it to the control unit."""
         verb, given, number = message['ask'], message.get('arguments') or {}, message.get('id')
         if not (isinstance(given, dict) and len(given) <= MAX_ARGUMENTS and _is_allowed(verb) and all(
                 _is_allowed(name) and isinstance(value, (str, int, float)) and _is_allowed(str(value))
@@ -67,6 +69,8 @@ class PageRequests:
         self._waiting[self._request(str(client), verb, given)] = client, number, verb, now
 
     def _jog(self, client, rates, now, age):
+        """Check a jog of a page, and forward it. rates: (azimuth, elevation) [deg/s], both 0 at its end; age: age of
+        the last state on the page [s]."""
         refusal = page_security.refusal_reason(client.role, 'rate', {})
         if refusal:
             self._send(client, {'verb': 'rate', 'granted': False, 'reply': refusal})
@@ -89,11 +93,12 @@ class PageRequests:
         self._waiting[number] = client, None, 'rate', now
 
     def _end_jog(self, client, now):
+        """Stop the axes if the page jogs and the antenna still follows a jog."""
         if self._jogs.pop(client, None) is not None and self._is_jogging():
             self._rate(client, (0.0, 0.0), now)
 
     def look(self, now):
-        """Forward replies, end the jogs of silent pages, and report missing replies."""
+        """Forward replies, end the jogs of silent pages, and report missing replies, at the time now [s]."""
         for client in [client for client, at in self._jogs.items() if now - at > JOG_TIMEOUT_S]:
             self._end_jog(client, now)
         for number, (client, page_number, verb, at) in list(self._waiting.items()):
@@ -105,6 +110,7 @@ class PageRequests:
                 self._forward_reply(client, page_number, verb, reply, now)
 
     def _forward_reply(self, client, page_number, verb, reply, now):
+        """Send a Reply to the page that sent the command; the Reply to an accepted jog is left out."""
         if verb == 'stop' and not reply.granted:  # standby is the fallback if the control unit cannot hold the axes
             self._waiting[self._request(str(client), 'standby', {})] = client, page_number, 'standby', now
         if verb != 'rate' or not reply.granted:

@@ -1,4 +1,4 @@
-"""Access to the server of the page by token, name of the host and origin of the request. No ROS, no server.
+"""Access control of the web server of the page: it checks token, `Host` and `Origin` of a request. No ROS, no server.
 
 A token stands for a role. It arrives once in the address of the page, then in a cookie. No script can read the
 cookie, and the browser sends it to this site only. `Host` must be a name of this server. This avoids that a foreign
@@ -28,14 +28,14 @@ SUPERVISOR_REQUESTS = (('take', 'role', 'supervisor'),)
 
 
 HOST = re.compile(r'(\[[0-9a-f:.]+\]|[^\[\]:]+)(?::(\d{1,5}))?')
-"""Name and port of a `Host` in small letters."""
+"""Pattern of a `Host` in small letters: group 1 is the name, group 2 the port."""
 
 MAX_SHOWN_CHARACTERS = 100
 """Longest part of a request in a refusal [characters]."""
 
 
 class Refused(Exception):  # noqa: N818  no error of the server
-    """A refused request. status: of HTTP; reason: one line."""
+    """A refused request. status: status code of HTTP; reason: one line."""
 
     def __init__(self, status, reason):
         super().__init__(reason)
@@ -43,10 +43,10 @@ class Refused(Exception):  # noqa: N818  no error of the server
 
 
 class Request(typing.NamedTuple):
-    """Parts of a request that decide about access.
+    """Parts of an HTTP request that decide about access.
 
-    path: without the query; token: of the query; changes_state: True for a web socket, and for all methods except GET
-    and HEAD.
+    host, origin, cookie: its headers; path: without the query; token: from the query; changes_state: True for a web
+    socket, and for all methods except GET and HEAD.
     """
     host: str
     origin: str
@@ -57,9 +57,10 @@ class Request(typing.NamedTuple):
 
 
 class Access:
-    """New tokens of a server at an address and port. names: further names of the server, without scheme and port.
+    """Access to a server at an address and port, with new tokens for each role.
 
-    Raises ValueError for a name that is not the name of a host.
+    names: further names of the server, without scheme and port. Raises ValueError for a name that is not the name of a
+    host.
     """
 
     def __init__(self, address, port, names=()):
@@ -149,7 +150,8 @@ def _bracketed(name):
 
 
 def headers(host):
-    """Return the headers [(name, value)] of every answer: content of this site only, revalidated, without frames."""
+    """Return the headers [(name, value)] of every answer. They allow content of this site only, require the browser to
+    check its cache, and forbid frames. host: `Host` of the request."""
     return [('content-security-policy',
              "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self'; "
              f"connect-src 'self' ws://{host} wss://{host}; "

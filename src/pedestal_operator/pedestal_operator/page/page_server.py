@@ -1,10 +1,12 @@
-"""Server of the page: its files, and a web socket for each page, in a separate thread. No ROS here.
+"""Web server of the page of the operator: the files of the page, and a web socket for each open page. No ROS here.
 
-A section is a named part of the state that a page shows, as JSON. The revision of a section is the number of its last
-change. A message to a page has the sections whose revision the page does not have yet. Messages are numbered, and a
-page acknowledges the number of the last one. A page with MAX_UNSEEN_MESSAGES unacknowledged messages receives no
-further message; the next one has the newest sections. So no queue grows except the short queue of replies to the page.
-A page without an acknowledgement for PAGE_TIMEOUT_S is dropped.
+The server runs in its own thread. A section is a named part of the state that a page shows, as JSON. The revision of a
+section is the number of its last change. A message to a page has the sections whose revision the page does not have
+yet. Messages are numbered, and a page acknowledges the number of the last message.
+
+A page with MAX_UNSEEN_MESSAGES unacknowledged messages receives no further message. After its next acknowledgement it
+receives the newest sections. Therefore no queue grows, except the short queue of replies to the page. A page without
+an acknowledgement for PAGE_TIMEOUT_S is dropped.
 """
 import asyncio
 import collections
@@ -50,14 +52,15 @@ SHUTDOWN_TIMEOUT_S = 1.0
 
 
 class PageMessage(typing.NamedTuple):
-    """Message of a page: a dict, None when the page has left. age: of the last acknowledged state [s]."""
+    """Message from a page. message: its content, None when the page has left; age: age of the last state that the page
+    acknowledged [s]."""
     client: 'Client'
     message: dict | None
     age: float
 
 
 class Client:
-    """A page. name: of its user; role: of page_security.PAGE_ROLES; address: of its host."""
+    """An open page. name: of its user; role: one of page_security.PAGE_ROLES; address: of its host."""
 
     def __init__(self, name, role, address):
         self.name, self.role, self.address = name, role, address
@@ -70,7 +73,8 @@ class Client:
         return f'{self.name}@page {self.address}'
 
     def newest(self, sections):
-        """Return the next message, JSON with the changed sections. sections: {name: (revision, JSON)}."""
+        """Return the next message to the page: JSON with the changed sections and the replies. sections: {name:
+        (revision, JSON)}."""
         self._number += 1
         self._sent[self._number] = time.monotonic()
         parts = [f'"number":{self._number}', *(f'"{name}":{text}' for name, (revision, text) in sections.items()
@@ -111,13 +115,14 @@ class Client:
 
 
 class PageServer:
-    """A server that runs from its construction to `close`.
+    """A server that runs from its construction to `close`. Raises OSError if the address and port are not available.
 
-    requests    queue of PageMessage, for the node
-    pages       number of pages
+    names       further names of the server, see page_security.Access
+    most        largest number of open pages
     history()   return the past of the charts for a new page; called in a thread of the server
 
-    Raises OSError if the address and port are not available.
+    requests    queue of PageMessage, for the node
+    pages       number of open pages
     """
 
     def __init__(self, address, port, names, most, history):
@@ -126,8 +131,8 @@ class PageServer:
         self.access = page_security.Access(address, self._socket.getsockname()[1], names)
         self._most, self._history = most, history
         self._clients, self._sections, self._revision, self._named = set(), {}, 0, 0
-        # _clients, _sections: of the thread of the server; _published, the JSON of each section: of the thread of the
-        # node.
+        # Only the thread of the server uses _clients and _sections. Only the thread of the node uses _published, the
+        # JSON of each section.
         self._published = {}
         app = Starlette(routes=[Route('/', self._index), Route('/history', self._history_answer),
                                 WebSocketRoute('/socket', self._serve_page),
@@ -177,7 +182,8 @@ class PageServer:
         self._thread.join(3.0 * SHUTDOWN_TIMEOUT_S)
 
     def _guarded(self, app):
-        """Return the app behind page_security, with the headers on its answers."""
+        """Return an ASGI app that checks each request by page_security before `app` answers, and adds headers to each
+        answer."""
         async def guarded(scope, receive, send):
             request = _request(scope)
             try:
@@ -199,6 +205,7 @@ class PageServer:
         return answer
 
     async def _history_answer(self, _):
+        """Answer with the past of the charts."""
         return Response(await asyncio.to_thread(lambda: encoded(list(self._history()))), media_type='application/json')
 
     async def _serve_page(self, websocket):

@@ -1,4 +1,4 @@
-"""Content of the sky plot of the page, in earth angles [deg] also on a moving deck. No ROS here."""
+"""Content of the sky plot of the page. Its angles are earth angles [deg], also on a moving deck. No ROS here."""
 import collections
 import math
 import typing
@@ -10,7 +10,7 @@ from pedestal_common.graph import topics
 from pedestal_common.wire import messages
 
 HORIZON_STEP_DEG = 5.0
-"""Azimuth between two points of a line around the horizon [deg]."""
+"""Difference in azimuth between two points of a line around the horizon [deg]."""
 
 MAX_PATH_POINTS = 240
 """Largest number of points of a path."""
@@ -20,13 +20,15 @@ MIN_HISTORY_STEP_DEG = 0.3
 
 
 class Path(typing.NamedTuple):
-    """A program track: times (n,) in UTC [s], angles (n, 2) [deg]: unwrapped earth azimuth, elevation."""
+    """A program track: times (n,) in UTC [s], angles (n, 2) [deg]: earth azimuth without jumps of 360 deg, elevation.
+    """
     times: np.ndarray
     angles: np.ndarray
 
 
 def path(message, midnight):
-    """Return the Path of an acu/program_track, None for a preset. midnight: UTC of a stamp 0 [s]."""
+    """Return the Path of a message of acu/program_track, None for a preset. midnight: UTC for which a stamp 0 stands
+    [s]."""
     if len(message.points) < 2 or not set(topics.AXES) <= set(message.joint_names):
         return None
     start = messages.nanoseconds(message.header.stamp) * 1e-9 or midnight
@@ -45,7 +47,14 @@ def thinned(path):
 
 
 def passage(path, loss):
-    """Return [the pass of a Path], [] without a rise. loss: text of the predicted loss of track [s], '' for none."""
+    """Return a list with the pass of a Path, [] if the path stays below the horizon.
+
+    aos, los    UTC of rise and set [s]
+    highest     highest elevation [deg]
+    from, to    azimuth at rise and at set [deg]
+    travel      change of the azimuth from rise to set [deg]
+    loss        text of the predicted loss of track [s], '' for none
+    """
     if path is None:
         return []
     up = np.flatnonzero(path.angles[:, 1] > 0.0)
@@ -98,9 +107,12 @@ class Deck:
         return [round(math.degrees(angle), 3) for angle in earth]
 
     def line(self, points):
-        """Return a line of deck angles [deg] in earth angles [[azimuth, elevation], ...], one per HORIZON_STEP_DEG."""
+        """Return a line in earth angles [[azimuth, elevation], ...] [deg], with a point every HORIZON_STEP_DEG.
+
+        points: corners of the line in deck angles [deg].
+        """
         found = []
-        for (A, E), (B, F) in zip(points, points[1:]):
+        for (A, E), (B, F) in zip(points, points[1:]):     # azimuth and elevation of two neighbours
             count = max(int(abs(B - A) / HORIZON_STEP_DEG), 1)
             found += [self.seen(A + (B - A) * i / count, E + (F - E) * i / count) for i in range(count)]
         return found + [self.seen(*points[-1])] if points else found

@@ -1,10 +1,10 @@
-"""Sections of the state that the page shows, of a running antenna or of a recording. No ROS here.
+"""Content of the page of the operator: the sections of the state, of a running antenna or of a recording. No ROS here.
 
 The functions take an antenna.Antenna with three further attributes:
 
 now             UTC [s]
-configuration   {name of a parameter: value}
-path            page_sky.Path or None
+configuration   {name of a parameter of SHOWN_PARAMETERS: value}
+path            page_sky.Path of the program track, or None
 """
 import math
 
@@ -42,11 +42,15 @@ HISTORY_COLUMNS = ('t', 'cross_elevation', 'elevation', 'azimuth_error', 'elevat
 
 
 def _deck(antenna):
+    """Return the page_sky.Deck at the last attitude; without an attitude, the deck ashore."""
     return page_sky.Deck(antenna.numbers[ATTITUDE_TOPIC][:4] if antenna.present(ATTITUDE_TOPIC) else None)
 
 
 def now(antenna) -> dict:
-    """Return the present numbers: angles and rates [deg, deg/s], errors [deg], level [dB-Hz], torques [Nm]."""
+    """Return the present numbers: angles and errors [deg], rates [deg/s], level [dB-Hz], torques of the motors [Nm].
+
+    `axes` are deck angles, `beam` the earth angles of the beam.
+    """
     actual, commanded = antenna.angles('joint_states'), antenna.angles('acu/reference')
     receiver, torques = (math.nan,) * 3, []
     if antenna.present(ANGLE_ERROR_TOPIC):
@@ -74,8 +78,8 @@ def history_row(frame) -> list:
 def status_section(antenna) -> dict:
     """Return the state of the antenna for the header, the axes and the buttons: see the module `state`.
 
-    refused: {'holder', 'other', 'supervisor': {command: reason}} for a client with control, without control, and for a
-    supervisor without control.
+    The item `refused` has {command: reason} for three kinds of client: `holder` has control, `other` has no control,
+    `supervisor` is a supervisor without control.
     """
     acu, header = antenna.diagnostics_of('acu'), state.header(antenna)
     texts = {name: antenna.texts.get(topic, '') if acu else '' for name, topic in TEXT_TOPIC_BY_NAME.items()}
@@ -105,7 +109,7 @@ def _dated(antenna, alarm):
 
 
 def epoch(antenna):
-    """Return time 0 of the graph in UTC [s]: graph.start, or the start of the day."""
+    """Return the UTC at which the time of the graph is 0 [s]: graph.start, or the start of the day."""
     return antenna.configuration.get('graph.start', 0) * 1e-9 or antenna.now // 86400.0 * 86400.0
 
 
@@ -124,9 +128,10 @@ def fixed(antenna) -> dict:
 
 
 def sky(antenna, coming) -> dict:
-    """Return the sky plot: path, hidden sectors, directions out of reach, sun and passes.
+    """Return the content of the sky plot in earth angles [deg]: path, hidden sectors, lines, sun and passes.
 
-    coming: passes after the program track, from page_passes.UpcomingPasses.
+    `floor` and `top` are the lines of the lowest and the highest elevation that the antenna can reach; `hole` is the
+    time of the keyhole, UTC [s]. coming: passes after the program track, from page_passes.UpcomingPasses.
     """
     deck, p, acu = _deck(antenna), antenna.configuration, antenna.diagnostics_of('acu')
     begin = epoch(antenna)

@@ -1,1 +1,1 @@
-"""Protocols of antenna rotators, and the controller behind them."""
+"""Servers of rotator protocols, by which satellite programs point the antenna, and their common controller."""

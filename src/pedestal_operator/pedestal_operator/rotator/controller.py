@@ -1,7 +1,8 @@
-"""Control of the antenna by programs, independent of their protocol.
+"""Controller: it turns the requests of rotator programs into commands to the control unit, for all protocols.
 
-One program at a time is in control. Set-points become a motion. A jog lasts until its program leaves. A program with
-a connection for each set-point stays in control until its motion ends.
+One program at a time is in control. Its set-points (directions) become one steady motion. A jog lasts until its
+program leaves or sends another command. Some programs open a connection for each set-point; such a program stays in
+control until its motion ends.
 """
 import math
 
@@ -28,15 +29,17 @@ CONTROL_TIMEOUT_S = 10.0
 class PendingRequest:
     """Pending request of a client.
 
-    outcome   an outcome of `outcomes`, None before it is known
-    reason    of a refusal, one line
+    numbers   numbers of its commands without a reply
+    deadline  time after which no reply is awaited [s]
+    outcome   one of the outcomes in `outcomes`, None before it is known
+    reason    reason of a refusal, one line
     """
 
     def __init__(self, numbers, deadline, outcome=None, reason=''):
         self.numbers, self.deadline, self.outcome, self.reason = list(numbers), deadline, outcome, reason
 
     def look(self, remote, now):
-        """Take the replies. Return the outcome."""
+        """Take the replies at the time now [s]. Return the outcome, None before it is known."""
         for number in list(self.numbers):
             reply = remote.replied(number)
             if reply is not None:
@@ -59,7 +62,10 @@ def _outcome(refusal):
 
 
 class Controller:
-    """Requests for the clients of a server, with their names. remote: remote_node.Remote."""
+    """Control of the antenna by the clients of a server. remote: the remote_node.Remote that sends the commands.
+
+    In all methods client is the name of a client, and now a time of the monotonic clock [s].
+    """
 
     def __init__(self, remote):
         self._remote = remote
@@ -98,7 +104,7 @@ class Controller:
         return PendingRequest([self._remote.request('stop')], now + CLIENT_REPLY_TIMEOUT_S)
 
     def look(self, now):
-        """Repeat a jog, end a motion without further set-points, and release unused control."""
+        """Repeat a jog, end a motion without further set-points, and release control that is no longer used."""
         self._remote.who = self._holder
         self.pointing.look(now)
         is_jogging = self._remote.texts.get('acu/mode') == 'rate'
@@ -135,6 +141,10 @@ class Controller:
         self._remote.request('release')
 
     def _request(self, client, now, send, continues=True):
+        """Return the pending request of send(), which sends a command; take control first if necessary.
+
+        continues: False for a command that ends the motion of the set-points.
+        """
         if self._has_left and address_of(client) == address_of(self._holder):
             self._release()  # the same program on a new connection: its motion continues
         if self._holder not in ('', client):

@@ -1,8 +1,8 @@
-"""Requests and answers of the EasyComm protocols I, II and III. No sockets, no ROS here.
+"""Requests and answers of the rotator protocols EasyComm I, II and III. No sockets, no ROS here.
 
-A line has words of two letters and a value, separated by spaces. A query is answered with the same letters and the
-value (azimuth 0 to 360 deg), a setting is not answered (hamlib/rotators/easycomm, easycomm.txt). A line with a word
-that cannot be read is refused as a whole.
+A line has words, separated by spaces. A word is mostly two letters and a value, such as AZ123.4. A query, such as AZ,
+is answered with the same letters and the value (azimuth 0 to 360 deg). All other words are settings, which are not
+answered (hamlib/rotators/easycomm, easycomm.txt). A line with a word that cannot be read is refused as a whole.
 """
 import re
 import typing
@@ -19,7 +19,8 @@ VERB_BY_WORD = {'SA': 'stop', 'SE': 'stop', 'RESET': 'acu/reset_faults', 'PARK':
 """{word: command of the control unit}."""
 
 RATE_DIRECTIONS = {'L': (0, -1), 'R': (0, 1), 'U': (1, 1), 'D': (1, -1)}
-"""{second letter of a move at the jog rate (ML) or of a velocity (VL0500, in mdeg/s): (axis, sign)}."""
+"""{second letter of a word: (axis, sign)}. The word is a move at the jog rate, such as ML, or a velocity, such as
+VL0500 [mdeg/s]. axis: 0 azimuth, 1 elevation."""
 
 IGNORED_WORDS = 'UP', 'DN', 'UM', 'DM', 'UR', 'DR', 'AO', 'LO', 'OP', 'IP', 'AN', 'ST', 'CR', 'CW'
 """Words of frequencies, modes, signals, ports, the time and the configuration, which an antenna control unit ignores.
@@ -40,7 +41,8 @@ class LineRequest(typing.NamedTuple):
     queries              words to answer, in order
     azimuth, elevation   of a set-point [deg], None if missing
     verb                 command of the control unit
-    rates                of a jog (azimuth, elevation) [deg/s], or, if scaled, in jog rates
+    rates                of a jog (azimuth, elevation) [deg/s], None for no jog
+    scaled               True if the rates are not in deg/s, but multiples of the jog rate of the server
     """
     queries: tuple = ()
     azimuth: float | None = None
@@ -100,7 +102,8 @@ def _speed(text):
 def answer(request, angles, status, errors, version) -> bytes:
     """Return the answer to a LineRequest.
 
-    angles: (azimuth, elevation) [deg], None if unknown: then AZ and EL are not answered; status, errors: of GS and GE.
+    angles: (azimuth, elevation) [deg], or None if unknown: then AZ and EL are not answered. status, errors, version:
+    values in the answers to GS, GE and VE.
     """
     values = {'GS': f'GS{status}', 'GE': f'GE{errors}', 'VE': f'VE{version}'}
     if angles is not None:

@@ -1,4 +1,4 @@
-"""Server of line protocols over TCP and a serial device; it never waits for a client."""
+"""Server of text lines over TCP and a serial device, for the rotator protocols; it never waits for a client."""
 import collections
 import contextlib
 import os
@@ -34,7 +34,7 @@ class Lines:
         self._has_line_ends = False
 
     def take(self, data):
-        """Return the lines that bytes complete, None for a line that is too long."""
+        """Return a list of the lines that these bytes complete; None stands for a line that is too long."""
         *lines, self._remainder = (self._remainder + data).replace(b'\r', b'\n').split(b'\n')
         found, self._has_line_ends = [], self._has_line_ends or bool(lines)
         for line in lines:
@@ -45,7 +45,8 @@ class Lines:
         return found
 
     def take_unterminated(self, is_complete):
-        """Return [the bytes without a line end] of a program that never sent one, if is_complete(line), else []."""
+        """Return a list with the received text without a line end, if is_complete(text) and if the program has never
+        sent a line end; else []."""
         line = self._remainder.decode('ascii', 'replace')
         if self._has_line_ends or self._skips_line or not is_complete(line):
             return []
@@ -60,7 +61,7 @@ class Client:
     lines     unanswered lines
     dropped   number of answers dropped because they were not read
     gone      reason of its end, None while it is connected
-    refusals  {command: reason of its last refusal}, as they were logged
+    refusals  {command: reason of its last logged refusal}
     """
 
     def __init__(self, stream, name, longest):
@@ -179,6 +180,7 @@ class LineServer:
         self._selector.register(stream, selectors.EVENT_READ, client)
 
     def _drop(self, client):
+        """Remove a client and close its connection."""
         self.clients.remove(client)
         self._selector.unregister(client.stream)
         client.stream.close()

@@ -1,4 +1,4 @@
-"""Outcomes of the requests of a client, independent of its protocol."""
+"""Outcomes of the requests of a rotator program, independent of its protocol."""
 
 (OUTCOME_DONE, OUTCOME_REFUSED, OUTCOME_OUT_OF_REACH, OUTCOME_BUSY, OUTCOME_NO_REPLY,
  OUTCOME_NO_POSITION) = range(6)
@@ -7,7 +7,7 @@ position, or its limits are unknown."""
 
 
 class Refused(Exception):  # noqa: N818  no error of the server
-    """A refused request. outcome: an outcome above; reason: one line."""
+    """A refused request. outcome: one of the outcomes above; reason: one line."""
 
     def __init__(self, outcome, reason):
         super().__init__(reason)

@@ -1,8 +1,9 @@
-"""Steady motion from the set-points of a program without knowledge of turns, rates and ships.
+"""Pointing of the antenna by the set-points (directions) of a rotator program, as one steady motion.
 
-Such a program sends a direction about every 0.8 s, with an azimuth of 0 to 360 deg. Ashore, a set-point is a `preset`
-on the nearest turn of the azimuth. On a ship, it is a `slave` direction in earth angles. Successive set-points become
-one motion (SetPointFilter), which ends at the last set-point.
+Such a program knows nothing of azimuth turns, rates and ships. It sends a direction about every 0.8 s, with an azimuth
+of 0 to 360 deg. Ashore, a set-point becomes a command `preset` on the nearest turn of the azimuth. On a ship, it
+becomes a command `slave` in earth angles. Successive set-points become one motion (SetPointFilter), which ends at the
+last set-point.
 """
 import math
 
@@ -17,8 +18,8 @@ from pedestal_operator.rotator.set_point_filter import SetPointFilter
 SLAVE_DURATION_S = 3600.0
 """Time for which a `slave` direction on a ship is valid [s].
 
-A program may send one set-point and then none for a long time. The antenna keeps this direction meanwhile, longer than
-a pass lasts.
+A program may send one set-point and then none for a long time. The antenna then keeps this direction for a time that
+is longer than a pass.
 """
 
 MAX_ANGLE_AGE_S = 0.5
@@ -38,7 +39,7 @@ LIMIT_PARAMETERS = tuple(f'{axis}.limits.{end}' for axis in topics.AXES for end 
 
 
 class Pointing:
-    """Set-points for a remote_node.Remote."""
+    """Pointing of the antenna of a remote_node.Remote by set-points."""
 
     def __init__(self, remote):
         self._remote = remote
@@ -64,7 +65,7 @@ class Pointing:
         return Limits(tuple(angles[:2]), tuple(angles[2:]))
 
     def look(self, now):
-        """Take the limits of the control unit, and settle if no set-point has followed the last one."""
+        """Take the limits of the control unit, and settle if no set-point has followed the last one in time."""
         self._query.look()
         if not self.continues(now):
             self.settle(now)
@@ -136,7 +137,10 @@ class Pointing:
         self._filter = SetPointFilter()
 
     def _request(self, angles, rates=(0.0, 0.0), moves=0.0):
-        """Request angles [deg] that move at rates [deg/s] for `moves` [s]; on a ship valid for `holds` [s]."""
+        """Command angles [deg] that move at rates [deg/s] for the time `moves` [s]. Return the number of the request.
+
+        On a ship the command is valid for SLAVE_DURATION_S.
+        """
         names = (*topics.AXES, *(f'{axis}_rate' for axis in topics.AXES))
         arguments = {**dict(zip(names, np.radians((*angles, *rates)))), 'moves': moves}
         if self.on_ship:

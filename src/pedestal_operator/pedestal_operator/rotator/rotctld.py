@@ -1,8 +1,8 @@
-"""Requests and answers of the network protocol of rotctld from Hamlib, line by line. No sockets, no ROS here.
+"""Requests and answers of the network protocol of rotctld, the rotator server of Hamlib. No sockets, no ROS here.
 
-Written for Hamlib 4.5.4 (rotctl -m 2, rotctld -m 1) and gpredict. The reference reads words; this module reads lines,
-with three differences. A command with too few arguments is refused at once and does not take the next line. An unknown
-command is answered. Numbers must be finite.
+The module is written for Hamlib 4.5.4 (rotctl -m 2, rotctld -m 1) and gpredict. rotctld itself reads word by word,
+this module reads line by line. There are three differences. A command with too few arguments is refused at once and
+does not take the next line. An unknown command is answered. Numbers must be finite.
 """
 import typing
 
@@ -17,7 +17,7 @@ MAX_LINE_BYTES = 256
 
 ERROR_REASONS = {RESULT_INVALID: 'invalid arguments', RESULT_NOT_IMPLEMENTED: 'unknown command',
                  RESULT_NOT_AVAILABLE: 'an antenna control unit has no such function'}
-"""{result of a line that cannot be read: its reason in the log}."""
+"""{result of a refused line: its reason in the log}."""
 
 
 class Row(typing.NamedTuple):
@@ -41,7 +41,7 @@ SET_COMMANDS = tuple(row.name for row in COMMANDS if row.sets)
 UNAVAILABLE_COMMANDS = (*'wCUuXx3LlDdEeBAaVv', 'send_cmd', 'set_conf', 'set_func', 'get_func', 'set_parm', 'get_parm',
                         'dump_conf', 'lonlat2loc', 'loc2lonlat', 'dms2dec', 'dec2dms', 'dmmm2dec', 'dec2dmmm', 'qrb',
                         'a_sp2a_lp', 'd_sp2d_lp', 'set_level', 'get_level')
-"""Commands of the reference without a function in an antenna control unit."""
+"""Commands of Hamlib's rotctld that have no function in an antenna control unit."""
 
 MOVE_DIRECTIONS = {2: (0, 1), 4: (0, -1), 8: (-1, 0), 16: (1, 0), 32: (-1, 1), 64: (1, 1), 128: (-1, -1), 256: (1, -1)}
 """{number: direction (azimuth, elevation)} of `move`."""
@@ -60,9 +60,9 @@ class Limits(typing.NamedTuple):
 class Request(typing.NamedTuple):
     """Content of a line.
 
-    name        of the command
+    name        name of the command
     values      its arguments
-    separator   character between the lines of an extended response, '' for a plain response
+    separator   character between the lines of an extended response (see rotctld), '' for a plain response
     header      first line of an extended response
     error       result of a refusal, RESULT_OK without one
     """
@@ -74,7 +74,7 @@ class Request(typing.NamedTuple):
 
 
 def read(line) -> Request | None:
-    """Return the Request of a line without its end, None for a line without an answer."""
+    """Return the Request of a line (without its line end), None for a line that has no answer."""
     line = line.strip()
     if not line or line.startswith('#'):
         return None
@@ -115,7 +115,7 @@ def _values(name, given):
 
 
 def is_complete(line) -> bool:
-    """Return True if a line without its end is a valid command with all its arguments."""
+    """Return True if a line (without its line end) is a valid command with all its arguments."""
     request = read(line)
     return request is not None and request.error == RESULT_OK
 
@@ -132,13 +132,13 @@ def answer(request, result, lines=()) -> bytes:
 
 
 def position(azimuth, elevation, raw=False):
-    """Return the lines of get_pos [deg]; azimuth from 0 to 360, unchanged if raw."""
+    """Return the lines of the answer to get_pos [deg]. The azimuth is from 0 to 360 deg, or unchanged if raw."""
     shown = azimuth if raw else round(azimuth % 360.0, 2) % 360.0
     return [('Azimuth', f'{shown:.2f}'), ('Elevation', f'{elevation:.2f}')]
 
 
 def state(limits, extended):
-    """Return the lines of dump_state."""
+    """Return the lines of the answer to dump_state."""
     (low_az, high_az), (low_el, high_el) = limits
     if extended:
         return [('rotctld Protocol Ver', '1'), ('Rotor Model', '2'), ('Minimum Azimuth', f'{low_az:.6f}'),
@@ -149,7 +149,7 @@ def state(limits, extended):
 
 
 def flags(rates, angles, limits):
-    """Return the status words of moving axes (rates [deg/s]) and of axes at a limit (angles [deg])."""
+    """Return the status words of axes that move and of axes at a limit. rates [deg/s], angles [deg]: of both axes."""
     words, moving = [], [abs(rate) > 0.01 for rate in rates]
     if any(moving):
         words.append('MOVING')

@@ -1,4 +1,4 @@
-"""Base of the nodes that serve a line protocol to other programs."""
+"""Base class of the nodes that serve a rotator protocol, line by line, to other programs (rotctld, EasyComm)."""
 import dataclasses
 import time
 
@@ -8,7 +8,7 @@ from pedestal_operator.rotator.controller import Controller
 from pedestal_operator.rotator.line_server import LineServer
 
 POLL_PERIOD_S = 0.005
-"""Period of the service of the clients [s]."""
+"""Period at which the node reads from and answers its clients [s]."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -75,10 +75,10 @@ class ServerNode(Remote):
             self.request('release')
 
     def refuse(self, client, command, line, reason):
-        """Log the refusal of a line, None for a line that was too long.
+        """Log the refusal of a line of a client. line: its text, None for a line that was too long.
 
-        A repeated reason is logged again after the next success of the command: the subclass then deletes the reason
-        from client.refusals.
+        A reason that repeats is logged once. It is logged again after the next success of the command: the subclass
+        then deletes the reason from client.refusals.
         """
         if client.refusals.get(command) != reason:
             client.refusals[command] = reason
@@ -86,7 +86,7 @@ class ServerNode(Remote):
             self.get_logger().warning(f'{client.name}: {refused}: {reason.removeprefix("refused: ")}')
 
     def close(self):
-        """Release the control of the clients, and close the port, then the node."""
+        """Release the control of the clients, then close the port and the node."""
         self.controller.release(time.monotonic())
         self._server.close()
         super().close()

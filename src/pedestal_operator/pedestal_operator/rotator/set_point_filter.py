@@ -1,8 +1,9 @@
-"""Steady motion from successive set-points. No ROS here.
+"""Filter that makes one steady motion of the set-points of a rotator program. No ROS here.
 
-    P, C    set-point and commanded point (azimuth, elevation) [deg]
-    r       rate of the set-points [deg/s]
+    P, C    set-point, and point that is commanded to the antenna: (azimuth, elevation) [deg]
+    r       estimated rate of the set-points [deg/s]
     T       time from one set-point to the next [s]
+    g, h    gains G and H of the filter
 
 Set-points at a regular pace are the measurements of a g-h filter
 (E. Brookner, Tracking and Kalman Filtering Made Easy, 1998, section 1.2):
@@ -10,9 +11,9 @@ Set-points at a regular pace are the measurements of a g-h filter
     r = r + h ((P - P_before) / T - r)
     rate of C = r + g (P - C) / T
 
-The motion of C continues from its present place, so it neither jumps nor stops. An irregular set-point cannot be
-predicted, for example from a program that waits for an error above a threshold. Then C is P, or stays at its place
-while this place is ahead of P.
+The motion of C continues from its present place, so it neither jumps nor stops. Irregular set-points cannot be
+predicted: some programs wait until the error exceeds a threshold. Then C becomes P. If C is already ahead of P in the
+direction of motion, C stays at its place.
 """
 import numpy as np
 
@@ -23,17 +24,22 @@ MAX_SET_POINT_RATE_DEG_S = 5.0
 """Rate between two set-points above which the second is a new target [deg/s]."""
 
 PERIOD_TOLERANCE_RATIO = 0.3
-"""Largest change of T for a regular pace, as part of T."""
+"""Largest change of T from one set-point to the next at a regular pace, as part of T [-]."""
 
 G, H = 0.5, 0.5
-"""Gains of the g-h filter."""
+"""Gains of the g-h filter [-]."""
 
 MOTION_DURATION_RATIO = 1.5
-"""Duration of the motion of C after a set-point, as part of T; then C stops."""
+"""Time for which C moves after a set-point, divided by T [-]; then C stops."""
 
 
 class SetPointFilter:
-    """The last set-point, None before the first, and its motion."""
+    """State of the filter. set_point: the last set-point P [deg], None before the first.
+
+    _when       time of the last set-point [s]; _T: the last T, None if the last set-point began a new motion
+    _begins     C at that time; it moves at _rate [deg/s] for the time _moves [s]
+    _r          r
+    """
 
     def __init__(self):
         self.set_point, self._when, self._T = None, 0.0, None

@@ -6,6 +6,8 @@ import {find, make, number, time} from './text.js';
 const POINT_PERIOD_S = 0.5;  // some hundred pixels show about a thousand points
 const DRAW_PERIOD_MS = 1000;  // the lines move by less than a pixel
 const MAX_GAP_S = 15;  // after a longer gap (hidden page, lost link) the page requests the history
+const RECENT_S = 20;  // every rate of this time is on the scale
+const MAX_OFF_SCALE = 0.05;  // share of the earlier rates that may be off the scale, at either end
 const COLOURS = ['--first', '--second', '--third', '--fourth'];
 const STYLES = ['first', 'second', 'third', 'fourth'];
 const TITLES = {error: 'receiver error [deg]', rate: 'axis rates [deg/s]', torque: 'motor torques [Nm]',
@@ -44,6 +46,18 @@ function marks(plot, beamwidth) {
   ctx.restore();
 }
 
+// Return the lowest and the highest of the rates to show: lines over the times t, null for a missing value. A slew of
+// some seconds leaves the scale after RECENT_S, so that it does not hide the rates of tracking.
+export function shownRates(t, lines) {
+  const known = lines.flatMap((line) => line.map((value, i) => [value, t[i]])).filter(([value]) => value !== null);
+  if (!known.length) return [null, null];
+  const sorted = known.map(([value]) => value).sort((a, b) => a - b);
+  const cut = Math.floor(MAX_OFF_SCALE * sorted.length);
+  const kept = known.filter(([, at]) => at > t.at(-1) - RECENT_S).map(([value]) => value);
+  kept.push(sorted[cut], sorted[sorted.length - 1 - cut]);
+  return [Math.min(...kept), Math.max(...kept)];
+}
+
 class Chart {
   constructor(name, series, beamwidth) {
     this.place = find(`chart-${name}`);
@@ -53,7 +67,8 @@ class Chart {
     series.forEach(([label], i) => heading.appendChild(make('i', STYLES[i], label)));
     this.plot = new uPlot({
       ...this.size(), cursor: {show: false}, legend: {show: false}, padding: [8, 22, 0, 0],
-      scales: {x: {time: false}, y: {range: (plot, low, high) => Chart.range(low, high)}},
+      scales: {x: {time: false}, y: {range: (plot, low, high) => Chart.range(
+        ...(name === 'rate' ? shownRates(plot.data[0], plot.data.slice(1)) : [low, high]))}},
       axes: [{...axis, size: 19, gap: 1, space: 72, values: (plot, values) => values.map((value) => time(value))},
              {...axis, size: 50, gap: 3, space: 24}],
       series: [{}, ...series.map((_, i) => ({stroke: colour(COLOURS[i]), width: 1.2, points: {show: false}}))],

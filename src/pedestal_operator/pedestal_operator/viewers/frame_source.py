@@ -1,4 +1,4 @@
-"""Frames of a running antenna from its encoders and its INS."""
+"""Source of the coordinate frames of a running antenna, from the messages of its encoders and its INS."""
 import contextlib
 
 import numpy as np
@@ -30,7 +30,9 @@ class _Latest:
 
 
 class FrameSource:
-    """Subscriptions to joint_states of every beam of a graph and to ship/imu/data, while active. node: a shell.Shell.
+    """Frames from the last messages of joint_states (of every beam) and ship/imu/data, subscribed while active.
+
+    node: a shell.Shell.
     """
 
     def __init__(self, node):

@@ -1,4 +1,6 @@
-"""Frames of the pedestal from the earth to the beam: right-handed, z up, x ahead (REP 103, REP 105). No ROS here.
+"""Coordinate frames of the pedestal for viewers, from the earth to the beam. No ROS here.
+
+The frames are right-handed, with z up and x ahead (REP 103, REP 105):
 
     earth -> base_link       attitude of the deck; ashore the bow points north
     base_link -> azimuth     turned by the azimuth
@@ -34,7 +36,11 @@ class Transform(typing.NamedTuple):
 
 
 class Joint(typing.NamedTuple):
-    """A joint of the model. axis: axis of its turn in the frame of its child, None for a fixed joint."""
+    """A joint of the model.
+
+    origin    place of the child in the parent [m]
+    axis      axis of its turn in the frame of its child, None for a fixed joint
+    """
     name: str
     parent: str
     child: str
@@ -47,7 +53,7 @@ def _numbers(text):
 
 
 def joints(description=PEDESTAL_URDF) -> tuple:
-    """Return the Joints of a URDF in its order; all frames must be parallel at angle 0 (no `rpy`)."""
+    """Return the Joints of a URDF in its order. At angle 0 all frames must be parallel: the URDF has no `rpy`."""
     found = []
     for joint in ElementTree.fromstring(description).iter('joint'):
         parts = {part.tag: part.attrib for part in joint}
@@ -61,21 +67,21 @@ PEDESTAL_JOINTS = joints()
 
 
 def _rotation(axis, angle):
-    """Return the quaternion of a turn about a unit vector."""
+    """Return the quaternion (x, y, z, w) of a turn about a unit vector by an angle [rad]."""
     sine = math.sin(0.5 * angle)
     return *(sine * part for part in axis), math.cos(0.5 * angle)
 
 
 def of_deck(attitude=ASHORE_ATTITUDE) -> Transform:
-    """Return the deck in the earth. attitude: quaternion (x, y, z, w) deck -> earth."""
+    """Return the Transform of the deck in the earth frame. attitude: quaternion (x, y, z, w) deck -> earth."""
     return Transform('earth', 'base_link', (0.0, 0.0, 0.0), tuple(attitude))
 
 
 def of_pedestal(angles, prefix='') -> list:
     """Return the Transforms from the deck to the beam.
 
-    angles: azimuth and elevation of joint_states [rad]; prefix: of one of several beams, for the frame beam_2/azimuth
-    for example.
+    angles: azimuth and elevation of joint_states [rad]; prefix: prefix of one of several beams, as in the frame
+    beam_2/azimuth.
     """
     turned = dict(zip(topics.AXES, angles))
     return [Transform(joint.parent if joint.parent == 'base_link' else prefix + joint.parent, prefix + joint.child,

@@ -3,7 +3,10 @@ from pedestal_common.node import subscriptions
 
 
 class OnDemand:
-    """Switchable subscription: take(data, info) receives the CDR bytes of a nodes.Link. node: a shell.Shell."""
+    """Subscription of a node (shell.Shell) to the topic of a nodes.Link, which can be switched on and off.
+
+    take(CDR bytes, rclpy's message info) is called for each message.
+    """
 
     def __init__(self, node, link, take):
         self._node, self._link, self._take, self._subscriptions = node, link, take, []

@@ -1,4 +1,7 @@
-"""Benchmarks of the graph, the compiled core and bags on this machine: one module each, run() -> its rows."""
+"""Benchmarks of `pedestal bench`: speed of the graph, of the compiled laws and of bags on this machine.
+
+Each benchmark is a module. Its function run() prints a table and returns the rows of the table.
+"""
 
 BENCH_MODULES = {'graph': 'lockstep', 'core': 'core', 'bag': 'recording'}
 """{name on the command line: module}."""

@@ -1,8 +1,10 @@
-"""The lower bound of `pedestal bench graph`: bare rclpy nodes that pass the graph's messages and compute nothing.
+"""Ring of bare rclpy nodes that pass the messages of the graph and compute nothing.
 
-`python -m pedestal_studies.bench.bare_ring ROLE STEPS` runs one process per role; the role `adu` prints the time of a
-lap. Topics, types, QoS and executor are those of the graph. The messages are made once, and rclpy itself publishes
-them.
+The time of its lap is the lower bound of the lap time in `pedestal bench graph`. A lap is one step of the lockstep: a
+message of the drive leads to messages of the receiver and the control unit, and returns to the drive.
+`python -m pedestal_studies.bench.bare_ring ROLE STEPS` runs one node; ROLE is its name in RING_NODES. The role `adu`
+prints the lap time. Topics, types, QoS and executor are those of the graph. Each node makes its messages once, and
+rclpy itself publishes them.
 """
 import json
 import sys
@@ -14,11 +16,11 @@ from pedestal_common.graph import layouts, nodes, topics
 from pedestal_common.node import middleware, shell
 
 RING_NODES = ('tracking_receiver', 'acu', 'adu', 'recorder')
-"""Nodes of the ring."""
+"""Names of the nodes of the ring."""
 TRIGGER_TOPICS = {'tracking_receiver': 'adu/truth', 'acu': 'tracking_receiver/angle_error', 'adu': 'acu/rate_command'}
 """{node: topic whose message triggers a lap of the node}."""
 WARM_UP_LAPS = 300
-"""Laps before the clock starts."""
+"""Number of laps before the measurement of the time starts."""
 
 
 def _filled(topic):
@@ -38,7 +40,8 @@ def _filled(topic):
 
 class Ring(Node):
     """Node of the ring: it publishes its messages when a message arrives on its trigger, and drops all others."""
-    # shell.main runs a node through these two attributes and `draining`, `close`; the Ring has the loop of the shell.
+    # shell.main uses the attributes `awaits` and `spin` and the methods `draining` and `close` of a node. The Ring
+    # takes `spin` from the shell, so that both have the same executor loop.
     awaits = 'its trigger'
     spin = shell.Shell.spin
 
@@ -62,7 +65,7 @@ class Ring(Node):
             self.start_timer = self.create_timer(0.01, self.start)
 
     def start(self):
-        """Send the first lap as soon as every subscriber is there."""
+        """Start the first lap as soon as every publisher has found its subscribers."""
         if all(publisher.get_subscription_count() >= readers for publisher, _, readers in self.writers):
             self.start_timer.cancel()
             time.sleep(1.0)     # The other nodes may not have found all publishers yet.
@@ -79,7 +82,7 @@ class Ring(Node):
         """Do nothing at the end."""
 
     def pass_on(self, _message):
-        """Publish the messages of a lap; after the last lap the drive prints the time of a lap [us]."""
+        """Publish the messages of a lap; after the last lap the drive prints the mean time of a lap [us]."""
         self.lap += 1
         if self.lap == WARM_UP_LAPS:
             self.begun = time.perf_counter()

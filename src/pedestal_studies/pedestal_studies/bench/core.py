@@ -1,4 +1,8 @@
-"""The compiled core on this machine, against its targets, the same axis through scipy and the filters of filterpy."""
+"""Benchmark `pedestal bench core`: speed of the compiled laws of drive, closed loop and filters on this machine.
+
+The times are compared with targets, with one axis of the drive in scipy (solve_ivp_axis.py), and with the filters of
+filterpy.
+"""
 import math
 import time
 
@@ -28,9 +32,9 @@ CORE_DURATION_S, TRIAL_DURATION_S = 20.0, 10.0
 SHORT_RUN_STEPS, SHORT_RUN_COUNT = 40, 100
 """Drive steps of a run that is short enough to be rarely interrupted by other processes; number of these runs."""
 SUBSTEPS_PER_STEP = 2 * 100
-"""Plant sub-steps of both axes in one drive step of 5 ms."""
+"""Sub-steps of the plant in one drive step of 5 ms: 100 of each axis."""
 SOLVE_IVP_TICKS, SUBSTEPS_PER_TICK = 100, 2
-"""Ticks of the current loop that scipy computes; sub-steps of the plant in one tick."""
+"""Periods of the current loop that scipy computes; sub-steps of the plant in one period."""
 
 
 @compiled
@@ -42,7 +46,7 @@ def _drive_steps(state, constants, inputs, outputs, count):
 
 @compiled
 def _steps_on_lanes(drives, count):
-    """Run `count` steps of the drives on all lanes."""
+    """Run `count` steps of the drives on all lanes; the processor computes all lanes, one trial each, together."""
     moving = adu_unit.DRIVE_LANES(drives)
     for _ in range(count):
         drive_unit.step(moving.state, moving.constants, moving.inputs, moving.outputs)
@@ -99,7 +103,11 @@ def _unscented_steps(state, constants, measured):
 
 
 def filterpy_unscented():
-    """Return filterpy's IMMEstimator of two UnscentedKalmanFilter of nine states with three measured numbers."""
+    """Return filterpy's IMMEstimator of two UnscentedKalmanFilter, as a counterpart of the compiled Cartesian filters.
+
+    The nine states x are position (east, north, up) [m], velocity and acceleration. The three measured numbers are
+    azimuth [rad], elevation [rad] and range [m].
+    """
     def unscented_filter():
         made = UnscentedKalmanFilter(
             9, 3, FILTER_PERIOD_S, lambda x: np.array([np.arctan2(x[0], x[1]), np.arctan2(x[2], np.hypot(x[0], x[1])),
@@ -110,6 +118,7 @@ def filterpy_unscented():
         return made
 
     T = FILTER_PERIOD_S
+    # F: transition over T of a target of constant acceleration
     F = np.kron([[1.0, T, 0.5 * T * T], [0.0, 1.0, T], [0.0, 0.0, 1.0]], np.eye(3))
     return IMMEstimator([unscented_filter(), unscented_filter()], np.full(2, 0.5),
                         np.array([[0.998, 0.002], [0.002, 0.998]]))
@@ -133,18 +142,22 @@ def filterpy_steps():
             estimator.predict()
             estimator.update(measured)
 
-    chain = 0.001 + 0.997 * np.eye(3)
+    switching = 0.001 + 0.997 * np.eye(3)       # probabilities of a change of the model in one step
     angle = np.zeros((1, 1))
     cases = ((kalman_filter(), angle),
-             (IMMEstimator([kalman_filter() for _ in range(3)], np.full(3, 1 / 3), chain), angle),
+             (IMMEstimator([kalman_filter() for _ in range(3)], np.full(3, 1 / 3), switching), angle),
              (filterpy_unscented(), np.array([0.0, 0.3, 500.0])))
     return [best_of(lambda case=case: steps(*case), 3) / FILTERPY_STEPS * 1e6 for case in cases]
 
 
 def filter_rows():
-    """Return the rows of a step of one filter, of an IMM of three and of two unscented filters, beside filterpy."""
+    """Return the rows of the time of a filter step, of our filters and of the filters of filterpy.
+
+    The filters are a Kalman filter of one axis, an IMM of three of them, and an IMM of two unscented filters.
+    """
     steps = (filter_step(kind='current_statistical'),
-             filter_step(**{'kind': 'imm', 'imm.models': 'cv ca current_statistical'}), unscented_step())
+             filter_step(**{'kind': 'imm', 'imm.models': 'cv ca current_statistical',
+                                                      'imm.rungs': 1}), unscented_step())
     rows = []
     for metric, ours, target, theirs in zip(('kalman', 'imm3', 'imm_ukf'), steps, ('<= 2', '<= 10', None),
                                             filterpy_steps()):
@@ -155,7 +168,10 @@ def filter_rows():
 
 
 def drive_rows():
-    """Return the rows of one drive beside drives on all lanes, and of whole trials on lanes in time of one core."""
+    """Return the rows of the time of a plant sub-step, in one drive and on a lane, and of the trial speed.
+
+    The trial speed is the simulated time of all lanes over the CPU time of one core.
+    """
     params = AduParameters(initial_elevation=0.7)
     one = np.zeros(1, adu_unit.RECORD_DTYPE)
     one['state'], one['constants'] = drive_unit.initial_state(params), drive_unit.constants(params)

@@ -1,4 +1,8 @@
-"""The lockstep ring beside its floor, the bare ring, interleaved on this machine; latency of the ring in realtime."""
+"""Benchmark `pedestal bench graph`: lap time of the graph in lockstep, and latency of the graph in realtime.
+
+A lap is one step of the lockstep. Its lower bound is the lap of the bare ring (bare_ring.py), whose nodes compute
+nothing. Runs of the graph and of the bare ring alternate, so that other load of the machine affects both alike.
+"""
 import contextlib
 import json
 import os
@@ -19,9 +23,11 @@ from pedestal_studies.bench import bare_ring
 from pedestal_studies.bench.table import show
 
 ROUND_COUNT = 3
+"""Number of rounds; a round is a run of the bare ring and a run of the graph."""
 RING_STEPS = 3000
-RUN_DURATION_S = 15.0
-LATENCY_DURATION_S = 10.0
+"""Measured laps of the bare ring in a round, as many as steps of 5 ms in RUN_DURATION_S."""
+RUN_DURATION_S, LATENCY_DURATION_S = 15.0, 10.0
+"""Simulated durations of a run of the graph in lockstep and in realtime [s]."""
 
 
 def bare_lap():
@@ -50,7 +56,11 @@ def graph_run(folder, number, pacing, seconds):
 
 
 def latencies(path):
-    """Return the wall-clock times [s] from joint_states(t_k) to rate_command(t_k), both at publication, of a bag."""
+    """Return the latencies (n,) [s] of the graph in a bag, by the wall clock.
+
+    A latency is the time from the publication of joint_states to the publication of the acu/rate_command with the same
+    stamp.
+    """
     sent = {topic: {log: published for _, log, published, _ in bag.read(path).raw(topic)}
             for topic in ('joint_states', 'acu/rate_command')}
     return np.array([(published - sent['joint_states'][stamp]) * 1e-9

@@ -1,4 +1,7 @@
-"""The recorder, verify and recompute on this machine, beside its disk and bare deserialisation."""
+"""Benchmark `pedestal bench bag`: message rates of recorder, verify and recompute on this machine.
+
+For comparison the benchmark measures the write rate of the disk and the rate of deserialisation alone.
+"""
 import json
 import os
 import pathlib
@@ -17,16 +20,19 @@ from pedestal_studies.bench.lockstep import graph_run
 from pedestal_studies.bench.table import best_of, show
 
 ROUND_COUNT = 3
+"""Number of measurements of recompute, of which the median counts."""
 BAG_DURATION_S = 30.0
+"""Simulated duration of the run whose bag is used [s]."""
 TRAFFIC_FACTOR = 5.0
-"""Rate of the messages sent to the recorder, over the rate of the demo in real time."""
+"""Speed at which the bag of the run is replayed to the recorder, as a multiple of real time."""
 DISK_TEST_BYTES = 200_000_000
+"""Size of the file that is written for the rate of the disk [bytes]."""
 
 
 def measure_recorder(path, again, rate):
-    """Return (messages/s, lost, CPU time over wall time) of a recorder that receives a bag.
+    """Return (messages/s, number of lost messages, CPU time over wall time) of a recorder that receives a bag.
 
-    rate: speed of the messages over real time.
+    path: bag that is replayed. again: new bag of the recorder. rate: speed of the replay as a multiple of real time.
     """
     with open(pathlib.Path(again).with_suffix('.log'), 'w+') as log:
         recorder = subprocess.Popen([sys.executable, '-m', 'pedestal_recording.recorder_node', '--ros-args',
@@ -62,7 +68,7 @@ def _cpu_time(pid):
 
 
 def disk_rate(folder):
-    """Return the bytes/s that can be written to a file of the folder, with all of them on the disk at the end."""
+    """Return the rate [bytes/s] at which a file in the folder is written, until all bytes are on the disk."""
     block = os.urandom(1_000_000)
 
     def fill():

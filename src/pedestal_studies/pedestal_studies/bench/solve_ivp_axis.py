@@ -1,7 +1,7 @@
-"""One axis of the drive through scipy's solve_ivp, the usual tool of a user: the floor of `pedestal bench core`.
+"""One axis of the drive in scipy's solve_ivp, the usual tool of an engineer.
 
-The equations of the plant are written a second time in the form for scipy. They measure speed only and are not part of
-the product.
+`pedestal bench core` compares its speed with that of the compiled laws. The equations of the plant are therefore
+written here a second time, in the form for scipy. Only the benchmark uses them.
 """
 import math
 
@@ -10,16 +10,20 @@ from scipy.integrate import solve_ivp
 
 
 def right_hand_side(t, x, p, v_q):
-    """Return d/dt of (i_d, i_q, w, theta) of both motors and (w, theta, z) of the load, with constant q voltages [V].
+    """Return the time derivative (11,) of the state x of an axis.
 
-    p: adu_drive.params.AxisParameters. x: state of 11 numbers. i_d, i_q: currents [A]; w, theta: rate and angle; z:
-    deflection of the bristles of the friction (LuGre).
+    x      i_d, i_q, w_m, theta_m of motor 1; these four of motor 2; w, theta, z of the load. i_d, i_q: currents [A];
+           w_m, w: rates [rad/s]; theta_m, theta: angles [rad]; z: deflection of the friction bristles (LuGre) [rad]
+    t      time [s], without effect
+    p      adu_drive.params.AxisParameters
+    v_q    constant q voltages of both motors [V]
     """
     g, f, N = p.gear_train, p.friction, p.gear_train.ratio
     w, theta, z = x[8:]
     slopes, mesh_torque = [], 0.0
     for m, (i_d, i_q, w_m, theta_m), v in ((p.motor_1, x[0:4], v_q[0]), (p.motor_2, x[4:8], v_q[1])):
-        delta = theta_m / N - theta
+        delta = theta_m / N - theta         # twist of pinion against bull gear, at the load
+        # over: twist beyond the lash, which deflects the teeth
         over = delta - math.copysign(min(abs(delta), 0.5 * g.lash), delta)
         mesh = g.stiffness * over + g.damping * (w_m / N - w) if over != 0.0 else 0.0
         mesh = mesh if mesh * over > 0.0 else 0.0
@@ -36,9 +40,9 @@ def right_hand_side(t, x, p, v_q):
 
 
 def run(p, ticks, period, v_q):
-    """Return the state after `ticks` control ticks of `period` [s] from rest with voltages v_q.
+    """Return the state (11,) after `ticks` periods of `period` [s] from rest; p, v_q: as of `right_hand_side`.
 
-    RK45 has scipy's own tolerances.
+    The method RK45 has the default tolerances of scipy.
     """
     x = np.zeros(11)
     for _ in range(ticks):

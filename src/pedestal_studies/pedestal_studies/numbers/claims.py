@@ -1,7 +1,7 @@
-"""Every figure and every printed number of the five papers: the claim, its reading, and the row that measures it.
+"""Claims of the five papers: every figure and every printed number, its reading, and the row that measures it.
 
-The measured numbers are in the rows of the studies. tools/reference.py writes claims and numbers side by side into
-docs/papers.md.
+A reading states how we interpret the claim, and under which conditions we measure it. The measured numbers are in the
+rows of the studies. tools/reference.py writes claims and numbers side by side into docs/papers.md.
 """
 import typing
 
@@ -20,7 +20,7 @@ class Claim(typing.NamedTuple):
 
 
 def _of(study, *claims):
-    """Return the Claims (claim, reading, case, metric) that a study measures."""
+    """Return the Claims that one study measures; claims: tuples (claim, reading, case, metric)."""
     return tuple(Claim(claim, reading, study, *where) for claim, reading, *where in claims)
 
 

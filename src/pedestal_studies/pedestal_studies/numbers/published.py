@@ -1,7 +1,10 @@
 """The numbers of the documentation: rows of the studies, kept in docs/rows.json, and the tables made from these rows.
 
 `python -m pedestal_studies.numbers.published [STUDY ...]` (`make numbers`) runs all published studies, or the named
-studies only. It writes the rows that the tables use. `make docs` writes the tables from these rows.
+studies only. The program writes the rows that the tables use. `make docs` writes the tables from these rows.
+
+A row is a measured number with study, case, metric, value, unit, interval and target. A table is (heads of the
+columns, lines of cells).
 """
 import inspect
 import json
@@ -28,6 +31,7 @@ from pedestal_studies.rigs.profiles import PROFILES
 from pedestal_studies.system import acquisition, budget, filters
 
 ROWS_FILE = 'docs/rows.json'
+"""File of the rows in a checkout."""
 
 SCENARIO_RESULTS = (
     ('`leo_pass`: pointing error against truth, per axis, rms', 'leo_pass', 'pointing_rms_deg'),
@@ -71,7 +75,7 @@ HEADLINE_RESULTS = (
 
 
 class Rows(dict):
-    """{(study, case, metric): row}; `used` holds the rows that were read."""
+    """Mapping {(study, case, metric): row}. `used` holds the rows that were read, which are the rows of the tables."""
 
     def __init__(self, rows):
         super().__init__(rows)
@@ -94,6 +98,7 @@ def read(root='.'):
 
 def write(rows, root='.'):
     """Write the rows that the tables use into ROWS_FILE."""
+    # The tables are made only to note the rows that they read in rows.used.
     for table in TABLES.values():
         table(rows)
     lines = {}
@@ -127,7 +132,7 @@ def _spread(row):
 
 
 def results_table(results):
-    """Return the function rows -> table of results as of SCENARIO_RESULTS."""
+    """Return the function(Rows) that makes the table of results, which are given as SCENARIO_RESULTS is."""
     def table(rows):
         of_results = [rows['scenarios', case, metric] for _, case, metric in results]
         return ('result', 'mean', '95 % interval', 'seeds', 'target'), [
@@ -136,7 +141,7 @@ def results_table(results):
 
 
 def claim_table(paper):
-    """Return the function rows -> table of the claims of a paper."""
+    """Return the function(Rows) that makes the table of the claims of a paper; paper: its number, such as '000'."""
     def table(rows):
         lines = []
         for claim in claims.CLAIMS_BY_PAPER[paper]:
@@ -150,6 +155,7 @@ def claim_table(paper):
 
 
 COLOURED_NOISE = filters.SHOWN_NOISE.replace('white', 'coloured')
+"""Name of the coloured noise with the rms of SHOWN_NOISE."""
 FILTER_METRICS = ('angle_rms_deg', 'reduction', 'rate_rms_deg_s', 'nis_mean', 'rate_over_sigma')
 """Metrics of the study filters in its table."""
 
@@ -175,7 +181,10 @@ def manoeuvre_numbers(rows):
 
 
 def feedforward_numbers(rows):
-    """Return the table of miss and rate noise of the sources of paper 003's feed-forward."""
+    """Return the table of paper 003's feed-forward: miss and rate noise for each source of rate and acceleration.
+
+    The miss is the pointing error, a term of the paper.
+    """
     lines = []
     for axis in REVERSAL_S_BY_AXIS:
         for name in ('kalman-cv', 'imm', 'imm-predicted', 'perfect-state', 'kalman-ca-40-predicted'):
@@ -202,7 +211,7 @@ def matrix_table(rows):
 
 
 def pareto_numbers(rows):
-    """Return the table of the least miss of any tuning of a filter, and of its miss at the rate noise of the IMM."""
+    """Return the table of the least miss of each filter over its tunings, and the miss at the IMM's rate noise."""
     lines = [(name, pareto.FILTER_MEANINGS[name], *(_spread(rows['pareto', name, metric]) for metric in (
         'least_miss_deg', 'rate_noise_at_least_miss_deg_s')),
         _spread(rows['pareto', name, 'miss_ratio_at_equal_rate_noise'])
@@ -278,7 +287,7 @@ def _milli(row):
 
 
 def budget_table(mode):
-    """Return the function rows -> error budget of a mode: each term alone, then their sums."""
+    """Return the function(Rows) that makes the table of the error budget of a mode: each term alone, then the sums."""
     sums = {'systematic': ('', 'sum of the systematic terms, added as signed vectors'),
             'whole': ('', 'runs with every term on')}
 
@@ -297,7 +306,7 @@ def budget_table(mode):
 
 
 def direction_table(mode):
-    """Return the function rows -> table of the signed systematic contributions of a mode along the pass."""
+    """Return the function(Rows) that makes the table of the signed systematic errors of a mode along the pass."""
     def table(rows):
         cases = [f'{mode}/{time}s' for time in budget.TABLE_TIMES_S]
         head = [f'az {rows["budget", case, "azimuth_deg"]["value"]:.0f}, '
@@ -316,17 +325,18 @@ TABLES = {'results over seeds': results_table(SCENARIO_RESULTS), 'headline resul
           'filters compared': filter_numbers, 'manoeuvre': manoeuvre_numbers, 'feed forward': feedforward_numbers,
           'pareto': pareto_numbers, 'flyby with a rate': flyby_numbers, 'alignment': alignment_numbers,
           'acquisition': acquisition_numbers, 'array loops': array_numbers, 'matrices': matrix_table}
-"""{name of a table: function rows -> (head, lines)}."""
+"""{name of a table: function(Rows) that returns (heads of the columns, lines)}."""
 
 PUBLISHED_STUDIES = tuple(dict.fromkeys((
     *(claim.study for of_paper in claims.CLAIMS_BY_PAPER.values() for claim in of_paper if claim.study),
     'filters', 'pareto', 'scenarios', 'budget', 'acquisition')))
+"""Names of the studies whose rows are in the tables."""
 
 
 def main(names=(), root='.') -> int:
-    """Run the named PUBLISHED_STUDIES, by default all, with their own number of runs, and write ROWS_FILE.
+    """Run PUBLISHED_STUDIES with their default number of runs and write ROWS_FILE. Return exit code 0.
 
-    Rows of studies that are not named stay.
+    names: studies to run, () for all; the rows of the other studies stay. root: folder of the checkout.
     """
     rows_of = json.loads(pathlib.Path(root, ROWS_FILE).read_text()) if names else {}
     with monte_carlo.Pool() as pool, console.progress_of_share() as progress:

@@ -1,14 +1,17 @@
 """Alignment of the INS: paper 001's figures 3 and 4 for five methods, over many seeds, beside the information limit.
 
-The IMU, the sway and the white velocity of 0.05 m/s per axis are those of paper 001 (section 5 and table 1), with a
-misalignment of 3, 3 and 180 deg. The velocity has one value per 0.02 s. The paper does not state this period, and the
-results scale with it. CASE_MEANINGS describes the five methods. Cases <method> are the conditions of the paper. Cases
-<method>/swell have a velocity of 0.5 m/s at 0.1 Hz on every axis in addition. Cases <method>/quadrant-N have any
-heading of the ship, an error of azimuth in quadrant N, and random biases.
+The INS measures the attitude of the deck. The alignment removes the error of its initial attitude (misalignment), here
+3, 3 and 180 deg. The IMU, the sway of the ship and a white velocity of 0.05 m/s per axis are those of paper 001
+(section 5 and table 1). The velocity has one value per 0.02 s. The paper does not state this period, and the results
+scale with it. CASE_MEANINGS describes the five methods.
 
-The case `limit` is the information limit, the 1 sigma that the gyros and this velocity permit. It is the root sum
-square of the 1 sigma of the Riccati filter and of the azimuth error that the bias of an east gyro causes, bias /
-(earth rate * cos latitude).
+Cases <method> have the conditions of the paper. Cases <method>/swell have an additional velocity of 0.5 m/s at 0.1 Hz
+on every axis. Cases <method>/quadrant-N have any heading of the ship, an initial azimuth error in quadrant N, and
+random biases.
+
+The case `limit` is the information limit: the smallest 1 sigma that the gyros and the velocity permit. This limit is
+the root sum square of the 1 sigma of the Riccati filter and of the azimuth error due to the bias of an east gyro. The
+latter is bias / (earth rate * cos latitude).
 """
 import dataclasses
 import functools
@@ -59,7 +62,7 @@ BATCH_RUNS = 5
 
 BASE_SEED, QUADRANT_SEED, SWELL_SEED = 1, 2, 3
 IMU_PERIOD_S, LAW_STEP_S, EVALUATION_PERIOD_S = 0.01, 0.02, 1.0
-"""Steps of the IMU, of the laws and of the evaluation [s]."""
+"""Periods of the IMU samples, of the alignment laws and of the evaluated errors [s]."""
 
 RUN_DURATION_S, SHORT_RUN_DURATION_S = 600.0, 300.0
 """Duration of a run, and of a run in a quadrant or on swell [s]."""
@@ -67,21 +70,23 @@ RUN_DURATION_S, SHORT_RUN_DURATION_S = 600.0, 300.0
 ARCMIN_RAD = math.radians(1.0 / 60.0)
 HOUR_S = 3600.0
 GYRO_BIAS_RAD_S, GYRO_NOISE_DENSITY = math.radians(0.01) / HOUR_S, math.radians(0.005) / 60.0
-"""Bias and noise of the gyros, from paper 001, section 5."""
+"""Bias [rad/s] and noise [rad/sqrt(s)] of the gyros, from paper 001, section 5."""
 G = 9.80665
+"""Acceleration [m/s2] in whose unit the paper states errors of accelerometers."""
 ACCELEROMETER_BIAS_M_S2, ACCELEROMETER_NOISE_DENSITY = 3e-5 * G, 6e-6 * G
-"""Bias and noise of the accelerometers, from paper 001, section 5."""
+"""Bias [m/s2] and noise [m/s/sqrt(s)] of the accelerometers, from paper 001, section 5."""
 
 SHIP_PARAMETERS = ShipParameters(motion='plain', speed=0.0, latitude_deg=34.0, plain=PlainParameters(
     roll_amplitude_deg=7.0, roll_period=1.0 / 0.3, pitch_amplitude_deg=5.0, pitch_period=1.0 / 0.5,
     yaw_amplitude_deg=9.0, yaw_period=1.0 / 0.2))
-"""Sway of paper 001, table 1, where x is to starboard and y to the bow."""
+"""Ship with the sway of paper 001, table 1. In the paper x points to starboard and y to the bow, so that a rotation
+about x is our pitch."""
 
 MISALIGNMENT_RAD = np.radians((3.0, 3.0, 180.0))
-"""Misalignment a_x, a_y, a_z [rad]."""
+"""Misalignment a_x, a_y, a_z about east, north, up [rad]."""
 
 VELOCITY_NOISE_M_S, SWELL_VELOCITY_M_S, SWELL_FREQUENCY_HZ = 0.05, 0.5, 0.1
-"""White velocity [m/s]; velocity [m/s] and frequency [Hz] of the swell."""
+"""1 sigma of the white velocity [m/s]; velocity amplitude [m/s] and frequency [Hz] of the swell."""
 
 INS_PARAMETERS = AlignmentParameters(step=LAW_STEP_S, aligned_sigma=1e-5, velocity_disturbance=VELOCITY_NOISE_M_S,
                                      gyro_noise=GYRO_NOISE_DENSITY, gyro_bias=GYRO_BIAS_RAD_S,
@@ -107,14 +112,18 @@ SWELL_EVALUATION_TIME_S = 200
 """Instant of the rows of the azimuth on swell [s]."""
 
 ALIGNMENT_ESTIMATE = np.dtype([('quaternion', 'f8', (4,)), ('azimuth_sigma', 'f8'), ('level_sigma', 'f8')])
-"""Attitude deck -> earth (x, y, z, w) and 1 sigmas [rad] of a navigator."""
+"""Attitude deck -> earth (x, y, z, w) of a navigator, and the 1 sigmas of azimuth and level that it states [rad]."""
 
 Sensors = namedtuple('Sensors', 'state constants ship inputs truth outputs')
-"""Records (1,) of an IMU on its ship: state and constants of imu, constants of motion, inputs of imu, outputs of
-motion and of imu."""
+"""Records (1,) of an IMU on its ship.
+
+`state`, `constants`, `inputs`, `outputs`: of the module imu. `ship`, `truth`: constants and outputs of the module
+motion.
+"""
 
 Increments = namedtuple('Increments', 'angle force attitude')
-"""Increments of an IMU, angle (n, 3) [rad], force (n, 3) [m/s], FLU, and the true attitude (n, 4) at their ends."""
+"""Samples of an IMU in FLU, each over IMU_PERIOD_S: rotation `angle` (n, 3) [rad] and integral `force` (n, 3) of the
+specific force [m/s]. `attitude` (n, 4): true attitude at the end of each sample."""
 
 
 AZIMUTH_COLUMN, EAST_TILT_COLUMN, LEVEL_COLUMNS = 2, 0, slice(0, 2)
@@ -123,7 +132,7 @@ AZIMUTH_COLUMN, EAST_TILT_COLUMN, LEVEL_COLUMNS = 2, 0, slice(0, 2)
 
 class Conditions(typing.NamedTuple):
     """Conditions of a run: heading of the ship [deg]; misalignment a_x, a_y, a_z [rad]; biases of three gyros and
-    three accelerometers, in units of their 1 sigma."""
+    three accelerometers, as multiples of GYRO_BIAS_RAD_S and ACCELEROMETER_BIAS_M_S2."""
     heading_deg: float
     misalignment: np.ndarray
     biases: np.ndarray
@@ -139,7 +148,8 @@ class Sums(typing.NamedTuple):
     """Sums over runs.
 
     `squares` (n, 3): squared errors about east, north, up [rad2]. `ratios` (n,): squared ratio of the error in azimuth
-    to its 1 sigma. `first` (n, 3): errors of the first run [rad], None if it is not among the runs. `wall_time`: [s].
+    to its 1 sigma. `first` (n, 3): errors of the first run [rad], None if it is not among the runs. `wall_time`,
+    `steps`: wall time [s] and number of the steps of the alignment law. `runs`: number of runs.
     """
     squares: np.ndarray | float = 0.0
     ratios: np.ndarray | float = 0.0
@@ -156,12 +166,13 @@ class Sums(typing.NamedTuple):
 
 
 JACKKNIFE_PARTS = 20
-"""Parts of the runs for the jackknife, which gives the intervals of statistics over all runs."""
+"""Number of parts into which the runs are divided for the jackknife (intervals.pseudo_values), which gives the
+intervals of statistics over all runs."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Accuracy:
-    """Accuracy of a method over parts of its runs, a list of Sums."""
+    """Accuracy of a method; parts: list of Sums, one for each part of its runs."""
     parts: list
 
     @functools.cached_property
@@ -186,16 +197,16 @@ class Accuracy:
 
     @property
     def ratio(self):
-        """Rms over the runs of the error in azimuth over its 1 sigma (n,)."""
+        """Rms over the runs of the ratio (n,) of the azimuth error to the 1 sigma that the navigator states."""
         return np.sqrt(self.whole.ratios / self.whole.runs)
 
     @property
     def step_us(self):
-        """Wall time of a step [us]."""
+        """Wall time of a step of the alignment law [us]."""
         return 1e6 * self.whole.wall_time / self.whole.steps
 
     def over_parts(self, statistic):
-        """Return intervals.pseudo_values of statistic(Accuracy)."""
+        """Return intervals.pseudo_values of a statistic, a function Accuracy -> number."""
         return pseudo_values(self.parts, lambda parts: statistic(Accuracy(parts)))
 
 
@@ -214,9 +225,10 @@ class Batch:
 
 @compiled
 def simulate(sensors, normals, velocity, out):
-    """Fill the Increments `out` of Sensors.
+    """Simulate an IMU (Sensors) on its ship and fill the Increments `out`.
 
-    normals: (n, IMU_NORMALS_PER_STEP). velocity (n + 1, 3): added to the velocity of the ship, ENU [m/s].
+    normals: standard normal noise (n, IMU_NORMALS_PER_STEP). velocity (n + 1, 3): added to the velocity of the ship,
+    ENU [m/s].
     """
     u, truth, measured = sensors.inputs[0], sensors.truth[0], sensors.outputs[0]
     dt = u.dt
@@ -236,7 +248,10 @@ def simulate(sensors, normals, velocity, out):
 
 @compiled
 def align(state, constants, angle, force, dt, every, estimates):
-    """Run a navigator on increments (n, 3) of dt [s]; estimates: an ALIGNMENT_ESTIMATE every `every` increments."""
+    """Run a navigator over increments angle, force (n, 3), each over dt [s].
+
+    After each block of `every` increments, its ALIGNMENT_ESTIMATE is written to the next record of `estimates`.
+    """
     aid = np.zeros(3)
     for k in range(len(angle)):
         navigator.step(state[0], constants[0], angle[k], force[k], dt, aid)
@@ -255,9 +270,9 @@ def quaternion(axis, angle):
 
 
 def misaligned(attitude, angles):
-    """Return the attitude deck -> n' of an attitude deck -> n: C_n^n' = R_y(a_y)^T R_x(a_x)^T R_z(a_z)^T.
+    """Return the attitude deck -> n' for a given attitude deck -> n: C_n^n' = R_y(a_y)^T R_x(a_x)^T R_z(a_z)^T.
 
-    n: the ENU frame; n': the frame that the INS takes for it. angles: a_x, a_y, a_z [rad].
+    n: the ENU frame; n': the misaligned frame that the INS takes for ENU. angles: a_x, a_y, a_z [rad].
     """
     for axis in (2, 0, 1):      # z, x, y: the order of the factors from right to left
         attitude = product(quaternion(axis, -angles[axis]), attitude)
@@ -265,9 +280,10 @@ def misaligned(attitude, angles):
 
 
 def draw_conditions(batch, random):
-    """Return the Conditions of one run."""
+    """Return the Conditions of one run of a Batch; random: numpy Generator, here and below."""
     if not batch.kind.startswith('quadrant'):
-        # The paper's axes point to starboard and to the bow; our x points to the bow, our y to port.
+        # The paper's axes point to starboard and to the bow; our x points to the bow, our y to port. Therefore the
+        # biases along our y are negative.
         return Conditions(0.0, MISALIGNMENT_RAD, np.array((1.0, -1.0, 1.0, 1.0, -1.0, 1.0)))
     azimuth = 0.5 * math.pi * (int(batch.kind[-1]) - 1 + random.random())
     misalignment = np.array((*MISALIGNMENT_RAD[:2], azimuth))
@@ -275,8 +291,8 @@ def draw_conditions(batch, random):
 
 
 def disturbance(batch, random, n):
-    """Return the velocity (n + 1, 3) of sea and swell at the IMU's samples, ENU [m/s]."""
-    held = round(LAW_STEP_S / IMU_PERIOD_S)     # samples of the IMU for which a value of the sea stays
+    """Return the velocity (n + 1, 3) of the white noise and the swell at the samples of the IMU, ENU [m/s]."""
+    held = round(LAW_STEP_S / IMU_PERIOD_S)     # samples of the IMU for which a value of the white noise holds
     velocity = np.repeat(VELOCITY_NOISE_M_S * random.standard_normal((n // held + 1, 3)), held, axis=0)[:n + 1]
     if batch.kind == 'swell':
         t = IMU_PERIOD_S * np.arange(n + 1)[:, None]
@@ -310,8 +326,8 @@ def simulated_run(batch, run):
 def errors(estimated, attitude):
     """Return the errors (n, 3) about east, north, up [rad] of an estimated attitude (n, 4) against the true one.
 
-    They are the rotation vector of the estimated attitude times the inverse of the true one. The sign of w takes the
-    shorter of the two rotations that a quaternion describes.
+    The errors are the rotation vector of the product: estimated attitude times inverse of the true attitude. A
+    quaternion describes two rotations; the sign of w selects the shorter one.
     """
     x, y, z, w = product(estimated.T, (attitude * (-1.0, -1.0, -1.0, 1.0)).T)
     size = np.sqrt(x * x + y * y + z * z)
@@ -320,7 +336,7 @@ def errors(estimated, attitude):
 
 
 def align_batch(batch):
-    """Return {case: Sums} of a batch."""
+    """Return {case: Sums} of a Batch, in which every method gets the same IMU samples."""
     every, latitude = round(EVALUATION_PERIOD_S / IMU_PERIOD_S), math.radians(SHIP_PARAMETERS.latitude_deg)
     n, sums = round(batch.duration / EVALUATION_PERIOD_S), {}
     for i in range(batch.count):
@@ -342,7 +358,7 @@ def align_batch(batch):
 
 
 def limit():
-    """Return the InformationLimit: the 1 sigmas that riccati_eso states for a motionless IMU without noise.
+    """Return the InformationLimit: the 1 sigmas that the method riccati_eso states for a motionless IMU without noise.
 
     The covariance of riccati_eso depends on the assumed noises, not on the measurements. Noise and sway could only
     enlarge the 1 sigmas, because innovations larger than expected increase them.
@@ -379,8 +395,9 @@ METRIC_TARGETS = {
     ('oba/swell', f'azimuth_rms_arcmin_{SWELL_EVALUATION_TIME_S}s'): '<= 10',
     **{(f'{case}/swell', f'azimuth_error_over_sigma_{SWELL_EVALUATION_TIME_S}s'): '<= 1.3' for case in CASE_METHODS}}
 """{(case, metric): target}. The targets are ours, because the paper prints only PAPER_VALUES. A time with a tolerance
-shows any change of the laws: it is the time that these conditions gave when the study was written."""
+is the time that these conditions gave when the study was written. This target shows a later change of the laws."""
 PAPER_VALUES = {('classical', 'time_to_12arcmin_rms_s'): 420, ('adrc', 'time_to_12arcmin_rms_s'): 250}
+"""{(case, metric): number that the paper prints}."""
 
 
 KIND_METRICS: dict[str, dict[str, tuple]] = {
@@ -397,7 +414,7 @@ KIND_METRICS: dict[str, dict[str, tuple]] = {
 
 
 def rows(accuracy, bound):
-    """Return the rows of accuracy {kind: {case: Accuracy}}; bound: InformationLimit."""
+    """Return the rows of the study; accuracy: {kind of runs: {case: Accuracy}}; bound: InformationLimit."""
     table = []
     for kind, cases in accuracy.items():
         for method, a in cases.items():
@@ -429,7 +446,7 @@ def remarks(runs):
 def run(progress, runs=DEFAULT_RUNS, pool=None) -> Result:
     """Align by every method, `runs` times; pool: monte_carlo.Pool, None for this process."""
     pool = pool or monte_carlo.Pool(1)
-    quarter = -(-runs // 4)
+    quarter = -(-runs // 4)     # a quarter of the runs, rounded up
     kinds = {'': runs, 'swell': runs, **{f'quadrant-{n}': quarter for n in range(1, 5)}}
     batches = [Batch(kind, *part) for kind, count in kinds.items() for part in monte_carlo.batches(count, BATCH_RUNS)]
     parts = {(kind, case): [Sums()] * min(JACKKNIFE_PARTS, -(-count // BATCH_RUNS))

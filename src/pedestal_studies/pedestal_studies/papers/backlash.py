@@ -1,16 +1,17 @@
 """Study of backlash. Two motors turn an axis and pull against each other with a bias torque.
 
-The study measures standstill, reversals and fast moves with each schedule of the bias, and compares one speed loop
-with two.
+The bias torque closes the lash, which is the free play between pinion and bull gear. The study measures standstill,
+reversals and fast moves with each schedule of the bias torque. The study also compares one speed loop for both motors
+with a speed loop for each motor.
 
-Three cases have the controller of paper 000, as in the scenarios. With the controller `best` of the study servo, the
-sine and the fast step are run with every schedule. `pedestal run servo_step|servo_sine --param ...` runs every case
-too (Case.command). The demand is the torque that the speed loop commands. The schedules of the bias torque are:
+Three cases have the controller of paper 000, as in the scenarios. The sine and the fast step run with the controller
+`best` of the study servo and with every schedule. `pedestal run servo_step|servo_sine --param ...` runs every case too
+(Case.command). The demand is the torque per motor that the speed loop commands. The schedules of the bias torque are:
 
     off         no bias torque
     constant    the same bias torque at every demand
-    fade        full without demand, falling to zero as the demand grows to `out`
-    hold_fade   full up to the demand `hold`, then falling to zero at the demand `out`
+    fade        full at demand 0; it falls to 0 as the demand grows to the parameter `out`
+    hold_fade   full up to the demand `hold`; it then falls to 0 at the demand `out`
 
 The metrics fight_torque_... are the opposing torque of the motors beyond the commanded bias, see `opposing_torque`.
 """
@@ -41,9 +42,9 @@ The slow sine shows the lash alone. The fast sine has a peak rate of 0.2 rad/s, 
 
 
 def bias(schedule, torque=12.0, hold=14.0, out=45.0):
-    """Return the parameters of a bias schedule, torques per motor [Nm].
+    """Return the parameters of a schedule of the bias torque; torques of one motor [Nm].
 
-    torque: bias; hold: demand up to which the bias is full; out: demand at which the bias is zero.
+    torque: full bias torque; hold: demand up to which it is full; out: demand at which it is 0.
     """
     return {'adu.azimuth.bias.schedule': schedule, 'adu.azimuth.bias.torque': torque,
             'adu.azimuth.bias.hold': hold, 'adu.azimuth.bias.out': out}
@@ -59,7 +60,7 @@ BIAS_SCHEDULES = {
     'off': bias('off'), 'constant-5': bias('constant', torque=5.0), 'constant-12': bias('constant', torque=12.0),
     'fade-5': bias('fade', torque=5.0, hold=0.0, out=30.0), 'fade-12': bias('fade', torque=12.0, hold=0.0, out=30.0),
     'hold-fade': bias('hold_fade')}
-"""{schedule: parameters}; the number in a name is the bias torque [Nm], hold-fade has 12 Nm."""
+"""{name of a schedule: parameters}; the number in a name is the bias torque [Nm], hold-fade has 12 Nm."""
 
 SPEED_LOOP_STRUCTURES = {
     'mean-speed': {'adu.azimuth.speed_loop.structure': 'mean'},
@@ -75,7 +76,10 @@ METRIC_TARGETS = {
 
 
 def reversal_case(kind, name):
-    """Return the Case of three periods of a sine of REVERSAL_FREQUENCIES_RAD_S."""
+    """Return the Case of three periods of a sine.
+
+    kind: key of REVERSAL_FREQUENCIES_RAD_S; name: key of PAPER_CASES.
+    """
     return cases.sine_case(Case(name, 'servo_sine', {
         **PAPER_CASES[name], 'tracking_receiver.target.angle.azimuth_amplitude': REVERSAL_AMPLITUDE_RAD}),
         REVERSAL_FREQUENCIES_RAD_S[kind], 3)
@@ -95,7 +99,10 @@ def standstill(record):
 
 
 def steady_residual(record, amplitude, w):
-    """Return (times [s], error without its fundamental w [rad/s], (n,) [rad]) over whole periods after the first."""
+    """Return (times [s], error [rad] without its part at the frequency of the sine), each (n,), of a sine run.
+
+    amplitude [rad], w [rad/s]: of the sine. Only whole periods after the first are evaluated.
+    """
     t, period = record.t, 2.0 * math.pi / w
     error = amplitude * np.sin(w * t) - record['adu/truth']['position'][:, 0]
     steady = metrics.whole_periods(t, period, period)
@@ -130,7 +137,7 @@ and a step with each of SPEED_LOOP_STRUCTURES.
 
 
 def measured(kind, name, record):
-    """Return {metric: (value, unit)} of one record."""
+    """Return {metric: (value, unit)} of one record (closed_loop.Run) of CASES; kind, name: its key there."""
     if kind == 'standstill':
         _, angle = standstill(record)
         return {'standstill_peak_to_peak_rad': (np.ptp(angle), 'rad')}
@@ -151,14 +158,14 @@ def measured(kind, name, record):
 
 
 def rows(done):
-    """Return the rows of records {(kind, case): closed_loop.Run}, all or some."""
+    """Return the rows of the records {(kind, case): closed_loop.Run} of some or all CASES."""
     table = []
     for (kind, name), record in done.items():
         values = measured(kind, name, record)
         if kind in REVERSAL_FREQUENCIES_RAD_S and name != 'bias-off' and (kind, 'bias-off') in done:
             without = measured(kind, 'bias-off', done[kind, 'bias-off'])[f'{kind}_error_rad'][0]
             values[f'{kind}_ratio_off_to_on'] = without / values[f'{kind}_error_rad'][0], ''
-        # hold-fade is the schedule of the product; the other schedules get a prefix.
+        # hold-fade is the default schedule of the drive; the cases of the other schedules have a prefix.
         case = f'schedule-{name}' if kind in ('sine', 'step') and name != 'hold-fade' else name
         table += [row(case, metric, value, unit, target=METRIC_TARGETS.get((name, metric)))
                   for metric, (value, unit) in values.items()]
@@ -215,7 +222,7 @@ def standstill_figure(done):
 
 
 def reversal_figure(done):
-    """Draw the effect of lash on a slow sine: reference and load, then the error without its fundamental."""
+    """Draw the effect of lash on a slow sine: reference, then the error without its part at the sine frequency."""
     error = 'error [\N{MICRO SIGN}rad]'
     figure, axes = new_panels(3, height=5.6, y=('reference [rad]', error, error), sharex=True,
                               height_ratios=(1, 1.2, 1.2))
@@ -232,7 +239,7 @@ def reversal_figure(done):
 
 def reversal_window():
     """Return (begin, end) [s] of the 3 s about the first reversal in the second period of the slow sine."""
-    # The first crest of the second period.
+    # The reversal is the first crest of this period.
     at = 1.25 * 2.0 * math.pi / REVERSAL_FREQUENCIES_RAD_S['reversal']
     return at - 1.0, at + 2.0
 

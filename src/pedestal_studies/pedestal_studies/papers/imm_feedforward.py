@@ -1,20 +1,22 @@
 """Feed-forward of estimated rate and acceleration (paper 003): a conventional Kalman filter beside the IMM.
 
-An IMM (interacting multiple model) filter mixes several Kalman filters by the probabilities of their models.
-The miss is the angle from the axis of the antenna to the target (the pointing error), as the paper's miss distance.
-The loop is `feedforward_loop`: 20 deg to and fro at 3.5 deg/s. Every 10 ms it gets a measured miss, which is 40 ms
-old. Cases AXIS/SOURCE, by the source of the rate and acceleration that are fed forward:
+An IMM (interacting multiple model) filter mixes several Kalman filters by the probabilities of their models. The miss,
+a term of the paper, is the pointing error: the angle from the axis of the antenna to the target. The loop is that of
+rigs/feedforward_loop.py. Its target moves to and fro through 20 deg at 3.5 deg/s. Every T = 10 ms the loop gets a
+measured miss, which is d = 40 ms old, and gives a command.
+
+Cases are AXIS/SOURCE. SOURCE is the source of the rate and acceleration that are fed forward:
 
 kalman-cv, kalman-cv-Q   conventional filter of constant velocity; Q: process noise [deg/s2/sqrt(Hz)]
 kalman-ca-Q              filter of constant acceleration; Q: process noise [deg/s3/sqrt(Hz)]
 imm, imm-b               IMM whose ca model has a process noise of 40 and of 5 deg/s3/sqrt(Hz)
 perfect-state            truth in the middle of the interval in which the command is in force
-...-predicted            the same filter, predicted from the time of the miss to that instant, d + T / 2 later
-drive-...                whole product: receiver with this latency, control unit, motors and gears
-drive-imm-default        the same with the default parameters of the IMM of the product
+...-predicted            filter of this name, predicted from the time of the miss to that middle, d + T / 2 later
+drive-...                filter of this name in the whole chain: receiver of latency d, control unit, motors, gears
+drive-imm-default        IMM with its default parameters in the whole chain
 
-d: delay of the miss, 40 ms; T: time between two commands, 10 ms. All filters get the same noise. The target of
-`drive-...` makes reversals without a pause, which is a sine.
+All filters get the same noise. In the cases drive-... the target reverses without a uniform part, so its motion is a
+sine.
 """
 import dataclasses
 import math
@@ -57,14 +59,14 @@ DEFAULT_RUNS = 50
 """Runs of each case, with independent noise."""
 
 DRIVE_DURATION_S, DRIVE_EVALUATION_START_S, DRIVE_ELEVATION_RAD = 36.0, 6.0, 0.5
-"""Duration of a run through the product, from receiver to gears [s], start of its evaluation in autotrack [s], and
-elevation [rad]."""
+"""Duration of a run of the whole chain from receiver to gears [s], start of its evaluation in autotrack [s], and
+elevation of the target [rad]."""
 
 CV_NOISES = (0.1, 0.2, 0.3, 0.5, 4.0)
 """Process noises of the conventional filter [deg/s2/sqrt(Hz)]."""
 
 PAPER_CV_NOISES = {'azimuth': 0.1, 'elevation': 0.3}
-"""Process noise of `kalman-cv` that comes nearest to the paper's results; the paper prints none."""
+"""Process noise of `kalman-cv` [deg/s2/sqrt(Hz)] that comes nearest to the paper's results; the paper prints none."""
 
 FEEDFORWARD_SOURCES = {
     'imm': imm(q_ca=40.0, predicted=False), 'imm-predicted': imm(q_ca=40.0, predicted=True),
@@ -86,7 +88,7 @@ SOURCE_MEANINGS = {
 
 
 def cv_name(axis, q):
-    """Return the name of the case of a conventional filter, q [deg/s2/sqrt(Hz)]."""
+    """Return the name of the case of a conventional filter; q: its process noise [deg/s2/sqrt(Hz)]."""
     return f'{axis}/kalman-cv' if q == PAPER_CV_NOISES[axis] else f'{axis}/kalman-cv-{q:g}'
 
 
@@ -99,9 +101,10 @@ CASES = {
 
 
 def drive_case(axis, tuned):
-    """Return a Case of reversals without a pause on an axis, tracked with a filter (FilterParameters).
+    """Return the Case of the whole chain, in which the target follows a sine on an axis.
 
-    The target's range of 510 m is that of uav_flyby's reference_range, at which the receiver has its nominal C/N0.
+    tuned: FilterParameters of this axis. The target's range of 510 m is the reference_range of the scenario uav_flyby,
+    at which the receiver has its nominal C/N0.
     """
     w = math.pi / REVERSAL_S_BY_AXIS[axis]
     amplitudes = {f'tracking_receiver.target.angle.{name}_amplitude':
@@ -120,11 +123,11 @@ DRIVE_CASES = {
     f'{axis}/drive-{name}': drive_case(axis, tuned) for axis in REVERSAL_S_BY_AXIS for name, tuned in {
         'kalman-cv': cv(PAPER_CV_NOISES[axis]).filter, 'imm': FEEDFORWARD_SOURCES['imm'].filter,
         'imm-default': filter_of('imm')}.items()}
-"""{name: Case} of the product."""
+"""{case: Case} of the whole chain."""
 
 
 def drive_error(item):
-    """Return (times [s], true error of the axis [rad]), each (n,), from DRIVE_EVALUATION_START_S on, of an item.
+    """Return (times [s], true pointing error of the axis [rad]), each (n,), from DRIVE_EVALUATION_START_S on.
 
     An item is (name of DRIVE_CASES, seed). The errors are NaN if the run left autotrack.
     """
@@ -147,7 +150,7 @@ MISS_TARGETS_DEG = {
 """Targets of miss_rms_deg."""
 
 PAPER_MISSES_DEG = {'azimuth/kalman-cv': 0.17, 'azimuth/imm': 0.035, 'elevation/kalman-cv': 0.1, 'elevation/imm': 0.03}
-"""Rms of the miss in the paper [deg], which the paper names the largest miss."""
+"""{case: number of the paper [deg]}. The paper names it the largest miss (RMS); we read it as the rms of the miss."""
 
 MAIN_CASES = {f'{axis}/{name}' for axis in REVERSAL_S_BY_AXIS
               for name in ('kalman-cv', 'imm', 'imm-predicted', 'perfect-state')}
@@ -155,12 +158,15 @@ MAIN_CASES = {f'{axis}/{name}' for axis in REVERSAL_S_BY_AXIS
 
 MISS_RATIO_TARGETS = {'azimuth/imm': ('>= 4', None), 'azimuth/imm-predicted': ('>= 6', None),
                       'elevation/imm': ('>= 3', 3.0), 'elevation/imm-predicted': ('>= 5', None)}
-"""{case: (target, value of the paper)} of the miss of kalman-cv, divided by the miss of the case. For azimuth the
-paper prints 4 to 5."""
+"""{case: (target, number of the paper or None)} of a ratio: miss of kalman-cv divided by miss of the case. For azimuth
+the paper prints 4 to 5."""
 
 
 def conventional_curve(misses, axis):
-    """Return (rate noise [deg/s], miss [deg]) of the conventional filter, an array (2, n, runs) over CV_NOISES."""
+    """Return (rate noise [deg/s], miss [deg]) of the conventional filters of CV_NOISES, an array (2, n, runs).
+
+    misses: {case: MissStatistics}, here and below.
+    """
     return np.array([[misses[cv_name(axis, q)].of(metric) for q in CV_NOISES]
                      for metric in ('rate_noise_deg_s', 'miss_rms_deg')])
 
@@ -168,8 +174,8 @@ def conventional_curve(misses, axis):
 def at_rate_noise(misses, axis, rate_noise):
     """Return the miss (runs,) [deg] of a conventional filter tuned to a rate noise (runs,) [deg/s] in each run.
 
-    It is interpolated between the filters of CV_NOISES (log-log). If even the quietest of them is noisier, its miss is
-    returned, which is too small.
+    The miss is interpolated between the filters of CV_NOISES on logarithmic scales. If even the quietest of these
+    filters is noisier, the miss of this filter is returned, which is too small.
     """
     noises, curve = np.log(conventional_curve(misses, axis))
     return np.exp([np.interp(*run) for run in zip(np.log(rate_noise), noises.T, curve.T)])
@@ -209,7 +215,7 @@ def drive_rows(of_drive):
 
 
 def remarks(misses):
-    """Return the sentences that explain the rows."""
+    """Return the sentences that explain the rows; misses: as of `rows`."""
     value = {(name, metric): case.mean(metric) for name, case in misses.items() for metric in METRIC_UNITS}
     late = (feedforward_loop.MISS_DELAY_STEPS + 0.5) * T
     steepest = math.pi * math.degrees(profiles.S_MOTION_RATE_RAD_S) / REVERSAL_S_BY_AXIS['azimuth']
@@ -219,7 +225,8 @@ def remarks(misses):
         'ours. Its "largest miss (RMS)" is read as the rms over the whole motion. miss_worst_second_deg is the rms of '
         'the worst second.',
         f'A feed-forward that is {1e3 * late:g} ms late (d + T / 2) causes a miss of a (d + T / 2) / K_p in a long '
-        f'turn. It is {steepest * late / feedforward_loop.K_P:.3f} deg at the {steepest:.1f} deg/s2 of the azimuth. '
+        f'turn at the acceleration a. The miss is {steepest * late / feedforward_loop.K_P:.3f} deg at the '
+        f'{steepest:.1f} deg/s2 of the azimuth. '
         'imm-predicted has no such miss. The rate of kalman-cv is the same with and without prediction.',
         'perfect-state is the limit of this servo: its miss comes from the noise of the miss and the jerk in the rate '
         'loop.',
@@ -276,7 +283,7 @@ def miss_figure(axis, figures_of_paper, misses):
 
 
 def feedforward_figure():
-    """Draw rate and acceleration fed forward through one reversal, one run, beside the truth."""
+    """Draw the rate and acceleration that are fed forward in one reversal of one run, beside the truth."""
     figure, axes = new_panels(2, height=5.4, y=('rate [deg/s]', 'acceleration [deg/s2]'), sharex=True)
     t, counts, target = from_first_reversal('azimuth')
     for panel, field, column in ((axes[0, 0], 'rate', 1), (axes[1, 0], 'acceleration', 2)):
@@ -306,7 +313,7 @@ def probability_figure():
 
 
 def tuning_figure(misses):
-    """Draw the miss against the noise of the rate fed forward, for the tunings."""
+    """Draw the miss of every filter over the noise of the rate that it feeds forward."""
     figure, axes = new_panels(1, 2, height=3.8, x='noise of the rate fed forward [deg/s]', y='miss rms [deg]',
                               sharex=True, sharey=True)
     for axis, panel in zip(REVERSAL_S_BY_AXIS, axes[0]):
@@ -324,7 +331,7 @@ def tuning_figure(misses):
 
 
 def drive_figure():
-    """Draw the miss of the product in reversals without a pause, one run of each filter."""
+    """Draw the miss of the whole chain over time, one run of each filter."""
     figure, axes = new_panels(2, height=4.8, y='miss [deg]', sharex=True)
     for axis, panel in zip(REVERSAL_S_BY_AXIS, axes[:, 0]):
         for name, colour in (('kalman-cv', TRUTH_COLOUR), ('imm', MOTOR_1_COLOUR), ('imm-default', FILTERED_COLOUR)):

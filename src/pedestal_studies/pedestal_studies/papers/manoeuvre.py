@@ -1,10 +1,10 @@
 """Rate and acceleration of filters through ever sharper reversals (paper 003, figures 3 and 4).
 
-A target moves to and fro through 20 deg at 3.5 deg/s. Its reversals are half a cosine and last 4, 2, 1, 0.5 and 0.35
-s, one after the other. It is measured at 100 Hz with 0.02 deg. Cases are reversal-<s>/<filter>, with the rms of a run
-inside the reversal. `cv` and `ca` are conventional filters of constant velocity and of constant acceleration. `imm-a`
-and `imm-b` are IMMs whose ca model has a process noise of 40 and of 5 deg/s3/sqrt(Hz): `imm` and `imm-b` of the study
-imm-feedforward.
+A target moves to and fro through 20 deg at 3.5 deg/s. In a reversal its rate is half a cosine. The reversals last 4,
+2, 1, 0.5 and 0.35 s, one after the other. The angle is measured at 100 Hz with a noise of 0.02 deg. Cases are
+reversal-<seconds>/<filter>; their metrics are the rms errors of rate and acceleration inside the reversal. `cv` and
+`ca` are conventional filters of constant velocity and of constant acceleration. `imm-a` and `imm-b` are IMMs whose ca
+model has a process noise of 40 and of 5 deg/s3/sqrt(Hz), as in `imm` and `imm-b` of the study imm-feedforward.
 """
 import math
 
@@ -30,10 +30,11 @@ BATCH_RUNS, NOISE_SEED = 25, 1
 """Runs of one batch; seed of their noise."""
 
 REVERSAL_DURATIONS_S = (4.0, 2.0, 1.0, 0.5, 0.35)
-"""Durations of the reversals [s], with peaks of 2.7 to 31 deg/s2."""
+"""Durations of the reversals [s]; their peak accelerations are 2.7 to 31 deg/s2."""
 
 LEAD_TIME_S = 5.0
-"""Duration of the uniform motion before the first reversal [s]."""
+"""Time at which the target is in the middle of its stroke before the first reversal [s]; its motion is uniform until
+then."""
 
 MEASUREMENT_NOISE = ensemble.Noise(feedforward_loop.MISS_SIGMA_RAD)
 """Noise of the measured angle."""
@@ -41,7 +42,8 @@ MEASUREMENT_NOISE = ensemble.Noise(feedforward_loop.MISS_SIGMA_RAD)
 FILTERS = {'cv': feedforward_loop.cv(0.1).filter, 'ca': feedforward_loop.ca(10.0).filter,
            'imm-a': feedforward_loop.imm(q_ca=40.0, predicted=False).filter,
            'imm-b': feedforward_loop.imm(q_ca=5.0, predicted=False).filter}
-"""{filter: FilterParameters}."""
+"""{filter: FilterParameters}. The numbers are the process noise of the filter: cv in deg/s2/sqrt(Hz), ca and imm in
+deg/s3/sqrt(Hz)."""
 
 FILTER_COLOURS = {'cv': TRUTH_COLOUR, 'ca': RAW_COLOUR, 'imm-a': MOTOR_1_COLOUR, 'imm-b': FILTERED_COLOUR}
 
@@ -49,12 +51,13 @@ ACCELERATION_ROW = 1
 """Row of the acceleration in the rms of `measured`; row 0 is the rate."""
 
 RATE_RATIO_TARGET = '>= 3'
-"""Target of the rate error of cv over the rate error of imm-b."""
+"""Required ratio: rate error of cv divided by rate error of imm-b [-]."""
 
 
 def motion():
     """Return (times (n,) [s], truth (angle, rate, acceleration) (n,), {reversal: mask (n,)}) of all reversals."""
-    # legs: time at which the target is in the middle before each reversal; starts: begin of each reversal.
+    # begin: time at which the target is in the middle of its stroke before the next reversal; legs: these times of all
+    # reversals; starts: {reversal: time at which it starts}.
     stroke, rate = profiles.S_MOTION_STROKE_RAD, profiles.S_MOTION_RATE_RAD_S
     begin, legs, starts = LEAD_TIME_S, [], {}
     for reversal in REVERSAL_DURATIONS_S:
@@ -81,7 +84,7 @@ def batch(item):
     sums = ensemble.moments(FILTERS[name], t, truth, MEASUREMENT_NOISE, ensemble.records(truth, MEASUREMENT_NOISE,
                                                                                          NOISE_SEED, first, count))
     inside = [ensemble.over_time(sums[:, mask]) for mask in reversals.values()]
-    rms = np.degrees([[ensemble.rms(of, what) for what in ('rate', 'acceleration')] for of in inside])
+    rms = np.degrees([[ensemble.rms(moments, what) for what in ('rate', 'acceleration')] for moments in inside])
     return ensemble.over_runs(sums), rms.transpose(2, 0, 1)
 
 
@@ -111,7 +114,7 @@ def measured(errors):
 
 
 def rows(values):
-    """Return the rows of values as of `measured`."""
+    """Return the rows of the study; values: as `measured` returns."""
     table = []
     for (reversal, name), (rate, acceleration) in values.items():
         case = f'reversal-{reversal:g}s/{name}'
@@ -145,17 +148,17 @@ def remarks(values):
 def moments_figure(sums_of, what, label):
     """Draw truth and mean estimates above, mean errors +-1 sigma below (paper 003, figures 3 and 4).
 
-    sums_of: {filter: MOMENTS (n,)}; what: 'rate' or 'acceleration'.
+    sums_of: {filter: MOMENTS (n,) of the errors, estimate minus truth}; what: 'rate' or 'acceleration'.
     """
     t, truth, _ = motion()
     figure, axes = new_panels(2, height=5.4, y=(label, f'error of the {label}'), sharex=True)
-    of = truth[('angle', 'rate', 'acceleration').index(what)]
-    axes[0, 0].plot(t, np.degrees(of), color=INK_COLOUR, linestyle='--', linewidth=0.8, label='truth')
+    true_value = truth[('angle', 'rate', 'acceleration').index(what)]
+    axes[0, 0].plot(t, np.degrees(true_value), color=INK_COLOUR, linestyle='--', linewidth=0.8, label='truth')
     for name in ('cv', 'imm-b'):
         sums = sums_of[name]
         mean = sums[what] / sums['runs']
         sigma = np.sqrt(np.maximum(sums[f'{what}2'] / sums['runs'] - mean * mean, 0.0))
-        axes[0, 0].plot(t, np.degrees(of + mean), color=FILTER_COLOURS[name], label=name)
+        axes[0, 0].plot(t, np.degrees(true_value + mean), color=FILTER_COLOURS[name], label=name)
         axes[1, 0].plot(t, np.degrees(mean), color=FILTER_COLOURS[name])
         axes[1, 0].fill_between(t, np.degrees(mean - sigma), np.degrees(mean + sigma), color=FILTER_COLOURS[name],
                                 alpha=0.25, linewidth=0.0)

@@ -3,10 +3,11 @@
 The loop is that of the study imm-feedforward, azimuth, with prediction over the delay for all filters. The miss is the
 pointing error: the angle from the axis of the antenna to the target. The rate noise is the rms error of the rate that
 is fed forward while the rate of the target is constant. Any filter has a small miss if its rate may be noisy. Each
-filter is therefore tuned from low to high bandwidth, and its curve of miss over rate noise is compared with one
-point. This point is the case imm-predicted: the IMM with the tuning of the study imm-feedforward. Cases <filter> are
-numbers of the curve of a filter; case `imm` is the curve of the IMM over its tunings. The numbers are the miss at the
-rate noise of imm-predicted, the rate noise at the miss of imm-predicted, and the least miss.
+filter is therefore tuned from low to high bandwidth, which gives a curve of miss over rate noise. This curve is
+compared with one point, the case imm-predicted: the IMM with the tuning of the study imm-feedforward.
+
+A case <filter> gives three numbers of the curve of a filter: the miss at the rate noise of imm-predicted, the rate
+noise at the miss of imm-predicted, and the least miss. The case `imm` is the curve of the IMM over its tunings.
 """
 import dataclasses
 import math
@@ -32,6 +33,7 @@ DEFAULT_RUNS = 50
 """Runs of each tuning, as many as in the paper."""
 
 LOOP_AXIS = 'azimuth'
+"""Axis of all runs."""
 
 REFERENCE_SOURCE = feedforward_loop.imm(q_ca=40.0, predicted=True)
 """Case imm-predicted of the study imm-feedforward, with which the curves are compared."""
@@ -41,7 +43,7 @@ REFERENCE_POINT = ('reference', 0.0)
 
 
 def _current_statistical(a_max):
-    """Return the Source of a 'current' statistical filter; a_max [deg/s2]."""
+    """Return the Source of a 'current' statistical filter; a_max: largest acceleration of its model [deg/s2]."""
     return Source(feedforward_loop.filter_of('current_statistical', current_statistical={
         'alpha': 0.5, 'a_max': math.radians(a_max)}))
 
@@ -91,12 +93,18 @@ def measured(statistics):
 
 
 def curve(points, name):
-    """Return (rate noise [deg/s], miss [deg]) of a filter over its tunings, an array (2, n)."""
+    """Return (rate noise [deg/s], miss [deg]) of a filter over its tunings, an array (2, n).
+
+    points: as of `remarks`.
+    """
     return np.array([points[name, value] for value in FILTER_TUNINGS[name][1]]).T
 
 
 def frontier(points, name):
-    """Return the Pareto frontier of the curve, (2, n) by rising noise: less miss for more rate noise."""
+    """Return the Pareto frontier of the curve of a filter, an array (2, n) of (rate noise, miss) by rising rate noise.
+
+    It holds the tunings for which no other tuning has both less rate noise and less miss.
+    """
     kept = []
     for noise, miss in sorted(map(tuple, curve(points, name).T)):
         if not kept or miss < kept[-1][1]:
@@ -105,12 +113,12 @@ def frontier(points, name):
 
 
 def miss_at(front, noise):
-    """Return the miss [deg] on a frontier at a rate noise [deg/s] inside it, log-log between its points."""
+    """Return the miss [deg] on a frontier at a rate noise [deg/s] within its range, log-log between its points."""
     return math.exp(np.interp(math.log(noise), *np.log(front)))
 
 
 def noise_at(front, miss):
-    """Return the rate noise [deg/s] on a frontier at a miss [deg] inside it, log-log between its points."""
+    """Return the rate noise [deg/s] on a frontier at a miss [deg] within its range, log-log between its points."""
     noises, misses = np.log(front)
     return math.exp(np.interp(math.log(miss), misses[::-1], noises[::-1]))
 
@@ -128,7 +136,7 @@ def rows(points):
         fronts = [frontier({case: values[:, i] for case, values in points.items()}, name) for i in range(len(miss))]
         table += [row(name, 'least_miss_deg', np.array([front[1, -1] for front in fronts]), 'deg'),
                   row(name, 'rate_noise_at_least_miss_deg_s', np.array([front[0, -1] for front in fronts]), 'deg/s')]
-        # A front begins at its least noise and ends at its least miss.
+        # A frontier begins at its least rate noise and ends at its least miss.
         if all(front[0, 0] <= own for front, own in zip(fronts, noise)):
             equal = np.array([miss_at(*run) for run in zip(fronts, noise)])
             table += [row(name, 'miss_at_equal_rate_noise_deg', equal, 'deg'),

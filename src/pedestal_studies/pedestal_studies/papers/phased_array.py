@@ -1,10 +1,16 @@
 """Paper 002's angle loop of a phased array: figures 3 to 7 and 9, limits of stability and of lock, a better loop.
 
-Cases run the kernels of `angle_loop`. Cases graph/... are the scenario phased_array_sway in the closed loop. S0, S1,
-S2: without smoothing, with the paper's recursion, with a moving average, with n = 20 at 1 kHz. A case without S0, S1
-or S2 in its name has S1. `lag_deg` is the largest error that the receiver measures (the paper's figures).
-`true_lag_deg` is the largest true error of the beam. The noise is 0.05 deg in each millisecond. `max_error_deg` is the
-error without noise, `jitter_rms_deg` the effect of the noise.
+The array steers its beam electronically. The loop moves the beam after the target by the error that the receiver
+measures. alpha is the gain of the loop from the error to the angle [-], T the time between two updates. Cases run the
+loops of rigs/angle_loop.py; cases graph/... run the scenario phased_array_sway in the closed loop.
+
+S0, S1 and S2 are the kinds of smoothing in the receiver: none, the paper's recursion, and a moving average, with n =
+20 samples at 1 kHz. A case without S0, S1 or S2 in its name has S1.
+
+lag_deg          largest error that the receiver measures, as in the paper's figures
+true_lag_deg     largest true error of the beam
+max_error_deg    largest true error without noise
+jitter_rms_deg   rms of the motion of the beam due to the noise, 0.05 deg in each millisecond
 """
 import dataclasses
 import functools
@@ -46,15 +52,15 @@ SINE_RATE_DEG_S, SINE_ACCELERATION_DEG_S2 = 30.0, 10.0
 """Largest rate [deg/s] and acceleration [deg/s2] of figure 7."""
 
 SWAY_AMPLITUDE_RAD, SWAY_PERIOD_S = math.radians(10.0), 8.0
-"""Amplitude [rad] and period [s] of figure 9."""
+"""Amplitude [rad] and period [s] of the ship's sway in figure 9."""
 
 RATE_COMPENSATIONS = (0.0, 0.85, 1.0)
-"""Shares delta of the ship's rate that are compensated [-]."""
+"""Shares delta of the ship's rate that the loop compensates [-]."""
 LOOP_DELAY_MS = 20
 """Delay of figure 7 and of all loops of COMPARED_LOOPS [ms]."""
 
 RECEIVER_NOISE_RAD, INS_ANGLE_NOISE_RAD, INS_RATE_NOISE_RAD_S = map(math.radians, (0.05, 0.005, 0.01))
-"""1-sigma of one millisecond: of the receiver [rad], of the INS's attitude [rad] and rate [rad/s]."""
+"""1-sigma noise of one sample of 1 ms: error of the receiver [rad], attitude [rad] and rate [rad/s] of the INS."""
 
 INS_STAMP_ERROR_MS = 5
 """Error of the INS's stamps [ms]."""
@@ -67,36 +73,34 @@ BEAMWIDTH_RAD = math.radians(1.0)
 
 
 def jerk(q):
-    """Return the noise of the filter [rad/s3/sqrt(Hz)] for a spectral density of the jerk in deg2/s5."""
+    """Return the process noise of the filter [rad/s3/sqrt(Hz)]; q: spectral density of the jerk [deg2/s5]."""
     return math.radians(math.sqrt(q))
 
 
 COMPARED_LOOPS = {
     # The loop of the paper, with and without compensation of 0.85 of the ship's rate.
     'paper': PaperLoop(delay=LOOP_DELAY_MS), 'paper-delta': PaperLoop(delay=LOOP_DELAY_MS, delta=0.85),
-    # The same loop, which points the beam at the angle predicted for the next update, R(k+1/k).
+    # The loop of the paper in a form that points the beam at R(k+1/k), the angle predicted for the next update.
     'type-2': PaperLoop(delay=LOOP_DELAY_MS, form='type_2'),
     'type-2-delta': PaperLoop(delay=LOOP_DELAY_MS, form='type_2', delta=0.85),
-    # Filters that expect more or less jerk of the target; tracked-10ms commands the beam every 10 ms, not every 1 ms.
+    # Loops with filters that expect more or less jerk of the target; tracked-10ms commands the beam every 10 ms, the
+    # others every 1 ms.
     'tracked-10ms': FilterLoop(jerk(1.0), RECEIVER_NOISE_RAD, hold=10),
     'best': FilterLoop(jerk(0.1), RECEIVER_NOISE_RAD),
     'fast': FilterLoop(jerk(1.0), RECEIVER_NOISE_RAD), 'faster': FilterLoop(jerk(10.0), RECEIVER_NOISE_RAD),
     # `best` with a delay of 150 ms, and `best` which assumes a delay that is 10 ms too short.
     'best-delay-150ms': FilterLoop(jerk(0.1), RECEIVER_NOISE_RAD, delay=150),
     'best-told-10ms-less': FilterLoop(jerk(0.1), RECEIVER_NOISE_RAD, assumed_delay=LOOP_DELAY_MS - 10)}
-"""Loops on one plant: the paper's loop, its type-2 form, and constant-acceleration filters.
-
-The input of the filters is beam in force + error. The command is their prediction for the middle of the interval in
-which the beam is held.
-"""
+"""{name: loop} of the loops that are compared: the paper's loop, its type-2 form, and loops with a filter of constant
+acceleration (FilterLoop). All loops have the same receiver and the same beam."""
 
 INS_LOOPS = {
     'best/sway-ins': FilterLoop(jerk(1e-3), RECEIVER_NOISE_RAD, use_ins=True, stamp_error=INS_STAMP_ERROR_MS),
     'best/sway-ins/exact-stamps': FilterLoop(jerk(1e-3), RECEIVER_NOISE_RAD, use_ins=True),
     'best/sway-ins/rate-only': FilterLoop(jerk(1e-3), RECEIVER_NOISE_RAD, use_ins=True, tau=0.0)}
-"""Loops with a filter in the earth frame, to which the INS rotates the measured angle. The stamps of the INS are 5 ms
-wrong, exact, or exact without use of the acceleration from the INS (rate-only). On the sway the target stands still in
-the earth frame, so the filter expects little jerk."""
+"""{case: loop} of loops with a filter in the earth frame. The attitude from the INS rotates the measured angle to this
+frame. The stamps of the INS are 5 ms wrong, or exact, or exact while the acceleration from the INS is not used
+(rate-only). Because the target stands still in the earth frame, the filter expects little jerk."""
 
 METRIC_TARGETS = {
     ('step/alpha=0.1/T=10ms/S0', 'overshoot_percent'): '19.7 +- 0.5',
@@ -119,11 +123,12 @@ PAPER_VALUES = {
 """{(case, metric): number that the paper prints}."""
 
 STUDY_REMARKS = [
-    'sine: the paper prints 0.30 deg, the v T of the largest rate only. The measured error is '
-    'sqrt((v T)^2 + (a T^2 / beta)^2), because the acceleration needs an innovation too. The two shares are 0.30 and '
-    '0.19 deg, a quarter of a period apart.',
-    'The error that the receiver measures is v T with any delay and smoothing. With smoothing the true error of the '
-    'beam (true_lag_deg) is larger, because a smoothed error is old.',
+    'sine: the paper prints 0.30 deg, which is v T alone (v: largest rate, T: time between two updates). The measured '
+    'error is sqrt((v T)^2 + (a T^2 / beta)^2), because the acceleration needs an innovation too (a: largest '
+    'acceleration, beta: gain of the loop on the rate). The two shares are 0.30 and 0.19 deg, a quarter of a period '
+    'apart.',
+    'ramp: the error that the receiver measures is v T with any delay and smoothing. With smoothing the true error of '
+    'the beam (true_lag_deg) is larger, because a smoothed error is old.',
     'The paper does not state its alphas, the use of the smoothing, the delays of figure 5, and the place at which an '
     'error is read. The 20 % of figure 3 fit S0 and S2. The growth in figure 4 needs S1 or S2, because without '
     'smoothing T has no effect.',
@@ -144,7 +149,7 @@ def instants(seconds):
 
 
 def sine(t, amplitude, w):
-    """Return (angle, rate), each (n,), of a sine at times t (n,) [s]; w [rad/s]."""
+    """Return (angle, rate), each (n,), of a sine at times t (n,) [s]; amplitude [rad], angular frequency w [rad/s]."""
     return amplitude * np.sin(w * t), amplitude * w * np.cos(w * t)
 
 
@@ -154,13 +159,13 @@ def ramp_target(rate):
 
 
 def sine_target(rate=SINE_RATE_DEG_S):
-    """Return the angle (n,) [rad] of figure 7's sine, with any largest rate [deg/s] at its frequency."""
+    """Return the angle (n,) [rad] of a sine of the frequency of figure 7; rate: its largest rate [deg/s]."""
     w = SINE_ACCELERATION_DEG_S2 / SINE_RATE_DEG_S
     return sine(instants(RECORD_DURATION_S), math.radians(rate) / w, w)[0]
 
 
 def sway_target():
-    """Return (angle [rad], rate [rad/s]), each (n,), of the line of sight on the swaying deck."""
+    """Return (angle [rad], rate [rad/s]), each (n,), of a fixed target, seen from the swaying deck."""
     return sine(instants(RECORD_DURATION_S), SWAY_AMPLITUDE_RAD, 2.0 * math.pi / SWAY_PERIOD_S)
 
 
@@ -170,24 +175,24 @@ def settled(x):
 
 
 def isolation(error):
-    """Return the isolation [dB] from the ship's sway with a remaining error [rad]."""
+    """Return the isolation [dB]: amplitude of the ship's sway over a remaining error [rad]."""
     return -20.0 * math.log10(error / SWAY_AMPLITUDE_RAD)
 
 
 def name(loop):
-    """Return the name of a PaperLoop in the names of cases."""
+    """Return the part of a case name that describes a PaperLoop."""
     parts = [f'alpha={loop.alpha:g}', f'T={loop.period}ms', loop.smoothing]
     parts += [f'slope={loop.slope:g}'] * (loop.slope != 1.0) + [f'delay={loop.delay}ms'] * (loop.delay > 0)
     return '/'.join(parts)
 
 
 def steps():
-    """Return {PaperLoop: step response (n,) of the beam from rest, over the size of the step at sample 0}."""
+    """Return {PaperLoop: step response}: beam (n,) over the size of the step, which comes at sample 0."""
     loops = [PaperLoop(alpha=alpha, period=T, smoothing=S) for alpha in ALPHA_GAINS for T in LOOP_PERIODS_MS
              for S in SMOOTHING_CODES]
     loops += [PaperLoop(delay=delay, smoothing=S) for delay in LOOP_DELAYS_MS[1:] for S in SMOOTHING_CODES]
     loops += [PaperLoop(slope=slope) for slope in SLOPE_RATIOS if slope != 1.0]
-    # The step comes after the smoothing is full of samples at rest, and 3 s of its response follow.
+    # Before the step, samples at rest fill the smoothing. The response is 3 s long.
     target = np.full(3000 + SMOOTHING_SAMPLES, STEP_SIZE_RAD)
     target[:SMOOTHING_SAMPLES] = 0.0
     return {loop: loop.run(target)[0][SMOOTHING_SAMPLES:] / STEP_SIZE_RAD for loop in loops}
@@ -206,9 +211,9 @@ def step_rows(done):
 
 
 def eigenvalue_limit(loop, near):
-    """Return the largest delay [ms] with all eigenvalues of a PaperLoop inside the unit circle.
+    """Return the largest delay [ms] at which all eigenvalues of a PaperLoop are inside the unit circle.
 
-    near: start of the search [ms].
+    near: delay at which the search starts [ms].
     """
     def inside(delay):
         return spectral_radius(dataclasses.replace(loop, delay=delay)) < 1.0
@@ -233,7 +238,7 @@ def limits():
 
 
 def limit_rows(delays):
-    """Return the rows (case, metric, value, unit) of `limits`."""
+    """Return the rows (case, metric, value, unit) of the delays that `limits` returns."""
     rows = []
     for loop, (bisected, by_eigenvalues) in delays.items():
         case = f'delay-limit/{name(loop)}' + ('/type-2' if loop.form == 'type_2' else '')
@@ -242,9 +247,9 @@ def limit_rows(delays):
 
 
 def lag_rows(case, loop, target, rate=None):
-    """Return the rows of the error that the receiver measures, and of the true error of the beam with each smoothing.
+    """Return the rows (case, metric, value, unit) of lag_deg of a PaperLoop, and of true_lag_deg with each smoothing.
 
-    Arguments as of PaperLoop.run.
+    target, rate: as of PaperLoop.run.
     """
     rows = [(case, 'lag_deg', math.degrees(peak(settled(loop.run(target, rate)[1]))), 'deg')]
     for S in SMOOTHING_CODES:
@@ -254,7 +259,7 @@ def lag_rows(case, loop, target, rate=None):
 
 
 def moving_rows():
-    """Return the rows of figures 6, 7 and 9."""
+    """Return the rows (case, metric, value, unit) of figures 6, 7 and 9."""
     rows = []
     for T, rates in zip(LOOP_PERIODS_MS, (RAMP_RATES_DEG_S, (30,))):
         for rate in rates:
@@ -270,7 +275,7 @@ def moving_rows():
 
 
 def noises(run):
-    """Return the noise of the receiver [rad], of the INS's attitude [rad] and rate [rad/s], each (n,), of one run."""
+    """Return the noise of receiver [rad], INS attitude [rad] and INS rate [rad/s], each (n,), of one run."""
     rng = np.random.default_rng(FIRST_SEED + run)
     return [sigma * rng.standard_normal(round(RECORD_DURATION_S / GRID_STEP_S))
             for sigma in (RECEIVER_NOISE_RAD, INS_ANGLE_NOISE_RAD, INS_RATE_NOISE_RAD_S)]
@@ -284,7 +289,7 @@ def compared_targets():
 def max_error_at_ends(error, target):
     """Return the largest error [rad] at the ends of the milliseconds, from the error (n,) in their middles.
 
-    At the ends the target (n,) has moved half-way to its neighbours.
+    At the ends the target (n,) [rad] is half-way between its neighbours, and the beam is that of the middle.
     """
     half = 0.5 * np.diff(target)
     return max(peak(settled(error[:-1] + half)), peak(settled(error[1:] - half)))
@@ -295,7 +300,7 @@ COMPARED_CASES = (*(f'{loop}/{target}' for loop in COMPARED_LOOPS for target in 
 
 
 def beam(case, run=None):
-    """Return the beam (n,) [rad] of one of COMPARED_CASES; run: number of the noise, None for no noise."""
+    """Return the beam (n,) [rad] of one of COMPARED_CASES; run: number of the run, None for a run without noise."""
     sway, rate = sway_target()
     noise, ins_angle, ins_rate = 3 * (np.zeros(len(sway)),) if run is None else noises(run)
     if case in INS_LOOPS:
@@ -350,17 +355,20 @@ def compared_rows(done, jitters):
 RECEIVER_LOSS_POWERS = {
     'half-beamwidth': 0.5,
     'pattern': 10.0**(0.1 * (ReceiverParameters().lose_level_dbhz - ReceiverParameters().cn0_dbhz))}
-"""Power over the power on axis at which the signal is lost: at half a beamwidth, and at our receiver's default."""
+"""{kind: power over the power on axis at which the signal is lost [-]}.
+
+half-beamwidth: half of the power, at half a beamwidth. pattern: the level at which our receiver loses lock by default.
+"""
 
 
 def signal_loss_loop(kind, form):
-    """Return the PaperLoop of a form with a kind of RECEIVER_LOSS_POWERS."""
+    """Return the PaperLoop with a receiver that loses the signal; kind: of RECEIVER_LOSS_POWERS; form: of the loop."""
     return PaperLoop(delay=LOOP_DELAY_MS, form=form, beamwidth=BEAMWIDTH_RAD,
                      lost_power_ratio=RECEIVER_LOSS_POWERS[kind])
 
 
 def sine_from_rest(rate):
-    """Return the angle (n,) [rad] of the sine target of a largest rate [deg/s], from rest at one of its ends."""
+    """Return the angle (n,) [rad] of a sine that starts at rest at one of its ends; rate: its largest rate [deg/s]."""
     w = SINE_ACCELERATION_DEG_S2 / SINE_RATE_DEG_S
     return math.radians(rate) / w * (1.0 - np.cos(w * np.maximum(instants(RECORD_DURATION_S), 0.0)))
 
@@ -381,7 +389,11 @@ def max_kept_rate(loop):
 
 
 def loss_rows():
-    """Return the rows of the largest rate of the sine that a loop keeps, and of the linear receiver's error at it."""
+    """Return the rows (case, metric, value, unit) of loops with a receiver that loses the signal.
+
+    The metrics are the largest rate of the sine at which the loop keeps the target, and the error at this rate with a
+    linear receiver, which loses no signal.
+    """
     rows = []
     for form in ('type_1', 'type_2'):
         for kind in RECEIVER_LOSS_POWERS:
@@ -396,6 +408,7 @@ def loss_rows():
 
 PAPER_LOOP_PARAMETERS = {f'acu.{axis}.beam.{key}': value for axis in ('azimuth', 'elevation')
                          for key, value in (('form', 'type_1'), ('rate_compensation', 0.85))}
+"""Parameters of the control unit with the paper's loop."""
 
 GRAPH_CASES = {'graph/T=10ms': {}, 'graph/T=1ms': {'adu.period': 0.001},
                'graph/T=10ms/paper-delta': PAPER_LOOP_PARAMETERS}
@@ -403,6 +416,7 @@ GRAPH_CASES = {'graph/T=10ms': {}, 'graph/T=1ms': {'adu.period': 0.001},
 
 NOISELESS_PARAMETERS = {'tracking_receiver.receiver.cn0_dbhz': 110.0, 'ins.tilt_noise': 0.0, 'ins.heading_noise': 0.0,
                         'ins.rate_noise': 0.0}
+"""Parameters of an INS without noise, and of a signal so strong that the noise of the receiver has no effect."""
 
 
 def graph_case(case, quiet=False):
@@ -413,6 +427,7 @@ def graph_case(case, quiet=False):
     noisy = Case(case, 'phased_array_sway', GRAPH_CASES[case])
     if not quiet:
         return noisy
+    # The control unit still assumes the noise of the noisy case, so that its filter has the same gains.
     tracking = noisy.loaded().node_parameters('tracking_receiver')
     sigma = receiver.angle_noise(tracking, tracking.receiver.cn0_dbhz, tracking.period)
     return dataclasses.replace(noisy, parameters={**GRAPH_CASES[case], **NOISELESS_PARAMETERS,
@@ -451,7 +466,10 @@ def graph_rows(jitters):
 
 
 def readings(loops, target, rate=None):
-    """Return {label: {S: (error that the receiver measures, true error), each (n,) [rad]}} of {label: PaperLoop}."""
+    """Return {label: {smoothing: (error that the receiver measures, true error), each (n,) [rad]}}.
+
+    loops: {label: PaperLoop}; target, rate: as of PaperLoop.run.
+    """
     errors = {}
     for label, loop in loops.items():
         errors[label] = {}

@@ -1,13 +1,20 @@
 """Effect of an independent measurement of the rate on the filter (paper 004): bandwidth and dynamic error.
 
-The 'current' statistical filter with constant sigma_a and noises settles to constant gains: X+ = A X + B (y, y'). A
-and B are identified on the compiled filter itself, with one unit state and one unit measurement at a time. A sine y =
-e^jwt, y' = jw y then gives
+With constant sigma_a and noises, the 'current' statistical filter settles to constant gains: X+ = A X + B (y, y').
+
+    X, X+     estimate (angle, rate, acceleration) of one measurement and of the next
+    y, y'     measured angle [rad] and measured rate [rad/s]
+    sigma_a   standard deviation of the acceleration of the target that the filter assumes
+    T, w, t   time between two measurements [s]; angular frequency [rad/s]; time [s]
+    j, e^jwt  imaginary unit; sine of frequency w as a complex exponential
+
+A and B are identified on the compiled filter itself, with one unit state and one unit measurement at a time. A sine
+y = e^jwt, y' = jw y then gives the response G of the estimate:
 
     G(jw) = (1 - A e^-jwT)^-1 B (1, jw)',        angle: G_1,  rate: G_2 / jw,  dynamic error: |1 - G_1|.
 
-The bandwidth of the rate is the frequency at which |G_2 / jw| first falls below -3 dB. With enough weight on the
-measured rate |G_1| never does, because the two measurements make a complementary filter.
+The bandwidth of the rate is the frequency at which |G_2 / jw| first falls below -3 dB. If the measured rate has enough
+weight, |G_1| never falls below -3 dB, because the two measurements make a complementary filter.
 """
 import dataclasses
 import math
@@ -41,16 +48,16 @@ ANGLE_SIGMA_RAD = math.radians(0.03)
 """Noise of a measured angle [rad]."""
 
 ALPHA = 0.5
-"""Manoeuvre frequency [1/s]."""
+"""Reciprocal of the time for which the filter expects an acceleration to last [1/s]."""
 
 ACCELERATION_SIGMAS_DEG_S2 = (0.05, 0.5, 3.0)
-"""Standard deviations of the acceleration [deg/s2]."""
+"""Values of sigma_a [deg/s2]."""
 
 RATE_SIGMAS_DEG_S = {'position': math.nan, 'position-rate': 0.1, 'position-rate-0.02': 0.02}
 """{case: noise of a measured rate [deg/s]}, NaN without a measured rate."""
 
 MAIN_SIGMA_DEG_S2 = 0.5
-"""sigma_a of the rows whose name is one of RATE_SIGMAS_DEG_S alone [deg/s2]."""
+"""sigma_a of the cases whose name does not state it [deg/s2]."""
 
 DYNAMIC_ERROR_FREQUENCY_HZ = 0.2
 """Frequency of the dynamic error [Hz]."""
@@ -64,7 +71,8 @@ SETTLING_STEPS = 20000
 FLYBY_PROFILE = 'flyby-60m'
 
 MAX_ACCELERATION_RATIO, MIN_SIGMA_RATIO = 1.2, 0.3
-"""Filter of a flight: a_max over the largest acceleration of the flight, and least sigma_a over a_max."""
+"""Parameters of the filter of a flight: its a_max over the largest acceleration of the flight [-], and the least
+sigma_a over a_max [-]."""
 
 SETTLING_TIME_S = 5.0
 """Time of the flyby from which the errors are evaluated [s]."""
@@ -92,14 +100,20 @@ BATCH_RUNS, NOISE_SEED = 25, 1
 
 
 def filter_of(a_max, floor):
-    """Return a 'current' statistical filter (FilterParameters) that takes the measured rate; a_max in rad/s2."""
+    """Return a 'current' statistical filter (FilterParameters) that uses the measured rate.
+
+    a_max: largest acceleration of its model [rad/s2]; floor: least sigma_a over a_max [-].
+    """
     model = dataclasses.replace(FilterParameters().current_statistical, alpha=ALPHA, a_max=a_max, floor=floor)
     return FilterParameters(kind='current_statistical', rate_measurement=True, current_statistical=model)
 
 
 @compiled
 def _settle(f, c, rate, R_rate, steps):
-    """Run the filter for `steps` on a target at rest; rate: 0 if it is measured, else NaN."""
+    """Run the filter for `steps` on a target at rest.
+
+    rate: measured rate, 0, or NaN without a measured rate. R_rate: its variance [rad2/s2].
+    """
     axis_filter.start(f[0], c[0], 0.0, ANGLE_SIGMA_RAD * ANGLE_SIGMA_RAD, 1.0)
     for _ in range(steps):
         axis_filter.predict(f[0], c[0], T)
@@ -108,15 +122,16 @@ def _settle(f, c, rate, R_rate, steps):
 
 @compiled
 def _step(f, c, y, y_rate, R_rate):
-    """Run one step of the filter with a measured angle [rad] and rate [rad/s]."""
+    """Run one step of the filter with a measured angle y [rad] and a rate y_rate [rad/s] of variance R_rate."""
     axis_filter.predict(f[0], c[0], T)
     axis_filter.correct(f[0], c[0], AxisMeasurement(y, ANGLE_SIGMA_RAD * ANGLE_SIGMA_RAD, y_rate, R_rate))
 
 
 def steady_state_matrices(sigma_a, rate_sigma):
-    """Return (A (3, 3), B (3, 2)) of X+ = A X + B (y, y') with constant gains; sigma_a [deg/s2], rate_sigma [deg/s].
+    """Return (A (3, 3), B (3, 2)) of X+ = A X + B (y, y') with constant gains.
 
-    B has a column of zeros for a rate that is not measured (NaN).
+    sigma_a [deg/s2]; rate_sigma: noise of the measured rate [deg/s], NaN without a measured rate. B then has a column
+    of zeros for the rate.
     """
     c = axis_filter.constants(filter_of(math.radians(sigma_a), 1.0))        # floor 1: sigma_a = a_max at all times
     R_rate = math.radians(rate_sigma) ** 2
@@ -137,7 +152,7 @@ def steady_state_matrices(sigma_a, rate_sigma):
 
 
 def responses(A, B, frequency):
-    """Return (G_1, G_2 / jw) of X+ = A X + B (y, y') at frequencies (n,) [Hz]: estimated over true angle and rate."""
+    """Return (G_1, G_2 / jw), each (n,), at frequencies (n,) [Hz]: estimated over true angle, and over true rate."""
     jw = 2j * math.pi * frequency
     X = np.linalg.solve(np.eye(3) - A * np.exp(-jw * T)[:, None, None], (B[:, 0] + jw[:, None] * B[:, 1])[..., None])
     return X[:, 0, 0], X[:, 1, 0] / jw
@@ -155,7 +170,7 @@ def bandwidth(G):
 
 
 def measures(sigma_a, rate_sigma):
-    """Return {metric: (value, unit)} of the filter with constant gains."""
+    """Return {metric: (value, unit)} of the filter with constant gains; arguments as of `steady_state_matrices`."""
     A, B = steady_state_matrices(sigma_a, rate_sigma)
     angle, rate = responses(A, B, RESPONSE_FREQUENCIES_HZ)
     (angle_at_frequency,), _ = responses(A, B, np.array([DYNAMIC_ERROR_FREQUENCY_HZ]))
@@ -181,9 +196,9 @@ def differenced_rate(y, steps):
 
 
 def filtered(t, target, y, y_rate, R_rate):
-    """Return the ESTIMATE (n,) of the filter for a target (n, 3), from measured angles and rates (n,).
+    """Return the estimates (n,), ESTIMATE_DTYPE, of the filter from measured angles y and rates y_rate (n,).
 
-    t: times (n,) [s]. R_rate: variance of the rates [rad2/s2].
+    t: times (n,) [s]. target (n, 3): true angle, rate and acceleration. R_rate: variance of y_rate [rad2/s2].
     """
     c = axis_filter.constants(filter_of(MAX_ACCELERATION_RATIO * np.abs(target[:, 2]).max(), MIN_SIGMA_RATIO))
     out = np.zeros(len(t), axis_filter.ESTIMATE_DTYPE)
@@ -228,6 +243,7 @@ def batch(item):
 
 
 FLYBY_CASES = (*RATE_SIGMAS_DEG_S, *DIFFERENCED_RATES)
+"""Cases of the flyby, by the source of the rate (RATE_SOURCE_MEANINGS)."""
 METRIC_TARGETS = {('position-rate', 'rate_bandwidth_ratio'): '>= 1.5',
                   ('position-rate', 'dynamic_error_ratio'): '>= 9'}
 
@@ -241,7 +257,7 @@ def rows(measured, errors):
     for name, values in measured.items():
         table += [row(name, metric, value, unit, target='< 1' if metric == 'largest_eigenvalue' else None)
                    for metric, (value, unit) in values.items()]
-        # The case without a measured rate and with the same sigma_a is the other part of the ratios.
+        # A ratio compares this case with the case of the same sigma_a without a measured rate.
         kind, _, sigma_a = name.partition('/')
         if kind != 'position':
             without = measured['position' + ('/' + sigma_a if sigma_a else '')]

@@ -1,10 +1,17 @@
 """Paper 000's step and sine (figures 5, 6), then a better controller on the same plant.
 
-The cases paper-r1 and paper-r2 are the two readings of the paper's sine, with gains for each: r1 = 0.4 Hz, r2 = 0.4
-rad/s. `paper-all` is one controller for every number that is printed with figures 5 and 6, with the sine read as 0.4
-Hz. `best` is the feed-forward controller. `best-inertia-plus` and `-minus` have the controller `best` with 20 % more
-and less load. `best-full-torque` has no reserve for such a load. `adrc` is the ADRC. `pedestal run
-servo_step|servo_sine --param ...` runs every case too (Case.command).
+The plant is the azimuth axis with two motors, gears and load. The paper prints a sine of "0.4 rad/s", which is read in
+two ways: 0.4 Hz (r1) and 0.4 rad/s (r2).
+
+paper-r1, paper-r2   controller of the paper, with gains for one reading of the sine
+paper-all            controller of the paper, with gains for all numbers of figures 5 and 6; the sine is 0.4 Hz
+best                 controller with feed-forward
+best-inertia-plus    controller of best, with 20 % more load inertia
+best-inertia-minus   controller of best, with 20 % less load inertia
+best-full-torque     controller that uses the full torque, with no reserve for a heavier load
+adrc                 active disturbance rejection control (ADRC)
+
+`pedestal run servo_step|servo_sine --param ...` runs every case too (Case.command).
 """
 import functools
 import math
@@ -37,6 +44,7 @@ SINE_FREQUENCIES_RAD_S = {'0p4hz': 0.8 * math.pi, '0p4rads': 0.4}
 """Two readings of the paper's sine [rad/s]."""
 
 SINE_READINGS = {'0p4hz': '0.4 Hz', '0p4rads': '0.4 rad/s'}
+"""{reading of the paper's sine: label in a figure}."""
 
 SINE_PERIODS = 4
 """Periods of each sine, of which the first belongs to the transient."""
@@ -57,10 +65,10 @@ PAPER_ALL_PARAMETERS = {'acu.azimuth.pid.bandwidth': 54.0, 'acu.azimuth.pid.deri
                         'adu.azimuth.speed_loop.proportional': 1.5, 'adu.azimuth.speed_loop.integral': 7.0}
 """Gains that a search found, because the paper prints none.
 
-A position loop K e + D e' before a rate loop of type 1 falls short of the amplitude. The shortfall is (1 + 2 D) (w /
-K)^2 / 2, which is 0.2 % with paper-r1. A slow rate loop, tau = J / K_p, compensates tau w^2 / K of it. K, D: bandwidth
-and derivative of the pid; e: position error; w: frequency of the sine; J: inertia; K_p: proportional gain of the speed
-loop.
+A position loop K e + D e' before a rate loop of type 1 does not reach the amplitude of the sine. The shortfall is
+(1 + 2 D) (w / K)^2 / 2, which is 0.2 % with paper-r1. A slow rate loop with the time constant tau = J / K_p reduces
+the shortfall by tau w^2 / K. K, D: bandwidth [1/s] and derivative gain [-] of the pid; e: position error, e': its
+rate; w: frequency of the sine [rad/s]; J: inertia; K_p: proportional gain of the speed loop.
 """
 
 DRIVE_PARAMETERS = {
@@ -72,7 +80,7 @@ DRIVE_PARAMETERS = {
 SHAPER_PARAMETERS = {
     'acu.azimuth.shaper.rate': 2.42, 'acu.azimuth.shaper.acceleration': 31.0, 'acu.azimuth.shaper.jerk': 8000.0,
     'acu.azimuth.shaper.h0': 0.006}
-"""Shaper that reserves a quarter of the torque for a load heavier than assumed."""
+"""Shaper whose acceleration leaves a quarter of the torque as a reserve for a load heavier than assumed."""
 
 BEST_PARAMETERS = {
     **DRIVE_PARAMETERS, **SHAPER_PARAMETERS, 'adu.azimuth.speed_loop.disturbance_observer': 400.0,
@@ -81,9 +89,9 @@ BEST_PARAMETERS = {
 """Controller of the case best.
 
 After a shock that opens the lash, the loop stays stable if any one gain is multiplied by up to 1.3. Above this factor
-(a bandwidth of 45 rad/s) the closing of the lash takes so much torque that the bias torque stays faded out. The lash
-then opens again, in a limit cycle of some mrad. A faster observer (600 rad/s) reduces the effect of the gust by 6 %
-and lets the load ring on the gear for 0.2 s.
+(for example a bandwidth of 45 rad/s) the closing of the lash takes so much torque that the bias torque stays faded
+out. The lash then opens again, in a limit cycle of some mrad. A faster observer (600 rad/s) reduces the effect of the
+gust by 6 % and lets the load ring on the gear for 0.2 s.
 """
 
 FULL_TORQUE_PARAMETERS = {**BEST_PARAMETERS, 'acu.azimuth.shaper.acceleration': 38.0,
@@ -100,7 +108,7 @@ CASE_PARAMETERS = {
     'best-inertia-plus': {**BEST_PARAMETERS, 'adu.azimuth.load.inertia': 252.0},
     'best-inertia-minus': {**BEST_PARAMETERS, 'adu.azimuth.load.inertia': 168.0},
     'best-full-torque': FULL_TORQUE_PARAMETERS, 'adrc': ADRC_PARAMETERS}
-"""{case: parameters}."""
+"""{case: parameters}; 252 and 168 kg m2 are 20 % more and less than the inertia of the load, 210 kg m2."""
 
 METRIC_TARGETS = {
     **{name: {'step_overshoot_percent': '12 +- 1.5', 'step_settling_2percent_s': '0.20 +- 0.03',
@@ -131,7 +139,7 @@ def step_case(name):
 
 
 def sine_case(name, reading):
-    """Return the Case of SINE_PERIODS of one of SINE_READINGS of the paper's sine."""
+    """Return the Case of SINE_PERIODS periods of the paper's sine; reading: key of SINE_READINGS."""
     return cases.sine_case(Case(name, 'servo_sine', CASE_PARAMETERS[name]), SINE_FREQUENCIES_RAD_S[reading],
                            SINE_PERIODS)
 
@@ -184,7 +192,7 @@ CASE_RUNS = {
     'best-inertia-minus': ('step',), 'best-full-torque': ('step',),
     'adrc': ('step', '0p4rads', '0p4hz', 'gust'),
 }
-"""Kinds of run of each case."""
+"""{case: kinds of its runs}: step, sine of one reading, gust."""
 
 
 def records(cases, progress):
@@ -200,10 +208,11 @@ def records(cases, progress):
 
 RUN_METRICS = {'step': step_metrics, 'gust': gust_metrics,
                **{reading: functools.partial(sine_metrics, reading=reading) for reading in SINE_FREQUENCIES_RAD_S}}
+"""{kind of run: function that returns {metric: value} of its closed_loop.Run}."""
 
 
 def rows(done):
-    """Return the rows of records as of `records`."""
+    """Return the rows of the study; done: as `records` returns."""
     return [row(name, metric, value, SUFFIX_UNITS[metric.rpartition('_')[2]],
                 PAPER_VALUES.get(metric.removeprefix(f'sine_{kind}_')),
                 METRIC_TARGETS.get(name, {}).get(metric))
@@ -213,8 +222,8 @@ def rows(done):
 def bang_bang(step, adu):
     """Return (time of the whole move, time to its 2 % band) [s] of the fastest rest-to-rest move of the azimuth axis.
 
-    step: [rad]. The motors have full torque forwards, then backwards. Coulomb friction opposes the acceleration and
-    supports the deceleration.
+    step: size of the move [rad]. adu: AduParameters. The motors have full torque forwards, then backwards. Coulomb
+    friction opposes the acceleration and supports the deceleration.
     """
     p = adu.azimuth
     N = p.gear_train.ratio
@@ -285,7 +294,7 @@ def step_figure(done):
 
 
 def sine_figure(done):
-    """Draw figure 6: reference and load, errors of both readings, the error of best on its own scale."""
+    """Draw figure 6: reference and load, errors of the paper's controllers, and the error of best on its own scale."""
     figure, axes = new_panels(3, height=7.0, x='time [periods of the sine]', sharex=True, height_ratios=(1.4, 1.2, 1),
                               y=('azimuth [rad]', 'error [mrad]', 'error [\N{MICRO SIGN}rad]'))
     period = 2.0 * math.pi / SINE_FREQUENCIES_RAD_S['0p4hz']
@@ -326,7 +335,7 @@ def gust_figure(done):
 
 
 def inertia_figure(done):
-    """Draw the end of the step of best with 20 % more and less load, and its torque."""
+    """Draw the end of the step of best with 20 % more and 20 % less load inertia, and the torque of the motors."""
     figure, axes = new_panels(2, height=5.2, y=('azimuth - 0.174 rad [mrad]', 'torque [Nm]'), sharex=True)
     for name, label in (('best-inertia-minus', 'load 20 % lighter'), ('best', 'load as assumed'),
                         ('best-inertia-plus', 'load 20 % heavier')):

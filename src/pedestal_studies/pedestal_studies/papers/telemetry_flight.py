@@ -1,19 +1,25 @@
 """Paper 004's filter on a flight of the same kind (figures 1 to 8), and the matrices of its proof of stability.
 
-The paper prints T = 0.01 s and the windows of its figures, and that the filter begins with the first measured angle
-and rate. The flight, the noises and the parameters of the filter are ours. A target flies straight past the antenna
-and is nearest at CULMINATION_TIME_S, inside the paper's figures 2 and 6. Cases <axis>/filtered are the 'current'
-statistical filter on angle and rate. Cases <axis>/measured are the measured angle and rate, and the acceleration as
-the difference of the measured rate over DIFFERENCE_STEPS steps.
+The filter estimates angle, rate and acceleration of one axis from measured angle and rate. The paper prints T = 0.01 s
+and the windows of its figures, and that the filter begins with the first measured angle and rate. The flight, the
+noises and the parameters of the filter are ours. A target flies straight past the antenna and is nearest at
+CULMINATION_TIME_S, inside the paper's figures 2 and 6. Cases <axis>/filtered are the 'current' statistical filter on
+angle and rate. Cases <axis>/measured are the measured angle and rate, and the acceleration as the difference of the
+measured rate over DIFFERENCE_STEPS steps.
 
-With x = (angle, rate, acceleration), x+ = Phi x + U abar and the mean acceleration abar as its input, y = H x:
+The model of the filter is x+ = Phi x + U abar, y = H x. The two matrices of the proof are
 
     controllability (U, Phi U, Phi^2 U),        observability (H', (H Phi)', (H Phi^2)')'.
 
-Phi, U: transition over T and effect of the mean acceleration abar; H: measurement; ': transposed. The condition number
-is the largest over the smallest singular value of a matrix. `condition` is measured with T in place of the second as
-the unit of time, in which the entries are of one size. In seconds the entries differ by up to 1 / T^2, and
-`condition_in_seconds` shows only this.
+    x, x+   state (angle, rate, acceleration) of one measurement and of the next, T later
+    y       measured numbers
+    abar    mean acceleration of the target, the input of the model
+    Phi, U  transition of the state over T, effect of abar over T
+    H, '    measurement matrix; ' means transposed
+
+The condition number of a matrix is its largest singular value over its smallest. `condition` is measured with T in
+place of the second as the unit of time, so that the entries are of one size. In seconds the entries differ by up to
+1 / T^2, and `condition_in_seconds` shows only this difference.
 """
 import math
 
@@ -31,7 +37,7 @@ from pedestal_studies.rigs.ensemble import MEASUREMENT_PERIOD_S
 from pedestal_studies.rigs.rows import Result
 
 DEFAULT_RUNS, NOISE_SEED = 40, 1
-"""Flights; seed of their noise."""
+"""Number of flights; seed of their noise."""
 
 BATCH_RUNS = 5
 """Flights that one worker makes at a time."""
@@ -46,7 +52,7 @@ SETTLING_TIME_S = 5.0
 """Time after FLIGHT_START_S from which the rows are evaluated [s]."""
 
 ZOOM_WINDOWS_S = {'azimuth': (39.0, 43.5), 'elevation': (41.5, 45.0)}
-"""Windows of figures 2 and 6 [s]."""
+"""{axis: (begin, end) [s] of the time that figure 2 or 6 shows}."""
 
 RATE_SIGMA_RAD_S = math.radians(0.1)
 """Noise of a measured rate [rad/s]."""
@@ -60,7 +66,8 @@ QUANTITY_UNITS = {'angle': 'deg', 'rate': 'deg/s', 'acceleration': 'deg/s2'}
 def flight():
     """Return (times (n,) [s], {axis: angle, rate, acceleration (n, 3) [rad, rad/s, rad/s2]}) of the target.
 
-    With x = v (t - t_0) along the track, d abeam and h up, rho^2 = x^2 + d^2 and r^2 = rho^2 + h^2,
+    A, E: azimuth, from the direction of the nearest point, and elevation. v: speed; t_0: time at the nearest point; d:
+    distance over ground at t_0; h: height. With x = v (t - t_0), rho^2 = x^2 + d^2 and r^2 = rho^2 + h^2,
 
         A = atan2(x, d),    A' = v d / rho^2,           A'' = -2 v^2 d x / rho^4,
         E = atan2(h, rho),  E' = -v h x / (rho r^2),
@@ -104,23 +111,23 @@ def batch(item):
 
 
 def model(T):
-    """Return (Phi (3, 3), U (3,)) of the 'current' statistical model over T (paper 004, equations 5 and 6)."""
+    """Return (Phi (3, 3), U (3,)) of the 'current' statistical model over T [s] (paper 004, equations 5 and 6)."""
     angle, rate, kept = motion_models.fading(ALPHA, T)
     return (np.array([[1.0, T, angle], [0.0, 1.0, rate], [0.0, 0.0, kept]]),
             np.array([0.5 * T * T - angle, T - rate, 1.0 - kept]))
 
 
 MEASUREMENT_MATRICES = {'angle': np.eye(3)[:1], 'angle-rate': np.eye(3)[:2]}
-"""{case: H} of the two kinds of measurement."""
+"""{case: H}: only the angle is measured, or angle and rate."""
 
 
 def controllability(Phi, U):
-    """Return (U, Phi U, Phi^2 U), (3, 3)."""
+    """Return the controllability matrix (3, 3) of the model: (U, Phi U, Phi^2 U)."""
     return np.column_stack([np.linalg.matrix_power(Phi, i) @ U for i in range(3)])
 
 
 def observability(Phi, H):
-    """Return H, H Phi, H Phi^2 stacked vertically."""
+    """Return the observability matrix of the model: H, H Phi, H Phi^2 stacked vertically; (3, 3) or (6, 3)."""
     return np.vstack([H @ np.linalg.matrix_power(Phi, i) for i in range(3)])
 
 
@@ -128,7 +135,7 @@ def matrices():
     """Return {case: (matrix in seconds, matrix with T as the unit of time)}."""
     T = MEASUREMENT_PERIOD_S
     Phi, U = model(T)
-    unit = np.diag([1.0, T, T * T])         # (angle, rate T, acceleration T^2) of (angle, rate, acceleration)
+    unit = np.diag([1.0, T, T * T])         # from (angle, rate, acceleration) to (angle, rate T, acceleration T^2)
     back = np.linalg.inv(unit)
     return {'controllability': (controllability(Phi, U), controllability(unit @ Phi @ back, unit @ U / (T * T))),
             **{f'observability/{name}': (observability(Phi, H), observability(unit @ Phi @ back, H))
@@ -136,7 +143,7 @@ def matrices():
 
 
 def rows(errors):
-    """Return the rows of errors {axis: as of `batch`, of all runs}, and of the matrices."""
+    """Return the rows of the study; errors: {axis: rms errors (runs, 2, 3) as `batch` returns}."""
     table = []
     for axis, of_runs in errors.items():
         for name, column in zip(('measured', 'filtered'), of_runs.transpose(1, 2, 0)):

@@ -1,10 +1,12 @@
 """The angle loop of a phased array on one axis, on a grid of 1 ms: paper 002's loop, and a loop with a target filter.
 
-Symbols of paper 002: R, v: angle and rate that the loop predicts for the target; T: time between two updates; alpha,
-beta: gains of the error for R and for v T, beta follows from alpha (Benedict and Bordner).
+The study phased-array runs both loops. Each loop is one compiled function of the laws that the nodes run: the
+smoothing and the pattern of the receiver, the loop of the beam or a target filter, and the electronic beam.
 
-Each loop is one compiled kernel of the laws that the nodes run: the smoothing and the pattern of the receiver, the
-loop of the beam or a target filter, and the electronic beam. The grid, with h = GRID_STEP_S:
+Symbols of paper 002: R, v: angle [rad] and rate [rad/s] that the loop predicts for the target; T: time between two
+updates [s]; alpha, beta: gains from the error to R and to v T [-]. beta follows from alpha (Benedict and Bordner).
+
+The grid, with h = GRID_STEP_S:
 
     stamp    (i-1) h                 i h                 (i+1) h
                 |------ sample i ------|---- sample i+1 ----|
@@ -35,31 +37,32 @@ GRID_STEP_NS = round(GRID_STEP_S * 1e9)
 
 SMOOTHING_CODES = {'S0': smoothing.SMOOTHING_NONE, 'S1': smoothing.SMOOTHING_RECURSION,
                    'S2': smoothing.SMOOTHING_MOVING_AVERAGE}
-"""Codes of S0, the last sample, of S1, paper 002's eq. (1), and of S2, the moving average whose name eq. (1) has."""
+"""{smoothing of the receiver: its code}. S0: no smoothing, the last sample; S1: the recursion of paper 002, eq. (1);
+S2: the moving average. The paper calls eq. (1) a moving average, so S1 and S2 are two readings of it."""
 
 SMOOTHING_SAMPLES = 20
-"""Samples n of the smoothing, as in the paper's example."""
+"""Number n of samples in the smoothing S1 and S2, as in the paper's example."""
 
 FULL_SCALE_BEAMWIDTHS, K_M = ReceiverParameters().full_scale, AntennaParameters().slope
-"""Full scale of the receiver [beamwidths] and slope of its antenna."""
+"""Full scale of the receiver [beamwidths], and slope of the difference pattern of its antenna [1/beamwidth]."""
 
 SMOOTHER_RECORD = np.dtype([('error', smoothing.SMOOTHER_DTYPE)], align=True)
 
 Target = namedtuple('Target', 'angle attitude rate noise')
-"""Target and carrier on the grid, each (n,).
+"""Target and carrier, such as a ship, on the grid, each (n,).
 
-`angle`: true angle [rad]. `attitude`, `rate`: share of the angle that the attitude of the carrier causes [rad] and its
-rate [rad/s], as measured for the loop. `noise`: noise of the samples [rad].
+`angle`: true angle of the target [rad]. `attitude`: part of the angle that the attitude of the carrier causes [rad],
+`rate`: rate of this part [rad/s]; both as the loop receives them. `noise`: noise of the samples [rad].
 """
 
 Beam = namedtuple('Beam', 'state constants inputs outputs')
-"""Records (1,) of an electronic beam without elevation."""
+"""Records (1,) of an electronic beam (adu_drive.array.electronic_beam), of which only the azimuth is used."""
 
 Receiver = namedtuple('Receiver', 'slope beamwidth lost_power_ratio')
 """Constants of a receiver.
 
-`slope`: true slope divided by assumed slope [-]. `beamwidth`: [rad], 0 for a linear receiver. `lost_power_ratio`:
-ratio of the power to the power on axis below which the signal is lost [-].
+`slope`: true slope divided by assumed slope [-]. `beamwidth`: [rad], 0 for a linear receiver. `lost_power_ratio`: the
+signal is lost if its power, divided by the power on the axis of the beam, is below this number [-].
 """
 
 PaperLoopConstants = namedtuple('PaperLoopConstants', 'form alpha period delta smoothing')
@@ -73,7 +76,7 @@ FilterLoopConstants = namedtuple('FilterLoopConstants', 'filter variance period 
 """Constants of a FilterLoop.
 
 `filter`: constants (1,) of its filter. `variance`: of a measurement [rad2]. `period`, `hold`: as in FilterLoop, in
-samples. `delay`: assumed delay of the beam [s]. `tau`: low-pass of the acceleration [s].
+samples. `delay`: assumed delay of the beam [s]. `tau`: time constant of the low-pass for the acceleration [s].
 """
 
 
@@ -81,7 +84,7 @@ samples. `delay`: assumed delay of the beam [s]. `tau`: low-pass of the accelera
 class PaperLoop:
     """Loop of paper 002.
 
-    alpha       gain [-]
+    alpha       gain from the error to the angle [-]
     period      time between two updates of the loop, in samples of the grid
     delay       time from a command to its effect, in samples
     smoothing   key of SMOOTHING_CODES
@@ -117,9 +120,10 @@ class PaperLoop:
 
 @dataclasses.dataclass(frozen=True)
 class FilterLoop:
-    """Loop in which beam in force + error is the input of a target filter.
+    """Loop with a target filter.
 
-    The command is the prediction of the filter for the middle of the interval in which the command will be in force.
+    The input of the filter is the angle of the target: beam in force + error of the receiver. The command is the
+    prediction of the filter for the middle of the interval in which the command will be in force.
 
     jerk            noise of the constant-acceleration filter [rad/s3/sqrt(Hz)]
     sigma           noise of one sample [rad]
@@ -129,7 +133,7 @@ class FilterLoop:
     assumed_delay   delay that the loop assumes, in samples; None: the true delay
     use_ins         True if the filter works in the earth frame, with the attitude of the INS
     stamp_error     error of the stamps of the INS, in samples
-    tau             low-pass of the acceleration of the INS [s]; 0: acceleration not used
+    tau             time constant of the low-pass for the acceleration from the INS [s]; 0: acceleration not used
     """
     jerk: float
     sigma: float
@@ -174,13 +178,13 @@ def _beam(delay, hold):
 def receiver_reading(offset, receiver):
     """Return the error [rad] that a Receiver measures for an offset [rad] of the target from the beam.
 
-    The error is linear without a beamwidth, otherwise it follows the monopulse pattern within full scale. It is NaN if
-    the signal is lost.
+    With the beamwidth 0 the error is linear. With any other beamwidth the error follows the monopulse pattern within
+    full scale, and it is NaN if the signal is lost.
     """
     slope, beamwidth, lost_power_ratio = receiver
     if beamwidth == 0.0:
         return slope * offset
-    # One axis: no offset across the axis, and no cross-coupling (cos beta = 1, sin beta = 0).
+    # The offset across the axis is 0, and the cross-coupling of the axes is 0 (its cosine is 1, its sine 0).
     S, D, _ = monopulse.channels(offset / beamwidth, 0.0, slope * K_M, 1.0, 0.0)
     if S * S < lost_power_ratio:
         return math.nan
@@ -189,9 +193,9 @@ def receiver_reading(offset, receiver):
 
 @compiled
 def command(u, stamp, due, beam):
-    """Put a command, beam [rad] at sample `stamp` of the grid, into the inputs u of the electronic beam.
+    """Put a command into the inputs u of the electronic beam.
 
-    due: True for a new command.
+    stamp: its sample on the grid. due: True for a new command. beam: commanded angle [rad].
     """
     u.stamp_ns = u.command_stamp_ns = stamp * GRID_STEP_NS
     u.due = 1 if due else 0
@@ -256,7 +260,10 @@ def _filter_loop(constants, target, smoothers, filters, plant, beam, errors):
 
 
 def is_stable(loop, size=1e-9, seconds=20.0):
-    """Return True if the error of a PaperLoop keeps falling after a step of `size` [rad]."""
+    """Return True if the error of a PaperLoop falls for `seconds` [s] after a step of `size` [rad].
+
+    The largest errors in the second and in the last third of this time are compared.
+    """
     n = round(seconds / GRID_STEP_S)
     error = np.abs(size - loop.run(np.full(n, size))[0])
     middle, last = error[n // 3:2 * n // 3].max(), error[2 * n // 3:].max()
@@ -276,11 +283,12 @@ def delay_limit(loop, highest=400):
 
 
 def spectral_radius(loop):
-    """Return the largest modulus of the eigenvalues of a PaperLoop, linear, over one period.
+    """Return the largest modulus of the eigenvalues of a PaperLoop over one period; below 1 the loop is stable.
 
-    The state is V = v T, the smoothed error E, and the commands C_k, C_k-1, ... that are in force in the samples of
-    the next period (and of the moving average before it). In sample j = 1 ... period after the update k the command
-    k - age with age = -floor((j - 1 - delay) / period) is in force. With a target at 0:
+    The receiver is linear. The state is V = v T, the smoothed error E, and the commands C_k, C_k-1, ... that are in
+    force in the samples of the next period (and of the moving average before it). In sample j = 1 ... period after
+    update k, the command k - age is in force, with age = -floor((j - 1 - delay) / period). n is SMOOTHING_SAMPLES.
+    With a target at 0:
 
         S1:      E <- E (1 - 1/n) - slope C_k-age / n       for each sample
         S0, S2:  E <- - slope times the mean of C_k-age over the samples in the smoothing

@@ -1,7 +1,8 @@
-"""A filter of acu_tracker over many noisy records of one motion, reduced to the moments of its errors.
+"""Runs of a filter of acu_tracker over many noisy records of one motion, reduced to the moments of its errors.
 
-The noise of a run depends only on a seed and the number of the run. Every filter, profile and noise therefore has the
-same draws, for any division of the runs into batches.
+The filter studies use this module. The moments are sums over the runs of the errors and of their squares. The noise of
+a run depends only on a seed and the number of the run. Every filter, motion and kind of noise therefore has the same
+draws, for any division of the runs into batches.
 """
 import dataclasses
 import math
@@ -20,15 +21,19 @@ MEASUREMENT_PERIOD_S = 0.01
 """Time between measurements in all studies of filters [s]."""
 
 INITIAL_RATE_SIGMA_RAD_S = TrackerParameters().initial_rate
-"""Standard deviation of the rate at the start [rad/s]."""
+"""Standard deviation of the rate that a filter assumes at its start [rad/s]."""
 
 MOMENTS = np.dtype([('runs', 'f8'), ('angle', 'f8'), ('angle2', 'f8'), ('rate', 'f8'), ('rate2', 'f8'),
                     ('acceleration', 'f8'), ('acceleration2', 'f8'), ('raw2', 'f8'), ('variance', 'f8'),
                     ('rate_variance', 'f8'), ('nis', 'f8'), ('nees', 'f8'), ('mu', 'f8', (axis_filter.BANK_SIZE,))])
-"""Sums over runs at one time: errors of angle, rate, acceleration and of the raw angle, and their squares.
+"""Sums over `runs` runs at one time.
 
-Further sums are the filter's own variances, normalised innovations squared, normalised errors squared of angle and
-rate, and mode probabilities.
+angle, rate, acceleration     errors of the estimate [rad, rad/s, rad/s2]
+angle2, rate2, acceleration2  squares of these errors
+raw2                          squared error of the measured angle [rad2]
+variance, rate_variance       variances of angle [rad2] and rate [rad2/s2] that the filter states
+nis, nees                     normalised innovation squared; normalised estimation error squared of angle and rate
+mu                            probability of each motion model in an IMM
 """
 
 Series = namedtuple('Series', 't y R y_rate R_rate')
@@ -39,15 +44,17 @@ Series = namedtuple('Series', 't y R y_rate R_rate')
 """
 
 RangedSeries = namedtuple('RangedSeries', 'azimuth elevation R ranges R_range')
-"""Measurements for the Cartesian filter: angles (runs, n) [rad] and ranges (runs, n) [m] with their variances."""
+"""Measurements for the Cartesian filter: angles (runs, n) [rad] with their variance R, ranges (runs, n) [m] with their
+variance R_range."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Noise:
-    """Noise of the measured angle: rms sigma [rad]; bandwidth of a first-order lag [Hz], None for white noise.
+    """Noise of the measurements of one axis.
 
-    `rate_sigma`: noise of an independent, white rate measurement [rad/s], None without such a measurement. `expected`:
-    True if the filter knows the bandwidth.
+    `sigma`: rms of the noise of the angle [rad]. `bandwidth`: bandwidth of the lag that colours this noise [Hz], None
+    for white noise. `expected`: True if the filter knows the bandwidth. `rate_sigma`: rms of the noise of an
+    independent, white rate measurement [rad/s], None without such a measurement.
     """
     sigma: float
     bandwidth: float | None = None
@@ -56,7 +63,7 @@ class Noise:
 
 
 def normal_draws(seed, first, count, n, sensors=2):
-    """Return standard normal noise (sensors, count, n) of the runs from `first` on; the first sensor is the angle."""
+    """Return standard normal noise (sensors, count, n) of `count` runs from run `first` on; sensor 0 is the angle."""
     runs = [np.random.default_rng((seed, first + i)).standard_normal((sensors, n)) for i in range(count)]
     return np.stack(runs, axis=1)
 
@@ -82,9 +89,10 @@ def records(truth, noise, seed, first, count):
 
 
 def moments(params, t, truth, noise, measured):
-    """Return MOMENTS (runs, n) of a filter (FilterParameters) at times t (n,) [s], for measured `records`.
+    """Return MOMENTS (runs, n) of a filter, each for one run and time.
 
-    The filter knows sigma and rate_sigma. It assumes white noise if it does not know the bandwidth.
+    params: FilterParameters. t: times (n,) [s]. truth: (angle, rate, acceleration). measured: as `records` returns.
+    The filter knows sigma and rate_sigma of the Noise. A filter that does not know the bandwidth assumes white noise.
     """
     y, y_rate = measured
     c = axis_filter.constants(dataclasses.replace(params, rate_measurement=noise.rate_sigma is not None),
@@ -98,7 +106,10 @@ def moments(params, t, truth, noise, measured):
 
 @compiled
 def _add_runs(c, truth, m, initial_rate, out, sums):
-    """Add the errors of a filter over a Series m to MOMENTS (runs, n); truth: AxisMotion of arrays (n,)."""
+    """Add the errors of a filter over a Series m to MOMENTS (runs, n).
+
+    c: constants of the filter. truth: AxisMotion of arrays (n,). out: working memory, ESTIMATE_DTYPE (n,).
+    """
     for run in range(len(m.y)):
         axis_filter.estimates(c, m.t, m.y[run], m.R, m.y_rate[run], m.R_rate, initial_rate, out)
         for k in range(len(m.t)):
@@ -107,7 +118,7 @@ def _add_runs(c, truth, m, initial_rate, out, sums):
 
 @compiled
 def _add(s, o, truth, k, y):
-    """Add the errors of an ESTIMATE at step k to one of MOMENTS; y: the measured angle [rad]."""
+    """Add the errors of an estimate o (ESTIMATE_DTYPE) at step k to a record s of MOMENTS; y: measured angle [rad]."""
     angle = truth.angle[k]
     d1, d2, d3, raw = o.angle - angle, o.rate - truth.rate[k], o.acceleration - truth.acceleration[k], y - angle
     s.runs += 1.0
@@ -147,7 +158,10 @@ def unscented_moments(params, truth, distance, noise, range_sigma, runs):
 
 @compiled
 def _add_unscented_runs(c, T, truth, measured, rate_variance, sums):
-    """Add the errors in azimuth over RangedSeries, every T [s], to MOMENTS (runs, n); truth: AxisMotion of arrays."""
+    """Add the errors in azimuth over a RangedSeries with a measurement every T [s] to MOMENTS (runs, n).
+
+    c: constants of the filter. truth: AxisMotion of arrays (n,). rate_variance: at the start [rad2/s2].
+    """
     R, R_range = measured.R, measured.R_range
     out = np.zeros(1, axis_filter.ESTIMATE_DTYPE)
     o = out[0]

@@ -1,16 +1,19 @@
-"""Expectations of an operator for every fault in every mode, derived from the purpose of the antenna.
+"""Expectations of an operator for every injected fault in every mode, derived from the purpose of the antenna.
 
-The expectations were written without regard to the behaviour of the product. Half a beamwidth (0.5 deg) off the target
-the link is 3 dB down, and the error signal still leads back to the target. A tenth of the beamwidth (0.1 deg) costs
-0.12 dB and counts as on target. In standby the antenna stays where it stood, within half a beamwidth. A step is 5 ms:
-20 steps are 0.1 s, 60 steps 0.3 s, 100 steps 0.5 s, 200 steps 1 s.
+The study faults compares these expectations with runs. The expectations were written without regard to the behaviour
+of the product. An error of half a beamwidth (0.5 deg) lowers the signal level by 3 dB, and the receiver error still
+leads the beam back to the target. An error of a tenth of the beamwidth (0.1 deg) costs 0.12 dB and counts as on
+target. In standby the antenna stays at its place within half a beamwidth. A step is 5 ms: 20 steps are 0.1 s, 60 steps
+0.3 s, 100 steps 0.5 s, 200 steps 1 s.
+
 The drive must report a trip or missing commands within 0.1 s. A fault that shows only in motion must be reported
 within 1 s. Nothing moves by itself after a fault that ended in standby.
 
-The modes that use the signal level (search, acquire, steptrack) lead to autotrack. They are judged by the permitted
-places of their beam: the searched area, the look-around, or half a beamwidth. They point by the attitude as program
-does, so the expectations of program hold for them. Only the faults of the receiver affect them as they affect
-autotrack.
+The modes that use the signal level (search, acquire, steptrack) lead to autotrack. The permitted error in these modes
+is the largest distance of their beam from the target. This is the distance across the searched area, the distance in
+the look-around (short motions of the beam about a peak of the level), or half a beamwidth.
+Because they point by the attitude as program does, the expectations of program hold for them. The faults of the
+receiver are the exception: they affect these modes as they affect autotrack.
 """
 import typing
 
@@ -20,7 +23,8 @@ TENTH_BEAMWIDTH_DEG, HALF_BEAMWIDTH_DEG = 0.1, 0.5
 """Tenth and half of the beamwidth of the antenna in the study [deg]."""
 
 HALF_PITCH_DEG = 1.32
-"""Play of a pinion with 17 teeth and ratio 8 at a missing tooth: pi / (17 * 8) [deg]."""
+"""Half of a tooth pitch on the axis [deg], the play at a missing tooth of a pinion with 17 teeth and gear ratio 8:
+pi / (17 * 8) rad."""
 
 SAME_MODE, STANDBY_MODE = (), ('standby',)
 """Values of `Expectation.end`: the mode at the onset; standby."""
@@ -65,21 +69,24 @@ LEVEL_INDEPENDENT_MODES = (*STILL_MODES, *MOVING_MODES, *FOLLOWING_MODES)
 
 
 def _in_every_mode(expected):
-    """Return one expectation for every mode.
+    """Return {mode: Expectation} with one expectation for every mode.
 
-    In standby the antenna does not point, so at least half a beamwidth is permitted.
+    Because the antenna does not point in standby, at least half a beamwidth is permitted there.
     """
     resting = expected._replace(error=max(expected.error or HALF_BEAMWIDTH_DEG, HALF_BEAMWIDTH_DEG))
     return {**dict.fromkeys(LEVEL_INDEPENDENT_MODES, expected), 'standby': resting}
 
 
 def _when_moving(expected, still=EXPECT_NO_EFFECT):
-    """Return an expectation for the modes that move the axes, and another for the modes at rest."""
+    """Return {mode: Expectation}: `expected` for the modes that move the axes, `still` for the modes at rest."""
     return {**_in_every_mode(still), **dict.fromkeys((*MOVING_MODES, *FOLLOWING_MODES), expected)}
 
 
 def _in_autotrack(report_steps, error, *end):
-    """Return an expectation for autotrack, where the receiver closes the loop; no other mode is affected."""
+    """Return {mode: Expectation} of a fault that affects only autotrack, where the receiver closes the loop.
+
+    end: permitted modes at the end.
+    """
     return {**_in_every_mode(EXPECT_NO_EFFECT), 'autotrack': Expectation(report_steps, end, error)}
 
 
@@ -87,17 +94,17 @@ _STANDBY_OR_SAME_MODE = {mode: ('standby', mode) for mode in LEVEL_INDEPENDENT_M
 
 
 def _attitude_fault(report_steps, error, still_report_steps=None):
-    """Return the expectations for a wrong or missing attitude.
+    """Return {mode: Expectation} of a wrong or missing attitude.
 
-    Without attitude no target can be followed, so a mode may end in standby. A mode that bridges the fault is right as
-    well.
+    Without attitude no target can be followed, so a mode may end in standby. A mode that bridges the fault may remain.
+    still_report_steps: as report_steps, for the modes that do not need the attitude.
     """
     return {**_in_every_mode(Expectation(still_report_steps, SAME_MODE, TENTH_BEAMWIDTH_DEG)),
             **{mode: Expectation(report_steps, _STANDBY_OR_SAME_MODE[mode], error) for mode in FOLLOWING_MODES}}
 
 
 def _heading_fault():
-    """Return the expectations for an attitude that is wrong by more than half a beamwidth.
+    """Return {mode: Expectation} of an attitude that is wrong by more than half a beamwidth.
 
     Only autotrack can point better than the attitude is known.
     """
@@ -109,9 +116,10 @@ def _heading_fault():
 LEVEL_MODE_ERRORS_DEG = {'search': 10.0, 'acquire': 2.0, 'steptrack': HALF_BEAMWIDTH_DEG}
 """Largest permitted distance of the beam from the target, for each mode that uses the signal level [deg].
 
-search: across the area of five beamwidths about the expected place. acquire: a look-around of 1.2 beamwidths about a
-peak within 0.7 beamwidths. steptrack: within the beam. A fade removes the level itself, so steptrack has to search and
-look around; it then has the limit of acquire.
+In search, the searched area reaches five beamwidths (5 deg) to each side of the expected place, and beam and target
+may be on opposite sides. In acquire, the beam looks around up to 1.2 beamwidths from the peak that was found. The peak
+is within 0.7 beamwidths of the target, so the sum is 1.9 beamwidths. In steptrack the target is within the beam. A
+fade removes the level itself, so steptrack has to search and look around; it then has the limit of acquire.
 """
 
 MODES_TO_AUTOTRACK = ('search', 'acquire', 'autotrack')
@@ -121,7 +129,10 @@ SIGNAL_LOSS_FAULTS, WRONG_ERROR_FAULTS = ('drop', 'freeze', 'nan', 'clock_step')
 
 
 def _signal_level_modes(of_modes, node, fault):
-    """Return {mode: Expectation} of the modes that use the signal level, derived from the other modes."""
+    """Return {mode: Expectation} of the modes that use the signal level, derived from the other modes.
+
+    of_modes: {mode: Expectation} of the other modes. node, fault: names of the node and of its fault.
+    """
     (report_steps, end, error), permitted_errors = of_modes['program'], LEVEL_MODE_ERRORS_DEG
     if node == 'tracking_receiver' and fault == 'fade':
         report_steps, end = None, ('program',)
@@ -137,9 +148,9 @@ def _signal_level_modes(of_modes, node, fault):
 
 
 def _unstow_expectation(fault, of_modes):
-    """Return the expectation in unstow, where the antenna stands on its brakes as in standby.
+    """Return the Expectation in mode unstow, derived from that in standby.
 
-    A trip need not end the mode.
+    In both modes the brakes hold the antenna. A trip need not end the mode unstow.
     """
     expected = of_modes['standby']
     expected = expected._replace(end=expected.end and _STANDBY_OR_SAME_MODE['unstow'])

@@ -1,13 +1,20 @@
-"""The loop of paper 003: a rate loop whose command is a measured miss with rate and acceleration fed forward.
+"""The position loop of paper 003 on one axis: measured miss, with rate and acceleration of the target fed forward.
 
-The target moves to and fro; in a reversal its rate is half a cosine. Every T the tracker measures the miss of the
-antenna, with noise and the delay d. The encoder angle of that instant plus the miss is the line of sight, y. A filter
-of `acu_tracker.estimation.filters.axis_filter` estimates its rate v and acceleration a. The command of the rate loop
-is
+The studies imm-feedforward and pareto use this loop. The miss, a term of the paper, is the pointing error: angle of
+the target minus angle of the antenna. The target moves to and fro; in a reversal its rate is half a cosine. Every T =
+10 ms the tracker measures the miss, with noise and the delay d. The encoder angle of that instant plus the miss is the
+angle y of the target. A filter of acu_tracker.estimation.filters.axis_filter estimates from y the rate v and the
+acceleration a of the target. The command u of the rate loop W(s) is
 
     u = K_p miss(t - d) + k_v v + k_a a,        W(s) = w^2 / (s^2 + 2 zeta w s + w^2),
 
-where k_v + k_a s are the first two terms of 1 / W(s), so that a constant acceleration leaves no miss.
+    u       commanded rate of the antenna [rad/s]
+    K_p     gain of the miss [1/s]
+    k_v     gain of the rate v [rad/s], no unit
+    k_a     gain of the acceleration a [rad/s2], in s
+    w, zeta bandwidth [rad/s] and damping [-] of the rate loop
+
+k_v + k_a s are the first two terms of the series of 1 / W(s). Therefore a constant acceleration leaves no miss.
 """
 import dataclasses
 import math
@@ -39,13 +46,13 @@ RATE_LOOP_CONSTANTS = (2.0 * math.pi * 8.0, 0.7)
 """Bandwidth w [rad/s] and damping zeta of the rate loop."""
 
 REVERSAL_S_BY_AXIS = {'azimuth': 1.0, 'elevation': 1.6}
-"""{axis: duration of a reversal [s]}, which the paper does not print; the peaks are 11 and 6.9 deg/s2."""
+"""{axis: duration of a reversal [s]}. The paper does not print it. The peak accelerations are 11 and 6.9 deg/s2."""
 
 EVALUATED_PERIODS = 2
 """Periods of the motion that are evaluated, after half a period to settle."""
 
 UNIFORM_RATE_DELAY_S = 2.0
-"""Time after a reversal from which the rate counts as uniform [s]."""
+"""Time after a reversal from which the rate of the target counts as uniform [s]."""
 
 BATCH_RUNS, NOISE_SEED = 25, 1
 """Runs of one batch; seed of their noise."""
@@ -54,13 +61,16 @@ BATCH_RUNS, NOISE_SEED = 25, 1
 def feedforward_gains(w, zeta):
     """Return (k_v [-], k_a [s]) of 1 / W(s) = 1 + 2 zeta s / w + s^2 / w^2.
 
-    They are paper 003's c1, c2, corrected, for this W.
+    The paper calls these gains c_1 and c_2. Its formulas are corrected here (acu_tracker/servo/feedforward.py).
     """
     return 1.0, 2.0 * zeta / w
 
 
 def rate_loop_step(w, zeta):
-    """Return M (3, 4) of (theta, omega, omega') T later = M (theta, omega, omega', u), exact for a constant u."""
+    """Return the matrix M (3, 4) of a step of the antenna over T: x(t + T) = M (x(t), u), exact for a constant u.
+
+    x = (theta, omega, omega'): angle [rad], rate [rad/s] and acceleration [rad/s2] of the antenna; u: rate command.
+    """
     A = np.zeros((4, 4))
     A[0, 1] = A[1, 2] = 1.0
     A[2, 1:] = -w * w, -2.0 * zeta * w, w * w
@@ -68,18 +78,26 @@ def rate_loop_step(w, zeta):
 
 
 K_V, K_A = feedforward_gains(*RATE_LOOP_CONSTANTS)
+"""Gains k_v [-] and k_a [s] of the feed-forward."""
 
 STEP_RECORD = np.dtype([('miss', 'f8'), ('rate', 'f8'), ('acceleration', 'f8'), ('mu', 'f8', axis_filter.BANK_SIZE)],
                        align=True)
-"""True angle minus antenna [rad]; rate [rad/s] and acceleration [rad/s2] fed forward; probability of each model."""
+"""Record of a step: true miss [rad]; rate [rad/s] and acceleration [rad/s2] fed forward; probability of each motion
+model."""
 
 
 @compiled
 def _follow(target, known, f, c, lead, M, normals, out):
-    """Run the loop: target (n, 3), normals (runs, n) into STEP_RECORD records out (runs, n); M as of `rate_loop_step`.
+    """Run the loop once for each row of `normals` (runs, n) and write its steps to `out` (runs, n) of STEP_RECORD.
 
-    known (n, 2): rate and acceleration to feed forward. If known is (0, 2), they are the estimates of the filter with
-    state f and constants c, `lead` [s] after its miss. Step j is the step of the miss that arrives in step k.
+    target (n, 3)   true angle, rate and acceleration of the target
+    known (n, 2)    rate and acceleration to feed forward; if it is (0, 2), the filter estimates them
+    f, c            state and constants (1,) of the filter
+    lead            time from the instant of the miss to the instant for which the filter predicts [s]
+    M               as of `rate_loop_step`
+    normals         standard normal noise of the miss
+
+    Step j is the step in which the miss was measured that arrives in step k.
     """
     R = MISS_SIGMA_RAD * MISS_SIGMA_RAD
     encoder = np.empty(len(target))
@@ -121,29 +139,30 @@ class Source:
 
 
 def filter_of(kind, **groups):
-    """Return the FilterParameters of a kind with groups of its parameters changed: cv=dict(noise=...)."""
+    """Return the FilterParameters of a kind with parameters changed by group, for example cv={'noise': 0.01}."""
     return FilterParameters(kind=kind, **{name: dataclasses.replace(getattr(FilterParameters(), name), **values)
                                           for name, values in groups.items()})
 
 
 def cv(q):
-    """Return the Source of a constant-rate filter; q [deg/s2/sqrt(Hz)]."""
+    """Return the Source of a constant-rate filter; q: process noise [deg/s2/sqrt(Hz)]."""
     return Source(filter_of('cv', cv={'noise': math.radians(q)}))
 
 
 def ca(q):
-    """Return the Source of a constant-acceleration filter; q [deg/s3/sqrt(Hz)]."""
+    """Return the Source of a constant-acceleration filter; q: process noise [deg/s3/sqrt(Hz)]."""
     return Source(filter_of('ca', ca={'noise': math.radians(q)}))
 
 
 def imm(q_ca, predicted):
-    """Return the Source of an IMM of cv, ca and current_statistical with a dwell of 5 s.
+    """Return the Source of an IMM of the models cv, ca and current_statistical.
 
-    cv has low noise, ca has q_ca [deg/s3/sqrt(Hz)], current_statistical has a high acceleration.
+    A model holds for a mean dwell of 5 s. cv has a low process noise, and ca has q_ca [deg/s3/sqrt(Hz)]. For fast
+    manoeuvres current_statistical has a largest acceleration of 40 deg/s2. predicted: as in Source.
     """
     default = FilterParameters().imm
     bank = {
-        'models': 'cv ca current_statistical', 'dwell': 5.0,
+        'models': 'cv ca current_statistical', 'rungs': 1, 'dwell': 5.0,
         'cv': dataclasses.replace(default.cv, noise=math.radians(0.003)),
         'ca': dataclasses.replace(default.ca, noise=math.radians(q_ca)),
         'current_statistical': dataclasses.replace(default.current_statistical, alpha=4.0, a_max=math.radians(40.0),
@@ -152,7 +171,11 @@ def imm(q_ca, predicted):
 
 
 def motion(axis):
-    """Return (t (n,) [s], target (n, 3), period [s]) of an axis, over half a period and EVALUATED_PERIODS."""
+    """Return (times t (n,) [s], target (n, 3), period [s]) of the motion on an axis.
+
+    target: angle [rad], rate [rad/s] and acceleration [rad/s2]. The times are half a period to settle and
+    EVALUATED_PERIODS.
+    """
     reversal = REVERSAL_S_BY_AXIS[axis]
     period = 2.0 * (S_MOTION_STROKE_RAD / S_MOTION_RATE_RAD_S + reversal * (1.0 - 2.0 / math.pi))
     t = T * np.arange(round((0.5 + EVALUATED_PERIODS) * period / T))
@@ -181,15 +204,16 @@ def steps_of(axis, source, first, count):
 
 METRIC_UNITS = {'miss_rms_deg': 'deg', 'miss_worst_second_deg': 'deg', 'miss_peak_deg': 'deg',
                 'rate_noise_deg_s': 'deg/s'}
-"""{metric of a run: unit}: rms, rms of the worst second and peak of the miss; noise of a uniform rate."""
+"""{metric of a run: unit}: rms, rms of the worst second and peak of the miss; rms error of the rate that is fed
+forward while the rate of the target is uniform."""
 
 
 def measures(axis, steps):
-    """Return METRIC_UNITS of every run, an array (runs, 4), of STEP_RECORD records (runs, n) on an axis."""
+    """Return the metrics of METRIC_UNITS of every run, an array (runs, 4); steps: (runs, n) of STEP_RECORD."""
     t, target, period = motion(axis)
     counts = t >= 0.5 * period
     second = round(1.0 / T)
-    # The rate counts as uniform from UNIFORM_RATE_DELAY_S after a rate below 99.9 % of that between the ends.
+    # reversing: the rate is below 99.9 % of the uniform rate, or was so in the last UNIFORM_RATE_DELAY_S.
     reversing = np.convolve(np.abs(target[:, 1]) < 0.999 * S_MOTION_RATE_RAD_S,
                             np.ones(round(UNIFORM_RATE_DELAY_S / T)))[:len(t)] > 0.5
     miss, noise = steps['miss'][:, counts], (steps['rate'] - target[:, 1])[:, counts & ~reversing]
@@ -199,7 +223,7 @@ def measures(axis, steps):
 
 
 def batch(item):
-    """Return (sum over the runs of the miss (n,) [rad], METRIC_UNITS of every run (count, 4)) of an item.
+    """Return (miss (n,) [rad], summed over the runs; metrics of METRIC_UNITS of every run (count, 4)) of an item.
 
     An item is (axis, source, first run, number of runs).
     """
@@ -212,7 +236,7 @@ def batch(item):
 class MissStatistics:
     """Statistics of the runs of a Source on an axis.
 
-    `miss_mean` (n,) [rad]: mean over the runs at each step. `values` (runs, 4): METRIC_UNITS of every run.
+    `miss_mean` (n,) [rad]: mean over the runs at each step. `values` (runs, 4): metrics of METRIC_UNITS of every run.
     """
     axis: str
     miss_mean: np.ndarray

@@ -1,8 +1,10 @@
-"""Metrics of steps and sines. Angles [rad], times [s], arrays (n,) on one even grid of time.
+"""Metrics of the response to a step and to a sine, such as overshoot and settling time, for the servo studies.
 
-Libraries give other numbers, so they are not used. `control.step_info` takes a settling time from the grid, not
-between its points. `scipy.optimize.curve_fit` gives amplitude and period of a sine that differ by 7e-13 from the
-published rows.
+t: times (n,) [s] with equal distances; y: response (n,) at these times, an angle [rad]; w: angular frequency [rad/s].
+
+Libraries are not used here, because their numbers differ. `control.step_info` rounds a settling time to the grid of
+times, and these metrics interpolate. `scipy.optimize.curve_fit` gives amplitude and period of a sine that differ by
+7e-13 from the published rows.
 """
 import math
 
@@ -15,7 +17,10 @@ def overshoot_percent(y, size):
 
 
 def settling_time(t, y, size, band=0.02):
-    """Return the time after which y stays within +-band * size of size, linear between samples, or NaN."""
+    """Return the time [s] from which y stays within size +-band * size, or NaN if it does not settle.
+
+    The time is interpolated linearly between two samples.
+    """
     excess = np.abs(y / size - 1.0) - band
     outside = np.flatnonzero(excess > 0.0)
     if outside.size == 0:
@@ -33,7 +38,7 @@ def crossings(y, size, band=0.005):
 
 
 def whole_periods(t, period, skip):
-    """Return the mask (n,) of the whole periods of a record, from `skip` [s] after its start on.
+    """Return the mask (n,) of the times in whole periods of `period` [s], counted from `skip` [s] after the start.
 
     Raises ValueError for a record without a whole period.
     """
@@ -53,9 +58,10 @@ def harmonic_fit(t, y, w):
 
 
 def amplitude_and_period(t, y, period):
-    """Return amplitude and period of a sine fitted to y by least squares (Gauss-Newton); period: first guess."""
+    """Return amplitude and period of a sine fitted to y by least squares (Gauss-Newton); period: first guess [s]."""
     w = 2.0 * math.pi / period
-    # With t from the middle on, an error of w hardly changes the fitted phase, so the search converges from afar.
+    # If t is 0 in the middle, an error of w hardly changes the fitted phase. The search then converges from a poor
+    # first guess too.
     middle = 0.5 * (t[0] + t[-1])
     t = t - middle
     for _ in range(20):
@@ -72,12 +78,12 @@ def amplitude_and_period(t, y, period):
 
 
 def residual(t, y, period):
-    """Return y without offset and fundamental: y - offset - a sin - b cos, (n,)."""
+    """Return y (n,) without its mean and without its part at the frequency 1 / period, by a least-squares fit."""
     w = 2.0 * math.pi / period
     offset, a, b = harmonic_fit(t, y, w)
     return y - offset - a * np.sin(w * t) - b * np.cos(w * t)
 
 
 def peak(y):
-    """Return the largest absolute value of y (any shape), a float in its unit."""
+    """Return the largest absolute value of an array of any shape."""
     return float(np.max(np.abs(y)))

@@ -1,4 +1,7 @@
-"""Figures of the study phased-array: those of paper 002 with S0, S1 and S2 side by side, and loops with a filter."""
+"""Figures of the study phased-array: the figures of paper 002 for each smoothing, and figures of loops with a filter.
+
+S0, S1 and S2 are the kinds of smoothing in the receiver, see SMOOTHING_TITLES.
+"""
 import numpy as np
 
 from pedestal_analysis.report.figures import (
@@ -26,7 +29,10 @@ def side_by_side(rows, **options):
 
 
 def steps(done, label, title, seconds):
-    """Draw step responses {PaperLoop: y (n,)} with a column for each smoothing; label(loop) names a line."""
+    """Draw step responses {PaperLoop: beam over step (n,)} with a column for each smoothing.
+
+    label: function that returns the name of a loop in the legend. seconds: end of the time axis [s].
+    """
     figure, axes = side_by_side(1, y='beam over step')
     for panel, S in zip(axes[0], SMOOTHING_TITLES):
         loops = [loop for loop in done if loop.smoothing == S]
@@ -41,7 +47,10 @@ def steps(done, label, title, seconds):
 
 
 def lags(done, title, seconds):
-    """Draw errors {label: {S: (measured error, true error (n,)) [rad]}}: above the measured, below the true error."""
+    """Draw errors {label: {S: (measured error, true error), each (n,) [rad]}}, measured errors above true errors.
+
+    seconds: (begin, end) of the drawn time [s], here and below.
+    """
     figure, axes = side_by_side(2, y=('measured error [deg]', 'true error [deg]'))
     for (label, by_smoothing), colour in zip(done.items(), LINE_COLOURS):
         for column, S in zip(axes.T, SMOOTHING_TITLES):
@@ -98,7 +107,7 @@ def filter_loop_errors(errors, seconds):
 
 
 def envelope(x, width=10):
-    """Return the largest of every `width` samples, repeated `width` times."""
+    """Return x (n,) with each block of `width` samples replaced by its largest sample; n: a multiple of `width`."""
     return np.repeat(np.maximum(x.reshape(-1, width).max(axis=1), 1e-9), width)
 
 

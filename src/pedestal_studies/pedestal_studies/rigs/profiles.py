@@ -1,4 +1,4 @@
-"""Target motions of the filter studies, exact: angle [rad], rate [rad/s] and acceleration [rad/s2] over time.
+"""Target motions (profiles) of the filter studies: exact angle [rad], rate [rad/s] and acceleration [rad/s2].
 
 `flyby-500m` and `flyby-60m` pass the antenna on a straight line at 15 m/s and are nearest in the middle of the record.
 `s-turn-500m` is an S of turns at 3 m/s2 across the line of sight, 500 m away, between two straight legs. `s-20deg` is
@@ -21,10 +21,10 @@ MIN_FLYBY_DISTANCES_M = {'flyby-500m': 500.0, 'flyby-60m': 60.0}
 """Least distance of the flybys [m]."""
 
 TURN_ACCELERATION_M_S2, TURN_DISTANCE_M = 3.0, 500.0
-"""Acceleration [m/s2] and distance [m] of the S-turn; the acceleration is a bank of 17 deg."""
+"""Acceleration [m/s2] and distance [m] of the S-turn; an aircraft has this acceleration at a bank angle of 17 deg."""
 
 TURN_SCHEDULE, ROLL_DURATION_S = {14.0: 1.0, 22.0: -1.0, 38.0: 1.0, 46.0: 0.0}, 1.0
-"""{time of a roll [s]: turn after it, 0 for straight on}, and duration of a roll [s].
+"""{time of a roll [s]: direction of the turn after it, 1, -1 or 0 for straight on}, and duration of a roll [s].
 
 The requirement for this motion states the acceleration and the distance. The times are ours.
 """
@@ -48,9 +48,9 @@ def distance(name, t):
 
 
 def flyby(t, w):
-    """Return (angle, rate, acceleration) (n,) of a straight line, nearest at t = 0.
+    """Return (angle, rate, acceleration) (n,) of a target on a straight line, nearest at t = 0.
 
-    w: speed over least distance [rad/s].
+    t: (n,) [s]. w: speed over least distance [rad/s].
     """
     u = w * t
     return np.arctan(u), w / (1.0 + u * u), -2.0 * u * w * w / (1.0 + u * u) ** 2
@@ -59,8 +59,8 @@ def flyby(t, w):
 def s_turn(t):
     """Return (angle, rate, acceleration) (n,) of an S-turn at t (n,) [s].
 
-    The target turns to one side, twice as long to the other side, and a third time back to the old course. It flies
-    straight before and after.
+    The target turns to one side, twice as long to the other side, and a third time back to the old course. Before
+    and after these turns the target flies straight.
     """
     motion, before = [0.0, 0.0, 0.0], 0.0
     for at, side in TURN_SCHEDULE.items():
@@ -71,7 +71,10 @@ def s_turn(t):
 
 
 def _step(t, width):
-    """Return (second integral, integral, s) of a step s from 0 to 1 at t = 0, half a cosine `width` [s] wide."""
+    """Return (second integral over time, integral over time, s), each (n,), of a step s from 0 to 1 at t = 0.
+
+    The step rises as half a cosine over `width` [s].
+    """
     x = np.clip(t / width + 0.5, 0.0, 1.0)
     after = np.maximum(t - 0.5 * width, 0.0)
     return (0.5 * width * width * (0.5 * x * x + (np.cos(np.pi * x) - 1.0) / np.pi**2) + 0.5 * after * (width + after),

@@ -1,4 +1,4 @@
-"""The result of a study."""
+"""The result of a study, which its function `run` returns and `pedestal study` prints and draws."""
 import dataclasses
 
 

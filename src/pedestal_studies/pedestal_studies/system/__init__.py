@@ -1,1 +1,1 @@
-"""Studies of the whole product against our own targets."""
+"""Studies of the whole control system, measured against our own targets; one study in each module."""

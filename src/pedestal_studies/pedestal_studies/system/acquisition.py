@@ -1,10 +1,13 @@
 """Acquisition: time to track a target, from power-up or after a loss, and share of searches that find the target.
 
-Cases <scenario> are the closed loop of a scenario under other seeds; in late_tle the satellite is 1 to 3 s late.
-`tracked_after_s` is the time from the start, or from the loss of the signal, until the antenna remains in autotrack
-with the receiver locked. Cases search-<pattern> have one round of a search. Their target stands still anywhere in the
-searched area, with equal probability. `found_percent` is the share of the runs that end in autotrack with the target
-in the beam. `found_percent_low` is the lower limit of its 95 % interval (Clopper and Pearson 1934).
+A case <scenario> runs the closed loop of a scenario with many seeds. In late_tle the satellite is 1 to 3 s late. A
+case search-<pattern> has one round of a search. Its target stands still anywhere in the searched area, with equal
+probability. The case steptrack_geo tracks a geostationary satellite by its signal level alone and has other metrics.
+
+tracked_after_s     time from the start, or from the loss of the signal, until the antenna remains in autotrack with
+                    the receiver locked
+found_percent       share of the runs that end in autotrack with the target in the beam
+found_percent_low   lower limit of its 95 % interval (Clopper and Pearson 1934)
 """
 import math
 
@@ -29,16 +32,16 @@ BATCH_RUNS = 5
 ERROR_TOPIC, MODE_TOPIC = 'tracking_receiver/angle_error', 'acu/mode'
 
 POWER_UP_CASES = ('late_tle', 'sidelobe')
-"""Cases whose time begins at the start."""
+"""Cases whose tracked_after_s is measured from the start."""
 SIGNAL_LOSS_CASES = ('fade', 'blockage', 'manoeuvre_in_coast')
-"""Cases whose time begins at the loss of the signal. `pedestal scenarios` describes all scenarios."""
+"""Cases whose tracked_after_s is measured from the loss of the signal; `pedestal scenarios` describes each."""
 
 TARGET_ELEVATION_RAD = 0.6
 """Elevation of the target of the search cases [rad]."""
 
 SEARCH_PARAMETERS = {'acu.commands': '3 search', 'acu.search.rounds': 1, 'acu.acquisition.expected_dbhz': 0.0,
                      'tracking_receiver.receiver.cn0_dbhz': 46.4}
-"""Parameters that make a search case of the scenario sidelobe."""
+"""Parameters that turn the scenario sidelobe into a case search-<pattern>."""
 
 SEARCH_DURATIONS_S = {'spiral': 85.0, 'raster': 55.0, 'square': 115.0, 'sector': 55.0}
 """{pattern: duration of a run with one round and the acquisition after it [s]}."""
@@ -47,9 +50,10 @@ FOUND_PERCENT_TARGET = '>= 99'
 """Target of found_percent."""
 
 CASE_NAMES = (*POWER_UP_CASES, *SIGNAL_LOSS_CASES, 'steptrack_geo', *(f'search-{name}' for name in SEARCH_PATTERNS))
+"""Names of all cases."""
 
 MAX_FOUND_ERROR_BEAMWIDTHS = 0.2
-"""Largest true error of a target that is in the beam [beamwidths]."""
+"""Largest true pointing error at which the target counts as in the beam [beamwidths]."""
 
 MAIN_LOBE_LOSS_DB = 12.0
 """Level lost at one beamwidth off the axis of a parabolic main lobe [dB]. The loss grows with the square of the error,
@@ -60,7 +64,7 @@ STEPTRACK_SETTLING_TIME_S = 90.0
 
 
 def case_of(name, seed):
-    """Return the Case of a run."""
+    """Return the Case of one run; name: one of CASE_NAMES."""
     rng = np.random.default_rng(seed)
     if name == 'late_tle':
         return Case(name, name, {'scenario.program.time_offset': -rng.uniform(1.0, 3.0)}, seed=seed)
@@ -75,10 +79,11 @@ def case_of(name, seed):
 
 
 def offset(pattern, rng, beamwidth=0.0175):
-    """Return (cross-elevation, elevation) [rad] of a random place in the full area of a pattern.
+    """Return the (cross-elevation, elevation) [rad] of a random place in the full search area, from its centre.
 
-    beamwidth [rad]: that of the scenario sidelobe. The area of a spiral and of a square pattern is a circle, so a
-    place outside the circle is drawn again. The area of the other patterns is a rectangle.
+    pattern: code of the search pattern. rng: numpy Generator. beamwidth [rad]: that of the scenario sidelobe. The area
+    of a spiral and of a square pattern is a circle; a place outside the circle is drawn again. The area of the other
+    patterns is a rectangle.
     """
     p = SearchParameters()
     while True:
@@ -92,7 +97,7 @@ def offset(pattern, rng, beamwidth=0.0175):
 def tracked_after(run, from_loss):
     """Return the time [s] until the target is tracked for the rest of the run; NaN if it is not tracked at the end.
 
-    The time begins at the start, or at the first loss of the signal in autotrack.
+    from_loss: True to measure the time from the first loss of the signal in autotrack, False from the start.
     """
     tracked = (run[MODE_TOPIC] == Mode.AUTOTRACK) & np.isfinite(run[ERROR_TOPIC]['vector'][:, 0])
     if not tracked[-1]:
@@ -107,15 +112,15 @@ def tracked_after(run, from_loss):
 
 
 def off_axis(run):
-    """Return the true error of the beam (n,) [beamwidths]; NaN where it is not known."""
+    """Return the true pointing error (n,) [beamwidths] of a closed_loop.Run; NaN where it is not known."""
     return np.hypot(*run.truth['error'].T) / run.units['tracking_receiver'].parameters.antenna.beamwidth
 
 
 def batch(item):
     """Return the values (count, 2) of an item (case, first run, number of runs).
 
-    The values are tracked_after_s and 1 if the target is in the beam at the end. For steptrack_geo they are the rms of
-    the lost level [dB] and the largest error [beamwidths].
+    The values of a run are tracked_after_s, and 1 if the target is in the beam at the end, else 0. For steptrack_geo
+    the values are the rms of the lost level [dB] and the largest error [beamwidths].
     """
     name, first, count = item
     values = []
@@ -139,7 +144,7 @@ def least_share(found, runs):
 
 
 def rows(values):
-    """Return the rows of values {case: (runs, 2)} as of `batch`."""
+    """Return the rows of the study; values: {case: (runs, 2)} as `batch` returns."""
     table = []
     for name, of_runs in values.items():
         if name == 'steptrack_geo':
@@ -165,7 +170,7 @@ def run(progress, runs=DEFAULT_RUNS, pool=None) -> Result:
 
 
 def time_figure(values):
-    """Draw the time of every run that found its target."""
+    """Draw tracked_after_s of every run that found its target; values as of `rows`."""
     figure, axes = new_panels(1, height=3.8, x='time until the target is tracked [s]')
     for name, of_runs in values.items():
         if name != 'steptrack_geo':

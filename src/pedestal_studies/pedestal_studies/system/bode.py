@@ -1,11 +1,13 @@
 """Frequency response of the current, speed and position loops, measured by multisine on the simulated plant.
 
-pedestal_analysis/tuning/frequency_response.py measures the open loop L. The dashed line of a figure is the design of
-the gains. Sampling, delay and elasticity cause the difference between the design and the measurement. The design is
+A multisine is a sum of sines of many frequencies. With it pedestal_analysis/tuning/frequency_response.py measures the
+open loop L. The dashed line of a figure is the open loop for which the gains were designed. Sampling, delay and
+elasticity cause the difference between the design and the measurement. The open loops of the design are
 
-    w_c / s                     current; w_c: bandwidth
-    (K_p + K_i / s) / (J s)     speed of a rigid drive; K_p, K_i: proportional and integral gain; J: inertia
-    K_p / s + K_i / s^2         position; K_p, K_i: proportional and integral gain
+    w_c / s                     current loop; w_c: bandwidth [rad/s]
+    (K_p + K_i / s) / (J s)     speed loop of a rigid drive; K_p, K_i: proportional and integral gain; J: inertia at
+                                the motor
+    K_p / s + K_i / s^2         position loop; K_p, K_i: proportional and integral gain
 """
 import dataclasses
 import functools
@@ -33,7 +35,7 @@ from pedestal_studies.rigs.rows import Result
 
 
 def controller(name):
-    """Return the Case of the default position loop with a position controller of this name on both axes."""
+    """Return the Case of scenario leo_pass in which both axes have the position controller of this name."""
     return frequency.case(name, 'leo_pass', {f'acu.{axis}.controller': name for axis in AXES})
 
 
@@ -54,14 +56,15 @@ LOOP_CASES = {
     'rigid': (frequency.case('rigid', 'leo_pass', FAST_LOOP_PARAMETERS), AXES[:1]),
     'structure': (frequency.case('structure', 'leo_pass', STRUCTURE_PARAMETERS), AXES[:1]),
     'structure-notch': (frequency.case('structure-notch', 'leo_pass', NOTCH_PARAMETERS), AXES[:1])}
-"""Position loops and the axes on which they are measured.
+"""{name of a position loop: (its Case, the axes on which it is measured)}.
 
-pid, feedforward, adrc: the controllers with their defaults. paper-r1, best: of the study servo. rigid, structure,
-structure-notch: a faster loop with a rigid load, with a flexible load, and with a notch against its resonance.
+pid, feedforward, adrc: the controllers with their defaults. paper-r1, best: cases of the study servo. rigid,
+structure, structure-notch: a faster loop with a rigid load, a flexible load, and a flexible load with a notch.
 """
 
 MARGIN_BAND_FACTOR = math.sqrt(10.0)
-"""Band about crossover in which the margins are read: |L| within this factor of 1, +-10 dB."""
+"""Band about crossover in which a loop must be linear, because the margins are read there: |L| within this factor of
+1, +-10 dB."""
 
 
 MAX_DRAWN_DEVIATION = 0.2
@@ -69,19 +72,28 @@ MAX_DRAWN_DEVIATION = 0.2
 
 
 def nonlinearity(measured, smaller):
-    """Return the largest relative change of L between two excitations, within MARGIN_BAND_FACTOR."""
+    """Return the largest relative change of L between two excitations, within MARGIN_BAND_FACTOR.
+
+    measured, smaller: Responses to the larger and to the smaller excitation.
+    """
     change = np.abs(smaller.open_loop / measured.open_loop - 1.0)
     return float(change[np.abs(np.log(np.abs(measured.open_loop))) < math.log(MARGIN_BAND_FACTOR)].max())
 
 
 def rows(responses):
-    """Return the rows of {name: Response}."""
+    """Return the rows of the margins; responses: {name of a loop: Response}."""
     return [row(name, metric, value, unit) for name, measured in responses.items()
             for metric, (value, unit) in frequency.margins(measured).items()]
 
 
+def without_gain_margin(responses):
+    """Return a line on the loops of {name: Response} that have no gain margin in the measured band."""
+    return frequency.without_gain_margin([name for name, measured in responses.items()
+                                          if math.isnan(frequency.margins(measured)['gain_margin_db'][0])])
+
+
 def run(progress) -> Result:
-    """Measure all loops, each also with half the excitation."""
+    """Measure all loops, each with full and with half excitation to test that it is linear."""
     drive = AduParameters()
     parts = {'current loops': (functools.partial(frequency.current, drive), frequency.CURRENT_SWEEP),
              'speed loops': (functools.partial(frequency.speed, drive), frequency.SPEED_SWEEP)}
@@ -96,14 +108,16 @@ def run(progress) -> Result:
         responses |= measured
     worst = max(change, key=change.__getitem__)
     remarks = [f'The loops are linear: with half the excitation no open loop changes by more than '
-               f'{100.0 * change[worst]:.1f} % within 10 dB of |L| = 1 (largest change: {worst}).']
+               f'{100.0 * change[worst]:.1f} % within 10 dB of |L| = 1 (largest change: {worst}).',
+               *without_gain_margin(responses)]
     return Result(rows(responses), drawings(responses, drive), remarks)
 
 
 def drawings(responses, drive):
-    """Return {name: function that draws a Figure}."""
+    """Return {name: function that draws a Figure}; responses as of `rows`; drive: AduParameters."""
     p, c = drive.azimuth, AcuParameters().azimuth.feedforward
     w_c = 2.0 * math.pi * p.current_loop.bandwidth
+    # At its shaft, each of the two motors moves its own inertia and half of the load.
     J = p.motor_1.inertia + 0.5 * p.load.inertia / p.gear_train.ratio ** 2
 
     def chosen(title, curves, design=None):
@@ -147,9 +161,9 @@ def degrees(x):
 def bode_figure(title, curves, design):
     """Draw Bode diagrams of the open and the closed loop.
 
-    curves: {label: (Response, colour)}; design(s): the open loop, or None. Crosses mark the crossover in gain and
-    phase, and the legend gives the margins. The first of two or more curves is drawn wide, so that it remains visible
-    behind a curve that coincides with it.
+    curves: {label: (Response, colour)}. design: function of s that returns the open loop of the design, or None.
+    Crosses mark the crossover in gain and phase, and the legend gives the margins. The first of two or more curves is
+    drawn wide, so that it remains visible behind a curve that coincides with it.
     """
     figure, axes = new_panels(2, 2, height=5.4, x='frequency [Hz]', y=('gain [dB]', 'phase [deg]'), sharex=True)
     figure.suptitle(title)

@@ -1,15 +1,15 @@
 """The error budget of scenario station_real: each term alone, the sum of all terms, and the run with all terms.
 
-A contribution is the pointing error of a run with one term on, minus the error of a run without any term. The two runs
-have the same seed and are subtracted step by step. Systematic contributions are added as signed vectors along the
-pass, random contributions as squares:
+A term is a source of error, such as the tilt of the azimuth axis. Its contribution is the pointing error of a run with
+this term on, minus the error of a run with all terms off. The two runs have the same seed and are subtracted step by
+step. Systematic contributions are added as signed vectors along the pass, random contributions as squares:
 
     combined^2 = mean |servo + sum of systematic|^2 + sum of mean |random|^2
 
-A random term has both: its mean over the seeds, <term>-mean, and its deviation from the mean. `servo` is the error
-with every term off (lag, friction, quantisation, bending of the structure by the unbalance of its axis). `noise` is
-the deviation of that error between the seeds of the receiver. Cases are <mode>/<term>. Cases <mode>/<time>s give the
-signed contributions at that time of the pass.
+A random term has both contributions: <term>-mean is its mean over the seeds and systematic, its deviation from this
+mean is random. `servo` is the error with all terms off (lag, friction, quantisation, bending of the structure by the
+unbalance of its axis). `noise` is the deviation of that error between the seeds of the receiver. Cases are
+<mode>/<term>. Cases <mode>/<time>s give the signed contributions at that time of the pass.
 """
 import dataclasses
 import functools
@@ -28,11 +28,12 @@ from pedestal_common.parameters import defaults
 from pedestal_studies.rigs.rows import Result
 
 SCENARIO_NAME = 'station_real'
+"""Scenario of all runs, in which all terms are on."""
 DEFAULT_RUNS, FIRST_SEED = 30, 1
 """Runs of the random terms; seed of the first run."""
 
 BATCH_RUNS, RANDOM_SHARE = 3, 0.8
-"""Runs that one worker makes at a time; share of the random terms in the shown progress."""
+"""Runs that one worker makes at a time; part of the progress bar for the runs of the random terms [-]."""
 
 EVALUATION_START_S, EVALUATION_PERIOD_S = 15.0, 0.1
 """Start and period of the evaluation of the error [s]."""
@@ -44,11 +45,15 @@ ERROR_COLUMNS = ('cross_elevation', 'elevation')
 """Names of the two columns of an error."""
 
 MODE_OVERRIDES = {'program': ('acu.tracker.handover=false',), 'autotrack': ()}
-"""{mode: overrides}."""
+"""{mode: overrides (texts node.key=value) with which the antenna points in this mode}."""
 
 
 class Term(typing.NamedTuple):
-    """Source of error: its parameters (node.key, * for both axes), True if it is random, its description."""
+    """Source of error.
+
+    `parameters`: node.key, with * for both axes; with their defaults the term is off. `random`: True if its error
+    depends on the seed. `doc`: description.
+    """
     name: str
     parameters: tuple
     random: bool
@@ -116,7 +121,7 @@ def parameters_of(term):
 
 
 def switched_off(term):
-    """Return overrides that give the parameters of a Term their defaults."""
+    """Return overrides that switch a Term off: they give its parameters their defaults."""
     texts = []
     for key in parameters_of(term):
         node, _, name = key.partition('.')
@@ -125,21 +130,24 @@ def switched_off(term):
 
 
 def overrides(mode, on):
-    """Return the overrides of a mode with one term on (a name), or NO_TERMS, or ALL_TERMS."""
+    """Return the overrides of a run in a mode; on: name of the one term that is on, or NO_TERMS, or ALL_TERMS."""
     off = [] if on == ALL_TERMS else [text for term in ERROR_TERMS if term.name != on for text in switched_off(term)]
     return [*MODE_OVERRIDES[mode], *off]
 
 
 @dataclasses.dataclass(frozen=True)
 class Pass:
-    """Direction of the antenna: azimuth and elevation (n,) [deg] at the times (n,) [s] of an error."""
+    """Direction of the antenna along the pass: azimuth and elevation (n,) [deg] at the times (n,) [s] of an error."""
     times: np.ndarray
     azimuth: np.ndarray
     elevation: np.ndarray
 
 
 def _run(mode, on, seed, duration):
-    """Return the run of a mode with one term on, every EVALUATION_PERIOD_S from EVALUATION_START_S on."""
+    """Return the closed_loop.Run of a mode, with a step every EVALUATION_PERIOD_S from EVALUATION_START_S on.
+
+    on: as of `overrides`. duration: length of the run [s], None for that of the scenario.
+    """
     chosen = scenario.load(SCENARIO_NAME, [*overrides(mode, on), f'adu.wind.field.seed={seed}'], seed=seed,
                            duration=duration)
     run = closed_loop.Loop(chosen).run()
@@ -148,7 +156,7 @@ def _run(mode, on, seed, duration):
 
 
 def pass_angles(duration):
-    """Return the Pass of the scenario."""
+    """Return the Pass of the scenario; duration as of `_run`."""
     run = _run('program', NO_TERMS, FIRST_SEED, duration)
     azimuth, elevation = np.degrees(run['joint_states']['position'].T)
     return Pass(run.t, azimuth, elevation)
@@ -168,11 +176,11 @@ def rms(errors):
 
 @dataclasses.dataclass(frozen=True)
 class Budget:
-    """Budget of a mode [deg].
+    """Budget of a mode. All errors are in deg; their two columns are cross-elevation and elevation.
 
-    `base` (runs, n, 2): errors with every term off; a single run if no noise reaches the antenna. `once` {term: (n,
-    2)} and `seeded` {term: (runs, n, 2)}: contributions of systematic and of random terms. `whole` (runs, n, 2):
-    errors with every term on.
+    `base` (runs, n, 2): errors with all terms off; a single run if no noise reaches the antenna. `once` {term: (n, 2)}
+    and `seeded` {term: (runs, n, 2)}: contributions of systematic and of random terms. `whole` (runs, n, 2): errors
+    with all terms on.
     """
     base: np.ndarray
     once: dict
@@ -192,7 +200,11 @@ class Budget:
 
     @property
     def random(self):
-        """Random contributions {name: (runs, n, 2)}: deviations from their mean, with the size about the true mean."""
+        """Random contributions {name: (runs, n, 2)}: deviations from the mean over the runs.
+
+        Because the mean of n runs follows their errors, the deviations are too small. The factor sqrt(n / (n - 1))
+        corrects this.
+        """
         off = {'noise': self.base} if len(self.base) > 1 else {}
         return {name: (e - e.mean(axis=0)) * np.sqrt(len(e) / (len(e) - 1.0))
                 for name, e in (off | self.seeded).items()}
@@ -206,7 +218,7 @@ class Budget:
 
     @property
     def to_whole(self):
-        """`combined` over the rms of all runs with every term on."""
+        """`combined` over the rms of the runs with all terms on [-]."""
         return self.combined / float(np.sqrt(np.mean(rms(self.whole) ** 2)))
 
 
@@ -227,14 +239,14 @@ def budget(mode, runs, duration, pool, progress):
 
 
 def _sizes(case, e):
-    """Return the rows of an error (n, 2), or of the error of several runs (runs, n, 2)."""
+    """Return the rows of the rms of an error e (n, 2), or of the error of several runs (runs, n, 2) [deg]."""
     return [row(case, 'rms_deg', rms(e), 'deg'),
             *(row(case, f'{axis}_rms_deg', tracking.rms(e[..., i], axis=-1), 'deg')
               for i, axis in enumerate(ERROR_COLUMNS))]
 
 
 def rows(mode, made, place):
-    """Return the rows of a Budget of a mode on a Pass."""
+    """Return the rows of a mode; made: its Budget; place: the Pass."""
     systematic = {**made.systematic, 'systematic': sum(made.systematic.values())}
     table = []
     for name, e in (*systematic.items(), *made.random.items(), ('whole', made.whole)):
@@ -276,7 +288,10 @@ def run(progress, runs=DEFAULT_RUNS, pool=None, duration=None) -> Result:
 
 
 def figure(made, place):
-    """Draw the contributions of every mode, rms, and the systematic sum beside the run with every term."""
+    """Draw the rms of all contributions in every mode, and the systematic sum beside the runs with all terms on.
+
+    made: {mode: Budget}. place: Pass.
+    """
     drawn, axes = new_panels(len(made), 2, height=7.0, x='')
     for (left, right), (mode, of_mode) in zip(axes, made.items()):
         sizes = {name: np.mean(rms(e)) for name, e in (*of_mode.systematic.items(), *of_mode.random.items())}

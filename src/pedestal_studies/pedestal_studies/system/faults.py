@@ -1,15 +1,20 @@
 """Every fault that can be injected, in every mode, against the expectation of an operator.
 
-A case NODE.FAULT/MODE is the closed loop of ship_pass in a mode. At 10 s a fault with its defaults is injected for 5
-s, and the run ends 5 s after the fault. The study measures three numbers of each case. `told_after_steps` is the
-number of steps from the onset to the first report. A report is an alarm, or a diagnostic text that the node does not
-publish without the fault. `ends_as_expected` is 1 if the mode at the end is one of the expected modes.
-`largest_error_deg` is the largest error against truth while the mode is kept. The error depends on the mode:
+A case NODE.FAULT/MODE is the closed loop of the scenario ship_pass in a mode. At 10 s a fault with its defaults is
+injected for 5 s, and the run ends 5 s after the fault. rigs/fault_expectations.py states the expectations. The study
+measures three numbers of each case:
 
-TOWARDS_TARGET_MODES   pointing error, off the true target
+told_after_steps    number of steps from the onset to the first report; a report is an alarm, or a diagnostic text that
+                    the node does not publish without the fault
+ends_as_expected    1 if the mode at the end is one of the expected modes, else 0
+largest_error_deg   largest error against truth while the mode is kept
+
+The error depends on the mode:
+
+TOWARDS_TARGET_MODES   pointing error, the angle from the true beam to the true target
 slave, sun             angle from the true beam to the commanded direction, or to the sun
-rate                   angle from the place at the onset, moved on with the commanded rate, on the deck
-all other modes        angle from the place at the onset, on the deck
+rate                   angle on the deck to a place that moves with the commanded rate from the place at the onset
+all other modes        angle on the deck to the place at the onset
 """
 import typing
 
@@ -32,7 +37,7 @@ from tracking_receiver_sim.params import LeoPassParameters
 SCENARIO_NAME, FAULT_ONSET_S, FAULT_DURATION_S, RUN_DURATION_S = 'ship_pass', 10.0, 5.0, 20.0
 """Scenario of all cases; onset and duration of the fault, and duration of a run [s]."""
 BASELINE_START_S = 5.0
-"""Time after which the reports of the nodes without a fault are settled [s]."""
+"""Time from which the reports of a run without a fault are collected; earlier reports belong to the start [s]."""
 
 AZIMUTH_RATE_RAD_S, SLAVE_DIRECTION_RAD = 0.02, (0.5, 0.6)
 """Commanded azimuth rate in mode rate [rad/s]; azimuth and elevation in mode slave [rad]."""
@@ -42,9 +47,10 @@ RATE_COMMANDS = '; '.join(f'{t:g} rate azimuth={AZIMUTH_RATE_RAD_S}'
 """Commands of mode rate, repeated because a rate command is valid for 0.5 s."""
 
 PROGRAM_OFFSET_RAD = 0.05
-"""Elevation error of the program in mode search [rad], so that the search takes some time to find the target."""
+"""Elevation error of the program track in mode search [rad], so that the search takes some time."""
 
 START_TIME_PARAMETER = 'tracking_receiver.target.leo_pass.start_time'
+"""Parameter with the time of the start of a run (UTC)."""
 
 _SPECIAL_MODE_PARAMETERS = {
     'stop': ['acu.commands=1 stop'],
@@ -62,11 +68,11 @@ _SPECIAL_MODE_PARAMETERS = {
                f'scenario.program.elevation_offset={PROGRAM_OFFSET_RAD}'],
     'acquire': ['acu.initial_mode=program', 'acu.commands=9 acquire'],
     'steptrack': ['acu.initial_mode=program', 'acu.commands=5 steptrack']}
-"""Parameters of the modes that need more than the initial mode. tle has the pass of the other modes, sun a time at
-which the sun is up."""
+"""{mode: overrides (texts node.key=value)} of the modes that need more than the parameter acu.initial_mode. The start
+time of tle gives the pass of the other modes. At the start time of sun the sun is above the horizon."""
 
 MODE_PARAMETERS = {mode: _SPECIAL_MODE_PARAMETERS.get(mode, [f'acu.initial_mode={mode}']) for mode in MODES}
-"""Parameters with which a run is in a mode at the onset."""
+"""{mode: overrides with which a run is in this mode at the onset of the fault}."""
 
 ALARM_SOURCE = 'alarm'
 """Source of a report that is an alarm, in place of the name of a node."""
@@ -75,14 +81,19 @@ ON_TARGET_MODES = ('program', 'tle', 'autotrack')
 """Modes that follow the target; a change between them does not count as leaving the mode."""
 
 TOWARDS_TARGET_MODES = ('search', 'acquire', 'steptrack', *ON_TARGET_MODES)
-"""Modes that use the signal level, and the modes to which they lead; a change between them does not count either."""
+"""Modes that use the signal level, and the modes to which they lead. A change between them does not count
+as leaving the mode either."""
 
 FINE_CHECK_STEPS, COARSE_CHECK_STEPS = 200, 20
 """Steps after the onset in which the reports are read in every step, and steps between two readings at other times."""
 
 
 class Report(typing.NamedTuple):
-    """An active alarm, or the diagnosis of a node, at a step. source: ALARM_SOURCE or the name of the node."""
+    """An active alarm, or the diagnosis of a node, at a step.
+
+    `source`: ALARM_SOURCE or the name of the node. `level`: level of the diagnosis, 0 for an alarm. `text`: name of
+    the alarm, or text of the diagnosis.
+    """
     step: int
     source: str
     level: int
@@ -105,9 +116,10 @@ class FaultOutcome(typing.NamedTuple):
 
 
 def run_of(mode, inject=''):
-    """Return (Run, [Report]) of a mode with a text NODE.inject=...
+    """Return (closed_loop.Run, [Report]) of a mode.
 
-    The reports are the active alarms and the diagnosis of every node, at each step at which they are read.
+    inject: text NODE.inject=... of the fault, '' for a run without a fault. The reports are the active alarms and the
+    diagnosis of every node, at each step at which they are read.
     """
     chosen = scenario.load(SCENARIO_NAME, [*MODE_PARAMETERS[mode], 'scenario.program.time_offset=0',
                                            *filter(None, [inject])],
@@ -156,7 +168,10 @@ def direction_error(run, directions):
 
 
 def deck_error(run, onset, azimuth_rate):
-    """Return the angle (n,) [rad] on the deck from the place before step `onset`, moved on with a rate [rad/s]."""
+    """Return the angle (n,) [rad] on the deck between the axes and their expected place.
+
+    The expected place is that before step `onset`, and moves on from there with azimuth_rate [rad/s].
+    """
     angles = run['adu/truth']['position']
     azimuth, elevation = angles[onset - 1]
     turned = azimuth_rate * (run.t - run.t[onset - 1])
@@ -189,7 +204,7 @@ def baseline_reports(mode):
 
 
 def fault_outcome(mode, inject, baseline):
-    """Return the FaultOutcome of a fault; baseline: as of `baseline_reports`."""
+    """Return the FaultOutcome of a fault in a mode; inject: as of `run_of`; baseline: of `baseline_reports`."""
     run, reports = run_of(mode, inject)
     onset = int(np.searchsorted(run.t, FAULT_ONSET_S - 1e-9))
     new = [one for one in reports if one.step >= onset and (one.source, one.level, one.text) not in baseline]
@@ -209,7 +224,10 @@ def cases():
 
 
 def rows(case, found, mode, expected):
-    """Return the rows of a case: time of the first report, mode at the end, largest error."""
+    """Return the rows of a case: time of the first report, mode at the end, largest error.
+
+    found: FaultOutcome. mode: at the onset. expected: Expectation.
+    """
     within = None if expected.report_steps is None else f'<= {expected.report_steps}'
     report_steps = row(case, 'told_after_steps', np.nan if found.report_steps is None else found.report_steps,
                        'steps', target=within)
@@ -220,7 +238,7 @@ def rows(case, found, mode, expected):
 
 
 def line(case, found, mode, expected, case_rows):
-    """Return a case in one line: outcome and expectation."""
+    """Return a case in one line: outcome and expectation; arguments as of `rows`, and the rows of the case."""
     report_text = 'no report' if found.report_steps is None else (
         f'report after {found.report_steps} steps "{found.text}"')
     if found.alarms:
@@ -251,7 +269,10 @@ DRAWN_FAULTS = ('adu.gust', 'adu.motor_loss', 'adu.drop', 'tracking_receiver.fad
 
 
 def figure(of_cases):
-    """Draw the error of DRAWN_FAULTS in autotrack over time, with a line at half a beamwidth."""
+    """Draw the error of DRAWN_FAULTS in autotrack over time, with a line at half a beamwidth.
+
+    of_cases: {case: error (n,) [deg]}.
+    """
     made, axes = new_panels(len(DRAWN_FAULTS), height=9.0, x='time from the onset [s]', y='[deg]', sharex=True)
     for panel, fault in zip(axes[:, 0], DRAWN_FAULTS):
         error = of_cases[f'{fault}/autotrack']

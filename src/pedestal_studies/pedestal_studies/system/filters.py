@@ -1,10 +1,15 @@
 """Filters compared: angle and rate noise of every filter on four target motions, white and coloured noise.
 
-Cases are <profile>/<filter>/<noise>, with measurements at 100 Hz. Every filter except UNTUNED_FILTERS is tuned for
-each profile and noise by pedestal_analysis/tuning/parameter_search.py. The tuning minimises the angle rms over
-TUNING_RUNS records of other seeds. `imm` has its default parameters, `imm-manoeuvre` those of an IMM that expects a
-manoeuvre at any time. `-rate-X` has an independent rate measurement of X deg/s rms. `-expecting` knows the bandwidth
-of coloured noise and has no case with white noise. Every run has its own rms and means, after SETTLING_TIME_S.
+Cases are <profile>/<filter>/<noise>. A profile is a target motion of rigs/profiles.py, whose angle is measured at 100
+Hz. Every filter except UNTUNED_FILTERS is tuned for each profile and noise. The tuning minimises the angle rms over
+TUNING_RUNS records of other seeds (pedestal_analysis/tuning/parameter_search.py).
+
+imm             IMM with its default parameters
+imm-manoeuvre   IMM that expects a manoeuvre at any time
+...-rate-X      filter with an independent rate measurement with a noise of X deg/s rms
+...-expecting   filter that knows the bandwidth of coloured noise; it has no case with white noise
+
+Every run gives its own rms and means, from SETTLING_TIME_S on.
 """
 import dataclasses
 import math
@@ -12,17 +17,15 @@ import math
 import numpy as np
 
 from acu_tracker.estimation.filters.kinds import FILTER_KINDS
-from acu_tracker.estimation.filters.motion_models import MODEL_NAMES
 from acu_tracker.estimation.params import FilterParameters, UkfParameters
 from pedestal_analysis.report.figures import (
     FILTERED_COLOUR,
     INK_COLOUR,
-    MOTOR_1_COLOUR,
-    MOTOR_2_COLOUR,
     RAW_COLOUR,
     TRUTH_COLOUR,
     new_panels,
 )
+from pedestal_analysis.report.filter_figures import MODEL_COLOURS
 from pedestal_analysis.results.intervals import row
 from pedestal_analysis.trials import monte_carlo
 from pedestal_analysis.tuning import parameter_search
@@ -45,13 +48,13 @@ SETTLING_TIME_S = 3.0
 
 NOISE_CASES = {f'{colour}-{sigma}': Noise(math.radians(sigma), bandwidth)
                for sigma in (0.03, 0.1) for colour, bandwidth in (('white', None), ('coloured', 5.0))}
-"""{name: Noise} with the rms [deg]; coloured noise passes a first-order lag of 5 Hz and has the
-same rms."""
+"""{name: Noise}; the number in a name is the rms [deg]. Coloured noise is white noise after a first-order lag of 5 Hz,
+with the same rms."""
 
 RATE_SIGMAS_RAD_S = {f'current_statistical-rate-{sigma}': math.radians(sigma) for sigma in (0.5, 0.1, 0.02)}
 """{filter with a rate measurement: standard deviation of the measured rate [rad/s]}."""
 
-MANOEUVRE_PARAMETERS = {'imm.models': 'cv ca current_statistical', 'imm.dwell': 5.0,
+MANOEUVRE_PARAMETERS = {'imm.models': 'cv ca current_statistical', 'imm.rungs': 1, 'imm.dwell': 5.0,
                         'imm.cv.noise': math.radians(0.003), 'imm.ca.noise': math.radians(0.1)}
 """Parameters of the filter imm-manoeuvre."""
 
@@ -87,15 +90,16 @@ METRIC_TARGETS = {
         ('s-20deg', '<= 0.0097'))},
     ('flyby-500m', 'imm', 'angle_rms_deg'): '<= 0.0048', ('flyby-60m', 'imm', 'angle_rms_deg'): '<= 0.0102',
     ('s-turn-500m', 'imm', 'angle_rms_deg'): '<= 0.0089', ('s-20deg', 'imm', 'angle_rms_deg'): '<= 0.0155'}
-"""{(profile, filter, metric): target} for the noise white-0.03. The targets of imm are 1.15 times the best tuned
-filter of one model."""
+"""{(profile, filter, metric): target} for the noise white-0.03. The targets of imm are 1.15 times the rms of the best
+tuned filter of one model."""
 
 CONSISTENCY_LIMITS = (0.8, 1.25)
-"""Range of mean NIS per degree of freedom, and of rms error over the filter's own sigma, of a consistent filter."""
+"""Range of two ratios of a consistent filter [-]: mean NIS (normalised innovation squared) per degree of freedom, and
+rms error over the sigma that the filter states."""
 
 
 def degrees_of_freedom(name):
-    """Return the degrees of freedom of the innovation of a filter."""
+    """Return the degrees of freedom of the innovation of a filter: 1 for the angle, and 1 for a measured rate."""
     return 1 + (name in RATE_SIGMAS_RAD_S)
 
 
@@ -105,13 +109,16 @@ def times():
 
 
 def noise_of(noise, name):
-    """Return the Noise of a name of NOISE_CASES, as the filter of a name of FILTERS receives it."""
+    """Return the Noise for a filter; noise: name of NOISE_CASES; name: of FILTERS."""
     return dataclasses.replace(NOISE_CASES[noise], rate_sigma=RATE_SIGMAS_RAD_S.get(name),
                                expected=name in NOISE_AWARE_FILTERS)
 
 
 def measured(params, profile, noise, seed, first, count):
-    """Return MOMENTS (count, n) of one filter (FilterParameters) with a Noise, runs first ... first + count - 1."""
+    """Return ensemble.MOMENTS (count, n) of one filter (FilterParameters) with a Noise.
+
+    The runs are first ... first + count - 1.
+    """
     t = times()
     truth = profiles.truth(profile, t)
     return ensemble.moments(params, t, truth, noise, ensemble.records(truth, noise, seed, first, count))
@@ -138,11 +145,11 @@ def tune(item):
 
 
 THINNING_STEPS = 10
-"""Figures show every tenth measurement."""
+"""Steps between two measurements that the figures show."""
 
 
 def batch(item):
-    """Return {filter: (MOMENTS (count,) of every run, MOMENTS over the runs at thinned times)} of an item.
+    """Return {filter: (MOMENTS (count,) of every run, MOMENTS of all runs at the drawn times)} of an item.
 
     An item is (profile, noise, {filter: parameters}, first run, number of runs).
     """
@@ -160,7 +167,10 @@ def batch(item):
 
 
 def run(progress, runs=DEFAULT_RUNS, pool=None, on=profiles.PROFILES, noises=tuple(NOISE_CASES)) -> Result:
-    """Compare all filters; on: names of profiles, noises: names of NOISE_CASES, fewer for a quick look."""
+    """Compare all filters in `runs` runs of each case; pool: monte_carlo.Pool, None for this process.
+
+    on: names of profiles; noises: names of NOISE_CASES.
+    """
     pool = pool or monte_carlo.Pool(1)
     applicable = {noise: [name for name in FILTERS if NOISE_CASES[noise].bandwidth
                           or name not in NOISE_AWARE_FILTERS] for noise in noises}
@@ -190,8 +200,10 @@ def run(progress, runs=DEFAULT_RUNS, pool=None, on=profiles.PROFILES, noises=tup
 def metrics(sums):
     """Return {metric: (values (runs,), unit)} of MOMENTS (runs,).
 
-    A consistent filter has a nis_mean equal to its degrees of freedom. Its nees_mean (angle and rate, per degree of
-    freedom) and both _over_sigma are 1.
+    `reduction`: rms of the measured angle over that of the estimate. nis, nees: normalised innovation squared and
+    normalised estimation error squared. `..._over_sigma`: rms error over the sigma that the filter states. A
+    consistent filter has a nis_mean equal to its degrees of freedom. Its nees_mean (angle and rate, per degree of
+    freedom) and both ..._over_sigma are 1.
     """
     angle, rate, raw = (ensemble.rms(sums, name) for name in ('angle', 'rate', 'raw'))
     n = sums['runs']
@@ -203,7 +215,7 @@ def metrics(sums):
 
 
 def rows(values):
-    """Return a row for every metric of every case (profile, filter, noise)."""
+    """Return a row for every metric of every case; values: {(profile, filter, noise): as `metrics` returns}."""
     return [row('/'.join(case), metric, value, unit,
                 target=METRIC_TARGETS.get((*case[:2], metric)) if case[2] == SHOWN_NOISE else None)
             for case, measured in values.items() for metric, (value, unit) in measured.items()]
@@ -225,7 +237,7 @@ def _cell(measured):
 def remarks(values, tuned, runs):
     """Return the sentences that explain the rows, with a table of the profiles.
 
-    values: {case: {metric: mean over the runs}}.
+    values: {case: {metric: mean over the runs}}. tuned: {(profile, noise): {filter: FilterParameters}}.
     """
     lines = [f'{runs} runs of each case. The columns are angle rms [deg] (reduction), rate rms [deg/s], and the error '
              f'over own sigma of angle and rate, for the noise {SHOWN_NOISE} deg. --json gives the rows of all cases.']
@@ -280,7 +292,10 @@ FILTER_COLOURS = {'current_statistical': RAW_COLOUR, 'current_statistical-rate-0
 
 
 def errors_figure(over_time, on, what='angle'):
-    """Draw the error over time: mean +-1 sigma over the runs, and dashed the filter's own sigma."""
+    """Draw the error over time: mean +-1 sigma over the runs, and dashed the sigma that the filter states.
+
+    over_time: {case: MOMENTS of all runs at the drawn times}; on: names of profiles, here and below.
+    """
     unit = 'deg' if what == 'angle' else 'deg/s'
     figure, axes = new_panels(len(on), len(FILTER_COLOURS), height=1.0 + 1.4 * len(on),
                               y=[f'{profile}\n[{unit}]' for profile in on], sharex=True, sharey='row')
@@ -303,7 +318,7 @@ def errors_figure(over_time, on, what='angle'):
 
 
 def profile_panels(on):
-    """Return (figure, panels (n,)) with a panel for each profile, two in a row, with a line for each filter."""
+    """Return (figure, panels (n,)) with a panel for each profile, two in a row, and room for a line of each filter."""
     rows = (len(on) + 1) // 2
     figure, axes = new_panels(rows, 2, x='', height=0.8 + rows * (0.5 + 0.2 * len(SHOWN_FILTERS)), sharey=True)
     for panel in axes.flat[len(on):]:
@@ -314,7 +329,8 @@ def profile_panels(on):
 def bars(values, on, metric, label, colour, text):
     """Return (figure, panels (n,)) with a panel of bars for each profile.
 
-    metric, text: functions of filter and metrics; colour: function of a filter.
+    metric, text: functions (filter, its metrics) that return the length of a bar and the text at its end. label: of
+    the x axis. colour: function that returns the colour of a filter.
     """
     figure, panels = profile_panels(on)
     for panel, profile in zip(panels, on):
@@ -356,12 +372,11 @@ def nis_figure(values, on):
 
 
 def probabilities_figure(over_time, on):
-    """Draw the mode probabilities of the imm, mean over the runs."""
+    """Draw the probability of each motion model in the filter imm, mean over the runs."""
     figure, axes = new_panels(len(on), height=1.0 + 1.2 * len(on), sharex=True, sharey=True)
     for panel, profile in zip(axes[:, 0], on):
         sums = over_time[profile, 'imm', SHOWN_NOISE]
-        colours = MOTOR_1_COLOUR, MOTOR_2_COLOUR, RAW_COLOUR, TRUTH_COLOUR
-        for j, (name, colour) in enumerate(zip(MODEL_NAMES, colours)):
+        for j, (name, colour) in enumerate(MODEL_COLOURS.items()):
             mu = sums['mu'][:, j] / sums['runs']
             if np.isfinite(mu).any():
                 panel.plot(times()[::THINNING_STEPS], mu, color=colour, label=name)
@@ -371,7 +386,7 @@ def probabilities_figure(over_time, on):
 
 
 def noise_figure(values, on):
-    """Draw the reduction of every filter under each noise: its dependence on the bandwidth of the receiver."""
+    """Draw the reduction of every filter under each noise, which shows the effect of the bandwidth of the noise."""
     figure, panels = profile_panels(on)
     for panel, profile in zip(panels, on):
         for noise, colour, marker in zip(NOISE_CASES, (RAW_COLOUR, RAW_COLOUR, FILTERED_COLOUR, FILTERED_COLOUR),

@@ -1,8 +1,9 @@
-"""Scenarios over many seeds: the results that `pedestal run` prints for one seed, with their intervals.
+"""Scenarios over many seeds: the results of `pedestal run`, with confidence intervals over the seeds.
 
-Every run is the closed loop of the scenario without ROS, with another seed. It is measured as its recording would be.
-Cases are <scenario>[-<variant>]; CASES gives the parameters that a variant changes. A ratio to another case is the
-ratio of two runs with the same seed. The metrics are those of `pedestal run --explain`, and those of `extra_results`.
+Every run is the closed loop of the scenario without ROS, with another seed. The results are computed as from a
+recording of the run. Cases are <scenario> or <scenario>-<variant>; CASES gives the parameters that a variant changes.
+A ratio to another case divides the results of two runs with the same seed. `pedestal run --explain` defines the
+metrics, except the metrics of `extra_results`.
 """
 import math
 
@@ -25,13 +26,14 @@ BATCH_RUNS = 5
 
 NEAR_FLYBY_PARAMETERS = {'tracking_receiver.target.flyby.closest_distance': 60.0,
                          'tracking_receiver.target.flyby.height': 20.0}
-"""Parameters of a flyby at 60 m."""
+"""Parameters of the case uav_flyby-60m, whose target passes at a distance of 60 m."""
 
 NOISELESS_PARAMETERS = {'tracking_receiver.receiver.cn0_dbhz': 120.0, 'acu.tracker.receiver.sigma_floor': 5e-4,
                         **{f'ins.{name}': 0.0 for name in ('tilt_noise', 'heading_noise', 'rate_noise', 'tilt_wander',
                                                            'heading_wander')}}
-"""Parameters of a receiver and an INS without noise. The filter assumes noise of 5e-4 rad. With a smaller assumed
-noise the filter would follow the smallest error of its model of the motion."""
+"""Parameters of a receiver and an INS without noise. The filter still assumes a noise of 5e-4 rad (sigma_floor). With
+less assumed noise, the filter would take even the smallest deviation of the target from the motion model for motion,
+not for noise."""
 
 CASES = {case.name: case for case in (
     Case('leo_pass', 'leo_pass'), Case('ship_pass', 'ship_pass'),
@@ -43,12 +45,15 @@ CASES = {case.name: case for case in (
 """{name: Case}."""
 
 TRACKING_METRICS = ('pointing_rms_deg', 'pointing_max_deg', 'single_sample_noise_deg', 'pointing_to_noise', 'loss_s')
+"""Results of the pointing error."""
 ISOLATION_METRICS = ('isolation_db', 'isolation_limit_db')
 """Isolation from the rotation of the ship, and the isolation that a perfect antenna would show with the noise and the
 length of the run."""
 NOISE_METRICS = ('noise_reduction_cross_elevation', 'noise_reduction_elevation')
+"""Noise of one receiver sample, divided by the error of the filtered line of sight."""
 ALIGNMENT_METRICS = ('aligned_s', 'heading_sigma_at_alignment_deg', 'heading_error_rms_deg',
                      'autotrack_after_alignment_s')
+"""Results of the alignment of the INS, and of the autotrack that follows it."""
 CASE_METRICS = {
     'leo_pass': TRACKING_METRICS, 'ship_pass': (*TRACKING_METRICS, *ISOLATION_METRICS),
     'ship_pass-late': (*TRACKING_METRICS, *ISOLATION_METRICS),
@@ -79,9 +84,13 @@ EXTRA_METRIC_UNITS = {'loss_to_predicted': '', 'keyhole_loss_predicted_s': 's', 
 def extra_results(values, run):
     """Return {name: value} of results that a recording does not give.
 
-        keyhole_loss_predicted_s        time off the beam that the control unit predicts for a slew through a keyhole
-        loss_to_predicted               measured time off the beam over the predicted time
-        autotrack_after_alignment_s     time from the alignment of the INS to the first autotrack, NaN without it
+    values: {name: value} of the other results; run: closed_loop.Run.
+
+        keyhole_loss_predicted_s        time with the target outside the beam, as the control unit predicts it for a
+                                        slew through a keyhole [s]
+        loss_to_predicted               measured time outside the beam, divided by the predicted time [-]
+        autotrack_after_alignment_s     time from the alignment of the INS to the first autotrack [s], NaN if autotrack
+                                        never began
     """
     more = {}
     slew = run.units['acu'].parts['state']['guidance']['lookahead']['slew']
@@ -112,7 +121,7 @@ def batch(item):
 
 
 def rows(values):
-    """Return the rows of values {case: (runs, len(CASE_METRICS[case]))}."""
+    """Return the rows of the study; values: {case: (runs, len(CASE_METRICS[case]))}."""
     table = []
     for name, of_runs in values.items():
         for metric, column in zip(CASE_METRICS[name], of_runs.T):
@@ -135,14 +144,15 @@ def run(progress, runs=DEFAULT_RUNS, pool=None) -> Result:
 
 
 def flyby_figure():
-    """Draw paper 000's figures 7 to 11 for uav_flyby: error and angle before and after the filter, azimuth flown."""
+    """Draw paper 000's figures 7 to 11 for uav_flyby: error and angle before and after the filter, and the azimuth."""
     figure, axes = new_panels(3, height=7.2, y=('error [deg]', 'elevation [deg]', 'azimuth [deg]'))
     case = CASES['uav_flyby'].with_seed(FIRST_SEED)
     flown = tracking.read(MemoryRecording(case.loaded(), case.run()))
     middle = np.abs(flown.t - 0.5 * flown.t[-1]) <= 0.5
     true = np.column_stack((flown.cross_elevation, flown.elevation_error))
     cross_elevations, elevation_errors = zip(*(errors.T for errors in (flown.measured, flown.filtered, true)))
-    # An elevation of the target is the true one plus the difference of an error to the true error.
+    # The measured elevation of the target is its true elevation plus the measured error minus the true error. The
+    # filtered elevation follows in the same way from the filtered error.
     _, target_elevation = flown.target_earth.T
     elevations = [error - flown.elevation_error + target_elevation for error in elevation_errors]
     for panel, curves, title in ((axes[0, 0], cross_elevations, 'error in cross-elevation (figures 7, 8)'),

@@ -1,11 +1,20 @@
 """The default target filter beside filters tuned for one target each: pointing in the closed loop.
 
-Cases are <target>/<filter>. The filter `default` has its default parameters. `tuned` is a filter of one model with the
-noise that points best at this target. `manoeuvre` is an IMM that expects a manoeuvre at any time.
-`current-statistical` is the filter of paper 000 with the default a_max. A ratio is the ratio to `tuned` under the same
-seed. A satellite seen from a ship is the satellite of leo or geo, seen from the deck of ship_pass.
+Cases are <target>/<filter>:
+
+default               target filter with its default parameters
+tuned                 filter of one motion model, whose process noise gives the smallest pointing error at this target
+manoeuvre             IMM that expects a manoeuvre at any time
+current-statistical   filter of paper 000 with its default a_max, the largest acceleration of its model
+
+A ratio divides the pointing error of a case by that of `tuned` under the same seed. A target whose name ends in -ship
+is seen from the deck of the scenario ship_pass. The targets that manoeuvre hard are those of `hard_targets`.
 """
+import dataclasses
+import functools
 import math
+import pathlib
+import tempfile
 
 import numpy as np
 
@@ -15,6 +24,8 @@ from pedestal_analysis.results.intervals import row
 from pedestal_analysis.trials import monte_carlo
 from pedestal_analysis.trials.cases import Case
 from pedestal_bringup.loop import memory_recording
+from pedestal_studies.rigs import hard_targets
+from pedestal_studies.rigs.hard_targets import HARD_TARGETS
 from pedestal_studies.rigs.rows import Result
 from pedestal_studies.system.filters import MANOEUVRE_PARAMETERS
 
@@ -23,6 +34,9 @@ DEFAULT_RUNS, FIRST_SEED = 30, 1
 
 BATCH_RUNS = 5
 """Runs that one worker makes at a time."""
+
+SHIP_SUFFIX = '-ship'
+"""End of the name of a target seen from a ship."""
 
 FLYBY_PREFIX, ANGLE_PREFIX = 'tracking_receiver.target.flyby', 'tracking_receiver.target.angle'
 FIXED_TARGET_PARAMETERS = {'tracking_receiver.target.kind': 'step', f'{ANGLE_PREFIX}.azimuth_amplitude': 0.0,
@@ -35,29 +49,48 @@ TARGET_SCENARIOS: dict[str, tuple[str, dict]] = {
     'uav-500m': ('uav_flyby', {}), 'leo': ('leo_pass', {}), 'geo': ('leo_pass', FIXED_TARGET_PARAMETERS),
     'leo-ship': ('ship_pass', {}), 'leo-ship-ss6': ('ship_pass_ss6', {}),
     'geo-ship': ('ship_pass', FIXED_TARGET_PARAMETERS)}
-"""{target: (scenario, its parameters)}."""
+"""{target: (scenario, parameters that it changes)}."""
 
-TUNED_FILTERS = {'uav-60m': ('ca', 6.3e-3, 2.3e-3), 'uav-150m': ('ca', 1.1e-3, 3.5e-4), 'uav-500m': ('ca', 6e-5, 2e-5),
-                 'leo': ('ca', 1.15e-4, 3.7e-5), 'geo': ('cv', 1e-9, 1e-9), 'leo-ship': ('ca', 1.15e-4, 3.7e-5),
-                 'leo-ship-ss6': ('ca', 1.15e-4, 3.7e-5), 'geo-ship': ('cv', 1e-9, 1e-9)}
-"""{target: (kind, its noise in azimuth and in elevation)}.
+HARD_TARGET_SCENARIOS = {
+    'ashore': ('track_file', {}), 'ship': ('ship_pass', {'tracking_receiver.target.kind': 'track_file'})}
+"""{place: (scenario, its parameters)} of a target of hard_targets."""
+TARGET_SCENARIOS |= {name.replace('_', '-') + suffix: HARD_TARGET_SCENARIOS[place] for name in HARD_TARGETS
+                     for place, suffix in (('ashore', ''), ('ship', SHIP_SUFFIX))}
 
-The filter is the better of cv and ca on the seeds 101 to 103. The noise is the best of a grid; for uav-60m and leo
-parameter_search found it. A target seen from a ship has the filter of leo.
-"""
+HARD_TARGET_DURATION_S = 60.0
 
 
 def _both(**changes):
-    """Return parameters of the filters of both axes."""
+    """Return parameters of the control unit with the same changes for the filters of both axes."""
     return {f'{axis}.filter.{name}': value for axis in ('azimuth', 'elevation') for name, value in changes.items()}
+
+
+def _one(kind, azimuth, elevation):
+    """Return parameters of a filter cv or ca with a noise in each axis."""
+    return {**_both(kind=kind), f'azimuth.filter.{kind}.noise': azimuth, f'elevation.filter.{kind}.noise': elevation}
+
+
+def _singer(alpha, sigma_deg):
+    """Return parameters of a filter singer: alpha [1/s], sigma [deg/s2]."""
+    return _both(kind='singer', **{'singer.alpha': alpha, 'singer.sigma': math.radians(sigma_deg)})
+
+
+TUNED_FILTERS = {
+    'uav-60m': _one('ca', 5e-3, 1.5e-3), 'uav-150m': _one('ca', 1e-3, 1.8e-4), 'uav-500m': _one('ca', 5e-5, 1.5e-5),
+    'leo': _one('ca', 1.2e-5, 1.2e-5), 'geo': _one('cv', 1e-9, 1e-9), 's-motion': _singer(1.0, 3.0),
+    'quadcopter': _singer(1.0, 1.0), 'launch-vehicle': _one('ca', math.radians(0.01), math.radians(0.01)),
+    'jet': _singer(0.3, 1.0), 'stunt-plane': _singer(0.3, 1.0),
+    'helicopter': _one('ca', math.radians(0.03), math.radians(0.03))}
+"""{target: parameters of its filter of one model}. A target seen from a ship has the filter of the target ashore.
+
+The filter is the best of a grid: over the noise of cv and ca, and over alpha and sigma of singer. The targets of
+hard_targets had two seeds from 101 on. The other targets had three seeds, and a noise for each axis.
+"""
 
 
 def filters(target):
     """Return {filter: parameters of the control unit} for a target of TARGET_SCENARIOS."""
-    kind, azimuth, elevation = TUNED_FILTERS[target]
-    return {'default': {},
-            'tuned': {**_both(kind=kind), f'azimuth.filter.{kind}.noise': azimuth,
-                      f'elevation.filter.{kind}.noise': elevation},
+    return {'default': {}, 'tuned': TUNED_FILTERS[target.removesuffix(SHIP_SUFFIX).removesuffix('-ship-ss6')],
             'manoeuvre': _both(kind='imm', **MANOEUVRE_PARAMETERS),
             'current-statistical': _both(kind='current_statistical')}
 
@@ -71,13 +104,31 @@ MAX_POINTING_RATIO = 1.15
 """Largest permitted ratio of the pointing with the default filter to the pointing with the tuned filter."""
 
 
+@functools.cache
+def _folder():
+    """Return the folder of the tables of hard targets; it ends with the process."""
+    return tempfile.TemporaryDirectory(prefix='pedestal-targets-')
+
+
+def loaded(case):
+    """Return the scenario.Scenario of a Case of CASES; for a target of hard_targets its table is written first."""
+    name = case.name.partition('/')[0].removesuffix(SHIP_SUFFIX).replace('-', '_')
+    if name not in HARD_TARGETS:
+        return case.loaded()
+    path = pathlib.Path(_folder().name) / f'{name}.csv'
+    if not path.exists():
+        hard_targets.write(path, name, HARD_TARGET_DURATION_S)
+    return dataclasses.replace(case, duration=HARD_TARGET_DURATION_S, parameters={
+        **case.parameters, 'tracking_receiver.target.track_file.path': path}).loaded()
+
+
 def pointing(case):
     """Return the rms of the true pointing error [deg] of one run of a Case, both axes; NaN if it left autotrack."""
-    flown = tracking.read(memory_recording.record(case.loaded()))
-    begun = np.flatnonzero(flown.mode == 'autotrack')
-    if not begun.size or np.any(flown.mode[begun[0]:] != 'autotrack'):
+    tracked = tracking.read(memory_recording.record(loaded(case)))
+    begun = np.flatnonzero(tracked.mode == 'autotrack')
+    if not begun.size or np.any(tracked.mode[begun[0]:] != 'autotrack'):
         return math.nan
-    return flown.pointing(tracking.known_rms)
+    return tracked.pointing(tracking.known_rms)
 
 
 def batch(item):
@@ -87,7 +138,7 @@ def batch(item):
 
 
 def rows(values):
-    """Return the rows of values {case: (runs,)}."""
+    """Return the rows of the study; values: {case: pointing error (runs,) [deg]}."""
     table = []
     for name, of_runs in values.items():
         target, _, filter_name = name.partition('/')
@@ -106,7 +157,7 @@ def run(progress, runs=DEFAULT_RUNS, pool=None) -> Result:
 
 
 def figure(values):
-    """Draw the pointing error of every seed over the mean of the tuned filter; values as of `rows`."""
+    """Draw the pointing error of every seed, divided by the mean of the tuned filter; values as of `rows`."""
     drawn, axes = new_panels(1, height=5.4, x='pointing error over that of the tuned filter')
     for name, of_runs in values.items():
         relative = of_runs / values[f'{name.partition("/")[0]}/tuned'].mean()

@@ -1,8 +1,19 @@
-"""Method of paper 001, corrected: level by ADRC (TD, ESO, NLC), azimuth from the commands that keep n' level.
+"""Alignment method of paper 001: level by ADRC, azimuth from the commands that keep the INS level.
 
-After levelling, the commands only cancel the tilt by the rotation of the earth, so (14), (15) at rest give (19):
-sin az = w_cE / w_N, cos az = 1 + w_cN / w_N. The commands are noisy. The least-squares slope of their integral since
-`start` removes the noise; a plain mean does not.
+The ADRC consists of tracking differentiator, extended state observer and nonlinear combination (module levelling, with
+a correction of equation (11) of the paper). After levelling, the commands only cancel the tilt that the rotation of
+the earth causes. For an INS at rest, equations (14) and (15) of the paper then give equation (19):
+
+    sin az = w_cE / w_N,    cos az = 1 + w_cN / w_N
+
+    n'              frame that the INS computes for east, north, up (ENU)
+    az              azimuth misalignment: rotation of n' about up, against ENU          [rad]
+    w_cE, w_cN      commanded rates of n' about east and north                          [rad/s]
+    w_N, g          north part of the rate of the earth, gravity                        [rad/s, m/s2]
+
+The noise of the commands is a derivative of the noise of the velocity. A plain mean of the commands therefore keeps
+the noise at the two ends of the window. The least-squares slope of their integral since `start` gives these ends the
+smallest weight (module slope), and so suppresses the noise.
 """
 import cmath
 import math
@@ -17,9 +28,9 @@ from ship_motion_sim.alignment.conditions import UNKNOWN_AZIMUTH_SIGMA_RAD
 CONSTANTS_DTYPE = np.dtype([
     ('w_o', 'f8'), ('w_c', 'f8'),           # bandwidth of observer and of level control [rad/s]
     ('start', 'f8'),                        # time after which the azimuth uses the commands [s]
-    ('velocity_variance', 'f8'),            # velocity of the settled loop [m2/s2]
-    ('innovation_variance', 'f8'),          # innovations of the settled loop [m2/s2]
-    ('swell', 'f8'),                        # variance of the velocity over that of the innovations, on swell [-]
+    ('velocity_variance', 'f8'),            # variance of the velocity in the settled loop [m2/s2]
+    ('innovation_variance', 'f8'),          # variance of the innovations in the settled loop [m2/s2]
+    ('swell', 'f8'),                        # variance of velocity / of innovations, both due to swell [-]
     ('level', 'f8'),                        # 1 sigma of level of the settled loop [rad]
 ], align=True)
 
@@ -33,12 +44,14 @@ STATE_DTYPE = np.dtype([
 
 
 def constants(k, p, h) -> np.ndarray:
-    """Return the record () of CONSTANTS_DTYPE of AdrcParameters p for steps of h [s]; k: CONDITIONS_DTYPE."""
+    """Return the constants, one record of CONSTANTS_DTYPE; p: AdrcParameters; h: step [s]; k: CONDITIONS_DTYPE."""
     record = np.zeros((), CONSTANTS_DTYPE)
     record['w_o'], record['w_c'], record['start'] = p.observer, p.control, p.start
     g, r = float(k['gravity']), float(k['velocity_density']) / h
-    # One channel with its command in the linear zone of fhan. The state is (v, x2, z1, z2, z3); the noises are the
-    # velocity and the random walk of the gyros. F, B: prediction of the observer; law: command of its state z.
+    # Model of one channel (east or north) while the function fhan of its level command is linear. The state is
+    # (v, x2, z1, z2, z3): velocity error, its rate, and the estimates of the observer for v, x2 and the rate of x2
+    # without command. The noises are those of the velocity (variance r [m2/s2]) and the random walk of the gyros. F,
+    # B: prediction of the observer; law: command from z1, z2, z3.
     F = np.array([[1.0, h, 0.5 * h * h], [0.0, 1.0, h], [0.0, 0.0, 1.0]])
     B = np.array([0.5 * h * h, h, 0.0])
     law = -np.array([p.control**2, 2.0 * levelling.DAMPING_COEFFICIENT * p.control, 1.0])
@@ -67,9 +80,15 @@ def constants(k, p, h) -> np.ndarray:
 def azimuth_sigma(c, k, o, window):
     """Return the 1 sigma [rad] of the azimuth from the slope over a window [s]; o: extended_observer.STATE_DTYPE.
 
-    The random walk of the gyros has 1.2 / window under the weights of the parabola. The noise of the commands is the
-    second derivative of the integral of the velocity. Because of this only the ends of the window count: 2 x 6^2 /
-    window^4 of the velocity variance. Innovations beyond the expected ones count as swell, which the loop enlarges.
+    c, k: records CONSTANTS_DTYPE, CONDITIONS_DTYPE. The variance of the slope has two parts:
+
+    - The random walk of the gyros, gyro_noise, adds 1.2 gyro_noise^2 / window, because the slope is a mean of the
+      commands with the weights of a parabola.
+    - The noise of the velocity reaches the commands as its second derivative, divided by g. In the slope only the
+      velocity at the two ends of the window remains. It adds 2 x 6^2 / (g window^2)^2 times the velocity variance.
+
+    If the innovations are larger than expected, the excess of their variance counts as swell. The velocity variance
+    grows by c.swell times this excess.
     """
     g, w_north = k.gravity, k.earth_rate[1]
     variance = c.velocity_variance + c.swell * extended_observer.swell_variance(o, c.innovation_variance)
@@ -79,11 +98,11 @@ def azimuth_sigma(c, k, o, window):
 
 @compiled
 def level_sigma(c, k, o, t):
-    """Return the 1 sigma [rad] of level t [s] after power-up.
+    """Return the 1 sigma [rad] of level t [s] after power-up; other arguments as of `azimuth_sigma`.
 
-    The result is the root sum square of two parts. The first is the larger one of the observed tilt and the 1 sigma of
-    the settled loop, increased if innovations are larger than expected. The second is the part of the initial tilt
-    that the observer, all poles at w_o, has not observed yet.
+    The result is the root sum square of two parts. The first part is the observed tilt or the 1 sigma of the settled
+    loop, whichever is larger. Innovations above the expected ones increase that 1 sigma. The second part is the share
+    of the initial tilt that the observer, with all poles at w_o, has not observed yet.
     """
     x = c.w_o * t
     unobserved = extended_observer.INITIAL_LEVEL_SIGMA_RAD * (1.0 + x + 0.5 * x * x) * math.exp(-x)

@@ -1,4 +1,13 @@
-"""Level by ADRC with an observer whose bandwidth falls as 6/t: fast at first, little noise later. Azimuth from z3."""
+"""Alignment method: level by ADRC with an observer whose bandwidth falls with time, azimuth from its estimate z3.
+
+The bandwidth 6 / t [rad/s], with the time t [s] since power-up, makes the observer fast at first and its noise small
+later.
+
+    n'              frame that the INS computes for east, north, up
+    z3              estimate of x3, the rate of change of the tilt (times g) without command; x3 depends on the azimuth
+    w_o             bandwidth of the observer                               [rad/s]
+    l1, l2, l3      gains of the observer
+"""
 import math
 
 import numpy as np
@@ -14,7 +23,7 @@ MAX_OBSERVER_BANDWIDTH_RAD_S, MIN_CONTROL_BANDWIDTH_RAD_S = 1.0, 0.1
 STATE_DTYPE = np.dtype([
     ('t', 'f8'),                            # time since power-up [s]
     ('observer', extended_observer.STATE_DTYPE),
-    ('v1', 'f8', (2,)), ('v2', 'f8', (2,)),
+    ('v1', 'f8', (2,)), ('v2', 'f8', (2,)),     # tracking differentiator: reference of velocity and of its rate
     ('command', 'f8', (3,)), ('azimuth', 'f8'), ('azimuth_sigma', 'f8'), ('level_sigma', 'f8'),
 ], align=True)
 

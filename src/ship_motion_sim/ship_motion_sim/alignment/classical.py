@@ -1,11 +1,18 @@
-"""The fourth-order gyrocompass: a wrong azimuth tilts the north channel, whose velocity corrects the azimuth.
+"""Alignment method: the fourth-order gyrocompass. A wrong azimuth tilts n', and the north velocity corrects it.
 
-    v' = f - K1 v, w_cE = -k2 v_N, w_cN = k2 v_E, w_cU = K3 / (w_N (s + K4)) v_N
+    dv/dt = f - K1 v, w_cE = -k2 v_N, w_cN = k2 v_E, w_cU = K3 / (w_N (s + K4)) v_N
     K1 = K4 = 2 s0, k2 = 4 s0^2/g, K3 = 4 s0^4/g
+
+    v, f            velocity error (v_E, v_N) [m/s] and specific force [m/s2], both level, in n'
+    w_cE .. w_cU    commanded rates of n' about east, north and up [rad/s]
+    s, s0           Laplace variable, bandwidth [rad/s]
+    n', az          frame that the INS computes for east, north, up; its azimuth misalignment [rad]
+    w_N, g          north part of the rate of the earth [rad/s], gravity [m/s2]
+    K1, k2, K3, K4  gains of the loop; a_x: tilt of n' about east [rad]
 
 All four poles are at -s0 +- j s0. An azimuth error of 180 deg is an unstable equilibrium. Because the loop is closed
 from power-up, the transient of the first levelling leaves this equilibrium. The velocities are those of a gyrocompass,
-the integrals of two accelerometers, without the term w_cU x v of the rotating axes.
+the integrals of two accelerometers. They lack the term w_cU x v, which the rotation of the axes would add.
 """
 import math
 
@@ -21,7 +28,7 @@ MAX_AZIMUTH_RATE_RAD_S = 0.1
 CONSTANTS_DTYPE = np.dtype([
     ('s0', 'f8'),                                       # bandwidth [rad/s]
     ('K1', 'f8'), ('k2', 'f8'), ('K3', 'f8'), ('K4', 'f8'),
-    ('azimuth_sigma', 'f8'), ('level_sigma', 'f8'), ('residual', 'f8'),     # 1 sigma of the settled loop [rad]
+    ('azimuth_sigma', 'f8'), ('level_sigma', 'f8'), ('residual', 'f8'),     # 1 sigmas in the settled loop [rad]
 ], align=True)
 
 STATE_DTYPE = np.dtype([
@@ -34,12 +41,13 @@ STATE_DTYPE = np.dtype([
 
 
 def constants(k, s0, h) -> np.ndarray:
-    """Return the record () of CONSTANTS_DTYPE for the bandwidth s0 [rad/s] and steps of h [s]; k: CONDITIONS_DTYPE."""
+    """Return one record of CONSTANTS_DTYPE for the bandwidth s0 [rad/s] and steps of h [s]; k: CONDITIONS_DTYPE."""
     record = np.zeros((), CONSTANTS_DTYPE)
     g, w_north = float(k['gravity']), float(k['earth_rate'][1])
     K1 = K4 = 2.0 * s0
     k2, K3 = 4.0 * s0**2 / g, 4.0 * s0**4 / g
-    # North channel: v, a_x, lagged, az, residual under velocity noise per step and random walk of the gyros.
+    # rates: d/dt of the state (v, a_x, lagged, az, residual) of the north channel. Its noises are the velocity noise
+    # per step and the random walk of the gyros.
     rates = np.array([[-K1, g, 0.0, 0.0, 0.0], [-k2, 0.0, 0.0, -w_north, 0.0], [1.0, 0.0, -K4, 0.0, 0.0],
                       [0.0, 0.0, K3 / w_north, 0.0, 0.0], [0.0, 0.0, K3 / w_north, 0.0, -0.5 * s0]])
     noise = h * rates[:, 0]
@@ -67,12 +75,12 @@ def step(s, c, k, v_east, v_north, h):
     """
     s.t += h
     s.lagged += h * (v_north - c.K4 * s.lagged)
-    # The damping, and the term w_c x v that the strapdown has just added.
+    # The correction has the damping, and removes the term w_c x v that the strapdown has just added.
     s.correction[0] = h * (c.K1 * v_east + s.command[2] * v_north)
     s.correction[1] = h * (c.K1 * v_north - s.command[2] * v_east)
     s.command[0], s.command[1] = -c.k2 * v_north, c.k2 * v_east
     s.command[2] = min(max(c.K3 / k.earth_rate[1] * s.lagged, -MAX_AZIMUTH_RATE_RAD_S), MAX_AZIMUTH_RATE_RAD_S)
-    # The loop corrects a steady az at az s0 / 2, except at 180 deg, which the envelope covers.
+    # The loop corrects a steady az with the rate az s0 / 2, except at 180 deg, which the envelope covers.
     s.residual += h * (s.command[2] - 0.5 * c.s0 * s.residual)
     transient = UNKNOWN_AZIMUTH_SIGMA_RAD * envelope(c.s0 * s.t)
     moving = max(s.residual**2 - 9.0 * c.residual**2, 0.0)      # beyond three sigma of its noise

@@ -1,7 +1,19 @@
-"""The linear extended state observer of a level channel: x1' = x2, x2' = x3 + b0 u, y = x1. Paper 001 equation (9).
+"""The linear extended state observer of the two level channels, which all alignment methods except classical share.
 
-The observer of the paper is linear too, because its delta = 20000 keeps fal in the linear zone. The gains are fixed,
-scheduled, or those of a Kalman filter; the covariance is valid for any gains.
+    dx1/dt = x2, dx2/dt = x3 + b0 u, dx3/dt = 0, y = x1        paper 001 equation (9)
+
+    x1, x2, x3      of the north and of the east channel: velocity error [m/s], its rate [m/s2], the rate of x2 without
+                    command [m/s3]
+    z1, z2, z3      estimates of x1, x2, x3; p11 to p33: elements of their covariance
+    u, b0 u         level command of the channel [rad/s]; its effect on the rate of x2 [m/s3]
+    w_o, h          bandwidth of the observer [rad/s], step [s]
+    l1, l2, l3      gains of the observer
+    n', az          frame that the INS computes for east, north, up; its azimuth misalignment [rad]
+    w_N, g          north part of the rate of the earth [rad/s], gravity [m/s2]
+
+The observer of the paper is linear too, because its delta = 20000 keeps the nonlinear function fal in its linear zone.
+The gains are fixed, scheduled, or those of a Kalman filter; the covariance is valid for any gains. Arguments: o is a
+record of STATE_DTYPE, k of CONDITIONS_DTYPE.
 """
 import math
 
@@ -11,7 +23,7 @@ from pedestal_common.compiled import compiled
 
 STATE_DTYPE = np.dtype([
     ('z', 'f8', (2, 3)),                # east, north: z1, z2, z3
-    ('input', 'f8', (2,)),              # b0 u in force since the last step [m/s3]
+    ('input', 'f8', (2,)),              # input b0 u since the last step [m/s3]
     ('p', 'f8', (6,)),                  # p11, p12, p13, p22, p23, p33, the same for both channels
     ('innovation_ratio', 'f8'),         # running mean of innovation^2 over its expected variance
 ], align=True)
@@ -26,7 +38,7 @@ MIN_SWELL_FREQUENCY_RAD_S = 2.0 * math.pi / 16.0
 
 @compiled
 def gains(w_o, h):
-    """Return (l1 [-], l2 [1/s], l3 [1/s2]) that put the three poles at exp(-w_o h)."""
+    """Return the gains (l1 [-], l2 [1/s], l3 [1/s2]) that put the three poles at exp(-w_o h). w_o [rad/s], h [s]."""
     p = math.exp(-w_o * h)
     return 1.0 - p**3, 1.5 * (1.0 - p)**2 * (1.0 + p) / h, (1.0 - p)**3 / (h * h)
 
@@ -40,20 +52,25 @@ def predicted(z1, z2, z3, b0_u, h):
 
 @compiled
 def kalman_gains(p11, p12, p13, r):
-    """Return (l1 [-], l2 [1/s], l3 [1/s2]) of the smallest covariance; r: variance of the measured v [m2/s2]."""
+    """Return the gains (l1 [-], l2 [1/s], l3 [1/s2]) that give the smallest covariance.
+
+    p11, p12, p13: elements of the covariance; r: variance of the measured velocity [m2/s2].
+    """
     return p11 / (p11 + r), p12 / (p11 + r), p13 / (p11 + r)
 
 
 @compiled
 def innovation_ratio(ratio, e_east, e_north, s, h):
-    """Return the running mean `ratio`, h [s] later, of innovation^2 [m2/s2] over its expected variance s; 1 if the
-    disturbance is as expected."""
+    """Return the running mean `ratio`, h [s] later, of innovation^2 divided by its expected variance s [m2/s2].
+
+    e_east, e_north: innovations [m/s]. The mean is 1 if the disturbance is as expected.
+    """
     return ratio + h / INNOVATION_TIME_CONSTANT_S * (0.5 * (e_east * e_east + e_north * e_north) / s - ratio)
 
 
 @compiled
 def swell_variance(o, s):
-    """Return the variance of the innovations [m2/s2] above that of a sea as expected, s; it counts as swell."""
+    """Return the variance of the innovations [m2/s2] above the variance s of the expected sea; it counts as swell."""
     return max(o.innovation_ratio - EXPECTED_INNOVATION_RATIO, 0.0) * s
 
 
@@ -91,7 +108,10 @@ def predict_covariance(o, k, h):
 
 @compiled
 def correct_covariance(o, l1, l2, l3, r):
-    """Correct the covariance o.p for any gains l: (I - l H) p (I - l H)^T + l r l^T, r [m2/s2]."""
+    """Correct the covariance o.p for any gains l = (l1, l2, l3): (I - l H) p (I - l H)^T + l r l^T with H = (1, 0, 0).
+
+    r: variance of the measured velocity [m2/s2].
+    """
     p = o.p
     p11, p12, p13 = p[0], p[1], p[2]
     p22, p23, p33 = p[3], p[4], p[5]
@@ -114,7 +134,10 @@ def predict(o, h):
 
 @compiled
 def correct(o, v_east, v_north, l1, l2, l3, s, h):
-    """Correct z of both channels with measured velocities [m/s]; s: expected variance of the innovations [m2/s2]."""
+    """Correct z of both channels with measured velocities [m/s].
+
+    l1, l2, l3: gains; s: expected variance of the innovations [m2/s2]; h: step [s].
+    """
     e_east, e_north = v_east - o.z[0, 0], v_north - o.z[1, 0]
     o.innovation_ratio = innovation_ratio(o.innovation_ratio, e_east, e_north, s, h)
     for i in range(2):
@@ -126,7 +149,7 @@ def correct(o, v_east, v_north, l1, l2, l3, s, h):
 
 @compiled
 def azimuth(o, k):
-    """Return the azimuth misalignment az [rad] from z3: g (-sin az w_N) north, -g (1 - cos az) w_N east."""
+    """Return the azimuth misalignment az [rad] from z3, which is -g sin az w_N north and -g (1 - cos az) w_N east."""
     return math.atan2(-o.z[1, 2] / k.gravity, k.earth_rate[1] + o.z[0, 2] / k.gravity)
 
 

@@ -1,7 +1,16 @@
-"""Level commands of an ADRC: tracking differentiator and nonlinear combination; paper 001 (7), (8), (11).
+"""Level commands of an ADRC: tracking differentiator and nonlinear combination, equations (7), (8), (11) of paper 001.
 
-(11) is u = (u0 - z3) / b0. The printed form is u0 - z3 / b0. With it the east channel (b0 < 0) has positive feedback
-and ends at 180 deg of level; the gain of the north channel is g times too high.
+    x1, x2          of the north and of the east channel: velocity error [m/s] and its rate [m/s2]
+    z1, z2, z3      estimates of x1, x2 and of the rate of x2 without command [m/s3]
+    v1, v2          reference of x1 and x2 from the tracking differentiator
+    u, b0           level command of a channel [rad/s]; its effect on the rate of x2: g north, -g east [m/s2 per rad]
+    u0              rate of x2 that the nonlinear function fhan demands [m/s3]
+    w_c, h          bandwidth of the level control [rad/s], step [s]
+    w_cE .. w_cU    commanded rates of the frame of the INS about east, north and up [rad/s]
+
+The correct form of (11) is u = (u0 - z3) / b0, but the paper prints u0 - z3 / b0. With the printed form the east
+channel (b0 < 0) has positive feedback and ends at 180 deg of level, and the gain of the north channel is g times too
+high.
 """
 from pedestal_common.compiled import compiled
 from pedestal_common.fhan import fhan
@@ -9,33 +18,37 @@ from pedestal_common.fhan import fhan
 DAMPING_COEFFICIENT = 0.8
 """Damping coefficient c1 [-]."""
 FHAN_LIMIT_M_S3 = 1e3
-"""Limit r1 of fhan, which is linear within r1 / w_c^2 [m/s3]."""
+"""Limit r1 of the function fhan [m/s3], which is linear for errors within r1 / w_c^2."""
 MAX_LEVELLING_RATE_RAD_S = 0.5
 """Limit of a level command [rad/s]."""
 
 
 @compiled
 def differentiated(v1, v2, reference, h):
-    """Return (v1 [m/s], v2 [m/s2]) of the tracking differentiator one step h [s] later.
+    """Return (v1 [m/s], v2 [m/s2]) of the tracking differentiator one step h [s] later; reference [m/s].
 
-    With r0 = 1/h^2, h0 = h, c0 = 1 the differentiator reaches the reference in two steps.
+    With the parameters r0 = 1/h^2, h0 = h, c0 = 1 of the paper, it reaches the reference in two steps.
     """
     return v1 + h * v2, v2 + h * fhan(v1 - reference, v2, 1.0 / (h * h), h)
 
 
 @compiled
 def command(z1, z2, z3, v1, v2, b0, w_c):
-    """Return u [rad/s], within MAX_LEVELLING_RATE_RAD_S, that brings z1, z2 to v1, v2 with bandwidth w_c [rad/s] and
-    cancels z3; b0: effect of u on the rate of x2 [m/s2 per rad]."""
+    """Return the command u [rad/s] of a channel, within MAX_LEVELLING_RATE_RAD_S.
+
+    The command brings z1, z2 to the references v1, v2 with the bandwidth w_c [rad/s], and cancels z3. b0: effect of u
+    on the rate of x2 [m/s2 per rad].
+    """
     u0 = fhan(z1 - v1, DAMPING_COEFFICIENT * (z2 - v2), FHAN_LIMIT_M_S3, 1.0 / w_c)
     return min(max((u0 - z3) / b0, -MAX_LEVELLING_RATE_RAD_S), MAX_LEVELLING_RATE_RAD_S)
 
 
 @compiled
 def level(o, k, v1, v2, w_c, out):
-    """Put the commands of both channels of o, extended_observer.STATE_DTYPE, into out (3,) (w_cE, w_cN, w_cU).
+    """Put the commands of both channels of o, extended_observer.STATE_DTYPE, into out (3,) (w_cE, w_cN, w_cU) [rad/s].
 
-    v1, v2 (2,): references. The observer receives the limited command.
+    k: record of CONDITIONS_DTYPE;
+    v1, v2 (2,): references; w_c: bandwidth [rad/s]. The observer receives the limited command.
     """
     g = k.gravity
     out[1] = command(o.z[0, 0], o.z[0, 1], o.z[0, 2], v1[0], v2[0], -g, w_c)

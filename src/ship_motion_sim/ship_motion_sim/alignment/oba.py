@@ -1,10 +1,18 @@
-"""Optimisation-based alignment: the rotation that best maps measured specific force onto gravity. No feedback loop.
+"""Alignment method: the rotation that best maps the measured specific force onto gravity (optimisation-based).
 
-a = int C_b^b0 f dt (gyros only, b0 the deck at the start) is, except for the velocity, C_n0^b0 b with
-b = -int C_n^n0 g dt. The rotation b0 -> n0 that brings the vectors a onto b with least squares is the eigenvector of
-a 4 x 4 matrix (Horn 1987). The centroids of the vectors a and of the vectors b are subtracted, which removes the
-unknown velocity at the start. With the usual assumption of zero velocity the error is 15 times larger at 100 s. The
-rest of the swell averages out.
+The attitude follows from sums of vectors, without a feedback loop. An observer beside them gives only the 1 sigmas.
+
+    a = int C_b^b0 f dt        integral of the measured specific force f, turned by the gyros only [m/s]
+    b = -int C_n^n0 g dt       integral of the reaction to gravity g, turned by the rotation of the earth [m/s]
+
+    C_x^y     rotation from a frame x to a frame y; x and y are one of these frames:
+    b0, n0    frames of the deck and of ENU at power-up, fixed in inertial space
+    b, n      frames of the deck and of ENU now; as an index of C, b is this frame, otherwise the vector above
+
+Except for the velocity of the ship, a is C_n0^b0 b. The rotation b0 -> n0 that brings the vectors a onto b with least
+squares is an eigenvector of a 4 x 4 matrix (Horn 1987). The mean of all a and the mean of all b are subtracted, which
+removes the unknown velocity of the ship at power-up. If this velocity is assumed to be zero, as is usual, the error
+of the alignment at 100 s is 15 times larger. The velocity of the swell after power-up averages out.
 """
 import math
 
@@ -20,19 +28,23 @@ MAX_JACOBI_SWEEPS = 12
 
 STATE_DTYPE = np.dtype([
     ('t', 'f8'),                                        # time since power-up [s]
-    ('observer', extended_observer.STATE_DTYPE),        # of a_x, a_y: its covariance is the information limit
+    ('observer', extended_observer.STATE_DTYPE),        # gives the 1 sigmas from the x, y parts of a
     ('coriolis', 'f8', (3,)),                           # int w_ie x v dt [m/s]
-    ('count', 'f8'),
-    ('sum_a', 'f8', (3,)), ('sum_b', 'f8', (3,)), ('sum_ab', 'f8', (3, 3)),
-    ('matrix', 'f8', (4, 4)), ('vectors', 'f8', (4, 4)),
+    ('count', 'f8'),                                    # number of pairs (a, b)
+    ('sum_a', 'f8', (3,)), ('sum_b', 'f8', (3,)), ('sum_ab', 'f8', (3, 3)),     # sums of a, b, a b^T
+    ('matrix', 'f8', (4, 4)), ('vectors', 'f8', (4, 4)),        # matrix of Horn; its eigenvectors, in columns
     ('azimuth_sigma', 'f8'), ('level_sigma', 'f8'),
 ], align=True)
+"""State of the method. The observer does not change the attitude. Its covariance is the information limit: the least
+that any linear method can reach with these measurements (module riccati_eso)."""
 
 
 @compiled
 def gravity_integral(t, k):
-    """Return b [m/s] in n0 after t [s]: integral of the reaction to gravity, which turns with the earth. Closed
-    form."""
+    """Return b [m/s] in n0 after t [s], in closed form; k: record of CONDITIONS_DTYPE.
+
+    b is the integral of the reaction to gravity, which turns with the earth.
+    """
     north, up = k.earth_rate[1], k.earth_rate[2]
     w = math.sqrt(north * north + up * up)
     n, u = north / w, up / w
@@ -44,14 +56,16 @@ def gravity_integral(t, k):
 def step(s, k, a, v, h):
     """Add one pair of vectors, h [s] after the last; s, k: records STATE_DTYPE, CONDITIONS_DTYPE.
 
-    a: int C_b^b0 f dt in b0, less the velocity of a log [m/s], three floats; v: velocity in n of a GNSS, zeros without
-    GNSS. The model omits the Coriolis force of the velocity of a log: 7 m/s tilt the level by 0.1 arcmin.
+    a: int C_b^b0 f dt in b0, three floats [m/s]; if the ship has a speed log, its velocity is subtracted. v: velocity
+    in n by GNSS [m/s], zeros without GNSS. With a speed log, the model omits the Coriolis force: at 7 m/s the level
+    then has an error of 0.1 arcmin.
     """
     s.t += h
     o = s.observer
     l1, l2, l3, variance = riccati_eso.advance_covariance(o, k, h)
     if v[0] == 0.0 and v[1] == 0.0:
-        # The innovations measure the difference to the expected sea. With a GNSS, b contains the motion of the ship.
+        # The innovations show how far the sea differs from the expected one. With a GNSS, b contains the motion of the
+        # ship, so a alone gives no innovation.
         extended_observer.predict(o, h)
         extended_observer.correct(o, a[0], a[1], l1, l2, l3, variance, h)
     s.azimuth_sigma, s.level_sigma = extended_observer.sigmas(o, k, 0.0)
@@ -61,7 +75,7 @@ def step(s, k, a, v, h):
     s.coriolis[1] += h * cy
     s.coriolis[2] += h * cz
     bx, by, bz = gravity_integral(s.t, k)
-    # The rotation from n back to n0 is linear, because w_ie t is small.
+    # The rotation from n back to n0 is taken to first order, because w_ie t is small.
     bx += v[0] + s.t * cx + s.coriolis[0]
     by += v[1] + s.t * cy + s.coriolis[1]
     bz += v[2] + s.t * cz + s.coriolis[2]
@@ -102,13 +116,13 @@ def jacobi(m, v):
 
 @compiled
 def centred(s, i, j):
-    """Return sum (a_i - mean a_i)(b_j - mean b_j)."""
+    """Return sum (a_i - mean a_i)(b_j - mean b_j) of all pairs [m2/s2]; i, j: axes."""
     return s.sum_ab[i, j] - s.sum_a[i] * s.sum_b[j] / s.count
 
 
 @compiled
 def solve(s):
-    """Return the quaternion (x, y, z, w) b0 -> n0 of all pairs added."""
+    """Return the quaternion (x, y, z, w) b0 -> n0 that maps the vectors a of all pairs onto b with least squares."""
     m = s.matrix
     xx, xy, xz = centred(s, 0, 0), centred(s, 0, 1), centred(s, 0, 2)
     yx, yy, yz = centred(s, 1, 0), centred(s, 1, 1), centred(s, 1, 2)
@@ -130,6 +144,9 @@ def solve(s):
 
 @compiled
 def attitude(s, k, qx, qy, qz, qw):
-    """Return the present quaternion (x, y, z, w) deck -> n; qx, qy, qz, qw: deck -> b0 from the gyros."""
+    """Return the present quaternion (x, y, z, w) deck -> n.
+
+    s, k: records STATE_DTYPE, CONDITIONS_DTYPE; qx, qy, qz, qw: quaternion deck -> b0 from the gyros.
+    """
     turned = strapdown.from_rotvec(-s.t * k.earth_rate[0], -s.t * k.earth_rate[1], -s.t * k.earth_rate[2])
     return product(turned, product(solve(s), (qx, qy, qz, qw)))

@@ -1,7 +1,7 @@
-"""The extended observer with Kalman gains: the best linear estimate of azimuth if the sea is as assumed.
+"""Alignment method: the extended observer with Kalman gains, the best linear estimate of azimuth on the assumed sea.
 
     x1, x2, x3   of the north and of the east channel: velocity error [m/s], its rate [m/s2], the rate of x2 without
-                 command [m/s3]. Tilt is x2 / g, and x3 depends on the azimuth (see the package)
+                 command [m/s3]. Tilt is x2 / g, and x3 depends on the azimuth, see alignment/__init__.py
     z1, z2, z3   their estimates
     r, q         variance of the measured velocity per step [m2/s2]; growth of the variance of x2, the random walk of
                  the gyros times g [(m/s2)2/s]
@@ -31,8 +31,10 @@ STATE_DTYPE = np.dtype([
 
 @compiled
 def advance_covariance(o, k, h):
-    """Advance the covariance of o by one step h [s] and its measurement; return (l1, l2, l3, expected variance of the
-    innovation [m2/s2])."""
+    """Advance the covariance of the observer o by one step h [s] with its measurement; k: record of CONDITIONS_DTYPE.
+
+    Return (l1, l2, l3, expected variance of the innovation [m2/s2]).
+    """
     r = k.velocity_density / h
     extended_observer.predict_covariance(o, k, h)
     s = o.p[0] + r
@@ -49,8 +51,8 @@ def step(s, k, v_east, v_north, h, w_c):
     not affect the estimate, because the observer receives its exact commands.
     """
     o = s.observer
-    # The wanted velocity error is zero, so v1 and v2 start at zero and stay there. The differentiator is that of the
-    # paper.
+    # The wanted velocity error is zero, so v1 and v2 start at zero and stay there. The differentiator is part of the
+    # ADRC of paper 001.
     for i in range(2):
         s.v1[i], s.v2[i] = levelling.differentiated(s.v1[i], s.v2[i], 0.0, h)
     extended_observer.predict(o, h)

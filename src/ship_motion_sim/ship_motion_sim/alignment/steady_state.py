@@ -1,6 +1,6 @@
 """Covariance of a stable linear loop under white noise: x(k+1) = A x(k) + noise of covariance Q.
 
-The alignment method `adrc` computes with it the noise of its loop.
+The alignment methods adrc and classical compute the noise of their loops with it.
 
 The covariance becomes a constant of a law. `reproducible.solution` therefore takes the place of numpy.linalg.solve,
 whose last bits differ between processors.

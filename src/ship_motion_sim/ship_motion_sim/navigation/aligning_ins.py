@@ -1,7 +1,8 @@
 """The INS of every method except `model`: integration of the IMU, alignment, navigation and estimated accuracy.
 
-Like `ins`, it takes `ship/imu/data_raw` and puts out attitude and deck rate after a latency. Of the ship parameters it
-uses the latitude, and the velocity that an aid measures with noise.
+This INS takes the messages of `ship/imu/data_raw` and puts out attitude and deck rate after a latency, as `ins` does.
+Its `ship` parameters serve only for the latitude and for the true velocity, which an aid measures with noise.
+Arguments: s state, c constants, i inputs, out outputs (records of this module and of ins).
 """
 import math
 
@@ -17,8 +18,10 @@ from ship_motion_sim.params import InsParameters
 from ship_motion_sim.sea import motion
 
 MAX_IMU_GAP_S = 0.1
-"""Longest time without a usable IMU message [s], over which the rates are assumed constant; an angular acceleration of
-the deck of 0.1 rad/s2 then causes an error of 0.5 mrad."""
+"""Longest time between two usable IMU messages over which the INS integrates [s].
+
+An angular acceleration of the deck of 0.1 rad/s2 causes an error of 0.5 mrad within this time.
+"""
 
 CONSTANTS_DTYPE = np.dtype([
     ('ship', motion.CONSTANTS_DTYPE),
@@ -27,7 +30,7 @@ CONSTANTS_DTYPE = np.dtype([
     ('increment', 'i8'),                    # 1: mean rates of the IMU since its last sample, 0: rates at the stamp
     ('aid_noise', 'f8'),                    # rms [m/s]
     ('navigator', navigator.CONSTANTS_DTYPE),
-    ('power_up', navigator.STATE_DTYPE),
+    ('power_up', navigator.STATE_DTYPE),    # state of the navigator at power-up
 ], align=True)
 
 STATE_DTYPE = np.dtype([
@@ -83,11 +86,11 @@ def measure_aid(c, s, stamp_ns, normals):
 
 @compiled
 def integrate(c, s, stamp_ns, rate, force):
-    """Integrate an IMU message, rate (3,) [rad/s] and force (3,) [m/s2]; return False after a gap, which resets the
-    INS to power-up.
+    """Integrate an IMU message, rate (3,) [rad/s] and force (3,) [m/s2], at stamp_ns.
 
-    Mean rates directly give the increments; rates at the stamps are integrated by the trapezoidal rule. The first
-    message after power-up is not integrated, because its interval began before power-up.
+    Return False after a gap above MAX_IMU_GAP_S, which resets the INS to the state at power-up. Mean rates directly
+    give the increments; rates at the stamps are integrated by the trapezoidal rule. The first message after power-up
+    is not integrated, because its interval began before power-up.
     """
     dt = 1e-9 * (stamp_ns - s.imu_stamp_ns) if s.imu_stamp_ns != NO_STAMP else 0.0
     if dt > MAX_IMU_GAP_S:

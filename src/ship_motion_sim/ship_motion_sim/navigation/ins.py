@@ -1,9 +1,11 @@
 """The INS of method `model`: the true attitude with parametrised errors, released after a latency.
 
-The node subscribes only to `ship/imu/data_raw`, which has no attitude (in REP 145 that is part of `imu/data`). So the
-INS evaluates the stateless law of the ship motion, with the same `ship` parameters, at the stamp of each IMU message
-and adds its errors. The INS compares the rate of the IMU with that of the law. If the `ship` parameters differ from
-those of ship_motion_node, the status reports it. `aligning_ins` integrates the IMU instead.
+The node `ins` subscribes only to `ship/imu/data_raw`, which has no attitude (REP 145, the ROS convention for an IMU,
+reserves it for `imu/data`). So the INS evaluates the stateless law of the ship motion (sea.motion) at the stamp of
+each IMU message, and adds its errors. Its `ship` parameters must be those of ship_motion_node. The INS compares the
+rate of the IMU with that of the law, and its status reports a difference. `aligning_ins` integrates the IMU instead.
+
+Arguments: s state, c constants, i inputs, out outputs (records of this module).
 """
 import math
 
@@ -17,7 +19,7 @@ from ship_motion_sim.params import InsParameters
 from ship_motion_sim.sea import motion
 
 INS_NORMALS_PER_STEP = 9
-"""Number of standard normals of a step: three wander, three attitude, three rate."""
+"""Number of standard normals of a step: three for the slow errors, three for the attitude, three for the rate."""
 STATUS_TEXTS = dict(
     OK='ok', BAD_STAMP='stamp does not advance', BAD_IMU='IMU data are not finite',
     IMU_DISAGREES='IMU disagrees with the ship parameters of the INS',
@@ -36,17 +38,17 @@ CONSTANTS_DTYPE = np.dtype([
     ('earth_rate', 'f8', (3,)),             # ENU [rad/s]
     ('bias', 'f8', (3,)),                   # roll, pitch, yaw [rad]
     ('wander', 'f8', (3,)),                 # rms of the slow error of roll, pitch, yaw [rad]
-    ('wander_time', 'f8'),                  # [s]
-    ('noise', 'f8', (3,)),                  # rms of roll, pitch, yaw [rad]
-    ('rate_noise', 'f8'),                   # [rad/s]
-    ('imu_tolerance', 'f8'),                # [rad/s]
+    ('wander_time', 'f8'),                  # correlation time of the slow error [s]
+    ('noise', 'f8', (3,)),                  # rms of the white noise of roll, pitch, yaw [rad]
+    ('rate_noise', 'f8'),                   # rms of the white noise of the deck rate [rad/s]
+    ('imu_tolerance', 'f8'),                # largest difference between the rates of IMU and law [rad/s]
     ('latency_ns', 'i8'),
     ('variance', 'f8', (3,)),               # declared variance of roll, pitch, heading [rad2]
     ('walk', 'f8', (3,)),                   # declared random walk of roll, pitch, heading [rad/sqrt(s)]
 ], align=True)
 
 LATENCY_RING_FIELDS = [
-    ('measured', 'i8'), ('released', 'i8'),     # number of samples; sample n has index n % LATENCY_RING_SIZE
+    ('measured', 'i8'), ('released', 'i8'),     # numbers of samples in and out; n has the index n % LATENCY_RING_SIZE
     ('stamp_ns', 'i8', (LATENCY_RING_SIZE,)),
     ('quaternion', 'f8', (LATENCY_RING_SIZE, 4)),
     ('angular_velocity', 'f8', (LATENCY_RING_SIZE, 3)),
@@ -54,7 +56,7 @@ LATENCY_RING_FIELDS = [
     ('variance', 'f8', (LATENCY_RING_SIZE, 3)),
     ('stage', 'i8', (LATENCY_RING_SIZE,)),
 ]
-"""Results that wait for their latency to pass."""
+"""Ring of the samples whose latency has not passed."""
 
 STATE_DTYPE = np.dtype([
     ('last_stamp_ns', 'i8'),
@@ -70,14 +72,14 @@ INPUTS_DTYPE = np.dtype([
 ], align=True)
 
 OUTPUTS_DTYPE = np.dtype([
-    ('status', 'i8'),                       # of Status
+    ('status', 'i8'),                       # one of Status, index into INS_STATUS_TEXTS
     ('due', 'i8'),                          # 1: the result below is new; 0: nothing to publish
     ('stamp_ns', 'i8'),                     # of the measurement
     ('quaternion', 'f8', (4,)),             # x, y, z, w, deck -> earth, with error
     ('angular_velocity', 'f8', (3,)),       # deck against earth, FLU, with noise [rad/s]
     ('linear_acceleration', 'f8', (3,)),    # of the IMU message with this stamp [m/s2]
     ('variance', 'f8', (3,)),               # declared variance of roll, pitch, heading [rad2]
-    ('stage', 'i8'),                        # stage of this result, of navigator.STAGES; NO_STAGE for the model
+    ('stage', 'i8'),                        # stage of this result, index of navigator.STAGES; NO_STAGE for the model
     ('noise', 'f8', (3,)), ('walk', 'f8', (3,)),    # declared, of roll, pitch, heading [rad], [rad/sqrt(s)]
     ('velocity', 'f8', (3,)),               # present velocity of an INS that navigates, ENU [m/s]
 ], align=True)
@@ -104,7 +106,7 @@ def constants(params: InsParameters) -> np.ndarray:
 
 
 def model_variance(p):
-    """Return the variance of roll, pitch and heading [rad2] that method model declares."""
+    """Return the variance of roll, pitch and heading [rad2] that the method `model` declares; p: InsParameters."""
     return (p.roll_bias**2 + p.tilt_wander**2 + p.tilt_noise**2, p.pitch_bias**2 + p.tilt_wander**2 + p.tilt_noise**2,
             p.heading_bias**2 + p.heading_wander**2 + p.heading_noise**2)
 
@@ -118,8 +120,11 @@ def initial_state() -> np.ndarray:
 
 @compiled
 def wander(c, s, stamp_ns, normals):
-    """Advance the slow errors [rad] to stamp_ns: first-order Gauss-Markov, exact for any step, stationary from the
-    start; normals: three or more."""
+    """Advance the slow errors [rad] of roll, pitch and yaw to stamp_ns; normals: three or more.
+
+    The errors are first-order Gauss-Markov processes. The step is exact for any length, and the first errors have the
+    final rms.
+    """
     kept = 0.0      # share of the last error in the new error
     if s.last_stamp_ns != NO_STAMP:
         kept = math.exp(-1e-9 * (stamp_ns - s.last_stamp_ns) / c.wander_time)
@@ -131,7 +136,8 @@ def wander(c, s, stamp_ns, normals):
 
 @compiled
 def disagrees(truth, c, measured):
-    """Return True if a measured rate (3,) [rad/s] differs by more than imu_tolerance from that of the ship."""
+    """Return True if a measured rate (3,) [rad/s] differs by more than imu_tolerance from the rate of the true
+    ship."""
     wx, wy, wz = imu.inertial_rate(truth, c.earth_rate)
     return max(abs(measured[0] - wx), abs(measured[1] - wy), abs(measured[2] - wz)) > c.imu_tolerance
 
@@ -156,7 +162,10 @@ def measure(c, s, stamp_ns, force, normals):
 
 @compiled
 def release(c, s, now_ns, out):
-    """Release the newest sample of at least the age `latency` at now_ns; due = 0 if it was released before."""
+    """Put the newest sample whose age at now_ns has reached the latency into the outputs `out`.
+
+    out.due is 0 if no sample has reached the latency since the last step.
+    """
     out.due = 0
     while s.released < s.measured and s.stamp_ns[s.released % LATENCY_RING_SIZE] <= now_ns - c.latency_ns:
         s.released += 1

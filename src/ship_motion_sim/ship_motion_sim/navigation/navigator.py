@@ -1,18 +1,19 @@
-"""A strapdown INS from power-up on: alignment by the selected method, then navigation.
+"""A strapdown INS from power-up on: alignment by the selected method, then navigation. aligning_ins calls `step`.
 
-aligning    The strapdown runs at the rate of the IMU, the method every `step` seconds. The commands of the method
-            rotate n'. Method oba commands no rotation: its strapdown integrates in inertial space (`step`: earth
-            rate, command and gravity are zero).
-aligned     Navigation begins as soon as the 1-sigma of azimuth is small enough. Without an aid the INS is free
-            inertial. With an aid, riccati_eso continues with the difference of both velocities, so level and azimuth
-            keep improving.
+aligning    The strapdown integration runs at the rate of the IMU, the alignment method every `step` seconds. The
+            commands of the method rotate n'. The method oba commands no rotation. Its strapdown integrates in inertial
+            space: earth rate, command and gravity are zero.
+aligned     Navigation begins as soon as the 1 sigma of azimuth is small enough. Without an aid, the INS navigates by
+            the IMU alone. With an aid, the method riccati_eso continues. It uses the difference of the velocities of
+            strapdown and aid, so that level and azimuth keep improving.
 
-An aid is a velocity in deck axes (log) or ENU (gnss).
+An aid measures the velocity of the ship, in deck axes (log) or in ENU (gnss).
 
-n, n'       ENU; computed navigation frame: n turned about the vertical by the azimuth, which is unknown at first, and
-            tilted by small level errors
+n, n'       ENU; frame that the INS computes as its estimate of n. n' is n turned about the vertical by the azimuth,
+            which is unknown at first, and tilted by small level errors
 w_c, w_cN   commanded rate of n' against the earth, and its north component [rad/s]
 w_N         north component of the earth rate [rad/s]
+s, c, h     arguments: state, constants (records of this module), time since the last step of the method [s]
 Methods     classical: gyrocompass; adrc, adrc_scheduled: ADRC; riccati_eso: extended state observer with Kalman
             gains; oba: optimisation-based alignment
 """
@@ -44,7 +45,7 @@ CONSTANTS_DTYPE = np.dtype([
 
 STATE_DTYPE = np.dtype([
     ('stage', 'i8'),
-    ('velocity_set', 'i8'),                     # 1 after the velocity was set to that of the aid
+    ('velocity_set', 'i8'),                     # 1 after the first step has set the velocity to that of the aid
     ('since_step', 'f8'),                       # time since the last step of the laws [s]
     ('unaided_time', 'f8'),                     # time since navigation without aid began [s]
     ('strapdown', strapdown.STATE_DTYPE),
@@ -75,8 +76,10 @@ def constants(p, method, aid, latitude) -> np.ndarray:
 
 
 def least_azimuth_sigma(c):
-    """Return the 1 sigma [rad] of azimuth that the method approaches after a long time; c: record of
-    CONSTANTS_DTYPE."""
+    """Return the 1 sigma [rad] of azimuth that the method approaches after a long time.
+
+    c: record of CONSTANTS_DTYPE.
+    """
     if c['method'] == METHOD_CLASSICAL:
         return float(c['classical']['azimuth_sigma'])
     k = c['conditions']
@@ -92,7 +95,7 @@ def initial_state(constants, quaternion) -> np.ndarray:
 
 @compiled
 def begin(s, c, qx, qy, qz, qw):
-    """Set the state s (zeros of STATE_DTYPE) to the state at power-up; c: record of CONSTANTS_DTYPE."""
+    """Set the state s (zeros of STATE_DTYPE) to the state at power-up; qx, qy, qz, qw: assumed attitude deck -> n'."""
     if c.method == METHOD_OBA:
         qx, qy, qz, qw = 0.0, 0.0, 0.0, 1.0
     strapdown.set_attitude(s.strapdown, qx, qy, qz, qw)
@@ -104,11 +107,11 @@ def begin(s, c, qx, qy, qz, qw):
 
 @compiled
 def aided_velocity(s, c, aid):
-    """Return the (E, N) components in n' [m/s] of the velocity (3,) of the aid.
+    """Return the (E, N) components in n' [m/s] of the velocity `aid` (3,) [m/s]; zeros without an aid.
 
-    GNSS: called only after the alignment, when n' is n (params.py refuses gnss with a method that commands n'). The
-    velocity of GNSS is not rotated by s.azimuth, which riccati_eso still improves in navigation. This avoids a
-    feedback of the estimate through the velocity of the ship (7 m/s), which would amplify its errors.
+    A GNSS is used only after the alignment, when n' is n (params.py refuses gnss with a method that commands n'). Its
+    velocity is not rotated by s.azimuth, which riccati_eso still improves in navigation. This avoids a feedback of the
+    estimate through the velocity of the ship (7 m/s), which would amplify the errors of the estimate.
     """
     if c.aid == AID_LOG:
         east, north, _ = to_earth(s.strapdown.mat, aid[0], aid[1], aid[2])
@@ -144,8 +147,8 @@ def align_in_inertial_space(s, c, aid, h):
 def reject_reversed_azimuth(s, c, h):
     """Declare the azimuth of the gyrocompass unknown if the level command shows an azimuth az above 60 deg.
 
-    The loop has a second equilibrium at 180 deg of azimuth, where the level command to the north is twice the
-    earth rate: (19) of paper 001, cos az = 1 + w_cN / w_N.
+    The loop has a second equilibrium at 180 deg of azimuth. There the north command w_cN is minus twice the north
+    component w_N of the earth rate, by equation (19) of paper 001: cos az = 1 + w_cN / w_N.
     """
     # s0: bandwidth of the gyrocompass [rad/s], here of the low-pass.
     s.north_command_smoothed += c.classical.s0 * h * (s.command[1] - s.north_command_smoothed)
@@ -186,7 +189,7 @@ def attitude(s, c):
     """Return the estimated quaternion (x, y, z, w) deck -> earth."""
     q = s.strapdown.quaternion
     if c.method == METHOD_OBA and s.stage == STAGE_ALIGNING:
-        if s.oba.count < 2.0:       # One pair of vectors minus its own mean determines no rotation.
+        if s.oba.count < 2.0:       # One pair of vectors, less its own mean, determines no rotation.
             return q[0], q[1], q[2], q[3]
         return oba.attitude(s.oba, c.conditions, q[0], q[1], q[2], q[3])
     return product((0.0, 0.0, math.sin(0.5 * s.azimuth), math.cos(0.5 * s.azimuth)), q)
@@ -207,10 +210,10 @@ def error_velocity(s, c):
 
 @compiled
 def begin_navigation(s, c, aid):
-    """Rotate n' onto n and start to navigate; aid (3,) [m/s].
+    """Rotate n' onto n and start to navigate; aid (3,): velocity [m/s].
 
-    The velocity becomes that of the aid. Without an aid, it becomes the part that alignment did not attribute to an
-    error, and zero after oba, whose velocity has an unknown origin.
+    The velocity of the strapdown becomes that of the aid. Without an aid, the part that the alignment attributed to an
+    error is subtracted. After oba without an aid it becomes zero, because the velocity at power-up is unknown.
     """
     k, v = c.conditions, s.strapdown.velocity
     qx, qy, qz, qw = attitude(s, c)
@@ -227,7 +230,8 @@ def begin_navigation(s, c, aid):
     for i in range(3):
         s.command[i] = 0.0
     s.aligned_azimuth_sigma, s.aligned_level_sigma = s.azimuth_sigma, s.level_sigma
-    # The velocity does not show the azimuth error of a constant gyro bias. The observer starts without this part.
+    # The velocity does not show the azimuth error that a constant gyro bias causes. The observer starts without its
+    # variance.
     without_bias_variance = max(s.azimuth_sigma**2 - (k.gyro_bias / k.earth_rate[1])**2, 0.0)
     m = s.riccati_eso
     extended_observer.start(m.observer, k, s.level_sigma, math.sqrt(without_bias_variance))
@@ -237,10 +241,10 @@ def begin_navigation(s, c, aid):
 
 @compiled
 def grow_unaided_sigmas(s, k, h):
-    """Increase the 1 sigmas of an INS without aid over h [s].
+    """Increase the 1 sigmas of an INS without aid over h [s]; k: record of CONDITIONS_DTYPE.
 
-    The causes are random walk and bias of the gyros, and the earth rate resolved with a heading that is wrong by its
-    1 sigma, which tilts the level.
+    The causes are the random walk and the bias of the gyros. The level is also tilted by the earth rate, whose
+    components are computed with a heading that is wrong by its 1 sigma.
     """
     s.unaided_time += h
     walk = k.gyro_noise**2 * s.unaided_time

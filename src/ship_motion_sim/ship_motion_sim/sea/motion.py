@@ -1,5 +1,7 @@
 """The truth of the ship at an instant: position, attitude and their exact derivatives. Stateless.
 
+The unit of the ship and the INS of method `model` call `truth`:
+
     outputs = np.zeros(1, OUTPUTS_DTYPE)
     truth(constants(params)[0], 12.5, outputs[0])
 """
@@ -72,6 +74,7 @@ def summary(params: ShipParameters) -> tuple[str, ...]:
 
 
 def _put_components(record, sines):
+    """Put the components of waves.Waves into record."""
     count = len(sines.frequency)
     record['frequency'][0, :count] = sines.frequency
     record['phase'][0, :count] = sines.phase
@@ -80,7 +83,7 @@ def _put_components(record, sines):
 
 
 def _put_recorded(record, params):
-    """Put a recording into record; return its mean yaw [rad]."""
+    """Put the recording of RecordedParameters into record. Return its mean yaw [rad]."""
     times, freedoms, _ = recording.read(params)
     mean = float(np.mean(freedoms[:, YAW]))
     freedoms[:, YAW] -= mean
@@ -94,10 +97,11 @@ def _put_recorded(record, params):
 
 @compiled
 def sin_cos(angle):
-    """Return (sin, cos), within 1e-15 up to 1e6 rad.
+    """Return (sin, cos) of an angle [rad], with errors below 1e-15 up to 1e6 rad.
 
-    Because the compiler vectorises it, unlike the functions of libm, it is four times as fast over an array. Reduction
-    and polynomials of fdlibm (Sun Microsystems 1993: e_rem_pio2.c, k_sin.c, k_cos.c).
+    Over an array this function is four times as fast as those of libm, because the compiler vectorises it. The
+    reduction of the angle and the polynomials are those of fdlibm (Sun Microsystems 1993: e_rem_pio2.c, k_sin.c,
+    k_cos.c).
     """
     # n quarter turns, subtracted as three parts of pi / 2, so that the remainder r has no rounding error.
     n = math.floor(angle * (2.0 / math.pi) + 0.5)
@@ -118,8 +122,8 @@ def sin_cos(angle):
 
 @compiled
 def sum_components(ship, t, freedoms):
-    """Fill freedoms (3, 6) with the sum of all components at t and its first and second derivative."""
-    # Row 0 holds the sines, row 1 the cosines, in a loop of their own because the compiler vectorises it.
+    """Fill freedoms (3, 6) with the sum of all components at t [s] and its first and second derivative."""
+    # Row 0 holds the sines, row 1 the cosines. Their loop is separate, because the compiler then vectorises it.
     wave = np.empty((2, WAVE_COMPONENT_COUNT))
     for i in range(WAVE_COMPONENT_COUNT):
         wave[0, i], wave[1, i] = sin_cos(ship.frequency[i] * t + ship.phase[i])
@@ -136,10 +140,10 @@ def sum_components(ship, t, freedoms):
 
 @compiled
 def body_rates(roll, pitch, roll_1, pitch_1, yaw_1, roll_2, pitch_2, yaw_2):
-    """Return (w [rad/s], dw [rad/s2]), three floats each, FLU, of fixed-axis roll, pitch [rad] and the first and
-    second derivatives of roll, pitch and yaw.
+    """Return the rate of the deck w [rad/s] and its derivative dw [rad/s2], FLU, three floats each.
 
-    mat_ed = Rz(yaw) Ry(pitch) Rx(roll), in FLU as in FRD, differentiated.
+    roll, pitch: angles about fixed axes [rad]; .._1, .._2: first and second derivatives [rad/s, rad/s2]. The result
+    follows from the derivatives of mat_ed = Rz(yaw) Ry(pitch) Rx(roll).
     """
     sr, cr, sp, cp = math.sin(roll), math.cos(roll), math.sin(pitch), math.cos(pitch)
     wx = roll_1 - yaw_1 * sp

@@ -13,8 +13,8 @@ Columns of the file:
 
 A cubic spline (not-a-knot ends) runs through all rows, so rates and accelerations are exact derivatives of the motion.
 Because the recorded values are taken as the truth, a noisy recording must be smoothed before. Outside the record the
-ship comes to rest within COME_TO_REST_TIME_S in the attitude of the nearest end: a quintic leads from value, rate and
-acceleration of this end to the same value at rest.
+ship comes to rest within COME_TO_REST_TIME_S in the attitude of the nearest end. A polynomial of degree 5 leads from
+value, rate and acceleration at this end to the same value at rest.
 """
 import typing
 
@@ -25,9 +25,9 @@ from pedestal_common.geometry.interval import interval
 from pedestal_common.text_files import csv_table
 
 MIN_ROWS, MAX_ROWS = 4, 16384
-"""Least number of rows of a recording, which a not-a-knot spline needs, and largest number.
+"""Least number of rows of a recording, which a not-a-knot spline needs, and largest number of rows.
 
-The largest number bounds the size of the law's constants, whose arrays have a fixed length (sea.motion).
+The largest number limits the constants of the law, whose arrays have a fixed length (sea.motion).
 """
 MAX_PIECES = MAX_ROWS + 1
 """Largest number of pieces, those before and after the record included."""

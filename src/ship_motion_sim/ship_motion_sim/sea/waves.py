@@ -1,7 +1,8 @@
 """A seaway as a sum of sine waves, and the response of the hull to each wave. Plain numpy, run once at the start.
 
-The surface at the ship is zeta = sum Re(a e^{j(w_e t + phase)}). For a wave that travels
-along the unit vector (d_x, d_y) of the deck (FLU), zeta ~ e^{-j k (d_x x + d_y y)}. Its slope along x is -j k d_x a.
+The elevation of the surface at the ship is zeta = sum Re(a e^{j(w_e t + phase)}) with the amplitudes a [m] of the
+waves. The package defines the wave number k and the encounter frequency w_e. A wave that travels along the unit
+vector (d_x, d_y) of the deck (FLU) has zeta ~ e^{-j k (d_x x + d_y y)}. Its slope along x is -j k d_x a.
 """
 import math
 import typing
@@ -28,22 +29,28 @@ _GRID_STEPS_PER_COMPONENT = 100
 
 
 class Waves(typing.NamedTuple):
-    """Components of the motion: encounter frequency (n,) [rad/s], phase (n,) [rad], response X (n, 6) complex
-    [m, rad]."""
+    """Components of the motion of the ship.
+
+    frequency: w_e (n,) [rad/s]; phase (n,) [rad]; response: X (n, 6), complex, of surge, sway, heave [m], roll, pitch,
+    yaw [rad].
+    """
     frequency: np.ndarray
     phase: np.ndarray
     response: np.ndarray
 
 
 def shape(w, tp, gamma):
-    """Return the relative density of JONSWAP at any positive w [rad/s] (Hasselmann et al. 1973)."""
+    """Return the density of JONSWAP at w [rad/s] > 0, apart from a constant factor (Hasselmann et al. 1973).
+
+    tp: peak period [s]; gamma: peak enhancement [-].
+    """
     wp = 2.0 * math.pi / tp
     width = np.where(w <= wp, 0.07, 0.09)
     return power(w, -5.0) * exp(-1.25 * power(wp / w, 4.0)) * power(gamma, exp(-0.5 * ((w - wp) / (width * wp)) ** 2))
 
 
 def band(tp):
-    """Return the (lowest, highest) frequency [rad/s] of the components: 0.55 wp to 4 wp, at most 2.2 rad/s."""
+    """Return the (lowest, highest) frequency [rad/s] of the components: 0.55 wp to 4 wp, at most 2.2 rad/s; tp [s]."""
     wp = 2.0 * math.pi / tp
     return 0.55 * wp, min(4.0 * wp, 2.2)
 
@@ -59,7 +66,8 @@ def _integral(x, y):
 
 
 def spectrum(w, hs, tp, gamma):
-    """Return S(w) [m2 s/rad], zero outside the band; its integral is Hs^2/16."""
+    """Return S(w) [m2 s/rad] at w [rad/s], zero outside the band; its integral is Hs^2/16. hs [m], tp [s], gamma
+    [-]."""
     low, high = band(tp)
     grid = _grid(tp)
     level = hs ** 2 / 16.0 / _integral(grid, shape(grid, tp, gamma))[-1]
@@ -67,32 +75,44 @@ def spectrum(w, hs, tp, gamma):
 
 
 def _second_order(w, period, damping):
-    """Return w_n^2 / (w_n^2 - w^2 + 2 j z w_n w), the response of an oscillator to e^{jwt}; 1 at w = 0."""
+    """Return w_n^2 / (w_n^2 - w^2 + 2 j z w_n w), the response of an oscillator to e^{jwt}; 1 at w = 0.
+
+    period: 2 pi / w_n [s]; damping: ratio z [-].
+    """
     wn = 2.0 * math.pi / period
     return wn ** 2 / (wn ** 2 - w ** 2 + 2j * damping * wn * w)
 
 
 def _mean_over(u):
-    """Return sin u / u: the mean of a sine over a length, u half its phase along the length."""
+    """Return sin u / u: the mean of a sine wave over a length, relative to the value in the middle.
+
+    u: half of the phase of the wave along the length [rad].
+    """
     v = np.where(u == 0.0, 1.0, u)
     return np.where(u == 0.0, 1.0, sin(v) / v)
 
 
 def _slope_over(u):
-    """Return 3 (sin u - u cos u) / u^3: the slope of the best straight line through a sine over a length, relative to
-    the slope of the sine in the middle."""
+    """Return 3 (sin u - u cos u) / u^3: the slope of the best straight line through a sine wave over a length.
+
+    The result is relative to the slope of the wave in the middle. u: half of the phase of the wave along the length
+    [rad].
+    """
     small = np.abs(u) < 1e-2
     v = np.where(small, 1.0, u)
     return np.where(small, 1.0 - u ** 2 / 10.0, 3.0 * (sin(v) - v * cos(v)) / (v * v * v))
 
 
 def transfer(hull: HullParameters, w, mu, speed, gravity):
-    """Return (w_e, RAO): encounter frequency [rad/s] and complex response (..., 6) to 1 m of wave.
+    """Return (w_e, RAO): encounter frequency [rad/s] and response amplitude operator (..., 6), complex.
 
-    w, mu: frequency [rad/s] and direction [rad] of the wave; speed [m/s]; gravity [m/s2]. Pressure falls with depth
-    (Smith e^{-k d/2}) and averages over length and beam. Roll, pitch and yaw follow the slope along the hull. Surge
-    and sway are the orbital motion of the water. At a crest it has the direction of the wave, so it is -j times the
-    elevation. Yaw follows the change of sway along the hull.
+    The RAO is the response to a wave of amplitude 1 m: surge, sway, heave [m], roll, pitch, yaw [rad]. w, mu:
+    frequency [rad/s] and direction [rad] of the wave; speed [m/s]; gravity [m/s2].
+
+    The pressure of a wave falls with the depth (Smith correction e^{-k draught / 2}) and averages over length and beam
+    of the hull. Roll and pitch follow the slope of the wave. Surge and sway are the orbital motion of the water. At a
+    crest the water moves in the direction of the wave, so its displacement is -j times the elevation. Yaw follows the
+    change of sway along the hull.
     """
     k = w ** 2 / gravity
     d_x, d_y = cos(mu), -sin(mu)
@@ -138,8 +158,9 @@ def density(params: ShipParameters):
 def seaway(params: ShipParameters):
     """Return the waves: (w [rad/s], amplitude [m], phase [rad], mu [rad]), each (WAVE_COMPONENT_COUNT,).
 
-    Each of equal bins has one wave, at a random frequency within the bin. This avoids the repetition after 2 pi / dw
-    of equal spacing. The wave has the whole energy of its bin: sum a^2/2 = Hs^2/16 for every seed.
+    The band is divided into WAVE_COMPONENT_COUNT equal bins with one wave each, at a random frequency within the bin.
+    This avoids the repetition of waves of equal spacing dw after 2 pi / dw. A wave has the whole energy of its bin, so
+    sum a^2/2 = Hs^2/16 for every seed.
     """
     grid, S = density(params)
     energy = _integral(grid, S)

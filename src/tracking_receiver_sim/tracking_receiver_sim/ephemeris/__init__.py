@@ -1,4 +1,4 @@
-"""Predicted tracks: orbits as states in a frame, and tables of directions.
+"""Predicted tracks of a target from files: orbits as states (position, velocity) in a frame, and tables of directions.
 
     oem.py, stk.py      readers of orbits, into states.py
     directions.py       reader of tables of azimuth and elevation

@@ -1,8 +1,8 @@
-"""Course of the target from an orbit or a table of directions, and the parameters of a run that follow from it.
+"""Trajectory of the target from an orbit or a table of directions, and the parameters of a run that the file gives.
 
-An orbit becomes a cubic Hermite spline through interpolated positions and velocities every MAX_KNOT_SPACING_S, within
-1 mm of the orbit. A table of directions becomes the cubic spline through its unit vectors, at the range
-target.angle.range. Because of the unit vectors, it is smooth at the zenith and through north.
+An orbit becomes a cubic Hermite spline through interpolated positions and velocities every MAX_KNOT_SPACING_S. This
+spline is within 1 mm of the orbit. A table of directions becomes the cubic spline through its unit vectors, at the
+range target.angle.range. Because of the unit vectors, this spline is smooth at the zenith and through north.
 """
 import math
 
@@ -51,7 +51,7 @@ def flight_of_orbit(ephemeris, target, duration, margin) -> Flight:
 def _check_acceleration(ephemeris, spline, zero, limit):
     """Raise TableError, with the line of the state nearest to the peak, if the acceleration exceeds limit [m/s2].
 
-    A wrong digit in the file has this effect.
+    A wrong digit in the file causes such an acceleration. zero: t of stamp 0 [s].
     """
     size = np.linalg.norm(spline(spline.x, 2), axis=1)
     worst = int(np.argmax(size))
@@ -64,12 +64,12 @@ def _check_acceleration(ephemeris, spline, zero, limit):
 
 
 def run_parameters_of_orbit(ephemeris, target, given):
-    """Return {parameter: value} of a run of the first pass that climbs above horizon.MIN_CULMINATION_DEG, from a whole
-    second after its rise until it sets.
+    """Return {parameter: value} of a run that covers the first pass above horizon.MIN_CULMINATION_DEG.
 
-    given: names of the parameters that the scenario sets. Raises csv_table.TableError.
+    The run begins at a whole second after the rise of the satellite and ends when it sets. given: names of the
+    parameters that the scenario sets. Raises csv_table.TableError.
     """
-    # zero: time of stamp 0. A start at a rise is moved to a whole second; a given start and the file's begin stay.
+    # zero: t of stamp 0. Only a start at a rise moves to a whole second; a given start and the begin of the file stay.
     start_given = 'target.track_file.start' in given
     start = ephemeris.begin + target.track_file.start if start_given else None
     begin, end = horizon.passage(ephemeris, target.station, start)

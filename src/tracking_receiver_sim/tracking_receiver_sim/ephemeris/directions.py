@@ -1,9 +1,9 @@
-"""Tables of directions: sat-nms program.txt, and CSV of time, azimuth and elevation.
+"""Reader of tables of directions: program.txt of sat-nms, and CSV of time, azimuth and elevation.
 
-program.txt has lines of Julian date, azimuth and elevation [deg]; further words are passed over. The columns of a CSV
-are found by their whole names with their units. If the first line consists of numbers, the file has exactly three
-columns: time, azimuth, elevation [deg]. All times are UTC, or all are numbers from any origin. A row that repeats the
-row before is passed over and counted.
+program.txt has lines of Julian date, azimuth and elevation [deg]; further words are passed over. The reader finds the
+columns of a CSV by their whole names with their units. If the first line consists of numbers, the file has exactly
+three columns: time, azimuth, elevation [deg]. All times are UTC, or all are numbers from any origin. A row that
+repeats the row before is passed over and counted.
 """
 import array
 import typing
@@ -17,7 +17,7 @@ from tracking_receiver_sim.track import tables, times
 AZIMUTH = columns.Quantity('azimuth', dict.fromkeys(('azimuth', 'azi', 'az'), 'deg'), 'deg')
 ELEVATION = columns.Quantity('elevation', dict.fromkeys(('elevation', 'elev', 'el'), 'deg'), 'deg')
 ELEVATION_LENGTH = columns.Quantity('elevation', {'elevation': ''}, 'm')
-"""Directions, and an elevation that is a height."""
+"""Columns of a direction, and of an elevation that is a height."""
 BARE_NAMES = 'time', 'azimuth', 'elevation'
 """Names of the columns of a table without names."""
 ANGLE_LIMITS_DEG = {'azimuth': (-720.0, 720.0), 'elevation': (-90.0, 90.0)}

@@ -1,8 +1,11 @@
-"""Conversion of orbits from other frames to the earth-fixed frame, and of time systems of files to UTC.
+"""Conversion of orbits from other frames to the earth-fixed frame, and of the times of files to instants.
 
-The rotations are those of skyfield: IAU 2006 precession and IAU 2000A nutation, UT1 - UTC and leap seconds from its
-built-in tables, no polar motion (up to 0.3", 9 m on the ground). Every ITRF is taken as WGS84; the difference is some
-centimetres. For dates after the end of the tables of UT1, an orbit may be off by some metres.
+An instant is the time of track files: TAI minus 37 s, in seconds since 1970. It counts leap seconds, and equals UTC
+from 2017 on (module track.instant). TAI is the international atomic time.
+
+The rotations are those of skyfield: IAU 2006 precession and IAU 2000A nutation, with UT1 - UTC and leap seconds from
+its built-in tables. They omit the polar motion (up to 0.3", 9 m on the ground). Every ITRF is taken as WGS84; the
+difference is some centimetres. For dates after the end of the tables of UT1, an orbit may be wrong by some metres.
 """
 import re
 
@@ -33,9 +36,11 @@ def names():
 
 
 def instants(system, days, seconds):
-    """Return the instants (n,), see track.instant, of days since 1970 and seconds of the day (n,) in a time system of
-    TIME_SYSTEM_OFFSETS_S. Raises ValueError(index of the row) for second 60 of a minute without a leap
-    second."""
+    """Return the instants (n,) [s] of days since 1970 and seconds of the day (n,) in a time system.
+
+    system: key of TIME_SYSTEM_OFFSETS_S. Raises ValueError(index of the row) if the seconds of the day are 86400 or
+    more on a day without a leap second. Only UTC has leap seconds.
+    """
     offset = TIME_SYSTEM_OFFSETS_S[system]
     if offset is None:
         late = np.flatnonzero(seconds >= SECONDS_PER_DAY)
@@ -54,15 +59,15 @@ def instants(system, days, seconds):
 
 
 def earth_fixed(frame, time, r, v):
-    """Return earth-fixed positions [m] and velocities against the earth [m/s], (n, 3) each.
+    """Return earth-fixed positions [m] and velocities relative to the rotating earth [m/s], (n, 3) each.
 
-    r, v (n, 3): positions and velocities in a supported frame; time (n,): instants, see track.instant.
+    r, v (n, 3): positions and velocities in a supported frame; time (n,): instants [s].
     """
     if EARTH_FIXED_PATTERN.fullmatch(frame):
         return r, v
     positions, velocities = np.empty_like(r), np.empty_like(v)
-    for at in range(0, len(time), NUTATION_BATCH_SIZE):
-        some = slice(at, at + NUTATION_BATCH_SIZE)
+    for first in range(0, len(time), NUTATION_BATCH_SIZE):
+        some = slice(first, first + NUTATION_BATCH_SIZE)
         mat = _to_fixed(frame, time[some])
         positions[some] = np.einsum('ijn,nj->ni', mat, r[some])
         velocities[some] = np.einsum('ijn,nj->ni', mat, v[some]) - np.cross([0.0, 0.0, EARTH_RATE], positions[some])
@@ -70,7 +75,7 @@ def earth_fixed(frame, time, r, v):
 
 
 def _to_fixed(frame, time):
-    """Return the rotations (3, 3, n) from a frame to the earth-fixed one."""
+    """Return the rotations (3, 3, n) from a frame to the earth-fixed frame at instants (n,) [s]."""
     from skyfield.framelib import ICRS_to_J2000, itrs, true_equator_and_equinox_of_date
     from skyfield.sgp4lib import TEME
     days = np.floor(time / SECONDS_PER_DAY)

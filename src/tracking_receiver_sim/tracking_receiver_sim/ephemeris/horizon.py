@@ -1,4 +1,7 @@
-"""An orbit seen from a station: position, time range that a run may use, and passes above the horizon."""
+"""An orbit seen from a station: position, time range that a run may use, and passes above the horizon.
+
+Arguments: ephemeris: states.Ephemeris; station: StationParameters; t: times [s] after ephemeris.midnight.
+"""
 import numpy as np
 from scipy.optimize import brentq
 
@@ -19,8 +22,10 @@ SEGMENT_GAP_TOLERANCE_S = 1e-3
 
 
 def enu(ephemeris, station, t):
-    """Return ENU position [m] and velocity against the earth [m/s], (n, 3) each, at t (n,); NaN outside all
-    segments."""
+    """Return position [m] and velocity relative to the earth [m/s], ENU of the station, (n, 3) each, at t (n,).
+
+    The numbers are NaN outside all segments.
+    """
     r, v = np.full((2, len(t), 3), np.nan)
     for segment in reversed(ephemeris.segments):
         covered = (t >= segment.begin - SEGMENT_GAP_TOLERANCE_S) & (t <= segment.end + SEGMENT_GAP_TOLERANCE_S)
@@ -60,18 +65,18 @@ def require(ephemeris, begin, end):
 
 
 def passage(ephemeris, station, start=None):
-    """Return (t of the beginning, t of the end) of the first pass that climbs above MIN_CULMINATION_DEG, from rise to
-    set or as far as the file goes.
+    """Return (t of the beginning, t of the end) of the first pass that climbs above MIN_CULMINATION_DEG.
 
-    start: t at which the run begins; None: the run begins with the pass. Raises csv_table.TableError if there is no
-    such pass.
+    The pass lasts from rise to set, or as far as the file goes. start: t at which the run begins, which is then
+    returned as the beginning; None: the run begins with the pass. Raises csv_table.TableError if there is no such
+    pass.
     """
     t = np.append(np.arange(ephemeris.begin, ephemeris.end, PASS_SEARCH_STEP_S), ephemeris.end)
     seen = np.full(len(t), np.nan)
     for at in range(0, len(t), PASS_SEARCH_BATCH_SIZE):
         some = slice(at, at + PASS_SEARCH_BATCH_SIZE)
         seen[some] = elevation(ephemeris, station, t[some])
-        # edges: by turns the first step of a pass and the first step after it.
+        # edges: first step of a pass, first step after the pass, first step of the next pass, and so on.
         edges = np.flatnonzero(np.diff(np.concatenate(([False], seen > 0.0, [False]))))
         for i, j in zip(edges[::2], edges[1::2]):
             # A pass at the end of the batch may continue in the next batch.

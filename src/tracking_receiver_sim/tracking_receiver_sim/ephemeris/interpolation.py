@@ -1,9 +1,9 @@
-"""Interpolation between states: the polynomial through the nearest states, HERMITE and LAGRANGE of CCSDS 502.0.
+"""Interpolation between the states of an orbit: HERMITE and LAGRANGE of CCSDS 502.0.
 
-HERMITE of degree d runs through the positions and velocities of (d + 1) / 2 states, LAGRANGE through the positions of
-d + 1 states. The states lie about the instant as evenly as the ends of the segment allow. scipy evaluates the form of
-Newton with divided differences (Krogh, Math. Comp. 24 (1970) 185-190). The variable is u instead of t, because this
-reduces the rounding errors.
+The polynomial HERMITE of degree d runs through the positions and velocities of (d + 1) / 2 states, LAGRANGE through
+the positions of d + 1 states. These states lie about the wanted time as evenly as the ends of the segment allow. scipy
+evaluates the form of Newton with divided differences (Krogh, Math. Comp. 24 (1970) 185-190). The variable u, the time
+scaled to -1 ... 1 over the states, takes the place of t, because this reduces the rounding errors.
 """
 import numpy as np
 from scipy.interpolate import KroghInterpolator

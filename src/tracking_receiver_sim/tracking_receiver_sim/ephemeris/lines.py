@@ -1,5 +1,7 @@
-"""Lines of a text file with their line numbers, and the words, numbers and times in them. Limits on length and count
-keep every file from blocking the process or filling its memory."""
+"""Lines of a text file with their line numbers, and the numbers and times in them, for the readers of track files.
+
+Limits on length and count keep every file from blocking the process or filling its memory.
+"""
 import contextlib
 import datetime
 import functools
@@ -47,8 +49,10 @@ def read(path):
 
 
 def numbers(path, line, text, limits):
-    """Return the numbers in a text; limits: {name: (low, high)} of each, further words are passed over. Raises
-    TableError."""
+    """Return the numbers in the text of a line. Raises TableError.
+
+    limits: {name: (low, high)} of each number. The function passes over further words.
+    """
     if '_' not in text:
         with contextlib.suppress(ValueError):
             values = [float(word) for word in text.split()[:len(limits)]]

@@ -1,4 +1,4 @@
-"""CCSDS Orbit Ephemeris Messages, 502.0-B in keyword = value notation, versions 1 to 3."""
+"""Reader of CCSDS Orbit Ephemeris Messages (OEM): 502.0-B in the notation KEYWORD = value, versions 1 to 3."""
 import array
 import re
 
@@ -16,7 +16,7 @@ LINE_COLUMN, DAY_COLUMN, SECOND_COLUMN, FIRST_NUMBER_COLUMN = range(4)
 """Columns of a row: line in the file, days since 1970, seconds of the day, first number of STATE_LIMITS."""
 COLUMN_COUNT = FIRST_NUMBER_COLUMN + len(STATE_LIMITS)
 REPEATED_STATE = 'state that repeats the one above'
-"""Name of the states that are passed over because they repeat epoch and numbers of the state above."""
+"""Name, in the description of a file, of the states that repeat epoch and numbers of the state above."""
 MAX_SEGMENTS = 1000
 """Largest number of segments of a file."""
 REQUIRED_KEYWORDS = ('OBJECT_NAME', 'OBJECT_ID', 'CENTER_NAME', 'REF_FRAME', 'TIME_SYSTEM')
@@ -66,6 +66,7 @@ def read(path, wanted='') -> states.Ephemeris:
 
 def _blocks(path):
     """Yield ({keyword: _Entry}, table (n, COLUMN_COUNT)) of each segment."""
+    # begun: line of the last META_START; state: part of the file that contains the line.
     meta, rows, begun, state, count = {}, array.array('d'), 0, 'header', 0
     for line, text in lines.read(path):
         word = text.split(None, 1)[0]
@@ -106,7 +107,8 @@ def _table(rows):
 
 
 def _row(path, line, text):
-    """Return the numbers of a line of data. The epoch is blanked in `rest`, so that errors name the right column."""
+    """Return the numbers of a line of data, in the columns of COLUMN_COUNT. Raises TableError."""
+    # rest: the line with blanks in place of the epoch, so that errors name the right column.
     epoch = text.split(None, 1)[0]
     at = text.index(epoch)
     rest = ' ' * (at + len(epoch)) + text[at + len(epoch):]
@@ -114,6 +116,10 @@ def _row(path, line, text):
 
 
 def _segment(path, meta, rows, midnight):
+    """Return the states.Segment of the metadata {keyword: _Entry} and a table (n, COLUMN_COUNT). Raises TableError.
+
+    midnight: instant of t = 0, see states.Ephemeris.
+    """
     _one_of(path, meta, 'CENTER_NAME', ('EARTH',))
     frame, system = meta['REF_FRAME'].upper(), meta['TIME_SYSTEM'].upper()
     if not frames.known(frame):
@@ -126,6 +132,7 @@ def _segment(path, meta, rows, midnight):
     _one_of(path, meta, 'TIME_SYSTEM', tuple(frames.TIME_SYSTEM_OFFSETS_S))
 
     def seconds(line, column, days, of_day):
+        """Return the times t (n,) of days since 1970 and seconds of the day (n,) in lines (n,) of the file."""
         try:
             return frames.instants(system, days, of_day) - midnight
         except ValueError as error:
@@ -134,6 +141,7 @@ def _segment(path, meta, rows, midnight):
                               'end of this minute') from None
 
     def bound(name):
+        """Return the time t of a keyword."""
         entry = meta[name]
         day, second = lines.instant(path, entry.line, entry.column, name, entry)
         return seconds([entry.line], entry.column, np.array([day]), np.array([second]))[0]

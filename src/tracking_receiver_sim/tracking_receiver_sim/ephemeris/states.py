@@ -1,4 +1,7 @@
-"""Orbit of a file: states in segments, each with its frame and the polynomial that joins its states."""
+"""Orbit of a file: states (time, position, velocity) in segments, which the readers oem and stk make.
+
+A segment has a frame, and the degree of the polynomials that join its states.
+"""
 import typing
 
 import numpy as np
@@ -6,6 +9,7 @@ import numpy as np
 from pedestal_common.text_files import csv_table
 
 INTERPOLATION_METHODS = ('HERMITE', 'LAGRANGE', 'LINEAR')
+"""Methods that a file may name; LINEAR is LAGRANGE of degree 1."""
 DEGREE_LIMITS = 1, 19
 """Range of the degree of a polynomial."""
 DEFAULT_INTERPOLATION = 'HERMITE', 7
@@ -15,11 +19,14 @@ RADIUS_LIMITS_M = 6.3e6, 2e9
 """Range of the distance from the centre of the earth [m]; a lower value points to another unit."""
 
 GAP_STEP_RATIO = 3.0
-"""Ratio of a step in time to both of its neighbours above which the step is a gap."""
+"""Ratio of a step in time to each of its neighbours above which the step is a gap."""
 
 
 def gaps(t):
-    """Return a mask (n - 1,): True for steps between times (n,) that exceed GAP_STEP_RATIO times both neighbours."""
+    """Return a mask (n - 1,) of the steps between the times t (n,): True for a gap.
+
+    A gap is longer than GAP_STEP_RATIO times each of its neighbours.
+    """
     step = np.diff(t)
     longest = np.maximum(np.append(0.0, step[:-1]), np.append(step[1:], 0.0))
     return (step > GAP_STEP_RATIO * longest) & (longest > 0.0)
@@ -28,12 +35,12 @@ def gaps(t):
 class Segment(typing.NamedTuple):
     """States that consecutive polynomials join.
 
-        line        (n,) line in the file
-        t           (n,) [s], growing
-        r, v        (n, 3) [m], [m/s]; v is None if the file has no velocities
+        line        (n,) line of each state in the file
+        t           (n,) times of the states after Ephemeris.midnight [s], growing
+        r, v        (n, 3) positions [m] and velocities [m/s] in `frame`; v is None if the file has no velocities
         frame       name of a frame that frames.earth_fixed supports
-        method      HERMITE or LAGRANGE, with the degree of the polynomial
-        begin, end  usable range of t
+        method      HERMITE or LAGRANGE, see interpolation.py; degree: of the polynomials
+        begin, end  usable range of t [s]
     """
     line: np.ndarray
     t: np.ndarray
@@ -47,13 +54,13 @@ class Segment(typing.NamedTuple):
 
     @property
     def nodes(self):
-        """Number of states of a polynomial."""
+        """Number of states that one polynomial joins."""
         return (self.degree + 1) // 2 if self.method == 'HERMITE' else self.degree + 1
 
 
 class Ephemeris(typing.NamedTuple):
-    """The orbit of one object. midnight: instant (see track.instant) of t = 0; segments: in order of time;
-    description: format, number of states, frame and interpolation."""
+    """The orbit of one object. midnight: instant of t = 0 [s], on the time of track files (module track.instant);
+    segments: in order of time; description: format, number of states, frame and interpolation."""
     path: str
     midnight: float
     segments: tuple
@@ -61,12 +68,12 @@ class Ephemeris(typing.NamedTuple):
 
     @property
     def begin(self):
-        """First usable t."""
+        """First usable time t [s]."""
         return self.segments[0].begin
 
     @property
     def end(self):
-        """Last usable t."""
+        """Last usable time t [s]."""
         return self.segments[-1].end
 
 
@@ -78,8 +85,9 @@ def has_velocities(table):
 def segment(path, first_line, table, frame, method, degree, begin=None, end=None) -> Segment:
     """Return a Segment of a table (n, 8) of line, t, x, y, z [m], vx, vy, vz [m/s]; (n, 5) without velocities.
 
-    first_line: line in which the segment begins; method, degree: '' and None if the file gives none. Raises TableError
-    if time does not grow, a state is outside RADIUS_LIMITS_M, or the states are too few.
+    first_line: line in which the segment begins; method, degree: '' and None if the file gives none; begin, end:
+    usable range of t [s], None: all states. Raises TableError if the time does not grow, a state is outside
+    RADIUS_LIMITS_M, or the states are too few.
     """
     if not len(table):
         raise csv_table.TableError(f'{path}: line {first_line}: the segment that begins here has no state')

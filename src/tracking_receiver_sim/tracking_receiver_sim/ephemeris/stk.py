@@ -1,7 +1,8 @@
-"""STK ephemeris files (.e): EphemerisTimePosVel, EphemerisTimePosVelAcc and EphemerisTimePos about the earth.
+"""Reader of STK ephemeris files (.e) about the earth.
 
-The case of keywords does not matter, as in STK. Two states of one instant end a segment and begin the next. Blocks
-inside the ephemeris (for example SegmentBoundaryTimes) and the covariance after the states are passed over.
+The states are EphemerisTimePosVel, EphemerisTimePosVelAcc or EphemerisTimePos. The case of keywords does not matter,
+as in STK. Two states of one instant end a segment and begin the next. Blocks inside the ephemeris (for example
+SegmentBoundaryTimes) and the covariance after the states are passed over.
 """
 import array
 import datetime
@@ -28,6 +29,7 @@ GEODETIC_MARK = 'lla'
 READ_KEYWORDS = ('numberofephemerispoints', 'scenarioepoch', 'interpolationmethod', 'interpolationsamplesm1',
                  'interpolationorder', 'centralbody', 'coordinatesystem', 'distanceunit')
 IGNORED_KEYWORDS = ('blockingfactor', 'coordinatesystemepoch', 'messagelevel', 'timeformat')
+"""Keywords of the header, in lower case: those that the reader uses, and those without effect."""
 MAX_SEGMENTS = 1000
 """Largest number of segments of a file."""
 EPOCH_PATTERN = re.compile(r'(\d{1,2}) ([a-z]{3})[a-z]* (\d{4}) (\d{1,2}):(\d\d):(\d\d(?:\.\d*)?)', re.ASCII)
@@ -107,7 +109,7 @@ def _ephemeris(path, head, table):
 
 
 def _epoch(path, line, column, text):
-    """Return (instant of midnight, seconds of the day) of a time in the form of STK."""
+    """Return (instant of midnight, seconds of the day) of a UTC in the form of STK, as 1 Jun 2026 12:00:00.0."""
     match = EPOCH_PATTERN.fullmatch(' '.join(text.lower().split()))
     try:
         day, month, year, hours, minutes, seconds = match.groups()
@@ -132,8 +134,10 @@ def _choice(path, head, name, choices, default):
 
 
 def _degree(path, head, method):
-    """Return the degree of the polynomial, None if the file gives none; InterpolationSamplesM1 is the number of its
-    states less 1."""
+    """Return the degree of the polynomials, None if the file gives none. Raises TableError.
+
+    InterpolationSamplesM1 is the number of states of a polynomial minus 1.
+    """
     name = next((name for name in ('interpolationsamplesm1', 'interpolationorder') if name in head), '')
     if not name:
         return None

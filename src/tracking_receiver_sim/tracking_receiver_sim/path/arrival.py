@@ -1,10 +1,12 @@
-"""Apparent position of a target: with refraction by the air, and at the time when the wave left it.
+"""Apparent position of a target for the receiver: the place at which the wave left the target, raised by refraction.
 
-The refraction is that of the VLBI Field System (file poclb/refrwn.c, for radio waves in moist air, also in katpoint):
+The refraction by the air is that of the VLBI Field System (file poclb/refrwn.c, for radio waves in moist air, also in
+katpoint):
 
     R = 5.7295787e-5 N (cot E - 42.5 / (E + 0.4)^2.64) - 40 / (E + 2.7)^4        R, E in deg, E the true elevation
 
-The wave needs the time r / c: the apparent position of a target with velocity v is v r / c behind the true one.
+N is the refractivity of the air. The wave travels for the time r / c with the range r and the speed of light c. So the
+apparent position of a target with the velocity v is v r / c behind the true position.
 """
 import math
 
@@ -19,29 +21,32 @@ MIN_ELEVATION_RAD = math.radians(1.0)
 """Elevation [rad] below which the refraction stays constant."""
 
 PATH_DTYPE = np.dtype([('refractivity', 'f8'), ('light_time', 'i8')], align=True)
+"""Constants of the path. refractivity: N, 0: no refraction; light_time: 1 to include the travel time of
+the wave."""
 
 
 def constants(p) -> np.ndarray:
-    """Return PATH_DTYPE (1,) of PathParameters."""
+    """Return PATH_DTYPE (1,) of PathParameters p."""
     return np.array([(p.refractivity, p.light_time)], PATH_DTYPE)
 
 
 @compiled
 def refraction(N, elevation):
-    """Return (R [rad], its derivative by the elevation) at a true elevation [rad]."""
+    """Return (R [rad], its derivative by the elevation [-]) at a true elevation [rad] and a refractivity N."""
     E = min(max(elevation, MIN_ELEVATION_RAD), 0.5 * math.pi)
-    degrees, per_N = math.degrees(E), 0.57295787e-4 * N
-    bent = per_N * (1.0 / math.tan(E) - 42.5 / (degrees + 0.4)**2.64) - 40.0 / (degrees + 2.7)**4
-    slope = (per_N * (-math.radians(1.0) / math.sin(E)**2 + 112.2 / (degrees + 0.4)**3.64)
+    degrees, scale = math.degrees(E), 0.57295787e-4 * N
+    bent = scale * (1.0 / math.tan(E) - 42.5 / (degrees + 0.4)**2.64) - 40.0 / (degrees + 2.7)**4
+    slope = (scale * (-math.radians(1.0) / math.sin(E)**2 + 112.2 / (degrees + 0.4)**3.64)
              + 160.0 / (degrees + 2.7)**5)
     return math.radians(bent), slope if elevation > MIN_ELEVATION_RAD else 0.0
 
 
 @compiled
 def _bent(N, r, v):
-    """Return a vector [m] and its velocity [m/s], ENU from the antenna, turned up by the refraction."""
+    """Return a vector r [m] and its velocity v [m/s], ENU from the antenna, turned up by the refraction for N."""
     (e, n, u), (ve, vn, vu) = r, v
-    # h: horizontal distance; .._seen: after the rotation by R in the vertical plane, which keeps the azimuth.
+    # h: horizontal distance [m]; vh: its rate [m/s]; .._seen: values after the rotation by R in the vertical plane,
+    # which keeps the azimuth.
     h = math.hypot(e, n)
     if h == 0.0:
         return r, v
@@ -71,6 +76,7 @@ def seen(c, r, v):
 
 @compiled
 def _all_seen(c, r, v, out):
+    """Write the apparent vectors into `out` (n, 3) [m]; c: (1,) of PATH_DTYPE; r, v: as in `all_seen`."""
     for k in range(len(r)):
         out[k, 0], out[k, 1], out[k, 2] = seen(c[0], (r[k, 0], r[k, 1], r[k, 2]), (v[k, 0], v[k, 1], v[k, 2]))[0]
 

@@ -1,9 +1,14 @@
 """The image of a target below the horizon: a wave that level ground reflects.
 
 A far target at the elevation E has its image at -E. The path of the reflected wave is longer by 2 h sin E. The
-reflection inverts the wave (-1, both polarisations at low angles), and rough ground reduces its amplitude:
+reflection inverts the wave (factor -1, for both polarisations at low angles), and rough ground reduces its amplitude.
+The factor of the reflected wave is
 
     Gamma = -rho exp(-2 (2 pi sigma_h sin E / lambda)^2) exp(-j 4 pi h sin E / lambda)
+
+    rho         amplitude factor of smooth ground [-]
+    h, sigma_h  height of the antenna over the ground, rms roughness of the ground [m]
+    lambda      wavelength [m]
 
 Roughness: W. S. Ament, Proceedings of the IRE 41 (1953) 142; the geometry: Barton, Modern Radar System Analysis,
 chapter on multipath. The model omits diffuse scattering and the curvature of the earth.
@@ -31,7 +36,10 @@ def constants(p) -> np.ndarray:
 
 @compiled
 def image(c, i, e, n, u):
-    """Return the Image of a target at an apparent ENU vector from the antenna; i: record of receiver.INPUTS_DTYPE."""
+    """Return the Image of a target at the apparent vector (e, n, u) from the antenna, ENU [m].
+
+    c: record of MULTIPATH_DTYPE; i: record of receiver.INPUTS_DTYPE.
+    """
     if c.reflection == 0.0 or u <= 0.0:
         return Image(0.0, 0.0, 0.0, 0.0)
     sin_E = u / math.sqrt(e * e + n * n + u * u)

@@ -2,8 +2,9 @@
 
     eta = 1/2 + (4 r_1 r_2 + (r_1^2 - 1) (r_2^2 - 1) cos(2 dtau)) / (2 (r_1^2 + 1) (r_2^2 + 1))
 
-r_1, r_2: signed axial ratios of both ellipses, dtau the angle between their long axes. Stutzman, Polarization in
-Electromagnetic Systems, chapter on antenna-wave interaction; for circular, elliptical and linear polarisation.
+eta is the efficiency. r_1, r_2 are the axial ratios of the ellipses of wave and antenna, negative for the left sense.
+dtau is the angle between the long axes of both ellipses. Source: Stutzman, Polarization in Electromagnetic Systems,
+chapter on antenna-wave interaction. The formula holds for circular, elliptical and linear polarisation.
 """
 import math
 

@@ -1,12 +1,14 @@
-"""Scintillation: turbulence of the air makes level and direction of the wave wander, a first-order Gauss-Markov
-process each.
+"""Scintillation: turbulence of the air makes level and direction of the wave wander.
 
-Level [dB]: sigma at the elevation E is that of the zenith over sin^1.2 E (ITU-R P.618, section 2.4.1). The value at
-the zenith contains the factors of humidity, frequency and aperture.
+The level and the two angles of the direction are first-order Gauss-Markov processes.
 
-Direction: the variance is proportional to the length of the path through the turbulence, so sigma is proportional to
-1 / sqrt(sin E). Tatarskii, The Effects of the Turbulent Atmosphere on Wave Propagation, angle of arrival:
-2.91 D^(-1/3) times the integral of C_n^2 along the path.
+Level [dB]: the 1-sigma at the elevation E is that at the zenith divided by sin^1.2 E (ITU-R P.618, section 2.4.1). The
+value at the zenith contains the factors of humidity, frequency and aperture.
+
+Direction: the variance is proportional to the length of the path through the turbulence, so the 1-sigma is
+proportional to 1 / sqrt(sin E). The variance of the angle of arrival is 2.91 D^(-1/3) times the integral of C_n^2
+along the path, with the diameter D of the antenna and the strength C_n^2 of the turbulence. Source: Tatarskii, The
+Effects of the Turbulent Atmosphere on Wave Propagation.
 """
 import math
 
@@ -36,7 +38,8 @@ def constants(p, period) -> np.ndarray:
 def wander(c, x, sin_E, normals, first):
     """Return (factor of the amplitude, deflection of the wave in cross-elevation, elevation [rad]) one step later.
 
-    x (3,): state of the process, updated; normals: used from index `first` on.
+    c: record of SCINTILLATION_DTYPE; sin_E: sine of the elevation; x (3,): state of the process, updated; normals:
+    used from index `first` on.
     """
     for i in range(NORMALS_PER_STEP):
         x[i] = c.keep * x[i] + c.draw * normals[first + i]

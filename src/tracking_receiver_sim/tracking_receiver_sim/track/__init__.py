@@ -1,7 +1,12 @@
-"""Recorded flights: from a log of fixes to a trajectory in the station's ENU frame.
+"""Recorded flights as targets: from a log of fixes to a trajectory in the ENU frame of the station.
 
-fixes.py reads a log (with tables.py for CSV, gpx.py, nmea.py), flight.py makes a spline of its fixes, and place.py
-finds a station for it.
+A fix is a recorded position of an aircraft with its time.
+
+    fixes.py                        fixes of one aircraft in a log
+    tables.py, gpx.py, nmea.py      readers of logs: CSV, GPX, NMEA
+    times.py, dates.py, instant.py  times of a log
+    flight.py                       spline of the fixes
+    place.py                        station for a flight
 
 Symbols
     e, n, u     east, north, up from the station, the place of the antenna                      [m]

@@ -1,4 +1,7 @@
-"""The fixes of one aircraft in a log, read from the stream and checked for their order in time."""
+"""The fixes of one aircraft in a log: recorded positions with their times, checked for their order in time.
+
+A reader of a format (tables.rows, gpx.rows, nmea.rows) yields the fixes of all aircraft; `read` selects one aircraft.
+"""
 import array
 import collections
 import pathlib
@@ -24,7 +27,7 @@ FIX_COLUMNS = ('line', 'aircraft', 'time', 'latitude', 'longitude', 'altitude')
 
 
 class Aircraft(typing.NamedTuple):
-    """An aircraft of a file. number: in the order of its first fix; names: all its names in the file."""
+    """An aircraft of a file. number: from 0, in the order of the first fixes; names: all its names in the file."""
     number: int
     names: set
 
@@ -37,7 +40,7 @@ class Log:
         dated           True if the time is an instant (see track.instant)
         remarks         sentences about the numbers
         passed_over     {kind of row or sentence: its number}
-        nothing         reason if the file has no fix
+        nothing         reason why the file has no fix, '' if it has one
     """
 
     def __init__(self):
@@ -63,8 +66,10 @@ class Fixes(typing.NamedTuple):
 
 
 def read(track, rows) -> Fixes:
-    """Return the Fixes of the file of a TrackFileParameters; rows: reader of its format. Raises
-    csv_table.TableError."""
+    """Return the Fixes of the file of a TrackFileParameters. Raises csv_table.TableError.
+
+    rows: reader of its format, a function (path, Log) that yields (line, names of the aircraft, *numbers of a fix).
+    """
     log, numbers = Log(), array.array('d')
     aircraft_by_identity: dict[tuple, Aircraft] = {}
     for line, identities, *fix in rows(track.path, log):
@@ -92,8 +97,10 @@ def read(track, rows) -> Fixes:
 
 
 def _without_repetitions(table, log):
-    """Return the rows (line, time, place) without those that repeat time and place of the row before, which are
-    counted."""
+    """Return the rows (line, time, place) without those that repeat time and place of the row before.
+
+    The Log receives the number of repetitions.
+    """
     repeated = np.append(False, (np.diff(table[:, 1:], axis=0) == 0.0).all(axis=1))[:len(table)]
     if repeated.any():
         log.passed_over['row that repeats time and place'] = int(repeated.sum())

@@ -1,11 +1,12 @@
 """A flight as a cubic spline in the ENU frame of the station, from fixes that are held, coarse and noisy.
 
 Held positions: an ADS-B log repeats latitude and longitude until the next message comes. Such a repetition is no
-measurement and is dropped. If a position stays for max_gap or longer, or throughout the file, the target stands still.
+measurement and is dropped. If a position stays for max_gap or longer, or throughout the file, the target stands still,
+and its fixes are kept.
 
-Smoothing: per axis the fixes are position + white noise of sigma, and the acceleration is white of the density q^2
-(constant velocity, CV). The Rauch-Tung-Striebel smoother of this model, started without prior knowledge, equals the
-natural cubic spline f that minimises
+Smoothing: on each axis the model takes a fix x_k at the time t_k as position plus white noise of 1-sigma sigma. The
+acceleration is white noise of the power density q^2 (constant-velocity model). The Rauch-Tung-Striebel smoother of
+this model, started without prior knowledge, equals the natural cubic spline f that minimises
 
     sum (x_k - f(t_k))^2 + lambda integral f''^2 dt,   lambda = sigma^2 / q^2
 
@@ -32,8 +33,11 @@ ALTITUDE_TOLERANCE_M = 0.06
 
 
 class Flight(typing.NamedTuple):
-    """A flight: breaks, coefficients, start_time and summary as in target.Target, with the peak speed [m/s] and the
-    greatest range from the station [m]."""
+    """A flight of a target.
+
+    breaks, coefficients, start_time, summary: as in target.Target; speed: peak speed [m/s]; greatest_range: from the
+    station [m].
+    """
     breaks: np.ndarray
     coefficients: np.ndarray
     start_time: str

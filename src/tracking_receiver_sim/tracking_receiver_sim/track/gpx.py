@@ -1,9 +1,9 @@
-"""Tracks as GPX: every trkpt with a time and an ele, read from the stream by expat.
+"""Reader of tracks as GPX: each point (trkpt) with a time and an elevation (ele) is a fix.
 
-expat gives the line of a point and keeps no parsed data in memory. The reader stops at a document type declaration.
-This avoids the expansion of entities and access to other files. ele is above mean sea level. The height above the
-ellipsoid is ele + geoidheight; without geoidheight ele is taken instead, with a remark in the log. The encoding is the
-one of the byte order mark, or of the XML declaration.
+The XML parser expat reads the file from the stream. expat gives the line of a point and keeps no parsed data in
+memory. The reader stops at a document type declaration. This avoids the expansion of entities and access to other
+files. ele is above mean sea level. The height above the ellipsoid is ele + geoidheight. Without geoidheight ele takes
+its place, with a remark in the log. The byte order mark or the XML declaration states the encoding.
 """
 import collections
 from xml.parsers import expat
@@ -55,7 +55,14 @@ def rows(path, log):
 
 
 class _Points:
-    """Handlers of expat, with the texts of the open point and the fixes since the last `taken_fixes`."""
+    """Handlers of expat.
+
+        path_of_elements    names of the open elements, the outermost first
+        texts               {name: text} of the elements of the open point
+        fixes               fixes since the last `taken_fixes`
+        with_ele            True if a point had no geoidheight, so that ele took the place of the height
+        count, others       number of trkpt; {name of OTHER_POINTS: number}
+    """
 
     def __init__(self, path, log):
         self.path, self.log = path, log
@@ -73,11 +80,12 @@ class _Points:
         self.parser.CharacterDataHandler = self.text
 
     def taken_fixes(self):
-        """Return the fixes since the last call, and forget them."""
+        """Return the fixes since the last call, and remove them."""
         fixes, self.fixes = self.fixes, []
         return fixes
 
     def declaration(self, _version, encoding, _standalone):
+        """Store the encoding of the XML declaration."""
         self.declared = encoding or ''
 
     def encoding(self):
@@ -85,10 +93,12 @@ class _Points:
         return f' (encoding {self.declared or "UTF-8":.40})'
 
     def doctype(self, *_):
+        """Raise TableError for a document type declaration."""
         raise csv_table.TableError(f'{self.path}: line {self.parser.CurrentLineNumber}: a document type declaration: '
                                    'GPX has none')
 
     def start(self, name, attributes):
+        """Begin an element. Raises TableError for a file that is no GPX or is nested too deeply."""
         name = name.rpartition(':')[2]
         self.path_of_elements.append(name)
         if len(self.path_of_elements) > MAX_XML_DEPTH:
@@ -107,11 +117,13 @@ class _Points:
             self.others[name] += 1
 
     def text(self, text):
+        """Add a part of the text of the open element."""
         parent, name = ['', '', *self.path_of_elements][-2:]
         if name in TEXT_ELEMENTS and parent == ('trk' if name == 'name' else 'trkpt'):
             self.texts[name] = (self.texts.get(name, '') + text[:MAX_TEXT_CHARS])[:MAX_TEXT_CHARS]
 
     def end(self, name):
+        """End an element: take the name of a track, or the fix of a point."""
         name = self.path_of_elements.pop()
         if name == 'name' and self.path_of_elements[-1:] == ['trk']:
             self.track = self.texts.pop('name', '').strip() or self.track
@@ -119,6 +131,7 @@ class _Points:
             self.point()
 
     def point(self):
+        """Take the fix of the open point, or count a point without time or elevation. Raises TableError."""
         path, line, texts = self.path, self.line, self.texts
         missing = next((name for name in ('time', 'ele') if not texts.get(name, '').strip()), '')
         if missing:

@@ -1,8 +1,8 @@
-"""Instants of files: seconds since 1970 that count leap seconds. The difference of two instants is the time between
-them.
+"""Instants, the times of track files: seconds since 1970 that count leap seconds.
 
-An instant is TAI - 37 s. From 2017 on it equals the seconds since 1970 of computers, which omit leap seconds. The
-table of leap seconds is that of skyfield.
+Because leap seconds count, the difference of two instants is the time between them. An instant is TAI - 37 s. From
+2017 on it equals the seconds since 1970 of computers, which omit leap seconds. The table of leap seconds is that of
+skyfield.
 """
 import datetime
 import functools
@@ -25,10 +25,10 @@ UNIX_EPOCH_JULIAN_DATE = 2_440_587.5
 
 ISO_TIME_PATTERN = re.compile(
     r'(\d{4}-\d\d-\d\d)[T ](\d\d):(\d\d):(\d\d)(?:[.,](\d{1,9}))?(?: ?(?:Z|UTC|([+-])(\d\d):?(\d\d)))?', re.ASCII)
-
+"""Date and time of day in ISO 8601, with or without a zone."""
 
 FINE_UNIX_TIME_PATTERN = re.compile(r'[1-9](?:\d{12}|\d{15})(?:\.0*)?', re.ASCII)
-"""Milliseconds or microseconds since 1970, of the years 2001 to 2286. In seconds, such a number is no date."""
+"""Milliseconds or microseconds since 1970, of the years 2001 to 2286. Read as seconds, such a number is no date."""
 
 
 @functools.cache
@@ -65,8 +65,11 @@ def second_of_day(hours, minutes, seconds):
 
 
 def seconds(path, line, name, text):
-    """Return the instant of a text: a date, see `dates` (without a zone: UTC), or a number of seconds since 1970
-    without leap seconds, also in milliseconds (13 digits) or microseconds (16 digits). Raises TableError."""
+    """Return the instant of a text. Raises TableError.
+
+    The text is a date, see `dates` (without a zone: UTC), or a number of seconds since 1970 without leap seconds. A
+    number of 13 digits is in milliseconds, and one of 16 digits in microseconds.
+    """
     text = dates.iso(text)
     match = ISO_TIME_PATTERN.fullmatch(text)
     try:
@@ -111,8 +114,10 @@ def iso(value):
 
 
 def utc_texts(begin, passed):
-    """Return ISO 8601 to the microsecond of times: passed (n,) timedelta64[us], growing, after a datetime64[us] in
-    UTC."""
+    """Return ISO 8601 to the microsecond of times, UTC.
+
+    begin: datetime64[us], UTC; passed (n,): timedelta64[us] after begin, growing.
+    """
     times = begin + passed
     texts = np.datetime_as_string(times)
     first, last = (int(time.astype('M8[D]').astype(int)) for time in (begin, times[-1])) if len(times) else (0, 0)

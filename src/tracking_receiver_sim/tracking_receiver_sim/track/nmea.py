@@ -1,10 +1,9 @@
-"""Reader of logs of NMEA 0183: time of day, position and height from GGA, the date from RMC.
+"""Reader of logs of NMEA 0183: fixes from the sentences GGA (time of day, position, height), the date from RMC.
 
-Other sentences are passed over.
-
-The height above the ellipsoid is altitude + geoidal separation. Text before the $ of a line and behind the checksum is
-passed over: the time of a logger, a tag block, `NMEA,` and the time of Android. Cut sentences, sentences with a wrong
-checksum, and GGA without fix, time or altitude (2D) are passed over and counted.
+The reader passes over other sentences. The height above the ellipsoid is altitude + geoidal separation. Text before
+the $ of a line and behind the checksum is passed over: the time of a logger, a tag block, `NMEA,` and the time of
+Android. Cut sentences, sentences with a wrong checksum, and GGA without fix, time or altitude (2D) are passed over and
+counted.
 """
 import collections
 import contextlib
@@ -35,7 +34,7 @@ def rows(path, log):
     """Yield the fixes (line, (), time [s], latitude, longitude [deg], altitude [m]) of a log.
 
     log: fixes.Log, which receives the description of the file. The time is an instant if an RMC has a date, otherwise
-    it is since midnight. (): NMEA names no aircraft; other formats have its identities there. Raises TableError.
+    it counts from midnight. The names of the aircraft are (), because NMEA has none. Raises TableError.
     """
     first_day = _first_day(path)
     log.form, log.time_name, log.dated = 'NMEA', 'time', first_day is not None
@@ -66,8 +65,10 @@ def is_log(beginning):
 
 
 def _sentences(path, log):
-    """Yield (line, sentence) of each RMC and GGA with a fix; a GGA also has time and altitude. Count the other GGA in
-    a fixes.Log."""
+    """Yield (line, sentence) of each RMC and GGA with a fix; a GGA also has time and altitude.
+
+    The counts of damaged sentences and of other GGA go into `log`, a fixes.Log.
+    """
     types, with_checksum = collections.Counter(), False
     for line, text in _lines(path):
         if CUT_SENTENCE_PATTERN.fullmatch(text) and not text.startswith('#'):
@@ -116,8 +117,9 @@ def _lines(path):
 
 
 class _Clock:
-    """Time of consecutive sentences, which hold only the time of day. Where the time of day jumps by more than
-    half a day, midnight lies between two sentences.
+    """Time of consecutive sentences, which hold only the time of day.
+
+    Where the time of day jumps by more than half a day, midnight lies between two sentences.
 
         first   day since 1970 of the first sentence, None if it is unknown
         days    midnights since the first sentence
@@ -175,7 +177,10 @@ def _second_of_day(sentence):
 
 
 def _angle(path, line, name, text, side, sides, limit):
-    """Return the degrees of a ddmm.mm and its side, positive on the first of the sides; raises TableError."""
+    """Return the angle [deg] of a text ddmm.mm (degrees and minutes) and its side. Raises TableError.
+
+    sides: letters of the positive and of the negative side, such as NS; limit: largest angle [deg].
+    """
     value = csv_table.number(path, line, name, text, 0.0, 100.0 * limit)
     degrees, minutes = divmod(value, 100.0)
     if minutes >= 60.0 or side not in tuple(sides):

@@ -1,4 +1,4 @@
-"""Flights as CSV. The names of the columns select the layout of a file, a row of CSV_LAYOUTS.
+"""Reader of flights as CSV. The names of the columns select the layout of a file, a row of CSV_LAYOUTS.
 
     Flightradar24               Timestamp, Position ("latitude,longitude"), Altitude: in feet
     traffic (ADS-B)             timestamp, latitude, longitude, geoaltitude or altitude: in feet
@@ -15,7 +15,7 @@ from tracking_receiver_sim.track import times
 
 ALTITUDE_LIMITS_FT_IN_M = -3000.0 * columns.METRES_PER_FOOT, 500_000.0 * columns.METRES_PER_FOOT
 ALTITUDE_LIMITS_M = -1000.0, 150_000.0
-"""Ranges of altitudes of ADS-B, of files in feet and in metres [m]."""
+"""Ranges of the altitudes of ADS-B [m]: for files in feet, and for files in metres."""
 
 EMPTY_CELL_TEXTS = ('', 'nan', 'none', 'null')
 """Texts of a cell without a value, in lower case."""
@@ -37,7 +37,7 @@ class CsvLayout(typing.NamedTuple):
         altitudes                   Quantities of the altitude, the best first
         limits                      range of an altitude [m]
         adsb                        True: UTC, and cells of the needed columns may be empty
-        barometric                  number of the first barometric altitude in `altitudes`
+        barometric                  index of the first barometric altitude in `altitudes`
     """
     name: str
     time: columns.Quantity
@@ -58,6 +58,10 @@ class CsvLayout(typing.NamedTuple):
 
 
 def _named(name, default, unit=''):
+    """Return the Quantity of a column of one name.
+
+    default: unit of the values if the name states none; unit: unit in which the reader takes them, '': `default`.
+    """
     return columns.Quantity(name, {name: default}, unit or default)
 
 
@@ -105,8 +109,10 @@ def rows(path, log):
 
 
 def _layout(table):
-    """Return the layout of a Table: the first that matches, else the layout of an ADS-B log that its column of time
-    names. The error about a missing column then names the columns of that layout."""
+    """Return the layout of a Table: the first that matches, else the ADS-B layout whose time column the table has.
+
+    The error about a missing column then names the columns of that layout.
+    """
     names = [name.lower() for name in table.fieldnames]
     return next((layout for layout in CSV_LAYOUTS if layout.matches(table)), None) or next(
         (layout for layout in CSV_LAYOUTS[1:] if layout.adsb and layout.time.label in names), CSV_LAYOUTS[-1])

@@ -1,6 +1,6 @@
-"""Times in a column of a table: UTC as a date, Julian dates, or numbers in the unit of the column, from any origin.
+"""Times in a column of a track file: UTC as a date, Julian dates, or numbers from any origin.
 
-A table may also have a column of the date and one of the time of day, UTC.
+A table may also have two columns: one of the date and one of the time of day, both UTC.
 """
 from pedestal_common.graph.steps import SECONDS_PER_DAY
 from pedestal_common.text_files import columns, csv_table
@@ -12,16 +12,16 @@ TIME = columns.Quantity('time', {
                     columns.UTC),
     **dict.fromkeys(('jd', 'jdut', 'jdutc', 'jd ut', 'jd utc', 'julian date', 'julian day'), columns.JULIAN_DATE),
     **dict.fromkeys(('mjd', 'mjd ut', 'mjd utc'), columns.MODIFIED_JULIAN_DATE)}, 's')
-"""Names of the time in a table."""
+"""Names of the column of the time in a table."""
 DATE = columns.Quantity('date', dict.fromkeys(('date', 'utc date'), columns.UTC), 's')
 TIME_OF_DAY = columns.Quantity('time of day', dict.fromkeys(('time', 'utc', 'utc time'), columns.UTC), 's')
-"""Names of the date and of the time of day in a table with a column for each."""
+"""Names of the columns of the date and of the time of day, in a table with a column for each."""
 MODIFIED_JULIAN_DATE_ZERO = 2_400_000.5
 """Julian date of the modified Julian date 0."""
 JULIAN_DATE_LIMITS = 2_400_000.5, 2_536_000.0
-"""Range of Julian dates: 1858, the modified Julian date 0, until 2231."""
+"""Range of Julian dates: from 1858, the modified Julian date 0, to 2231."""
 FIRST_EXPECTED_JULIAN_DATE = 2_440_000.5
-"""Julian date of 1968. `check` takes no number below it for a date.
+"""Julian date of 1968. `check` takes no smaller number for a date.
 
 Because this date is the modified Julian date 40,000, a short file of seconds from 0 on is not refused.
 """
@@ -43,7 +43,10 @@ class Times:
     """
 
     def __init__(self, table, wanted, unit=''):
-        """wanted: columns.Quantity of the time; unit: of its values, whatever its name states. Raises TableError."""
+        """Find the column of the time. Raises TableError.
+
+        wanted: columns.Quantity of the time; unit: of its values; '': the unit that the name of the column states.
+        """
         self.table, self.date, self.dated = table, _date(table.fieldnames, wanted), None
         unit = columns.UTC if self.date else unit
         column = table.column(wanted, without=self.date)
@@ -66,6 +69,7 @@ class Times:
         return value
 
     def _seconds(self, cell):
+        """Return the time [s] of the text of a cell. Raises TableError."""
         table, column = self.table, self.column
         place = table.path, table.line_num, self.name
         if column.unit in (columns.JULIAN_DATE, columns.MODIFIED_JULIAN_DATE):
@@ -107,9 +111,9 @@ class Times:
 
 
 def _date(names, wanted):
-    """Return the name of the only column of dates beside the only column of the time of day, '' if there is none.
+    """Return the name of the only column of dates if the table also has one column of the time of day, else ''.
 
-    wanted: Quantity of the time; its names include those of DATE if a table may have both.
+    wanted: Quantity of the time; its names include those of DATE if a table may have both columns.
     """
     if not DATE.names.keys() <= wanted.names.keys():
         return ''

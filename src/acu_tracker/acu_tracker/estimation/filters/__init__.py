@@ -1,1 +1,4 @@
-"""The target filters: their laws, the filter of one axis, of both axes, and the table of filter kinds."""
+"""The target filters: Kalman laws, motion models, filters of the axes, Cartesian filter, table of filter kinds.
+
+`target_filter` is the interface for `estimation.tracker`.
+"""

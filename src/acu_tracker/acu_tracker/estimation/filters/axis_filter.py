@@ -1,14 +1,16 @@
-"""The target filter of one axis, of any kind of kinds.FILTER_KINDS.
+"""The target filter of one axis: it estimates the angle, the rate and the acceleration of the target on this axis.
 
-Each kind is a bank of motion models; a single filter is a bank of one model.
+A kind of kinds.FILTER_KINDS defines the filter. Each kind is a bank: one or more Kalman filters with different motion
+models, which run side by side.
 
-The state stays at the last accepted measurement; `predict` and `outlook` extrapolate from there.
+The state stays at the last accepted measurement; `predict` and `outlook` extrapolate from there. `predict` writes its
+result into the prior fields; `expected`, `innovation` and `correct` use these fields.
 
 The noise of the angle may be coloured by a first-order lag. The filter then uses the differences y_k - rho y_k-1,
-whose noise is white (Bryson, Henrikson 1968; kalman.update_correlated). y_k: angle of measurement k; rho: correlation
-of the noise of two successive angles.
+whose noise is white (Bryson, Henrikson 1968; kalman.update_correlated). Here y_k is the angle of measurement k, and
+rho is the correlation of the noise of two successive angles.
 
-f, c: records of FILTER_DTYPE and of CONSTANTS_DTYPE.
+f, c: records of FILTER_DTYPE and of CONSTANTS_DTYPE; j: number of a model in the bank.
 """
 import math
 
@@ -18,11 +20,11 @@ from acu_tracker.estimation.filters import constant_gain, imm, kalman, motion_mo
 from acu_tracker.estimation.filters.kalman import Gaussian, PreviousAngle, Symmetric
 from acu_tracker.estimation.filters.kinds import FILTER_KINDS
 from acu_tracker.estimation.filters.measurement import AxisInnovation, AxisMeasurement, AxisVariances
-from acu_tracker.estimation.filters.motion_models import MODEL_NAMES
+from acu_tracker.estimation.filters.motion_models import COLUMN_NAMES
 from acu_tracker.geometry.motion import AxisMotion
 from pedestal_common.compiled import compiled
 
-BANK_SIZE = len(MODEL_NAMES)
+BANK_SIZE = len(COLUMN_NAMES)
 """Largest number of models in a bank."""
 
 P11_COLUMN, P33_COLUMN = Symmetric._fields.index('p11'), Symmetric._fields.index('p33')
@@ -32,10 +34,17 @@ CONSTANTS_DTYPE = np.dtype([('count', 'i8'), ('bank', 'i8'),
                             ('models', motion_models.MOTION_MODEL_DTYPE, (BANK_SIZE,)), ('states', 'i8'),
                             ('dwell', 'f8'), ('alpha', 'f8'), ('beta', 'f8'), ('gamma', 'f8'),
                             ('rate_measurement', 'i8'), ('noise_bandwidth', 'f8')], align=True)
-"""count: number of models in use, the first of `models`; bank: number that identifies their set; states: the
-most states of any of them. `dwell`: mean time for which a model holds [s]; alpha, beta, gamma: constant gains, alpha 0
-for a Kalman filter. `rate_measurement`: 1 if measured rates are used; noise_bandwidth: bandwidth of the noise of the
-angle [rad/s], 0 for white noise."""
+"""Constants of the filter.
+
+models            parameters of the models; only the first `count` are in use
+count             number of models in use
+bank              number that identifies the set of models
+states            largest number of states of a model: 2 or 3
+dwell             mean time for which one model holds [s]
+alpha, beta, gamma  gains of a filter of constant gain [-]; alpha is 0 for a Kalman filter
+rate_measurement  1 if measured rates are used
+noise_bandwidth   bandwidth of the noise of the angle [rad/s]; 0: white noise
+"""
 
 FILTER_DTYPE = np.dtype([('bank', 'i8'), ('count', 'i8'), ('states', 'i8'), ('T', 'f8'),
                          ('x', 'f8', (BANK_SIZE, 3)), ('p', 'f8', (BANK_SIZE, 6)), ('mu', 'f8', (BANK_SIZE,)),
@@ -45,33 +54,45 @@ FILTER_DTYPE = np.dtype([('bank', 'i8'), ('count', 'i8'), ('states', 'i8'), ('T'
                          ('drift_variance_rate', 'f8')], align=True)
 """State of the filter.
 
-bank, count, states: of the constants that x, p, mu belong to. `x`, `p`, `mu`: estimate, covariance (as in
-kalman.Symmetric) and probability of each model, after the last measurement. `x_prior`, `p_prior`, `mu_prior`:
-predicted by T [s] from there. `predict` sets these; `expected`, `innovation`, `correct` use them. `last_angle`:
-the last measured angle [rad]; correlated: 1 if the noise of the next angle is correlated with that of last_angle.
-`past`: x1, p11, c1, c2, c3 of the kalman.PreviousAngle of each model, of the same prediction. `weights`: scratch.
-`drift_variance_rate`: variance per second [rad2/s] that the prediction of every model adds to that of the angle, for
-the drift of the attitude error (target.py).
+bank, count, states  values of the constants to which x, p and mu belong
+x, p, mu             estimate, covariance (as in kalman.Symmetric) and probability of each model after the last
+                     measurement
+x_prior, p_prior, mu_prior  prediction of x, p and mu by T; the prior fields
+T                    time of the prediction since the last measurement [s]
+past                 x1, p11, c1, c2, c3 of the kalman.PreviousAngle of each model, for this prediction
+last_angle           last measured angle [rad]
+correlated           1 if the noise of the next angle is correlated with that of last_angle
+drift_variance_rate  variance per second [rad2/s] that each prediction adds to the variance of the angle, for the
+                     random walk of the attitude error (estimation/target.py)
+weights              scratch
 """
 
 ESTIMATE_DTYPE = np.dtype([('angle', 'f8'), ('rate', 'f8'), ('acceleration', 'f8'), ('variance', 'f8'),
                            ('covariance', 'f8'), ('rate_variance', 'f8'), ('innovation', 'f8'),
                            ('rate_innovation', 'f8'), ('nis', 'f8'), ('mu', 'f8', (BANK_SIZE,))], align=True)
-"""Estimate of the filter [rad, rad/s, rad/s2].
+"""One row of the result of `estimates`.
 
-variance, covariance, rate_variance: variances of angle and rate, and their covariance. `innovation` [rad],
-`rate_innovation` [rad/s], `nis` (nu' S^-1 nu): NaN where nothing was measured. `mu`: probability of each of
-MODEL_NAMES, NaN if it is not in the bank.
+angle, rate, acceleration  estimate [rad, rad/s, rad/s2]
+variance, rate_variance    variances of angle and rate [rad2, rad2/s2]
+covariance                 covariance of angle and rate [rad2/s]
+innovation                 innovation of the angle [rad]
+rate_innovation            innovation of the rate [rad/s]
+nis                        normalised innovation squared [-]
+mu                         probability of each of COLUMN_NAMES; NaN for a model that is not in the bank
+
+The innovations and nis are NaN if nothing was measured.
 """
 
 
 def constants(params, noise_bandwidth=0.0) -> np.ndarray:
-    """Return the constants (1,) of FilterParameters; noise_bandwidth [Hz]:
-    of the noise of the measured angle, 0 for white noise."""
+    """Return the constants (1,) of FilterParameters.
+
+    noise_bandwidth: bandwidth of the noise of the measured angle [Hz]; 0: white noise.
+    """
     c, bank = np.zeros(1, CONSTANTS_DTYPE), FILTER_KINDS[params.kind].bank(params)
     c['count'] = len(bank.models)
     c['models'][0, :len(bank.models)] = bank.models
-    c['bank'], c['states'] = np.sum(1 << bank.models['kind']), bank.models['states'].max()
+    c['bank'], c['states'] = np.sum(1 << bank.models['column']), bank.models['states'].max()
     c['dwell'], (c['alpha'], c['beta'], c['gamma']) = bank.dwell, bank.gains
     c['rate_measurement'], c['noise_bandwidth'] = params.rate_measurement, 2.0 * math.pi * noise_bandwidth
     return c
@@ -79,7 +100,7 @@ def constants(params, noise_bandwidth=0.0) -> np.ndarray:
 
 @compiled
 def _put(x, p, j, g):
-    """Set row j of x (n, 3), p (n, 6) to a Gaussian."""
+    """Write a Gaussian g to row j of x (n, 3) and of p (n, 6)."""
     x[j, 0], x[j, 1], x[j, 2] = g.x
     P = g.P
     p[j, 0], p[j, 1], p[j, 2], p[j, 3], p[j, 4], p[j, 5] = P.p11, P.p12, P.p13, P.p22, P.p23, P.p33
@@ -99,7 +120,7 @@ def _previous_angle(row):
 
 @compiled
 def _fill(f, c, g):
-    """Give every model of the constants the same Gaussian and probability."""
+    """Give every model in use the Gaussian g and equal probability."""
     f.bank, f.count, f.states = c.bank, c.count, c.states
     for j in range(c.count):
         f.mu[j] = 1.0 / c.count
@@ -107,37 +128,41 @@ def _fill(f, c, g):
 
 
 @compiled
-def _reset_acceleration_variance(f, c, rate_sigma):
-    """Set the variance of the acceleration to that at the start."""
+def _reset_acceleration_variance(f, c):
+    """Set the variance of the acceleration of every model to that at its start."""
     for j in range(c.count):
-        f.p[j, P33_COLUMN] = motion_models.initial_variance(c.models[j], rate_sigma)
+        f.p[j, P33_COLUMN] = c.models[j].initial_sigma * c.models[j].initial_sigma
 
 
 @compiled
 def start(f, c, y, R, rate_sigma):
-    """Start at a measured angle y [rad] of variance R; rate_sigma: standard deviation of the unknown rate [rad/s]."""
+    """Start at a measured angle y [rad] of variance R [rad2].
+
+    rate_sigma: standard deviation of the unknown rate [rad/s].
+    """
     _fill(f, c, Gaussian(AxisMotion(y, 0.0, 0.0), Symmetric(R, 0.0, 0.0, rate_sigma * rate_sigma, 0.0, 0.0)))
-    _reset_acceleration_variance(f, c, rate_sigma)
+    _reset_acceleration_variance(f, c)
     f.last_angle, f.correlated = y, 1
 
 
 @compiled
-def transfer(f, c, rate_sigma):
+def transfer(f, c):
     """If the bank has changed, start its models from the combined estimate and covariance of the old bank.
 
-    An acceleration that the old bank did not estimate gets the variance of a `start` with rate_sigma [rad/s].
+    An acceleration that the old bank did not estimate gets the variance of a `start`.
     """
     if f.bank != c.bank:
         unknown = f.states == 2
-        _fill(f, c, imm.combine(f.mu, f.x, f.p, f.count))
+        _fill(f, c, corrected(f))
         if unknown:
-            _reset_acceleration_variance(f, c, rate_sigma)
+            _reset_acceleration_variance(f, c)
 
 
 @compiled
 def move(f, c, motion):
     """Shift the models so that together they estimate this AxisMotion; their covariances stay.
 
+    Because the last measured angle belongs to the old frame, the noise of the next angle counts as uncorrelated.
     Models without an acceleration state ignore the acceleration.
     """
     x = outlook(f, c, 0.0)
@@ -150,8 +175,31 @@ def move(f, c, motion):
 
 
 @compiled
+def blend(f, c, own, share, other):
+    """Set the covariance of every model to `own` of itself plus `share` of `other`, a Symmetric.
+
+    Of a model without an acceleration state only angle and rate have a covariance.
+    """
+    for j in range(c.count):
+        P = f.p[j]
+        P[0] = own * P[0] + share * other.p11
+        P[1] = own * P[1] + share * other.p12
+        P[3] = own * P[3] + share * other.p22
+        if c.models[j].states > 2:
+            P[2] = own * P[2] + share * other.p13
+            P[4] = own * P[4] + share * other.p23
+            P[5] = own * P[5] + share * other.p33
+
+
+@compiled
+def corrected(f):
+    """Return the Gaussian of the bank at the last measurement."""
+    return imm.combine(f.mu, f.x, f.p, f.count)
+
+
+@compiled
 def predict(f, c, T):
-    """Predict the bank to T [s] >= 0 after its last measurement, into the prior fields; the state itself stays."""
+    """Predict the bank to T [s] >= 0 after its last measurement; only the prior fields change."""
     f.T = T
     stay, switch = imm.switching(T, c.dwell, c.count)
     for j in range(c.count):
@@ -170,7 +218,7 @@ def predict(f, c, T):
 
 @compiled
 def expected(f):
-    """Return the Gaussian of the prediction: mean and covariance of the bank."""
+    """Return the Gaussian of the prediction: mean and covariance of the whole bank."""
     return imm.combine(f.mu_prior, f.x_prior, f.p_prior, f.count)
 
 
@@ -188,18 +236,20 @@ def variances(g):
 
 @compiled
 def _correlation(f, c):
-    """Return rho, the correlation of the noise of a measurement now with that of the last one, for noise through a
-    first-order lag; 0 for white noise."""
+    """Return rho, the correlation of the noise of the present angle with that of the last angle; 0 for white noise."""
     return math.exp(-c.noise_bandwidth * f.T) if c.noise_bandwidth > 0.0 and f.correlated else 0.0
 
 
 @compiled
 def innovation(f, c, m):
-    """Return the AxisInnovation of an AxisMeasurement against the prediction; y_k - rho y_k-1 replaces the angle."""
+    """Return the AxisInnovation of an AxisMeasurement m against the prediction.
+
+    The innovation of the angle is that of the difference y_k - rho y_k-1; see the module.
+    """
     rho = _correlation(f, c)
     x, P = expected(f)
-    # u, U: mean and variance of the predicted difference y_k - rho y_k-1; p12: its covariance with the rate. d1, d2:
-    # distances of a model from the means.
+    # u, U: mean and variance of the predicted difference y_k - rho y_k-1, without the noise of the angle; p12: its
+    # covariance with the rate. w: probability of a model; d1, d2: differences between the model and the means.
     u = U = p12 = 0.0
     for j in range(c.count):
         u += f.mu_prior[j] * (f.x_prior[j, 0] - rho * _previous_angle(f.past[j]).x1)
@@ -216,17 +266,17 @@ def innovation(f, c, m):
 
 @compiled
 def correct(f, c, m):
-    """Correct the prediction with an AxisMeasurement."""
+    """Correct the prediction with an AxisMeasurement m; the result becomes the state."""
     rho = _correlation(f, c)
-    # The part of the noise that is not correlated with the last angle.
+    # own: variance of the part of the noise that is not correlated with the last angle.
     own = (1.0 - rho * rho) * m.variance
     for j in range(c.count):
         g, o = _gaussian(f.x_prior[j], f.p_prior[j]), _previous_angle(f.past[j])
         nu = m.angle - rho * f.last_angle - (g.x.angle - rho * o.x1)
         S = g.P.p11 - 2.0 * rho * o.c1 + rho * rho * o.p11 + own
         f.weights[j] = kalman.log_likelihood(nu, S)
-        # Constant gains are used where the Kalman gain p11 / S is below alpha. After a start or a gap the Kalman gain
-        # is larger, and is used.
+        # A filter of constant gain uses alpha only where the Kalman gain p11 / S is below alpha. After a start or a
+        # gap the Kalman gain is larger, and is used.
         if g.P.p11 < c.alpha * S:
             g = kalman.update_with_gain(g, nu, m.variance, constant_gain.gain(c.alpha, c.beta, c.gamma, f.T))
         elif rho > 0.0:
@@ -244,7 +294,10 @@ def correct(f, c, m):
 
 @compiled
 def outlook(f, c, T):
-    """Return the AxisMotion that `predict` expects T [s] >= 0 after the last measurement; the prior fields stay."""
+    """Return the AxisMotion that `predict` would give for T [s] >= 0 after the last measurement.
+
+    The prior fields do not change. Because no covariance is computed, this is faster than `predict`.
+    """
     angle = rate = acceleration = 0.0
     stay, switch = imm.switching(T, c.dwell, c.count)
     for j in range(c.count):
@@ -258,19 +311,25 @@ def outlook(f, c, T):
 
 @compiled
 def probabilities(f, c, mu):
-    """Set mu (BANK_SIZE,) to the probability of each of MODEL_NAMES, NaN if it is not in the bank."""
+    """Set mu (BANK_SIZE,) to the probability of each of COLUMN_NAMES, NaN if it is not in the bank."""
     mu[:] = math.nan
     for j in range(c.count):
-        mu[c.models[j].kind] = f.mu[j]
+        mu[c.models[j].column] = f.mu[j]
 
 
 @compiled
 def estimates(c, t, y, R, y_rate, R_rate, initial_rate, out):
-    """Filter arrays (n,): stamps t [s], angles y [rad] and variances R, rates y_rate [rad/s] and variances R_rate.
+    """Filter whole arrays (n,) of measurements, for tests and studies.
 
-    c: (1,) of CONSTANTS_DTYPE. out (n,) of ESTIMATE_DTYPE: row k after measurement k. The filter starts at the first
-    angle; earlier rows are NaN. It ignores an angle that is NaN or whose stamp does not advance; that row is the
-    outlook from the last accepted angle.
+    c                (1,) of CONSTANTS_DTYPE
+    t                stamps [s]
+    y, R             angles [rad] and their variances [rad2]
+    y_rate, R_rate   rates [rad/s] and their variances [rad2/s2]
+    initial_rate     standard deviation of the rate at the start [rad/s]
+    out              (n,) of ESTIMATE_DTYPE; row k is the estimate after measurement k
+
+    The filter starts at the first angle; earlier rows are NaN. The filter ignores an angle that is NaN or whose stamp
+    does not advance. The row of such an angle is the prediction from the last accepted angle.
     """
     state = np.zeros(1, FILTER_DTYPE)
     f, model = state[0], c[0]

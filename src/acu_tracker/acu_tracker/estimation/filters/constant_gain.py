@@ -1,10 +1,13 @@
-"""Filters of constant gain: X += (alpha, beta / T, gamma / (2 T^2)) nu, predicted at constant rate or acceleration.
+"""Filters of constant gain, the alpha-beta and the alpha-beta-gamma filter: their gains.
 
-    X    estimate of angle, rate and acceleration; its gains in parentheses are k1, k2, k3 of `gain`
+    X += (alpha, beta / T, gamma / (2 T^2)) nu
+
+    X    estimate of angle, rate and acceleration, predicted at constant rate or constant acceleration
     nu   innovation of the angle [rad]
     T    time between measurements [s]
 
-The gain alpha determines beta and gamma, by the relation of Benedict and Bordner or by that of Kalata.
+The gain alpha [-] determines beta and gamma [-]. The alpha-beta filter uses the relation of Benedict and Bordner, the
+alpha-beta-gamma filter that of Kalata.
 """
 import math
 
@@ -13,7 +16,7 @@ from pedestal_common.compiled import compiled
 
 @compiled
 def benedict_bordner(alpha):
-    """Return beta of the alpha-beta filter with the best compromise of noise and ramp transient
+    """Return beta of the alpha-beta filter with the best compromise between noise and the transient after a ramp
     (Benedict, Bordner 1962)."""
     return alpha * alpha / (2.0 - alpha)
 
@@ -28,5 +31,5 @@ def kalata(alpha):
 
 @compiled
 def gain(alpha, beta, gamma, T):
-    """Return (k1 [-], k2 [1/s], k3 [1/s2]) over T [s]."""
+    """Return (k1 [-], k2 [1/s], k3 [1/s2]), the gains on angle, rate and acceleration for measurements T [s] apart."""
     return (alpha, beta / T, gamma / (2.0 * T * T))

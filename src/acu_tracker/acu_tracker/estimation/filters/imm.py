@@ -1,11 +1,19 @@
-"""Interacting multiple models: a bank of filters, each weighted by its probability (Blom, Bar-Shalom 1988).
+"""Interacting multiple models (IMM): probabilities and mixing of a bank of filters (Blom, Bar-Shalom 1988).
 
-Paper 003, eq. 5 to 11, with two corrections. The mixing before the prediction is added. In eq. 11 the weights are the
-probabilities, and the spread of the models is added. In the printed equation the second factor has the
-reversed sign, which would subtract the spread. Probabilities are weighted by logarithms of likelihoods, so that even a
-measurement far from all models ranks them.
+Each filter of the bank has another motion model. Before a prediction the estimates of the filters are mixed. After a
+measurement the likelihood of the measurement changes the probability of each model. The estimate of the bank is the
+mean of all filters, weighted with these probabilities. `axis_filter` and `unscented` use this module.
 
-mu (n,): probabilities of the models; cbar_j: probability of model j before the measurement.
+The equations are those of paper 003, eq. 5 to 11, with two corrections. The paper omits the mixing before the
+prediction. In its eq. 11 the second factor has a reversed sign, which would subtract the spread of the models. Here
+the weights in eq. 11 are the probabilities, and the spread is added.
+
+The likelihoods are kept as logarithms. Therefore even a measurement far from all models ranks the models.
+
+mu      probabilities (n,) of the models [-]
+cbar_j  probability of model j before the measurement [-]
+count   number n of models in use
+x, p    estimates (n, 3) of the models, and covariances (n, 6) as in kalman.Symmetric
 """
 import math
 
@@ -16,11 +24,14 @@ from pedestal_common.compiled import compiled, inlined
 
 @compiled
 def switching(T, dwell, count):
-    """Return (stay, switch): probabilities that a model still holds after T [s],
-    and that a given other model has replaced it.
+    """Return (stay, switch), the probabilities of a change of model within T [s].
 
-    A chain in continuous time leaves a model after `dwell` [s] on average, and each other model follows with equal
-    probability: near exp(-T / dwell) for short T, 1 / count for long T.
+    stay    probability that the same model holds after T
+    switch  probability that a given other model holds after T
+    dwell   mean time for which one model holds [s]
+
+    The models form a Markov chain in continuous time. After one model each other model follows with equal probability.
+    The probability `stay` is near exp(-T / dwell) for short T, and near 1 / count for long T.
     """
     if count == 1:
         return 1.0, 0.0
@@ -30,10 +41,9 @@ def switching(T, dwell, count):
 
 @inlined
 def mix(mu, count, stay, switch, j, weights):
-    """Set weights[i] to the probability that model i held before, given that j holds now; return cbar_j, the
-    probability of j now.
+    """Set weights[i] to the probability that model i held before, if model j holds now. Return cbar_j.
 
-    A model that cannot hold now (just after a measurement that excluded it) keeps its own state.
+    stay, switch: result of `switching`. If cbar_j is 0, model j gets the weight 1 and so keeps its own state.
     """
     total = 0.0
     for i in range(count):
@@ -49,8 +59,8 @@ def mix(mu, count, stay, switch, j, weights):
 
 @inlined
 def alone(x, p, j):
-    """Return what `combine` returns for model j alone; only the sign of a zero may differ."""
-    # 0.0 + turns -0.0 into 0.0, as the sum of `combine` does.
+    """Return the Gaussian of model j alone, equal to that of `combine` with the weight 1 for this model."""
+    # Adding 0.0 turns -0.0 into 0.0, as the sum in `combine` does.
     return Gaussian(AxisMotion(0.0 + x[j, 0], 0.0 + x[j, 1], 0.0 + x[j, 2]),
                     Symmetric(0.0 + p[j, 0], 0.0 + p[j, 1], 0.0 + p[j, 2], 0.0 + p[j, 3], 0.0 + p[j, 4],
                               0.0 + p[j, 5]))
@@ -58,7 +68,7 @@ def alone(x, p, j):
 
 @inlined
 def mean(weights, x, count):
-    """Return the AxisMotion that is the mean of the weighted models (eq. 10); x (n, 3)."""
+    """Return the mean of the weighted models (eq. 10), an AxisMotion."""
     x1 = x2 = x3 = 0.0
     for i in range(count):
         x1 += weights[i] * x[i, 0]
@@ -69,8 +79,7 @@ def mean(weights, x, count):
 
 @inlined
 def combine(weights, x, p, count):
-    """Return the Gaussian with mean and covariance of the weighted models (eq. 10, 11);
-    x (n, 3), p (n, 6) as in Symmetric."""
+    """Return the Gaussian with the mean and the covariance of the weighted models (eq. 10, 11)."""
     x1, x2, x3 = mean(weights, x, count)
     p11 = p12 = p13 = p22 = p23 = p33 = 0.0
     for i in range(count):
@@ -86,9 +95,11 @@ def combine(weights, x, p, count):
 
 @compiled
 def weigh(mu_prior, log_likelihoods, count, mu):
-    """Set mu[j] to the probability of model j after the measurement (eq. 9),
-    from the logarithms of its likelihoods."""
-    # The largest logarithm is subtracted. This avoids that all exponentials are 0.
+    """Set mu[j] to the probability of model j after the measurement (eq. 9).
+
+    mu_prior: probabilities before the measurement; log_likelihoods: logarithm of the likelihood of each model.
+    """
+    # The largest logarithm is subtracted. Otherwise all exponentials might underflow to 0.
     best = -math.inf
     for j in range(count):
         mu[j] = math.log(mu_prior[j]) + log_likelihoods[j]

@@ -1,4 +1,7 @@
-"""The table of filter kinds: each row defines the bank of motion models of an axis."""
+"""The table of filter kinds, which the parameter acu.AXIS.filter.kind selects.
+
+Each row defines the bank: the motion models of the filter of one axis, and its gains.
+"""
 import functools
 import typing
 
@@ -8,12 +11,17 @@ from acu_tracker.estimation.filters import constant_gain, motion_models
 from acu_tracker.estimation.filters.motion_models import MODEL_NAMES, MODEL_ROWS
 from pedestal_common.parameters import ParameterError
 
+UNKNOWN_ACCELERATION_RAD_S2 = 1e3
+"""Standard deviation of the acceleration at the start of a filter of constant gains: none is assumed, and the filter
+starts as a least-squares fit."""
+
 
 class Bank(typing.NamedTuple):
-    """The motion models of an axis.
+    """The motion models of the filter of one axis.
 
-    models (count,): records of motion_models.MOTION_MODEL_DTYPE; dwell: mean time for which one of several models
-    holds [s]; gains: alpha, beta, gamma [-] of a filter of constant gains, alpha 0 for a Kalman filter.
+    models  (count,) of motion_models.MOTION_MODEL_DTYPE
+    dwell   mean time for which one of several models holds [s]
+    gains   alpha, beta, gamma of a filter of constant gain [-]; alpha is 0 for a Kalman filter
     """
     models: np.ndarray
     dwell: float = 0.0
@@ -21,8 +29,12 @@ class Bank(typing.NamedTuple):
 
 
 class Kind(typing.NamedTuple):
-    """A row of FILTER_KINDS. doc: its meaning; bank: function of FilterParameters that returns the Bank of an axis;
-    cartesian: True if the Cartesian filter is used as well."""
+    """A row of FILTER_KINDS.
+
+    doc        meaning of the kind
+    bank       function of FilterParameters that returns the Bank of an axis
+    cartesian  True if the Cartesian filter is used as well
+    """
     doc: str
     bank: typing.Callable
     cartesian: bool = False
@@ -36,7 +48,8 @@ def _bank_of_alpha_beta(params):
 
 def _bank_of_alpha_beta_gamma(params):
     alpha = params.alpha_beta_gamma.alpha
-    return Bank(motion_models.constants('ca', params.ca, noise=0.0), gains=(alpha, *constant_gain.kalata(alpha)))
+    return Bank(motion_models.constants('ca', params.ca, noise=0.0, initial_sigma=UNKNOWN_ACCELERATION_RAD_S2),
+                gains=(alpha, *constant_gain.kalata(alpha)))
 
 
 def _bank_of_one(name, params):
@@ -44,8 +57,10 @@ def _bank_of_one(name, params):
 
 
 def _bank_of_several(params):
-    models = [motion_models.constants(name, getattr(params.imm, name)) for name in named_models(params.imm.models)]
-    return Bank(np.concatenate(models), params.imm.dwell)
+    imm = params.imm
+    models = [motion_models.ladder(imm.ca, imm.rungs, imm.rung_ratio) if name == 'ca'
+              else motion_models.constants(name, getattr(imm, name)) for name in named_models(imm.models)]
+    return Bank(np.concatenate(models), imm.dwell)
 
 
 FILTER_KINDS = {
@@ -60,7 +75,10 @@ FILTER_KINDS = {
 
 
 def named_models(names) -> tuple:
-    """Return the names of the models in a text such as 'cv ca', in the order of MODEL_NAMES. Raises ParameterError."""
+    """Return the names of the models in a text such as 'cv ca', in the order of MODEL_NAMES.
+
+    Raise ParameterError for a wrong text.
+    """
     models = names.split()
     if not (2 <= len(models) == len(set(models)) and set(models) <= set(MODEL_NAMES)):
         raise ParameterError(f"models = '{names}': must be two or more of {', '.join(MODEL_NAMES)}, each once")

@@ -1,6 +1,7 @@
-"""Inputs and outputs of a target filter: measurement, innovation, estimate. Index 0 is azimuth, 1 elevation.
+"""Inputs and outputs of a target filter: measurement, innovation, estimate.
 
-nu, S: innovation and its variance, or its covariance for several numbers.
+The angles are those of the frame of the filter. In each pair of axes index 0 is azimuth, index 1 elevation. nu, S:
+innovation and its variance, or its covariance for several numbers.
 """
 import math
 from collections import namedtuple
@@ -9,23 +10,30 @@ from pedestal_common.compiled import compiled
 from pedestal_common.geometry.line_of_sight import wrap
 
 AxisMeasurement = namedtuple('AxisMeasurement', 'angle variance rate rate_variance')
-"""Measured angle [rad] and rate [rad/s] of one axis with their variances; the rate is NaN if it was not measured."""
+"""Measured angle [rad] and rate [rad/s] of the target on one axis, and their variances; rate NaN: not measured."""
 
 Measurement = namedtuple('Measurement', 'stamp axis range range_variance')
-"""stamp [s]; axis: the AxisMeasurement of both; range [m] and its variance, NaN if it was not measured."""
+"""Measurement of the target at one instant.
+
+stamp                  time of the measurement [s]
+axis                   AxisMeasurement of both axes
+range, range_variance  range [m], NaN if it was not measured, and its variance [m2]
+"""
 
 AxisInnovation = namedtuple('AxisInnovation', 'nu S chi_square rate rate_chi_square')
 """Innovation of an axis.
 
-    nu                 innovation of the angle [rad]; S: its variance; chi_square = nu^2 / S
-    rate               innovation of the rate [rad/s], NaN where none was used
-    rate_chi_square    NIS of angle and rate together, minus chi_square
+    nu, S              innovation of the angle [rad] and its variance [rad2]
+    chi_square         nu^2 / S: normalised innovation squared (NIS) of the angle [-]
+    rate               innovation of the rate [rad/s]; NaN if no rate was used
+    rate_chi_square    NIS of angle and rate together, minus chi_square [-]
 
 Both chi_square and rate_chi_square follow a chi-square distribution of one degree of freedom.
 """
 
 Innovation = namedtuple('Innovation', 'axis range_nu range_S')
-"""axis: the AxisInnovation of both; range_nu [m] and its variance range_S; NaN where nothing was compared."""
+"""axis: AxisInnovation of both axes; range_nu, range_S: innovation of the range [m] and its variance [m2]. A number is
+NaN if there was no measurement or no prediction of it."""
 
 AxisVariances = namedtuple('AxisVariances', 'p11 p12 p22')
 """p11, p12, p22: variance of the angle [rad2], its covariance with the rate, variance of the rate [rad2/s2]."""
@@ -35,15 +43,16 @@ Estimate = namedtuple('Estimate', 'motion variances')
 
 _NONE = AxisInnovation(math.nan, math.nan, math.nan, math.nan, math.nan)
 NO_INNOVATION = Innovation((_NONE, _NONE), math.nan, math.nan)
-"""Innovation where nothing was compared."""
+"""Innovation of a measurement without a prediction."""
 
 
 @compiled
 def error_variance(cross_elevation, elevation, cn0_dbhz, receiver):
     """Return the variance [rad2] of a receiver error (cross_elevation, elevation) [rad] at a C/N0 [dB-Hz].
 
-    It is the sum of a floor and of thermal noise, which grows with the distance from the beam's axis. receiver: record
-    of ReceiverModelParameters, with its integration [s] and its sigma_floor [rad].
+    receiver: record of ReceiverModelParameters; integration in s, sigma_floor in rad.
+
+    The variance is the sum of a floor and of thermal noise, which grows with the distance from the axis of the beam.
     """
     # slope [1/rad]: monopulse slope; offset [-]: difference over sum of the receiver at this error. With equal and
     # independent noise in both channels, this ratio has the variance (1 + offset^2) / (2 C/N0 integration) to first
@@ -56,14 +65,14 @@ def error_variance(cross_elevation, elevation, cn0_dbhz, receiver):
 
 @compiled
 def attitude_variances(verticals, tilt, heading):
-    """Return the variances (across, along) of a direction that follow from the variances of the
-    attitude, in their unit.
+    """Return (variance across, variance along) of a measured direction that errors of the attitude cause.
 
-        across, along    unit vectors at a right angle to the direction: that of growing azimuth, of growing elevation
-        verticals        their components along the earth's vertical, see estimate_frame.verticals
-        tilt, heading    variance of the attitude about every horizontal axis, and about the vertical
+        across, along    unit vectors at a right angle to the direction: towards growing azimuth, growing elevation
+        verticals        components of across and of along on the earth's vertical, from estimate_frame.verticals
+        tilt, heading    variances of the attitude about each horizontal axis, and about the vertical
 
-    A turn about `along` moves the direction across, and a turn about `across` moves it along.
+    The result has the unit of tilt and heading. A turn about `along` moves the direction across, and a turn about
+    `across` moves it along.
     """
     across, along = verticals
     return tilt + along * along * (heading - tilt), tilt + across * across * (heading - tilt)
@@ -85,6 +94,6 @@ def with_rate(a, rate):
 
 @compiled
 def nis(i):
-    """Return the normalised innovation squared of an AxisInnovation: of the angle, and of the rate if it was used."""
+    """Return the normalised innovation squared of an AxisInnovation i: of the angle, plus the rate if it was used."""
     # The comparison of a rate with itself is False for NaN.
     return i.chi_square + i.rate_chi_square if i.rate == i.rate else i.chi_square

@@ -1,11 +1,16 @@
-"""The target filter in use: the filters of the axes, or the Cartesian filter if the kind has it
-and a range is measured.
+"""The target filter: it holds the filters of both axes and the Cartesian filter, and selects which of them is used.
 
-The Cartesian filter starts from the estimate of the axes' filters, at a measured range whose standard deviation is at
-most ukf.range_share of it. An axis uses the Cartesian filter once its standard deviation of the rate is at most half
-of that of the axis's own filter. This margin avoids a hand-over that gains little. The axes' filters keep running
-beside the Cartesian filter. The Cartesian filter stops when the standard deviation of its own range exceeds the same
-share. The axes' filters then continue from its estimate. Measured rates go to the axes' filters only.
+The filters of the axes (`axes_filter`) always run. The Cartesian filter (`unscented`) runs if the kind of the filter
+is imm_ukf and the receiver measures the range:
+
+1. The Cartesian filter starts from the estimate of the axis filters, when the standard deviation of a measured range
+   is at most ukf.range_share of the range.
+2. An axis uses the Cartesian filter once this filter knows the rate with at most half the standard deviation of the
+   axis filter. This margin avoids a hand-over that gains little.
+3. The Cartesian filter stops when the standard deviation of its own range exceeds ukf.range_share of the range. The
+   axis filters then continue from its estimate.
+
+Measured rates go to the axis filters only. The prior fields of a filter hold its prediction.
 
 f, c: records of FILTER_DTYPE and of CONSTANTS_DTYPE; m: a Measurement.
 """
@@ -22,17 +27,33 @@ from pedestal_common.geometry.line_of_sight import wrap
 
 CONSTANTS_DTYPE = np.dtype([('axis', axis_filter.CONSTANTS_DTYPE, (2,)), ('cartesian', unscented.CONSTANTS_DTYPE),
                             ('range_share_2', 'f8'), ('wanted', 'i8', (2,))], align=True)
-"""range_share_2: square of ukf.range_share; wanted: 1 for an axis of a kind that uses the Cartesian filter."""
+"""Constants of the filter.
+
+axis, cartesian  constants of the axis filters and of the Cartesian filter
+range_share_2    square of ukf.range_share [-]
+wanted           of each axis: 1 if its kind uses the Cartesian filter
+"""
 
 FILTER_DTYPE = np.dtype([('axis', axis_filter.FILTER_DTYPE, (2,)), ('cartesian', unscented.STATE_DTYPE),
                          ('running', 'i8'), ('used', 'i8', (2,)), ('predicted', 'f8')], align=True)
-"""running: 1 while the Cartesian filter runs; used: 1 for an axis that takes its estimate. `predicted`: time [s] by
-which the prior fields are predicted from the present estimate, NaN if they belong to an older one."""
+"""State of the filter.
+
+axis, cartesian  states of the axis filters and of the Cartesian filter
+running          1 while the Cartesian filter runs
+used             of each axis: 1 if the estimate of the Cartesian filter is used
+predicted        time by which the prior fields are predicted from the present estimate [s]; NaN if they belong to an
+                 earlier estimate
+"""
 
 
 def constants(ukf, axes, noise_bandwidth) -> np.ndarray:
-    """Return the constants (1,) of UkfParameters and the FilterParameters of both axes; noise_bandwidth [Hz]: of the
-    noise of the measured angles, 0 for white noise. The Cartesian filter always assumes white noise."""
+    """Return the constants (1,).
+
+    ukf              UkfParameters
+    axes             FilterParameters of both axes
+    noise_bandwidth  bandwidth of the noise of the measured angles [Hz]; 0: white noise. The Cartesian filter always
+                     assumes white noise
+    """
     c = np.zeros(1, CONSTANTS_DTYPE)
     c['axis'] = np.concatenate([axis_filter.constants(params, noise_bandwidth) for params in axes])
     c['cartesian'], c['range_share_2'] = unscented.constants(ukf), ukf.range_share**2
@@ -50,16 +71,19 @@ def start(f, c, m, rate_sigma):
 
 @compiled
 def walk(f, azimuth, elevation):
-    """Set the variances per second [rad2/s] by which the error of the measured angles walks at random from now on.
+    """Set the random walk of the error of the measured azimuth and elevation: variances per second [rad2/s].
 
-    This is the slowly changing error of an INS. The Cartesian filter neglects it.
+    An INS with a slowly changing error causes this walk. The Cartesian filter neglects it.
     """
     f.axis[0].drift_variance_rate, f.axis[1].drift_variance_rate = azimuth, elevation
 
 
 @compiled
 def predict(f, c, T):
-    """Predict by T [s] >= 0 from the last measurement into the prior fields; a repeated call costs nothing."""
+    """Predict by T [s] >= 0 from the last measurement; the result is in the prior fields.
+
+    A repeated call with the same T does nothing.
+    """
     if f.predicted == T:
         return
     f.predicted = T
@@ -70,14 +94,16 @@ def predict(f, c, T):
 
 @compiled
 def axes_azimuth(f):
-    """Return the azimuth [rad] that the axis's own filter predicted; measured azimuths are unwrapped to it."""
+    """Return the azimuth [rad] that the axis filter predicted; measured azimuths are put on the wrap nearest to it."""
     return axis_filter.expected_motion(f.axis[0]).angle
 
 
 @compiled
 def innovation(f, c, m):
-    """Return the Innovation of a Measurement against the prediction;
-    rate_chi_square is always that of the axis's filter."""
+    """Return the Innovation of a Measurement against the prediction.
+
+    rate_chi_square is always that of the axis filter.
+    """
     axes = axes_filter.innovation(f.axis, c.axis, m)
     if not f.running:
         return axes
@@ -89,7 +115,7 @@ def innovation(f, c, m):
 
 @compiled
 def _chosen_innovation(used, own, cartesian):
-    """Return the AxisInnovation of the Cartesian filter if it is used, otherwise that of the axis's own filter."""
+    """Return the AxisInnovation of the Cartesian filter if it is used, otherwise that of the axis filter (own)."""
     if not used:
         return own
     # The NaN is the innovation of the rate, because the Cartesian filter uses no measured rate.
@@ -98,7 +124,7 @@ def _chosen_innovation(used, own, cartesian):
 
 @compiled
 def correct(f, c, m):
-    """Correct the prediction with the Measurement that `innovation` was called with."""
+    """Correct the prediction with a Measurement; `innovation` must have been called with it before."""
     axes_filter.correct(f.axis, c.axis, m)
     if f.running:
         unscented.correct(f.cartesian, m)
@@ -107,7 +133,7 @@ def correct(f, c, m):
 
 @compiled
 def expected(f):
-    """Return the Motion at the instant of the last `predict`; the azimuth on the wrap of the axis's filter."""
+    """Return the Motion at the instant of the last `predict`; its azimuth is on the wrap of the axis filter."""
     axes = axes_filter.expected(f.axis)
     if not (f.used[0] or f.used[1]):
         return axes
@@ -120,8 +146,10 @@ def expected(f):
 
 @compiled
 def outlook(f, c, T):
-    """Return the Motion T [s] >= 0 after the last measurement:
-    `expected` after `predict`, which is omitted where possible."""
+    """Return the predicted Motion T [s] >= 0 after the last measurement.
+
+    The result equals that of `expected` after `predict`. If only the axis filters are used, no covariance is computed.
+    """
     if f.predicted == T or f.used[0] or f.used[1]:
         predict(f, c, T)
         return expected(f)
@@ -140,7 +168,7 @@ def read(f):
 
 @compiled
 def probabilities(f, c, mu):
-    """Set mu (2, BANK_SIZE) to the probability of each of MODEL_NAMES on both axes, NaN if it is not in the filter."""
+    """Set mu (2, BANK_SIZE) to the probability of each of COLUMN_NAMES on both axes, NaN if not in the filter."""
     for i in range(2):
         axis_filter.probabilities(f.axis[i], c.axis[i], mu[i])
         if f.used[i]:
@@ -149,7 +177,7 @@ def probabilities(f, c, mu):
 
 @compiled
 def usable(c, m):
-    """Return the Measurement without the rates that the kinds do not use, and without a range that is not valid."""
+    """Return the Measurement without the rates that the axis filters do not use, and without an invalid range."""
     azimuth = with_rate(m.axis[0], m.axis[0].rate if c.axis[0].rate_measurement else math.nan)
     elevation = with_rate(m.axis[1], m.axis[1].rate if c.axis[1].rate_measurement else math.nan)
     ranged = m.range > 0.0 and m.range_variance > 0.0
@@ -173,8 +201,7 @@ def select(f, c, m):
 
 @compiled
 def _use_cartesian(f, c):
-    """Use the Cartesian estimate for the axes of such a kind once its standard deviation of the rate
-    is half of the axis's."""
+    """Use the Cartesian filter on each axis that wants it, once it knows the rate twice as well as the axis filter."""
     if (f.used[0] or not c.wanted[0]) and (f.used[1] or not c.wanted[1]):
         return
     predict(f, c, 0.0)
@@ -186,8 +213,10 @@ def _use_cartesian(f, c):
 
 @compiled
 def _leave_cartesian(f, c, azimuth, elevation):
-    """Move the filters of these axes (azimuth, elevation: 1 for yes) to the Cartesian estimate, unless it is NaN, and
-    stop using it."""
+    """Stop using the Cartesian filter on the axes whose argument is 1; their axis filters continue from its estimate.
+
+    An estimate that is not finite is not taken over.
+    """
     if not (azimuth or elevation):
         return
     predict(f, c, 0.0)
@@ -201,25 +230,25 @@ def _leave_cartesian(f, c, azimuth, elevation):
 
 
 @compiled
-def transfer(f, c, rate_sigma, running):
-    """Adopt constants that may have changed: a filter of another kind continues from the estimate of the old one.
+def transfer(f, c, running):
+    """Adopt constants that may have changed: a filter of a new kind continues from the estimate of the old filter.
 
-    running: whether there is an estimate; rate_sigma: as in `start`.
+    running: 1 if there is an estimate.
     """
     f.predicted = math.nan
     if running:
         for i in range(2):
-            axis_filter.transfer(f.axis[i], c.axis[i], rate_sigma)
+            axis_filter.transfer(f.axis[i], c.axis[i])
     _leave_cartesian(f, c, f.used[0] and not c.wanted[0], f.used[1] and not c.wanted[1])
     if not (c.wanted[0] or c.wanted[1]):
         f.running = 0
 
 
 @compiled
-def move(f, c, motion):
-    """Change to a frame in which the target has this Motion now; the covariances stay. The Cartesian filter stops,
-    because it works in the old frame."""
-    f.running = f.used[0] = f.used[1] = 0
-    for i in range(2):
-        axis_filter.move(f.axis[i], c.axis[i], motion[i])
+def turn(f, c, rotation):
+    """Turn the estimate and its covariances into another frame; rotation: Rotation from the old frame into the new
+    one."""
+    axes_filter.turn(f.axis, c.axis, rotation)
+    if f.running:
+        unscented.turn(f.cartesian, rotation)
     f.predicted = math.nan

@@ -1,14 +1,23 @@
-"""The Cartesian target filter: an IMM of two unscented filters, CV and CA; azimuth, elevation and range measured.
+"""The Cartesian target filter: it estimates the position of the target from measured azimuth, elevation and range.
 
-X = (east north up, velocity, acceleration) [m, m/s, m/s2] of each mode, relative to the antenna; CV keeps its
-acceleration at zero. Without a range only the two angles are used, and the variance of the range grows.
+The filter is an IMM of two unscented Kalman filters, called modes: CV (constant velocity) and CA (constant
+acceleration). The state of each mode is X = (position, velocity, acceleration) [m, m/s, m/s2], relative to the
+antenna, in the frame of the filter (`estimate_frame`), whose axes take the place of east, north and up. CV keeps its
+acceleration at zero. Without a range only the angles are used, and the variance of the range grows.
 
-The unscented filter (Merwe's points; Wan and Van der Merwe 2000) has two simplifications here. Because the motion is
-linear, the transform of the prediction is F P F' + Q exactly. The points of the measurement are drawn from the
-predicted P, after Q. With P = L L' (L lower triangular) they are X +- sqrt(n + lambda) L_k. Only k = 1, 2, 3 move the
-position, and only the position is measured: 7 of the 19 points are evaluated, and the other 12 have the measurement of
-the centre point. Angles are relative to those of the centre point, so that the azimuth may wrap. With alpha = 1, kappa
-= 3 - n, beta = 2 no weight of the seven is negative, and S is positive for every geometry.
+An unscented filter evaluates the measurement at sigma points, states that represent mean and covariance of X (points
+of Merwe; Wan and Van der Merwe 2000). Here it has two simplifications:
+
+- Because the motion is linear, the covariance of the prediction is F P F' + Q exactly, without sigma points.
+- The points are drawn from the predicted P. With P = L L' (L lower triangular, L_k its column k) they are X and
+  X +- sqrt(n + lambda) L_k; n: number of states. Only L_1, L_2 and L_3 move the position, and only the position is
+  measured. Therefore 7 of the 19 points are evaluated; the other 12 have the measurement of the centre point X.
+
+The angles of the points are relative to those of the centre point, so that the azimuth may wrap. With the parameters
+alpha = 1, kappa = 3 - n, beta = 2 of the points no weight of the seven is negative. The covariance S of the innovation
+is then positive for every geometry.
+
+s: record of STATE_DTYPE; c: record of CONSTANTS_DTYPE; m: a Measurement; j: number of the mode, 0 CV, 1 CA.
 """
 import math
 
@@ -17,7 +26,7 @@ import numpy as np
 from acu_tracker.estimation.filters import imm, motion_models
 from acu_tracker.estimation.filters.measurement import AxisInnovation, AxisVariances, Innovation
 from acu_tracker.geometry.motion import line_of_sight, motion_of_position
-from acu_tracker.geometry.vector import Vector, dot, times
+from acu_tracker.geometry.vector import Vector, dot, rotated, times
 from pedestal_common.compiled import assign, compiled
 from pedestal_common.geometry.line_of_sight import earth_angles, wrap
 
@@ -26,14 +35,15 @@ N = 9
 MODE_MODELS = motion_models.MODEL_CV, motion_models.MODEL_CA
 """Motion models of mode 0 (CV, constant velocity) and mode 1 (CA, constant acceleration)."""
 ALPHA, BETA, KAPPA = 1.0, 2.0, 3.0 - N
-"""Parameters of Merwe's points [-]."""
+"""Parameters alpha, beta, kappa of the sigma points [-]."""
 LAMBDA = ALPHA**2 * (N + KAPPA) - N
+"""Parameter lambda of the sigma points, which follows from the others [-]."""
 SIGMA_POINT_SCALE = math.sqrt(N + LAMBDA)
-"""Distance of a point from the centre, in columns L_k [-]."""
+"""Distance of a sigma point from the centre point, as a multiple of the column L_k [-]."""
 SIGMA_POINT_WEIGHT = 0.5 / (N + LAMBDA)
 """Weight of each of the six points that move the position [-]."""
 CENTRE_COVARIANCE_WEIGHT = 1.0 - 6.0 * SIGMA_POINT_WEIGHT + 1.0 - ALPHA**2 + BETA
-"""Weight in a covariance [-] of the centre point and of the twelve points with the same measurement as the centre."""
+"""Weight in a covariance of the centre point, together with the twelve points that have its measurement [-]."""
 
 STATE_DTYPE = np.dtype([
     ('x', 'f8', (2, N)), ('p', 'f8', (2, N, N)), ('mu', 'f8', (2,)),
@@ -42,9 +52,11 @@ STATE_DTYPE = np.dtype([
     ('weights', 'f8', (2,)), ('mean', 'f8', (N,)), ('covariance', 'f8', (N, N))], align=True)
 """State of both modes.
 
-x, p, mu: estimate, covariance and probability of each mode after the last measurement; x_prior, p_prior, mu_prior: as
-predicted by `predict`. `z`, `s`, `g`: expected measurement in `innovation`, its covariance, and its covariance with X.
-`points`, `weights`, `mean`, `covariance`: scratch.
+x, p, mu                    estimate, covariance and probability of each mode after the last measurement
+x_prior, p_prior, mu_prior  their prediction by `predict`; the prior fields
+z                           expected measurement (azimuth, elevation, range) of each mode, set by `innovation`
+s, g                        covariance of this measurement, and its covariance with X; `correct` overwrites g
+points, weights, mean, covariance  scratch
 """
 
 CONSTANTS_DTYPE = np.dtype([('models', motion_models.MOTION_MODEL_DTYPE, (2,)), ('dwell', 'f8'),
@@ -63,10 +75,11 @@ def constants(params) -> np.ndarray:
 
 @compiled
 def _spread(p, along, onward, variances):
-    """Add the AxisVariances of one coordinate and its rate to the covariance p.
+    """Add the variances of one coordinate (azimuth, elevation or range) and of its rate to the covariance p.
 
-    A unit of the coordinate moves the position by along (3,) and the velocity by onward (3,); a unit of its rate moves
-    the velocity by along.
+    along      change of the position (3,) per unit of the coordinate, and of the velocity per unit of its rate
+    onward     change of the velocity (3,) per unit of the coordinate
+    variances  AxisVariances of the coordinate and its rate
     """
     s11, s12, s22 = variances
     for i in range(3):
@@ -80,17 +93,17 @@ def _spread(p, along, onward, variances):
 
 @compiled
 def start(s, c, estimate, r, R_range):
-    """Start at an Estimate of the angles and a first range r [m] of variance R_range.
+    """Start from an Estimate of the angles and a first range r [m] of variance R_range [m2].
 
-    `expected` continues from that Estimate. CA starts with the acceleration of a target at a constant range, CV with
-    none. Standard deviations at the start: c.initial_speed of the radial speed, which is 0; c.initial_acceleration of
-    the acceleration.
+    The radial speed starts at 0 with the standard deviation c.initial_speed. CA starts with the acceleration of a
+    target at constant range and the standard deviation c.initial_acceleration; CV starts without an acceleration.
+    After the start `expected` equals the Estimate.
     """
     A, dA, _ = estimate.motion.azimuth
     E, dE, _ = estimate.motion.elevation
     sight = line_of_sight(estimate.motion)
     u, du, ddu = sight
-    # The centripetal acceleration keeps the range constant.
+    # k u: centripetal acceleration over r, which keeps the range constant.
     k = dot(du, du)
     x = s.x[1]
     x[0], x[1], x[2] = times(r, u)
@@ -115,7 +128,7 @@ def start(s, c, estimate, r, R_range):
 
 @compiled
 def _mixed(x, p, w, x_out, p_out):
-    """Write mean and covariance of two modes with weights w (2,) to x_out, p_out."""
+    """Write the mean and the covariance of both modes, with weights w (2,), to x_out and p_out."""
     for a in range(N):
         x_out[a] = w[0] * x[0, a] + w[1] * x[1, a]
         for b in range(a, N):
@@ -125,8 +138,10 @@ def _mixed(x, p, w, x_out, p_out):
 
 @compiled
 def _moved(x, p, m, T):
-    """Set x = F x and p = F p F' + Q of a model over T [s] in place;
-    the motion is the same in the three directions."""
+    """Set x = F x and p = F p F' + Q over T [s], in place; m: record of the motion model.
+
+    The model is the same in the directions east, north and up.
+    """
     model = motion_models.discretised(m, 0.0, T)
     (f13, f23, f33), Q = model.F, model.Q
     for i in range(3):
@@ -165,24 +180,41 @@ def predict(s, c, T):
 
 
 @compiled
+def turn(s, rotation):
+    """Turn the estimate and covariance of both modes into another frame; rotation: Rotation from the old frame into
+    the new one."""
+    for j in range(2):
+        x, p = s.x[j], s.p[j]
+        for k in range(0, N, 3):
+            x[k], x[k + 1], x[k + 2] = rotated(rotation, Vector(x[k], x[k + 1], x[k + 2]))
+            for i in range(N):
+                p[i, k], p[i, k + 1], p[i, k + 2] = rotated(rotation, Vector(p[i, k], p[i, k + 1], p[i, k + 2]))
+        for k in range(0, N, 3):
+            for i in range(N):
+                p[k, i], p[k + 1, i], p[k + 2, i] = rotated(rotation, Vector(p[k, i], p[k + 1, i], p[k + 2, i]))
+
+
+@compiled
 def _measured(east, north, up):
-    """Return (azimuth, elevation, range) of a position."""
+    """Return (azimuth [rad], elevation [rad], range [m]) of an ENU position [m]."""
     azimuth, elevation = earth_angles(east, north, up)
     return azimuth, elevation, math.sqrt(east * east + north * north + up * up)
 
 
 @compiled
 def _transformed(x, p, z, s, g, d):
-    """Transform the prediction x, p to the measurement (unscented): mean z (3,), covariance s (3, 3) without R.
+    """Compute the expected measurement of a mode from its prediction x, p by the unscented transform.
 
-    g (9, 3): covariance of the measurement with X; d (2, 3, 3): measurements of the points at +L_k and -L_k, relative
-    to that of the centre point.
+    z  result: expected measurement (3,): azimuth, elevation, range
+    s  result: its covariance (3, 3), without the noise of the measurement
+    g  result: its covariance (9, 3) with X
+    d  scratch: measurements (2, 3, 3) of the points at +L_k and -L_k, relative to that of the centre point
     """
     A, E, r = _measured(x[0], x[1], x[2])
     z[0] = z[1] = z[2] = 0.0
     s[:, :] = 0.0
     for k in range(3):
-        # Column k of L into g, scaled to the offset of the points; the columns before it are in g already.
+        # Put column k of L, scaled to the offset of the points, into g. The columns before it are in g already.
         for i in range(k, N):
             rest = p[i, k]
             for m in range(k):
@@ -219,7 +251,7 @@ def _transformed(x, p, z, s, g, d):
 def innovation(s, m):
     """Return the Innovation of a Measurement against the prediction of both modes together.
 
-    A range that is NaN was not measured; its variance is then that of a perfect one. Rates are not used.
+    Rates are not used. Without a measured range (NaN) range_nu is NaN, and range_S contains no noise of a measurement.
     """
     for j in range(2):
         _transformed(s.x_prior[j], s.p_prior[j], s.z[j], s.s[j], s.g[j], s.points)
@@ -233,7 +265,10 @@ def innovation(s, m):
 
 @compiled
 def _compared(s, i, y):
-    """Return (nu, S) of a measured component i (azimuth, elevation, range) against both modes, with their spread."""
+    """Return (innovation nu, its variance S) of a measured number y against both modes together.
+
+    i: 0 azimuth, 1 elevation, 2 range. S contains the spread of the modes.
+    """
     d = s.z[1, i] - s.z[0, i]
     if i == 0:
         d = wrap(d)
@@ -250,9 +285,11 @@ def _axis_innovation(s, i, m):
 
 @compiled
 def _corrected(s, j, azimuth, elevation, range_):
-    """Correct mode j with the measurement; return its log-likelihood, without the terms that are equal for all modes.
+    """Correct mode j with a measurement; return the logarithm of its likelihood, without terms equal in both modes.
 
-    S = G G'; G^-1 nu are the standardised innovations n, the gain times G is w: X += w n, P -= w w'.
+    The covariance S of the innovation nu is factored: S = G G', G lower triangular. The correction is X += w n, P -= w
+    w'. Here n = G^-1 nu is the standardised innovation, and w is the gain times G. per_G22 is 1 / G22, or 0 without a
+    range.
     """
     S, g = s.s[j], s.g[j]
     G00 = math.sqrt(S[0, 0])
@@ -283,7 +320,10 @@ def _corrected(s, j, azimuth, elevation, range_):
 
 @compiled
 def correct(s, m):
-    """Correct with the Measurement that `innovation` was called with; if its range is NaN, with the angles only."""
+    """Correct the prediction with a Measurement; `innovation` must have been called with it before.
+
+    If the range is NaN, only the angles are used.
+    """
     for j in range(2):
         s.weights[j] = _corrected(s, j, m.axis[0].angle, m.axis[1].angle, m.range)
     imm.weigh(s.mu_prior, s.weights, 2, s.mu)
@@ -291,8 +331,10 @@ def correct(s, m):
 
 @compiled
 def range_known(s, share_2):
-    """Return True if, in both modes, the standard deviation of the range is at most a share of the range; share_2:
-    square of the share."""
+    """Return True if, in both modes, the standard deviation of the range is at most a given share of the range.
+
+    share_2: square of this share [-].
+    """
     for j in range(2):
         x, p = s.x[j], s.p[j]
         spread = 0.0
@@ -307,7 +349,7 @@ def range_known(s, share_2):
 
 @compiled
 def probabilities(s, mu):
-    """Set mu (BANK_SIZE,) to the probability of each of motion_models.MODEL_NAMES, NaN if it is not in the filter."""
+    """Set mu (BANK_SIZE,) to the probability of each of motion_models.COLUMN_NAMES, NaN if it is not in the filter."""
     mu[:] = math.nan
     for j in range(len(MODE_MODELS)):
         mu[MODE_MODELS[j]] = s.mu[j]
@@ -315,7 +357,7 @@ def probabilities(s, mu):
 
 @compiled
 def expected(s):
-    """Return the Motion in earth angles of the prediction, both modes together; the azimuth in (-pi, pi]."""
+    """Return the predicted Motion of both modes together, in the angles of the filter; the azimuth is in (-pi, pi]."""
     _mixed(s.x_prior, s.p_prior, s.mu_prior, s.mean, s.covariance)
     x = s.mean
     return motion_of_position(Vector(x[0], x[1], x[2]), Vector(x[3], x[4], x[5]), Vector(x[6], x[7], x[8]))
@@ -323,8 +365,10 @@ def expected(s):
 
 @compiled
 def _projected(p, g, h, v):
-    """Return the AxisVariances of two numbers linear in position and velocity:
-    g x and h x + v dx, each a tuple (3,)."""
+    """Return the AxisVariances of a coordinate and its rate, both linearised.
+
+    The coordinate is g x, its rate h x + v dx; x, dx: position and velocity with the covariance p; g, h, v: (3,).
+    """
     gg = gh = hh = 0.0
     for a in range(3):
         for b in range(3):
@@ -336,8 +380,10 @@ def _projected(p, g, h, v):
 
 @compiled
 def variances(s):
-    """Return (AxisVariances of both axes, variance of the range [m2]) of the prediction of both modes, linearised and
-    with their spread."""
+    """Return (AxisVariances of both axes, variance of the range [m2]) of the prediction of both modes together.
+
+    The angles and the range are linearised in the position. The covariance contains the spread of the modes.
+    """
     _mixed(s.x_prior, s.p_prior, s.mu_prior, s.mean, s.covariance)
     x, p = s.mean, s.covariance
     e, n, u, de, dn, du = x[0], x[1], x[2], x[3], x[4], x[5]

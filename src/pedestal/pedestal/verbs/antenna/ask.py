@@ -56,15 +56,18 @@ def with_elements(options: argparse.Namespace, texts: Iterable[str]) -> dict[str
 
 def send_command(options: argparse.Namespace, verb: str, given: Mapping[str, str | float], node: str = 'acu',
                  hold: float | None = None) -> int:
-    """Send a command to a node and print its reply. Return the exit code. hold: time of its repetition [s]."""
+    """Send a command to a node and print its reply. Return the exit code.
+
+    hold: time for which the command is repeated [s], None to send it once.
+    """
     from pedestal_common.graph import nodes
     commanded = [row.name for row in nodes.NODES if row.obeys]
     if node not in commanded:
         raise ValueError(f'--node {node}: must be one of {", ".join(commanded)}')
-    with arguments.remote(options, node) as spun:
-        spun.wait_for_node(options.timeout)
-        reply = spun.request(verb, given, options.timeout)
+    with arguments.remote(options, node) as session:
+        session.wait_for_node(options.timeout)
+        reply = session.request(verb, given, options.timeout)
         if hold and reply.granted:
-            reply = spun.hold_jog(verb, given, hold)
+            reply = session.hold_jog(verb, given, hold)
     print(f'{node}: {reply.text}')
     return 0 if reply.granted else 1

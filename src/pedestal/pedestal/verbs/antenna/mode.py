@@ -4,7 +4,7 @@ Publishes the command on acu/command and waits for the reply. Exit code 0: the A
 the ACU refused it; the reason is printed.
 
     pedestal mode preset --az 30 --el 45
-    pedestal mode preset 30 45           the same
+    pedestal mode preset 30 45           go to the same angles, given without --az and --el
     pedestal mode preset point=zenith    go to the stored preset zenith (parameter acu.points)
     pedestal mode rate --az 0.5          turn at 0.5 deg/s for half a second
     pedestal mode rate --az 0.5 --hold 8 turn at 0.5 deg/s for 8 s; Ctrl-C ends the motion at once

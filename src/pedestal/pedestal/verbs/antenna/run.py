@@ -6,6 +6,7 @@ Exit codes (1, 3 and 130 take precedence over 4):
 
 """
 import argparse
+import os
 import sys
 import typing
 from collections.abc import Collection
@@ -13,11 +14,12 @@ from collections.abc import Collection
 from pedestal import stop
 from pedestal.verbs import arguments
 from pedestal_analysis import console
+from pedestal_common import parameters
 
 __doc__ += console.exit_codes()
 
 if typing.TYPE_CHECKING:
-    from pedestal_bringup.scenario.scenario import Scenario
+    from pedestal_bringup.scenario.scenario import Draft, Scenario
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -66,7 +68,7 @@ def main(options: argparse.Namespace) -> int:
     for line in plan.announced():
         print(line)
     outcome = graph.run(plan, bag, console.progress_of_run(chosen.header.duration), servers)
-    # Because these modules import scipy, which takes half a second, they are loaded after the run.
+    # Because these modules import scipy, which takes half a second, the verb loads them after the run.
     from pedestal_analysis.results import results, tracking, verdict
     from pedestal_recording.bag import read
     from pedestal_recording.verify import verify
@@ -82,6 +84,7 @@ def main(options: argparse.Namespace) -> int:
     parts = [results.of_run(view, run) for view, run in zip(views, runs)]
     of_beams = [results.measured(part) for part in parts]
     realtime = chosen.header.pacing == 'realtime'
+    # whole: results of the run, such as lost steps, in contrast to the results of each beam
     whole = results.measured({'run': outcome, 'supervised': outcome if realtime else None})
     lost, steps = whole['lost_steps'][0], outcome.drive.get('steps')
     for beam, found in zip(beams, verdicts):
@@ -116,7 +119,7 @@ def main(options: argparse.Namespace) -> int:
     disturbed = [check.ending] if check.aborted else []
     if outcome.losses > MAX_LOST_STEP_SHARE * planned:
         disturbed.append(f'the drive lost {outcome.losses} of {planned:.0f} steps, more than '
-                         f'{MAX_LOST_STEP_SHARE:.0%}, outside announced restarts')
+                         f'{MAX_LOST_STEP_SHARE:.0%}, outside announced restarts: {_cure(chosen.header.priority)}')
     for reason in disturbed:
         print(f'pedestal: {reason}', file=sys.stderr)
     if disturbed:
@@ -124,8 +127,16 @@ def main(options: argparse.Namespace) -> int:
     return console.EXIT_FAILED_RUN if any(found.failed for found in verdicts) else 0
 
 
+def _cure(priority: int) -> str:
+    """Return the remedy for lost steps; priority: the realtime priority of the scenario, 0 for none."""
+    load, cores = os.getloadavg()[0], len(os.sched_getaffinity(0))
+    text = f'load {load:.1f} on {cores} cores; end other programs or use a machine with more cores'
+    return text if priority else (f'{text}, or give the nodes a realtime priority: --param scenario.priority=10 '
+                                  '(docs/station.md)')
+
+
 def _some(values: dict[str, tuple], names: Collection[str]) -> dict[str, tuple]:
-    """Return the results of some names."""
+    """Return the part of the results {name: (value, unit)} whose names are in `names`."""
     return {name: value for name, value in values.items() if name in names}
 
 
@@ -166,7 +177,23 @@ def _chosen(options: argparse.Namespace) -> 'Scenario | None':
         start, duration, line = selection.choose('next' if options.which is None else options.which, duration)
         print(line)
         changes = start + changes
+    if options.tle:
+        changes += _without_prediction_errors(draft, changes)
     return scenario.checked(draft.changed(changes), options.seed, duration, options.pacing)
+
+
+def _without_prediction_errors(draft: 'Draft', changes: list[str]) -> list[str]:
+    """Return the changes that end the errors of the prediction in a scenario, which are of its own satellite, and
+    print them; an error in `changes` stays."""
+    from pedestal_bringup.scenario import scenario
+    given, header = {change.partition('=')[0] for change in changes}, parameters.as_dict(draft.header)
+    found = []
+    for key, unit in scenario.PROGRAM_ERRORS.items():
+        if header[key] and f'scenario.{key}' not in given:
+            print(f'scenario.{key} = 0 {unit} in place of {header[key]:g} {unit}, which belongs to the satellite of '
+                  f'{draft.name}')
+            found.append(f'scenario.{key}=0')
+    return found
 
 
 def _refuse_with_list(options: argparse.Namespace) -> None:

@@ -20,11 +20,12 @@ def main(options: argparse.Namespace) -> int:
     from pedestal_analysis import console
     from pedestal_operator import state
     console.check_json(options.json)
-    with arguments.remote(options) as spun:
-        spun.wait_for_node(options.timeout)
-        name = spun.remote.beam + 'acu'
-        spun.until(lambda: spun.remote.present(name) and spun.remote.present('joint_states'), options.timeout)
-        rows, alarms = state.rows(spun.remote), state.node_reports(spun.remote)
+    with arguments.remote(options) as session:
+        session.wait_for_node(options.timeout)
+        name = session.remote.beam + 'acu'
+        session.until(lambda: session.remote.present(name) and session.remote.present('joint_states'),
+                      options.timeout)
+        rows, alarms = state.rows(session.remote), state.node_reports(session.remote)
     table = [{'case': row.group, 'metric': row.name, 'value': row.json, 'unit': row.unit} for row in rows]
     table += [{'case': 'alarm', 'metric': node, 'value': text, 'unit': ''} for node, text in alarms]
     console.write_json(options.json, {'name': 'status', 'rows': table})

@@ -8,7 +8,7 @@ from pedestal_studies import bench
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the benchmark and the file of the rows."""
+    """Add the arguments: the benchmark to run, and the file for its rows."""
     parser.add_argument('what', nargs='?', choices=tuple(bench.BENCH_MODULES), help='benchmark to run; default: all')
     console.add_json(parser)
 

@@ -23,7 +23,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def main(options: argparse.Namespace) -> int:
-    """Write the file. Return exit code 0. Raises ValueError for a wrong value, FileExistsError for an old file."""
+    """Write the file. Return exit code 0. Raises ValueError for a wrong value, FileExistsError for an
+    existing file."""
     from pedestal_analysis.tuning import antenna_from_data_sheet
     from pedestal_analysis.tuning.data_sheet_format import DataSheet
     if options.file.suffix not in ('.yaml', '.yml'):

@@ -28,6 +28,7 @@ def main(options: argparse.Namespace) -> int:
 
 
 def _columns(meta: Mapping[str, typing.Any], value: object) -> tuple[str, str, str]:
+    """Return default, range or options, and meaning with unit of a parameter, as texts."""
     allowed = f'{meta["low"]:g} to {meta["high"]:g}' if 'low' in meta else ' | '.join(meta.get('options', ()))
     unit = f' [{meta["unit"]}]' if meta.get('unit') else ''
     return f'{value:g}' if isinstance(value, float) else str(value), allowed, f'{meta["doc"]}{unit}'

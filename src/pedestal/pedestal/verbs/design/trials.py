@@ -1,6 +1,6 @@
 """run a scenario many times with varied parameters, and print statistics and the worst trials
 
-Each trial has its own seed. It yields the same kinds of results as `pedestal run`. A trial runs all nodes in one
+Each trial has its own seed and gives the same kinds of results as `pedestal run`. A trial runs all nodes in one
 process, without ROS. For each of the worst trials a `pedestal run` command is printed, which runs separate nodes and
 gives the same numbers.
 
@@ -11,8 +11,9 @@ form --vary FILE.csv reads the trials from a file with a column for each paramet
 Rows are written to OUTPUT/trials.csv as soon as they exist. Repeat the command to continue after Ctrl-C or a crash.
 The column `why` of the table holds the verdict on each trial that did not track.
 
---side NAME NODE.KEY=VALUE ... adds a side to a comparison and may be repeated; --against and --against-param add one
-side. Trial i of all sides has the same seed and drawn values. The best side by --by is printed first.
+--side NAME NODE.KEY=VALUE ... adds a side to a comparison and may be repeated. A side is a variant of the scenario
+with parameters of its own. --against and --against-param add one side. Trial i of all sides has the same seed and
+drawn values. The side with the best result of --by is printed first.
 
 --require 'RESULT < LIMIT' prints the share of the trials that meet a criterion, with its 95 % interval. A trial
 without the result does not meet it.
@@ -59,9 +60,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     arguments.add_params_file(parser)
     parser.add_argument('--side', action='append', nargs='+', default=[], metavar=('NAME', 'NODE.KEY=VALUE'),
                         help='side of a comparison: its name, then the parameters that it changes; may be repeated')
-    parser.add_argument('--against', metavar='SCENARIO', help='scenario of the second variant')
+    parser.add_argument('--against', metavar='SCENARIO', help='scenario of the second side of a comparison')
     parser.add_argument('--against-param', action='append', default=[], metavar='NODE.KEY=VALUE',
-                        help='parameter of the second variant and its value; may be repeated')
+                        help='parameter of the second side and its value; may be repeated')
     parser.add_argument('--by', metavar='RESULT', help='result that ranks the trials and decides a comparison; '
                         'default: pointing_rms_deg')
     parser.add_argument('--require', action='append', default=[], metavar="'RESULT < LIMIT'", help="criterion for a "
@@ -112,6 +113,7 @@ def _compare(options: argparse.Namespace) -> int:
             print(f'pedestal: {sum(len(table.rows) for table in tables)} of {sum(plan.runs for plan in plans)} trials '
                   f'are in {folder}; the same command continues', file=sys.stderr)
             raise
+    # differences: parameters in which the sides differ; names: label of a side, else these; full: both
     differences = comparison.names(*plans)
     names = [label or text for label, text in zip(labels, differences)]
     full = [f'{label} ({text})' if label else text for label, text in zip(labels, differences)]
@@ -127,7 +129,8 @@ def _compare(options: argparse.Namespace) -> int:
         name, table = names[place], tables[place]
         rows += [*statistics.of_results(name, table), *statistics.of_requirements(name, table, required),
                  *statistics.of_questions(name, table), *statistics.of_sensitivity(name, table)]
-    lines = [comparison.sentence(pair(best, other), ranking) for other in order[1:]]
+    lines = [comparison.unchanged(plans[best], plans[other]) or comparison.sentence(pair(best, other), ranking)
+             for other in order[1:]]
     lines += _requirement_lines(rows, required)
     shown = trials_page.read(plans[0], tables[0], ranking, pair(best, order[1]) if lines and len(plans) > 1 else None,
                              lines, options.command, WORST_TRIAL_COUNT)
@@ -155,7 +158,7 @@ def _compare(options: argparse.Namespace) -> int:
 
 
 def _solve(options: argparse.Namespace) -> int:
-    """Search for the value of --solve. Return exit code 0."""
+    """Search for the parameter value that --solve and --until define. Return exit code 0."""
     from pedestal_analysis.trials import monte_carlo, solve
     from pedestal_analysis.trials.plan import plan
     changes = arguments.changes(options)
@@ -228,6 +231,7 @@ def _requirement_lines(rows: Iterable[Mapping[str, typing.Any]], required: Itera
 
 def _sensitivity_lines(rows: Iterable[Mapping[str, typing.Any]], ranking: str) -> list[str]:
     """Return lines with the sensitivity of the ranking result to each varied parameter, the strongest first."""
+    # Because eta_squared is the square of a correlation, its square root is compared with a rank correlation.
     powers = {f'{ranking}/rank_correlation': 1.0, f'{ranking}/eta_squared': 0.5}
     found = [row for row in rows if row['metric'].partition('(')[0] in powers]
     return [f'{row["metric"]}: {console.number(row["value"])} ({console.interval(row)})'

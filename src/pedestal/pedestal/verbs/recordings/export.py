@@ -38,7 +38,7 @@ def main(options: argparse.Namespace) -> int:
 
 
 def _tracking_data(options: argparse.Namespace) -> int:
-    """Write the tracking data as TDM. Return exit code 0."""
+    """Write the tracking data as a tracking data message (TDM). Return exit code 0."""
     import datetime
 
     from pedestal_analysis.report import tdm

@@ -6,7 +6,7 @@ from pedestal.verbs import arguments
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add bag, beam, output file and folder of the figures."""
+    """Add bag, beam, output file, folder of the figures, author and PDF."""
     parser.add_argument('bag', type=pathlib.Path, help='recording: a folder or an .mcap file')
     parser.add_argument('--output', type=pathlib.Path, metavar='FILE', help='output file; default: report.html in '
                         'the bag')
@@ -14,6 +14,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--png', type=pathlib.Path, metavar='DIR', help='folder in which each figure is also '
                         'written as PNG')
     arguments.add_vector(parser)
+    parser.add_argument('--author', default='', metavar='NAME', help='name of the author on the first page; default: '
+                        'none')
+    parser.add_argument('--pdf', action='store_true', help='the report also as PDF, beside the HTML file; needs '
+                        'Chromium or Google Chrome')
 
 
 def main(options: argparse.Namespace) -> int:
@@ -21,5 +25,9 @@ def main(options: argparse.Namespace) -> int:
     from pedestal_analysis.report import page
     if options.vector and not options.png:
         raise ValueError(f'--vector {options.vector}: needs --png DIR, the folder of the figures')
-    print(page.write(options.bag, options.output, options.png, options.beam, options.vector))
+    report = page.write(options.bag, options.output, options.png, options.beam, options.vector, options.author,
+                        options.pdf)
+    print(report)
+    if options.pdf:
+        print(report.with_suffix('.pdf'))
     return 0

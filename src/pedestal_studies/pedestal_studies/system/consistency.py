@@ -1,0 +1,85 @@
+"""Consistency of the default target filter, second by second after its start.
+
+NEES is the squared error of angle and rate over the covariance that the filter states, against the direction that
+sensors without noise would measure (`pedestal_analysis.results.consistency`). A consistent filter has 2. A larger
+value means that the filter is too sure. Cases are scenarios; a metric nees_AXIS_T_s is the mean of one second about
+T [s] after the first estimate of the filter.
+"""
+import functools
+
+import numpy as np
+
+from pedestal_analysis.report.figures import FILTERED_COLOUR, TRUTH_COLOUR, new_panels
+from pedestal_analysis.results import consistency, tracking
+from pedestal_analysis.results.intervals import row
+from pedestal_analysis.trials import monte_carlo
+from pedestal_analysis.trials.cases import Case
+from pedestal_bringup.loop import memory_recording
+from pedestal_common.graph.topics import AXES
+from pedestal_studies.rigs import drawing
+from pedestal_studies.rigs.rows import Result
+
+DEFAULT_RUNS, FIRST_SEED = 100, 1
+"""Runs of each case; seed of the first run."""
+BATCH_RUNS = 5
+"""Runs that one worker makes at a time."""
+
+TIMES_S = (5.0, 10.0, 30.0, 60.0, 120.0)
+"""Times after the first estimate [s]."""
+DURATION_S = 125.0
+WINDOW_S = 1.0
+"""Span of a mean [s]."""
+
+SCENARIOS = ('blockage', 'fade', 'late_tle', 'leo_pass', 'leo_station_7m', 'manoeuvre_in_coast', 'phased_array_sway',
+             'ship_overhead', 'ship_pass', 'ship_pass_ss6', 'ship_terminal_1m2', 'sidelobe', 'station_real',
+             'uav_flyby', 'uav_tracker_3m')
+CASES = {name: Case(name, name, duration=DURATION_S) for name in SCENARIOS}
+"""{name: Case}."""
+
+MAX_NEES = 2.4
+"""Largest NEES of a filter that is not too sure: 2 plus 20 %."""
+
+
+def nees(case):
+    """Return the NEES (len(TIMES_S), 2) of one run of a Case at TIMES_S, NaN without an estimate at that time."""
+    recorded = memory_recording.record(case.loaded())
+    found = consistency.read(recorded, tracking.read(recorded))
+    known = np.isfinite(found.nees[:, 0])
+    if not known.any():
+        return np.full((len(TIMES_S), 2), np.nan)
+    after = found.t - found.t[np.argmax(known)]
+    values = [found.nees[(np.abs(after - time) <= 0.5 * WINDOW_S) & known] for time in TIMES_S]
+    return np.array([value.mean(axis=0) if len(value) else (np.nan, np.nan) for value in values])
+
+
+def batch(item):
+    """Return the NEES (count, len(TIMES_S), 2) of an item (case, first run, number of runs)."""
+    name, first, count = item
+    return np.array([nees(CASES[name].with_seed(FIRST_SEED + first + i)) for i in range(count)])
+
+
+def rows(values):
+    """Return the rows of values {case: (runs, len(TIMES_S), 2)}; a time that no run reaches has no row."""
+    return [row(name, f'nees_{axis}_{time:g}_s', of_runs[known, k, i], '', target=f'<= {MAX_NEES:g}')
+            for name, of_runs in values.items() for k, time in enumerate(TIMES_S) for i, axis in enumerate(AXES)
+            if (known := np.isfinite(of_runs[:, k, i])).sum() > 1]
+
+
+def run(progress, runs=DEFAULT_RUNS, pool=None) -> Result:
+    """Run every case `runs` times; pool: monte_carlo.Pool, None for this process."""
+    values = (pool or monte_carlo.Pool(1)).of_cases(batch, CASES, runs, BATCH_RUNS, progress)
+    return Result(rows(values), {'nees': functools.partial(figure, values)},
+                  [f'Seeds {FIRST_SEED} to {FIRST_SEED + runs - 1}. A filter is too sure above {MAX_NEES:g}.'])
+
+
+def figure(values):
+    """Draw the mean NEES of both axes over the time after the start, a panel for each scenario."""
+    drawn, axes = new_panels(len(values), height=1.1 * len(values) + 1.0, y='NEES', sharex=True)
+    for panel, (name, of_runs) in zip(axes[:, 0], values.items()):
+        for i, (axis, colour) in enumerate(zip(AXES, (FILTERED_COLOUR, TRUTH_COLOUR))):
+            known = np.isfinite(of_runs[:, :, i]).any(axis=0)
+            panel.semilogy(np.array(TIMES_S)[known], np.nanmean(of_runs[:, known, i], axis=0), 'o-', color=colour,
+                           label=axis)
+        panel.axhline(2.0, linewidth=0.8)
+        panel.set_title(name)
+    return drawing.legend(drawn)
