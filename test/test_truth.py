@@ -12,8 +12,10 @@ from pedestal_bringup.scenario import scenario
 from pedestal_recording import bag as bags
 
 SHARE, FREQUENCY = 0.5, 8.0
-SWINGS = (f'adu.azimuth.structure.inertia_share={SHARE}', f'adu.azimuth.structure.frequency={FREQUENCY}')
-"""Half the load of the azimuth is a dish that swings at 8 Hz."""
+SWINGS = (f'adu.azimuth.structure.inertia_share={SHARE}', f'adu.azimuth.structure.frequency={FREQUENCY}',
+          'acu.azimuth.filter.imm.rungs=5')
+"""Half the load of the azimuth is a dish that swings at 8 Hz. `pedestal tune --loops` gives it a filter of five models
+ca, which does not follow the swing."""
 
 STEADY = (*SWINGS, 'adu.wind.azimuth=800')
 GUST, GUST_FREQUENCY = 300.0, 5.0
@@ -94,9 +96,9 @@ def test_a_gusting_dish_shows_in_the_results_and_its_encoders_have_their_own(gus
         assert values[f'{name}pointing_rms_deg'] == pytest.approx(np.sqrt(np.mean(error**2)), rel=5e-3)
         assert values[f'{name}pointing_max_deg'] == pytest.approx(np.abs(error).max(), rel=5e-3)
         assert values[f'{name}cross_elevation_max_deg'] == pytest.approx(np.abs(error[:, 0]).max(), rel=5e-3)
-        # The error across leaves (0.07 deg)^2 / 2 tan E of second order in elevation.
+        # The error across, up to 0.12 deg, leaves its square / 2 tan E of second order in elevation.
         elevation = np.sqrt(np.mean(error[:, 1]**2))
-        assert values[f'{name}elevation_rms_deg'] == pytest.approx(elevation, rel=5e-3, abs=2e-5)
+        assert values[f'{name}elevation_rms_deg'] == pytest.approx(elevation, rel=5e-3, abs=1e-4)
     # The filter follows the swing of the dish in part, and the encoders with it.
     assert values['pointing_rms_deg'] > 2.0 * values['encoder_pointing_rms_deg']
     assert values['elevation_rms_deg'] == pytest.approx(values['encoder_elevation_rms_deg'], abs=1e-4)

@@ -81,7 +81,7 @@ def test_travel_until_the_end():
     ([0.0, math.nan], [[0, 0], [1, 0]], 'row 1'),
     ([0.0, 1.0], [[0, math.inf], [1, 0]], 'row 0'),
     ([0.0, 2.0, 2.0], [[0, 0]] * 3, 'row 2: time 2 s; must be after 2'),
-    ([0.0, 2.0], [[0, 0], [0, 1.6]], 'row 1: elevation 1.6 rad'),
+    ([0.0, 2.0], [[0, 0], [0, 1.6]], 'row 1: elevation 91.6732 deg'),
 ])
 def test_bad_tables_are_named(times, angles, words):
     with pytest.raises(program_track.ProgramTrackError) as error:

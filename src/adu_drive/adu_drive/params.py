@@ -146,7 +146,8 @@ class LoadParameters(Parameters):
 @dataclasses.dataclass(frozen=True)
 class StructureParameters(Parameters):
     """Flexible structure: the dish swings on the rest of the load, to which gear and encoder are attached."""
-    inertia_share: float = parameter(0.0, 0.0, 0.9, '', 'share of the dish in the load inertia; 0: rigid')
+    inertia_share: float = parameter(0.0, 0.0, 0.9, '', 'share of the dish in the load inertia; 0: rigid; above 0 '
+                                   '`pedestal tune --loops` finds loops and filter')
     frequency: float = parameter(12.0, 1.0, 200.0, 'Hz', 'frequency of the dish on a locked base')
     damping: float = parameter(0.01, 0.0, 1.0, '', 'damping ratio of the dish on a locked base')
 
