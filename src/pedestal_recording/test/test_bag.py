@@ -513,7 +513,7 @@ def test_a_disk_that_takes_a_chunk_partly_leaves_a_whole_bag_without_a_hole(tmp_
             return getattr(self.stream, name)
 
     writer = Writer(tmp_path / 'b', RECORDED, METADATA)
-    writer._disk.stream = Disk(writer._disk.stream, 300_000)
+    writer._disk.stream = Disk(writer._disk.stream, 400_000)
     errors = []
     for name, stamp, data in rows:
         try:

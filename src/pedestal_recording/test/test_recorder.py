@@ -360,7 +360,7 @@ def test_a_directory_that_exists_or_cannot_be_made_is_refused(tmp_path, domain):
 
 
 def test_a_full_disk_is_one_line_and_what_was_written_stays_readable(tmp_path, graph, rows):
-    size = 300_000
+    size = 400_000
 
     def small_files():
         resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
