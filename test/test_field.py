@@ -166,9 +166,7 @@ def test_a_second_writer_of_the_command_moves_nothing_and_is_named(standing, con
                 if status.name == 'adu' and 'another publisher: stranger' in status.message]
     stranger_writes(standing, connect, 'acu/rate_command', time.time_ns, 1.5, said, velocity=(0.5, 0.5))
     assert set(said()) == {2}
-    # Followed for 1.5 s, the stranger would move the axes by 0.75 rad. While a busy machine holds up the control unit,
-    # the stranger is the only publisher: 0.05 s were seen.
-    np.testing.assert_allclose(standing.joints.position, before, atol=0.05)
+    np.testing.assert_allclose(standing.joints.position, before, atol=1e-4)
     assert standing.state == 'enabled'
 
 
