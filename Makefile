@@ -3,7 +3,7 @@
 # make test    set up, lint, run every test
 # make update-references  record bags/reference anew and print the difference that is accepted with it
 # make docs    write the tables of README.md and docs/ anew from the tables of the code and from docs/rows.json
-# make book    the documentation as a book in build/book/site, to be read without a network; a broken link fails
+# make book    the documentation as a book in build/book/site, to be read without a network; needs Chromium
 # make numbers run the studies and write docs/rows.json anew (some minutes), then make docs
 # make bench   set up, measure the graph, the core and bags
 # make colcon  build src/ as a ROS 2 workspace and start a node from it
@@ -11,7 +11,7 @@
 
 PYTHON ?= python3
 PACKAGES := pedestal_common ship_motion_sim tracking_receiver_sim acu_tracker adu_drive pedestal_operator \
-	pedestal_recording pedestal_bringup pedestal_analysis pedestal_studies pedestal
+	pedestal_recording pedestal_hardware pedestal_bringup pedestal_analysis pedestal_studies pedestal
 ROS := 'ros-jazzy-rclpy[fastrtps]' ros-jazzy-common-interfaces
 # pip would write the bytecode of all that it installs on one core, tests of others included; here that of the product is
 # written on all cores, and the rest when it is imported.
@@ -22,7 +22,8 @@ DEMO := bags/runs/demo
 # Graphs in realtime that are killed, frozen and cut, not beside other tests; the files that take longest come first,
 # and before them those that share one (conftest.py).
 REALTIME := test/test_live.py test/test_rotctld.py test/test_page.py test/test_operating.py test/test_supervision.py \
-	test/test_realtime.py test/test_field.py test/test_network.py
+	test/test_realtime.py test/test_drives.py test/test_iq.py test/test_level_receiver.py test/test_ins_input.py \
+	test/test_rotator.py test/test_field.py test/test_network.py
 # Tests of laws, which lie beside their packages and start no graph. That of the compiler starts processes by the
 # dozen, and compiles.
 LAWS := $(foreach package,ship_motion_sim tracking_receiver_sim acu_tracker adu_drive pedestal_common,src/$(package)) \
@@ -55,8 +56,8 @@ quick: install
 
 test: install
 	$(LINT)
-	$(LIMITED) 1800 $(PYTEST_IN_TURN) --numprocesses 3 $(addprefix --ignore=,$(REALTIME))
-	$(LIMITED) 1000 $(PYTEST_IN_TURN) --numprocesses 2 $(REALTIME)
+	$(LIMITED) 2400 $(PYTEST_IN_TURN) --numprocesses 3 $(addprefix --ignore=,$(REALTIME))
+	$(LIMITED) 1500 $(PYTEST_IN_TURN) --numprocesses 2 $(REALTIME)
 
 update-references: install
 	.venv/bin/python bags/reference/update.py
@@ -64,12 +65,14 @@ update-references: install
 docs: install
 	.venv/bin/python -m tools.reference
 
-# What is made of the code is written beside a copy of docs/; no page may fetch anything from elsewhere.
+# What is made of the code is written beside a copy of docs/; no page may fetch anything from elsewhere. A browser opens
+# the book from the disk, searches it, and looks for clipped tables and code.
 book: install .venv/mkdocs
 	.venv/bin/python -m tools.book build/book/pages
 	NO_MKDOCS_2_WARNING=1 .venv/bin/mkdocs build --strict
 	! grep --recursive --include='*.html' --extended-regexp --files-with-matches \
 	    '<(script|img|iframe|link)[^>]*(src|href)="?(https?:)?//' build/book/site
+	BOOK=build/book/site .venv/bin/python -m pytest $(PYTEST) test/test_built_book.py
 	@echo 'Book: $(CURDIR)/build/book/site/index.html'
 
 numbers: install

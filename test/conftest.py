@@ -242,6 +242,8 @@ def recorded(reserve_domain, tmp_path_factory):
 MODULES = {'ship_motion': 'ship_motion_sim.ship_motion_node', 'ins': 'ship_motion_sim.ins_node',
            'tracking_receiver': 'tracking_receiver_sim.tracking_receiver_node', 'acu': 'acu_tracker.acu_node',
            'adu': 'adu_drive.adu_node', 'beam_steering': 'adu_drive.beam_steering_node',
+           'drive': 'pedestal_hardware.drive_node', 'drives': 'pedestal_hardware.simulated.drives_node',
+           'monopulse': 'pedestal_hardware.monopulse.monopulse_receiver_node',
            'recorder': 'pedestal_recording.recorder_node', 'page': 'pedestal_operator.page_node'}
 
 
@@ -259,11 +261,11 @@ class NodeProcess:
 
 @pytest.fixture(scope='module')
 def start_node(reserve_domain, tmp_path_factory):
-    """start(node, *ROS arguments) -> NodeProcess, alone in a domain of its own."""
+    """start(node, *ROS arguments, domain_id=None) -> NodeProcess, alone in a domain of its own, or in that domain."""
     started = []
 
-    def start(node, *arguments):
-        folder, domain = tmp_path_factory.mktemp(node), reserve_domain()
+    def start(node, *arguments, domain_id=None):
+        folder, domain = tmp_path_factory.mktemp(node), domain_id or reserve_domain()
         command = [sys.executable, '-m', MODULES[node], '--ros-args', *arguments]
         started.append(NodeProcess(_popen(command, folder, _environment(domain, folder)), domain))
         return started[-1]

@@ -1,5 +1,7 @@
 """The pages that are made of the code hold all of it, and every page of docs/ has a place in the book."""
 import pathlib
+import re
+import xml.etree.ElementTree
 
 import pytest
 import yaml
@@ -8,6 +10,7 @@ from tools import book
 from pedestal import cli
 from pedestal_bringup.scenario import scenario
 from pedestal_common import parameters
+from pedestal_common.graph import nodes
 
 ROOT = pathlib.Path(__file__).parents[1]
 
@@ -15,7 +18,7 @@ ROOT = pathlib.Path(__file__).parents[1]
 @pytest.fixture(scope='module')
 def pages(tmp_path_factory):
     folder = tmp_path_factory.mktemp('book') / 'pages'
-    assert book.main(folder, ROOT) == 0
+    assert book.main(folder, ROOT, execute=False) == 0
     return folder
 
 
@@ -47,3 +50,25 @@ def test_every_page_is_in_the_table_of_contents(pages):
 def test_every_law_has_a_sentence(pages):
     laws = (pages / 'reference' / 'laws.md').read_text()
     assert '- `step(' in laws and not any(line.endswith('`: ') for line in laws.splitlines())
+
+
+def test_the_drawing_of_the_chain_has_the_nodes_and_topics_of_the_tables():
+    drawing = xml.etree.ElementTree.parse(ROOT / 'docs' / 'chain.svg').getroot()
+    drawn = {element.get('data-node') for element in drawing.iter() if element.get('data-node')}
+    arrows = {(element.text, element.get('data-from'), element.get('data-to')) for element in drawing.iter()
+              if element.get('data-from')}
+    links = nodes.links()
+    not_drawn = {'recorder', 'weather_station'}
+    assert drawn == set(nodes.NODE_NAMES) - not_drawn
+    # An operator sends commands, and receives what no node of the chain subscribes to.
+    for topic, writer, reader in arrows:
+        assert writer in links[topic].writers or (writer, links[topic].rate) == ('operator', 'command')
+        assert reader in links[topic].readers or (reader, links[topic].rate) == ('operator', 'change')
+    assert arrows >= {(link.name, writer, reader) for link in links.values() if not link.flag
+                      for writer in link.writers for reader in link.readers
+                      if link.name != 'diagnostics' and writer not in not_drawn}
+
+
+def test_every_verb_has_one_place_in_the_groups_of_commands():
+    groups = (ROOT / 'docs' / 'tools.md').read_text().partition('| you want to |')[2].partition('\n\n')[0]
+    assert sorted(re.findall(r'`([a-z]+)`', groups)) == sorted(cli.VERBS)

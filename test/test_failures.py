@@ -15,41 +15,49 @@ DEADLINE_S = 10
 """Six graphs start side by side on the machine's cores, beside other tests: each of them may be slow."""
 
 
-@pytest.fixture(scope='module')
-def hurt(start_run):
-    """hurt({target: signal}) -> {target: (run, result)} of runs side by side; as soon as one is well under way its
-    target, a node or the command `pedestal` itself, gets the signal."""
-    def hurt(targets):
-        runs = {target: start_run('leo_pass', '--pacing', 'lockstep', '--duration', '200',
-                                    '--param', f'scenario.deadline={DEADLINE_S}')
-                for target in targets}
-        waiting = set(targets)
-        deadline = time.monotonic() + 90.0
-        while waiting:
-            assert time.monotonic() < deadline, f'{waiting} did not start'
-            for target in sorted(waiting):
-                run = runs[target]
-                if run.recorded():
-                    waiting.remove(target)
-                    if target == 'pedestal':
-                        run.process.send_signal(targets[target])
-                    elif target == 'everything':
-                        run.kill()
-                    else:
-                        run.signal(target, targets[target])
-            time.sleep(0.02)
-        return {target: (run, run.finish()) for target, run in runs.items()}
-    return hurt
+def hurt(start_run, targets):
+    """{target: run} of runs side by side for {target: signal}; as soon as one is well under way its target, a node or
+    the command `pedestal` itself, gets the signal."""
+    runs = {target: start_run('leo_pass', '--pacing', 'lockstep', '--duration', '200',
+                              '--param', f'scenario.deadline={DEADLINE_S}')
+            for target in targets}
+    waiting = set(targets)
+    deadline = time.monotonic() + 90.0
+    while waiting:
+        assert time.monotonic() < deadline, f'{waiting} did not start'
+        for target in sorted(waiting):
+            run = runs[target]
+            if run.recorded():
+                waiting.remove(target)
+                if target == 'pedestal':
+                    run.process.send_signal(targets[target])
+                elif target == 'everything':
+                    run.kill()
+                else:
+                    run.signal(target, targets[target])
+        time.sleep(0.02)
+    return runs
+
+
+def finished(runs):
+    return {target: (run, run.finish()) for target, run in runs.items()}
 
 
 @pytest.fixture(scope='module')
-def killed(hurt):
-    return hurt({**dict.fromkeys((*NODES, 'everything'), signal.SIGKILL), 'pedestal': signal.SIGINT})
+def silent(start_run):
+    """Runs that wait DEADLINE_S for a node, in which time those of `killed` run."""
+    return hurt(start_run, dict.fromkeys(NODES, signal.SIGSTOP))
 
 
 @pytest.fixture(scope='module')
-def stopped(hurt):
-    return hurt(dict.fromkeys(NODES, signal.SIGSTOP))
+def killed(silent, start_run):
+    return finished(hurt(start_run, {**dict.fromkeys((*NODES, 'everything'), signal.SIGKILL),
+                                     'pedestal': signal.SIGINT}))
+
+
+@pytest.fixture(scope='module')
+def stopped(silent):
+    return finished(silent)
 
 
 def assert_readable(run, damaged=False):

@@ -40,47 +40,6 @@ def test_a_receiver_of_ones_own(start_process, connect, domain_id):
     assert math.isnan(step(200).x)
 
 
-def test_a_receiver_of_ones_own_without_error_channels(start_process, connect, reserve_domain):
-    """Step track climbs to the target by a level, 20 times a second. First the ACU learns the noise off target."""
-    domain, target, beamwidth = reserve_domain(), np.array((0.506, 0.6)), 0.0175
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
-        free.bind(('127.0.0.1', 0))
-        port = free.getsockname()[1]
-    start_process([sys.executable, FILE.with_name('level_receiver.py'), port], ROS_DOMAIN_ID=str(domain))
-    graph = ('graph.pacing:=realtime', 'graph.nodes:=acu,adu', 'period:=0.02')
-    for module, changes in (('adu_drive.adu_node', ('initial_azimuth:=0.7', 'initial_elevation:=0.6')),
-                            ('acu_tracker.acu_node', ('steptrack.cycle:=4.0', 'steptrack.dwell:=0.3',
-                                                      'azimuth.feedforward.bandwidth:=4.0',
-                                                      'elevation.feedforward.bandwidth:=4.0'))):
-        start_process([sys.executable, '-m', module, '--ros-args',
-                       *(part for change in (*graph, *changes) for part in ('-p', change))], ROS_DOMAIN_ID=str(domain))
-    client, last = connect(domain, 'level'), [-math.inf]
-    noise = np.random.default_rng(1)
-
-    def send(joints):
-        if time.monotonic() - last[0] > 0.05:
-            last[0] = time.monotonic()
-            off = (np.array(joints.position) - target) * (math.cos(target[1]), 1.0) / beamwidth
-            level = max(50.0 - 12.0 * float(off @ off), 20.0) + 0.02 * noise.standard_normal()
-            with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as hardware:
-                hardware.sendto(str(level).encode(), ('127.0.0.1', port))
-
-    def error():
-        return abs(client.heard['joint_states'][-1].position[0] - target[0]) / beamwidth
-
-    client.read('joint_states', send)
-    client.read('acu/mode')
-    client.write('acu/command')
-    client.spin(4.0)
-    client.publish('acu/command', commands.message(commands.Command('preset', 'client', '1', {
-        'azimuth': 0.5, 'elevation': 0.6})))
-    client.until(lambda: error() < 0.4)
-    client.spin(2.0)
-    client.publish('acu/command', commands.message(commands.Command('steptrack', 'client', '2')))
-    client.until(lambda: error() < 0.03, told=lambda: f'{error():.3f} beamwidths off')
-    assert client.heard['acu/mode'][-1].data == 'steptrack'
-
-
 class Amplifiers(threading.Thread):
     """Amplifiers of two axes at a UDP port: of first order in rate, or in angle where they close the position loop."""
 

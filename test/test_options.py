@@ -1,5 +1,6 @@
 """Options of the command line: negative values, and options that would have no effect."""
 import pathlib
+import re
 
 import pytest
 
@@ -76,3 +77,12 @@ def test_a_status_asks_nothing_in_a_name(capsys):
     with pytest.raises(SystemExit):
         cli.main(['status', '--who', 'me'])
     assert 'unrecognized arguments: --who me' in capsys.readouterr().err
+
+
+def test_a_wrong_verb_gets_a_suggestion_and_the_version_is_printed(capsys):
+    with pytest.raises(SystemExit) as ended:
+        cli.main(['runn'])
+    assert ended.value.code == 2 and "no verb 'runn': did you mean 'run'?" in capsys.readouterr().err
+    with pytest.raises(SystemExit) as ended:
+        cli.main(['--version'])
+    assert ended.value.code == 0 and re.fullmatch(r'pedestal \d+\.\d+\.\d+\n', capsys.readouterr().out)

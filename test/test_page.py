@@ -327,6 +327,37 @@ def test_a_recording_on_the_page(browser, start_process):
     assert player.wait(PATIENCE) == 0
 
 
+@needs_chromium
+def test_the_residuals_of_the_model_in_force_as_a_sky_plot_and_as_arrows(browser, start_process, start_run):
+    """The recording has a model with three residuals; the longest arrow is that of the largest."""
+    run = start_run('leo_pass', '--duration', 2, '--param', 'acu.pointing.p1=0.001', '--param',
+                    'acu.pointing.residuals=0 10 2 0; 90 45 0 4; 180 80 -1 -1')
+    assert run.finish().returncode == 0
+    player = start_process([*PEDESTAL, 'replay', run.bag, '--page', free_port(), '--paused'])
+    page = opened(browser[1], re.search(r'http\S+', begins_with(player, 1))[0])
+    page.locator('#slider').fill('1')
+    page.wait_for_selector('#show-residuals:not([hidden])')
+    assert page.locator('#sky-plot .residual').count() == 0
+    page.locator('#show-residuals').press('Enter')
+    reads(page, '#sky-frame', 'rms 0.0019°, longest arrow 0.0040°')
+    arrows = [[[float(number) for number in point.split(',')] for point in arrow.get_attribute('points').split()]
+              for arrow in page.locator('#sky-plot .residual').all()]
+    (x, y), (to_x, to_y) = arrows[0][:2]
+    assert (x, y) == pytest.approx((0.0, -85.3), abs=0.06)
+    assert (to_x - x, to_y - y) == pytest.approx((12.0, 0.0), abs=0.2)
+    (x, y), (to_x, to_y) = arrows[1][:2]
+    # An elevation residual in the east points to the zenith, which is in the middle.
+    assert (x, y) == pytest.approx((48.0, 0.0), abs=0.06)
+    assert (to_x - x, to_y - y) == pytest.approx((-24.0, 0.0), abs=0.2)
+    assert page.locator('#sky-plot .residual-place').count() == 3
+    page.locator('#show-residuals').press('Enter')
+    reads(page, '#sky-frame', 'north up')
+    assert page.locator('#sky-plot .residual').count() == 0 and page.errors == []
+    page.context.close()
+    player.send_signal(signal.SIGINT)
+    assert player.wait(PATIENCE) == 0
+
+
 @pytest.fixture(scope='module')
 def antenna(station):
     """(Run, Client of its graph, Site of its page); not even a serial line, which nobody closes, is in control."""

@@ -30,12 +30,12 @@ NOT_RUN = {
 """{how a line begins: why it is not executed}. Whatever is not here is."""
 
 SHORTER = {
-    'pedestal run uav_flyby': '--duration 8',
+    'pedestal run uav_flyby': '--duration 4',
     'pedestal run leo_pass --tle iss.tle --station 47.4,8.5,500 --pass 3': '--duration 2',
     'pedestal run track_file': '--duration 2',
     'pedestal run ship_pass': '--duration 2',
     'pedestal run my_antenna.yaml': '--duration 2',
-    'pedestal trials uav_flyby': '--runs 4 --duration 4',
+    'pedestal trials uav_flyby': '--runs 2 --duration 3',
     'pedestal run leo_pass --pacing realtime': '--duration 5',
 }
 """{how a line begins: what makes it short}; the same command, on less time."""
@@ -115,8 +115,13 @@ def documented_changes(text):
         source, given = getattr(options, 'scenario', None), getattr(options, 'param', [])
         if verb == 'run' and options.bag:
             recorded[str(options.bag)] = source
-        yield line, source, [], given
-        yield line, source, given, getattr(options, 'against_param', [])
+        # Simulated equipment has parameters of its own.
+        equipment = [f'scenario.{name}={value}' for name in ('pacing', 'drives', 'receiver')
+                     if (value := getattr(options, name, None))]
+        if line.startswith('pedestal simulate receiver ') or getattr(options, 'iq', None):
+            equipment = ['scenario.pacing=realtime', 'scenario.receiver=simulated-iq']
+        yield line, source, equipment, given
+        yield line, source, [*equipment, *given], getattr(options, 'against_param', [])
         for _, *more in getattr(options, 'side', []):
             yield line, source, given, more
 

@@ -38,8 +38,8 @@ def test_what_is_random_is_never_of_one_seed():
 
 
 def test_a_number_that_no_paper_prints_is_in_no_paper_column():
-    printed = {(claim.study, claim.case, claim.metric): claim.claim
-               for of in claims.CLAIMS_BY_PAPER.values() for claim in of}
+    printed = {(claim.study, claim.case, claim.metric)
+               for of in claims.CLAIMS_BY_PAPER.values() for claim in of if '(no number)' not in claim.claim}
     for key, row in published.read(ROOT).items():
         if row['paper'] is not None:
-            assert key in printed and '(no number)' not in printed[key], key
+            assert key in printed, key

@@ -115,7 +115,7 @@ def test_a_second_replay_begins_again(run, connect, start_process, run_process, 
 def test_a_second_replay_into_the_drive_begins_again(run, connect, start_process, run_process, domain):
     """The drive waits longer than its deadline for the second replay."""
     drive = start_process([sys.executable, '-m', 'adu_drive.adu_node', '--ros-args', '--params-file',
-                           run.log / 'parameters.yaml', '-p', 'adu:graph.deadline:=10.0'], ROS_DOMAIN_ID=str(domain))
+                           run.log / 'parameters.yaml', '-p', 'adu:graph.deadline:=5.0'], ROS_DOMAIN_ID=str(domain))
     client = connect(domain)
     client.read('joint_states')
     for count in (1, 2):
@@ -123,7 +123,7 @@ def test_a_second_replay_into_the_drive_begins_again(run, connect, start_process
                            ROS_DOMAIN_ID=str(domain))
         assert (done.returncode, done.stderr) == (0, '')
         client.until(lambda count=count: len(client.heard['joint_states']) >= 402 * count)
-        client.spin(11.0)
+        client.spin(5.5)
     heard = [messages.serialize(message) for message in client.heard['joint_states']]
     assert heard == data(run.bag, 'joint_states')[:402] * 2
     end(drive)

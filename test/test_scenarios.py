@@ -11,8 +11,9 @@ DURATION = 6.0
 
 
 OF_THEIR_WHOLE_LENGTH = ('ship_overhead', 'ship_align_and_track', 'late_tle', 'sidelobe', 'steptrack_geo',
-                         'leo_station_7m')
-"""Runs of seconds say nothing about these; test_ship, test_acquisition and test_data_sheet make them."""
+                         'leo_station_7m', 'station_new', 'station_sun', 'receiver_phasing')
+"""Runs of seconds say nothing about these; test_ship, test_acquisition, test_data_sheet, test_pointing_collect,
+test_pointing_scan and test_receiver_calibration make them."""
 
 TRACKED = [name for name in scenario.available()
            if not name.startswith('servo_') and name not in OF_THEIR_WHOLE_LENGTH]

@@ -2,6 +2,7 @@
 
 `python -m tools.book FOLDER` copies docs/ into the folder. It adds three pages generated from the code, in reference/:
 the parameters of every node, the verbs, the laws. CONTRIBUTING.md, which is outside docs/, becomes contributing.md.
+Each notebook is executed and becomes a page with its output.
 """
 import argparse
 import ast
@@ -10,6 +11,8 @@ import pathlib
 import re
 import shutil
 import sys
+
+from tools import notebooks
 
 from pedestal import cli
 from pedestal_bringup.scenario import scenario
@@ -103,15 +106,18 @@ def contributing_page(root):
     return re.sub(r'\[([^]]*)\]\([A-Z][^)]*\)', r'\1', text)
 
 
-def main(folder, root='.') -> int:
+def main(folder, root='.', execute=True) -> int:
     """Write all pages of the book of a checkout (root) into a folder, whose old content is deleted. Return the exit
-    code 0."""
+    code 0. execute: True to run the notebooks, whose pages otherwise have no output."""
     root, folder = pathlib.Path(root), pathlib.Path(folder)
     shutil.rmtree(folder, ignore_errors=True)
     shutil.copytree(root / 'docs', folder)
     (folder / 'contributing.md').write_text(contributing_page(root))
     for page in folder.glob('*.md'):
-        page.write_text(page.read_text().replace('](../CONTRIBUTING.md)', '](contributing.md)'))
+        text = page.read_text().replace('](../CONTRIBUTING.md)', '](contributing.md)')
+        page.write_text(text.replace('.ipynb)', '.md)'))
+    for notebook in sorted(folder.glob('*.ipynb')):
+        notebooks.write_page(notebooks.read(notebook, execute), notebook)
     (folder / 'reference').mkdir()
     for name, lines in (('parameters', parameter_page()), ('verbs', verb_page()), ('laws', law_page(root))):
         (folder / 'reference' / f'{name}.md').write_text('\n'.join(lines) + '\n')

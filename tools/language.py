@@ -2,7 +2,8 @@
 test/test_language.py uses it.
 
 `python -m tools.language [PATH ...]` prints the texts that break a rule of CONTRIBUTING.md: forbidden words and long
-sentences. Without PATH it reads README.md, CONTRIBUTING.md, CHANGELOG.md, docs/ and all modules except the tests.
+sentences. PATH is a file or a folder. Without PATH it reads README.md, CONTRIBUTING.md, CHANGELOG.md, docs/ and all
+modules except the tests.
 """
 import ast
 import io
@@ -139,9 +140,15 @@ def public_constants(path):
 
 
 def main(names):
-    """Print the broken rules of the files of these names, or of all files if there is no name. Return the exit code: 1
-    if a rule is broken, otherwise 0."""
-    broken = [f'{path}:{line}: {rule}: {text[:200]}' for path in (map(pathlib.Path, names) if names else paths())
+    """Print the broken rules of the files and folders of these names, or of all files if there is no name. Return the
+    exit code: 1 if a rule is broken, otherwise 0."""
+    named = [pathlib.Path(name).resolve() for name in names]
+    missing = [str(path) for path in named if not path.exists()]
+    if missing:
+        sys.exit(f'no such file or folder: {", ".join(missing)}')
+    chosen = [path for path in paths() if any(path.is_relative_to(folder) for folder in named)] if named else paths()
+    files = sorted({*chosen, *filter(pathlib.Path.is_file, named)})
+    broken = [f'{path}:{line}: {rule}: {text[:200]}' for path in files
               for line, rule, text in broken_rules(path)]
     print(*broken, sep='\n')
     constants = [name for path in paths() if path.suffix == '.py' for name in public_constants(path)]

@@ -36,14 +36,15 @@ TABLE_PARAMETERS = (
     'acu.azimuth.filter.current_statistical.alpha', 'acu.tracker.ukf.cv_noise',
     'acu.azimuth.feedforward.acceleration_feedforward', 'acu.azimuth.filter.imm.models', 'acu.tracker.gate',
     'acu.azimuth.controller', 'acu.azimuth.feedforward.bandwidth', 'acu.azimuth.notch.frequency',
-    'acu.azimuth.shaper.acceleration', 'acu.initial_mode', 'tracking_receiver.receiver.cn0_dbhz',
+    'acu.azimuth.shaper.acceleration', 'acu.initial_mode', 'acu.refraction.kind',
+    'acu.refraction.pressure_hpa', 'acu.prediction.earth_orientation.file', 'tracking_receiver.receiver.cn0_dbhz',
     'tracking_receiver.antenna.beamwidth', 'tracking_receiver.path.refractivity',
     'tracking_receiver.receiver.latency', 'ship_motion.ship.motion', 'ship_motion.ship.sea_state',
     'ship_motion.ship.spectrum', 'ship_motion.nmea.port', 'ins.method', 'ins.latency')
 """The parameters in the table of docs/parameters.md."""
 
 RATE_TEXTS = {'step': 'every step', 'once': 'once, latched or not', 'second': '1 Hz', 'change': 'on change, latched',
-              'reply': 'after each request', 'command': 'on request'}
+              'reply': 'after each request', 'command': 'on request', 'sample': 'at any time, in realtime only'}
 """{rate of a topic, as in topics.Topic: its text in the table of topics}."""
 
 
@@ -56,7 +57,7 @@ def node_table():
     """Return the table of the nodes: executable, function, and the equipment of a real antenna that the node stands
     for."""
     rows = [(f'`{node.name}`', f'`{node.executable}` ({node.package})' if node.module else '', node.doc,
-             node.stands_for) for node in (*nodes.NODES, nodes.ARRAY_DRIVE)]
+             node.stands_for) for node in (*nodes.NODES, *nodes.HARDWARE_ROWS)]
     return _table(('node', 'executable (package)', 'function', 'stands for'), rows)
 
 

@@ -135,8 +135,8 @@ class Remote:
 
     exists = present
 
-    def angles(self, topic):
-        """(azimuth, elevation) [deg] of the encoders."""
+    def directions(self, topic):
+        """(azimuth, elevation) [deg] of the encoders, which are the directions without a pointing model."""
         return tuple(np.degrees(self._acu.parts['inputs']['position']))
 
     def query(self, names):

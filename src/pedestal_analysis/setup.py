@@ -12,7 +12,7 @@ setup(
     ],
     install_requires=['numpy', 'scipy', 'matplotlib', 'rich', 'joblib', 'PyYAML'],
     extras_require={'cluster': ['dask', 'distributed'],
-                    'test': ['pytest', 'dask', 'distributed', 'ccsds-ndm-py', 'beyond']},
+                    'test': ['pytest', 'dask', 'distributed', 'ccsds-ndm-py', 'beyond', 'katpoint']},
     python_requires='>=3.10',
     zip_safe=False,
     maintainer='pedestal maintainers',

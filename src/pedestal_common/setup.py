@@ -12,7 +12,7 @@ setup(
         ('share/' + package_name, ['package.xml']),
     ],
     install_requires=['numpy', 'numba', 'rosbags', 'scipy', 'sgp4', 'PyYAML'],
-    extras_require={'test': ['pytest']},
+    extras_require={'test': ['pytest', 'pyerfa']},
     python_requires='>=3.10',
     zip_safe=False,
     maintainer='pedestal maintainers',

@@ -33,6 +33,7 @@ from acu_tracker.lookahead import levelled_deck, planner
 from acu_tracker.mode import mode_change, outage, reachability, resumption, signal_level_modes, stow, supervision
 from acu_tracker.modes import Mode, Reason
 from acu_tracker.params import AxisParameters, SharedParameters
+from acu_tracker.pointing import model
 from acu_tracker.program import bridge, tables
 from acu_tracker.servo import axes, ends, floor, frozen, notch, position_loop, uncommanded_motion
 from acu_tracker.servo.position_loop import Instants
@@ -100,7 +101,8 @@ def initial_state(params) -> np.ndarray:
     s['stamp'] = -math.inf
     mode_change.initialise(s['mode'], params)
     guidance.initialise(s['guidance'], (params.azimuth.preset, params.elevation.preset))
-    for name, module in (('resumption', resumption), ('stow', stow), ('tracking', tracking), ('outage', outage),
+    tracking.initialise(s['tracking'], params.pointing)
+    for name, module in (('resumption', resumption), ('stow', stow), ('outage', outage),
                          ('unasked', uncommanded_motion), ('supervision', conditions)):
         module.initialise(s[name])
     return s
@@ -196,6 +198,7 @@ def _observe(s, c, u, o, program, silence):
     """
     g, k, mode = s.guidance, s.tracking, s.mode.now
     way = bridge.way(g.bridge, program)
+    model.step(k.pointing, s.stamp)
     tracker.transfer(k.target.tracker, c.tracker)
     flags = signals.Flag.STEP_GAP if silence else 0
     flags |= measurements.take_encoders(k.encoders, u) | _take_attitude(s, c, u) | _take_receiver(s, c, u, o, way)
@@ -303,17 +306,17 @@ def _situation(s, c, u, all_tables, request, no_signal):
     flags = flag = 0
     if unstable == Reason.NONE:
         if Mode.PROGRAM in wanted:
-            program, flags = reachability.judge_table(k.attitude, c, u, Mode.PROGRAM, all_tables, t, g.azimuth)
+            program, flags = reachability.judge_table(k, c, u, Mode.PROGRAM, all_tables, t, g.azimuth)
         if Mode.TLE in wanted:
-            tle, flag = reachability.judge_table(k.attitude, c, u, Mode.TLE, all_tables, t, g.azimuth)
+            tle, flag = reachability.judge_table(k, c, u, Mode.TLE, all_tables, t, g.azimuth)
             flags |= flag
         if Mode.SUN in wanted:
-            sun, flag = reachability.judge_table(k.attitude, c, u, Mode.SUN, all_tables, t, g.azimuth)
+            sun, flag = reachability.judge_table(k, c, u, Mode.SUN, all_tables, t, g.azimuth)
             flags |= flag
     why = modes.Conditions(
         nothing=Reason.NONE, stow=reachability.outside(c, c.axis[0].p.stow, c.axis[1].p.stow),
         pin=Reason.PINS_OUT if pins == Reason.NONE else Reason.NONE,
-        preset=reachability.outside(c, g.preset.angle[0], g.preset.angle[1]),
+        preset=reachability.judge_direction(k.pointing.model, c, g.preset.angle[0], g.preset.angle[1]),
         direction=Reason.NONE if direction.valid_at(g.slave, t) else Reason.NO_DIRECTION,
         program=program, tle=tle, sun=sun, lock=lock, slope=slope, track=track,
         level=signal_level_modes.end(g.acquisition, m.now, c, t))
@@ -378,7 +381,7 @@ def _note_outage_reason(s, c):
     The target may be hidden, the beam may slew through the keyhole, or the azimuth may turn at a limit of its travel.
     """
     g, follows = s.guidance, modes.FOLLOWS_TARGET[s.mode.now]
-    hidden = follows and blockage.blocked(c.lookahead.sectors, g.target_angles[0], g.target_angles[1])
+    hidden = follows and blockage.blocked(c.lookahead.sectors, g.direction[0], g.direction[1])
     turning = g.turn.under_way and supervision.axes_follow_commands(s.supervision)
     reason = outage.watch(s.outage, hidden, follows and planner.slewing(g.lookahead, s.stamp), follows and turning,
                           s.stamp)

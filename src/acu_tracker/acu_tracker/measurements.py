@@ -46,6 +46,17 @@ def take_attitude(s, p, u):
 
 
 @compiled
+def correct_error(matrix, u):
+    """Multiply the error of a new message of the receiver with the matrix of its calibration.
+
+    matrix: record of ErrorMatrixParameters. The rates of the error come from a tachometer, and stay as they are.
+    """
+    if u.error_came:
+        x, e = u.cross_elevation, u.elevation
+        u.cross_elevation, u.elevation = matrix.xx * x + matrix.xe * e, matrix.ex * x + matrix.ee * e
+
+
+@compiled
 def _wrong_level(s, u):
     """Return the flag of a message of the receiver with an invalid signal level or stamp, else 0.
 

@@ -6,10 +6,12 @@ import dataclasses
 import math
 
 from acu_tracker.estimation.params import FilterParameters, TrackerParameters
-from acu_tracker.geometry.history import HISTORY_LENGTH
+from acu_tracker.geometry.history import MAX_DELAY_STEPS
 from acu_tracker.lookahead.params import KeyholeParameters
 from acu_tracker.modes import FALLBACK_MODES
 from acu_tracker.operating.command_table import ACU_COMMANDS, POINTS_DOC, points
+from acu_tracker.pointing.params import PointingParameters
+from acu_tracker.program.air import RefractionParameters
 from acu_tracker.program.prediction import PredictionParameters
 from acu_tracker.search.params import AcquisitionParameters, SearchParameters, StepTrackParameters
 from acu_tracker.servo import ends, floor
@@ -37,8 +39,8 @@ from pedestal_common.wire.commands import SCHEDULE_DOC, schedule
 class AxisParameters(Parameters):
     """Parameters of one axis."""
 
-    stow: float = parameter(0.0, -20.0, 20.0, 'rad', 'deck angle in mode stow')
-    preset: float = parameter(0.0, -20.0, 20.0, 'rad', 'deck angle in mode preset before the first preset command')
+    stow: float = parameter(0.0, -20.0, 20.0, 'rad', 'encoder angle in mode stow')
+    preset: float = parameter(0.0, -20.0, 20.0, 'rad', 'deck angle on the sky in mode preset before the first command')
     filter: FilterParameters = group(FilterParameters)
     controller: str = choice('feedforward', CONTROLLERS, 'law of the position loop, changeable at run time; '
                              'beam is for an electronic array, and an array allows no other')
@@ -66,8 +68,8 @@ class AxisParameters(Parameters):
 class ElevationParameters(AxisParameters):
     """Parameters of the elevation axis, with other defaults: its load and its limits are those of this axis."""
 
-    stow: float = parameter(0.5 * math.pi, -20.0, 20.0, 'rad', 'deck angle in mode stow')
-    preset: float = parameter(0.5, -20.0, 20.0, 'rad', 'deck angle in mode preset before the first preset command')
+    stow: float = parameter(0.5 * math.pi, -20.0, 20.0, 'rad', 'encoder angle in mode stow')
+    preset: float = parameter(0.5, -20.0, 20.0, 'rad', 'deck angle on the sky in mode preset before the first command')
     feedforward: FeedforwardParameters = group(FeedforwardParameters, inertia=288.0, friction=45.0)
     shaper: ShaperParameters = group(ShaperParameters, rate=1.4, acceleration=20.0)
     limits: LimitsParameters = group(LimitsParameters, low=math.radians(-2.0), high=math.radians(92.0),
@@ -93,12 +95,15 @@ class SharedParameters(topic_flags(nodes.row('acu').reads)):  # type: ignore[mis
     stow_timeout: float = parameter(20.0, 0.1, 3600.0, 's', 'time within which the pins must reach their commanded '
                                     'position')
     prediction: PredictionParameters = group(PredictionParameters)
+    refraction: RefractionParameters = group(RefractionParameters)
     fallback: str = choice('program', FALLBACK_MODES,
                            'mode after the loss of the track, until an operator chooses another')
     points: str = text('', POINTS_DOC)
     commands: str = text('', SCHEDULE_DOC)
     attitude_timeout: float = parameter(0.2, 1e-3, 10.0, 's', 'age of the ship attitude at which it counts as lost')
     attitude_smoothing: float = parameter(0.05, 0.0, 10.0, 's', 'time constant of the deck angular acceleration')
+    antenna: str = text('', 'name of this antenna; a pointing model of another antenna is refused')
+    pointing: PointingParameters = group(PointingParameters)
     lever_arm: LeverArm = group(LeverArm)
     blockage: str = text('', SECTORS_DOC)
     floor: str = text('', floor.FLOOR_DOC)
@@ -168,27 +173,27 @@ class AcuParameters(SharedParameters):
         Each delay must fit into the histories of past steps. A notch must be below half the step rate. An attitude
         must be used before it times out. `step_gap` must be longer than a step.
         """
+        self.pointing.check_antenna(self.antenna)
         sectors(self.blockage)
         schedule('commands', self.commands, ACU_COMMANDS)
         points(self.points)
-        # A history holds HISTORY_LENGTH steps; four of them are a margin for stamps between and ahead of the steps.
         kept = ['receiver_latency', 'attitude_latency']
         # command_delay does not matter for a beam, because a beam keeps no history of its reference.
         if {self.azimuth.controller, self.elevation.controller} != {'beam'}:
             kept.append('command_delay')
         for name in kept:
-            if getattr(self, name) > (HISTORY_LENGTH - 4) * self.period:
-                raise ParameterError(f'{name} = {getattr(self, name):g} s: must be 0 to {HISTORY_LENGTH - 4} periods, '
-                                     f'{(HISTORY_LENGTH - 4) * self.period:g} s')
+            if getattr(self, name) > MAX_DELAY_STEPS * self.period:
+                raise ParameterError(f'{name} = {getattr(self, name):g} s: must be 0 to {MAX_DELAY_STEPS} periods, '
+                                     f'{MAX_DELAY_STEPS * self.period:g} s')
         for name in ('azimuth', 'elevation'):
             if getattr(self, name).notch.frequency * self.period >= 0.5:
                 raise ParameterError(f'{name}.notch.frequency = {getattr(self, name).notch.frequency:g} Hz: must be '
                                      f'below half the step rate, {0.5 / self.period:g} Hz')
         for name in ('age', 'beam_age'):
             age = getattr(self.tracker.receiver, name)
-            if self.receiver_latency + age > (HISTORY_LENGTH - 4) * self.period:
-                longest = (HISTORY_LENGTH - 4) * self.period - self.receiver_latency
-                raise ParameterError(f'tracker.receiver.{name} = {age:g} s: must be 0 to {HISTORY_LENGTH - 4} periods '
+            if self.receiver_latency + age > MAX_DELAY_STEPS * self.period:
+                longest = MAX_DELAY_STEPS * self.period - self.receiver_latency
+                raise ParameterError(f'tracker.receiver.{name} = {age:g} s: must be 0 to {MAX_DELAY_STEPS} periods '
                                      f'less receiver_latency, {longest:g} s')
         longest = self.attitude_timeout - self.command_delay - 0.5 * self.period
         if self.attitude_latency >= longest:

@@ -63,7 +63,7 @@ OUTPUTS_DTYPE = np.dtype([
     ('rate', 'f8', (2,)), ('torque', 'f8', (2,)),       # rate command [rad/s], feed-forward torque [Nm]
     ('estimate', 'f8', (2, 3)),                         # of the target at t_k: earth angle, rate, acceleration;
                                                         # NaN: no estimate
-    ('reference', 'f8', (2, 3)),                        # deck angle, rate, acceleration at t_k; for a beam: the
+    ('reference', 'f8', (2, 3)),                        # encoder angle, rate, acceleration at t_k; for a beam: the
                                                         # command at t_m, the middle of its interval
     ('covariance', 'f8', (2, 3)),                       # of the estimate: variance of the angle, covariance, variance
                                                         # of the rate

@@ -18,27 +18,31 @@ from acu_tracker.estimation.filters import measurement, target_filter
 from acu_tracker.geometry import attitude, deck_reference, encoders
 from acu_tracker.geometry.vector import Vector, rotated
 from acu_tracker.modes import Reason
+from acu_tracker.pointing import model
 from acu_tracker.search import coast, place
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry import line_of_sight as pointing
 
 TRACKING_DTYPE = np.dtype([
-    ('encoders', encoders.ENCODERS_DTYPE), ('attitude', attitude.ATTITUDE_DTYPE), ('target', target.TARGET_DTYPE),
+    ('encoders', encoders.ENCODERS_DTYPE), ('pointing', model.POINTING_DTYPE), ('attitude', attitude.ATTITUDE_DTYPE),
+    ('target', target.TARGET_DTYPE),
     ('error', 'f8', (2,)),
     ('repetition', repetition.REPETITION_DTYPE), ('divergence', divergence.DIVERGENCE_DTYPE),
     ('slope_sign', slope_sign.SLOPE_SIGN_DTYPE)], align=True)
 """State of the tracking.
 
-encoders, attitude  histories of the beam and of the deck
+encoders, attitude  histories of the encoder angles and of the deck
+pointing            pointing model in force, between encoder angles and directions
 target              target filter
 error               receiver error of this step, in deck angles (azimuth, elevation) [rad]; NaN: no error
 repetition, divergence, slope_sign  monitors of the errors
 """
 
 
-def initialise(k):
-    """Begin without an estimate; k: view of TRACKING_DTYPE."""
+def initialise(k, pointing):
+    """Begin without an estimate; k: view of TRACKING_DTYPE; pointing: PointingParameters."""
     target.initialise(k['target'])
+    model.initialise(k['pointing'][0], pointing.terms, pointing.named)
 
 
 @compiled
@@ -54,11 +58,12 @@ def take_place(k, u):
 def used_error(k, c, u, by_level, offset):
     """Return (flags of the receiver's message, True if its error is used, the Pointing of the beam at the error).
 
-    A repeated error is not used. by_level, offset: uses_level and intended_offset of measurements.error_at.
+    The Pointing is on the sky. A repeated error is not used. by_level, offset: uses_level and intended_offset of
+    measurements.error_at.
     """
     k.error[0] = k.error[1] = math.nan
     flags, used, at = measurements.error_at(k.encoders, c.p.tracker.receiver, u, by_level, offset)
-    return flags, used and not repetition.take(k.repetition, u, at), at
+    return flags, used and not repetition.take(k.repetition, u, at), model.to_sky(k.pointing.model, at)
 
 
 @compiled
@@ -151,6 +156,7 @@ def sight(k, c, t):
 def beam(k, c, t):
     """Return (ENU unit vector along the beam at t [s], rate of the vector: taken as zero)."""
     _, at = encoders.at(k.encoders, t)
+    at = model.to_sky(k.pointing.model, at)
     _, deck = attitude.at(k.attitude, c.p, t)
     return rotated(deck.mat, Vector(*pointing.direction(at.A, at.E))), place.ZERO_VECTOR
 
@@ -159,13 +165,15 @@ def beam(k, c, t):
 def deck_rates(k, c, t, A, E):
     """Return the rates [rad/s] at which the motion of the deck moves the deck angles of an earth-fixed direction.
 
-    A, E: deck angles of the direction at t [s], in rad. The rates are 0 if no axis uses them (beam.rate_compensation).
+    A, E: encoder angles of the direction at t [s], in rad. The rates are 0 if no axis uses them
+    (beam.rate_compensation).
     """
     compensated = c.axis[0].p.beam.rate_compensation != 0.0 or c.axis[1].p.beam.rate_compensation != 0.0
     if compensated and k.attitude.stabilised:
         known, deck = attitude.at(k.attitude, c.p, t)
         if known:
-            return deck_reference.fixed_rates(deck.w, A, E)
+            at = model.to_sky(k.pointing.model, encoders.Pointing(A, E, 0.0, 0.0))
+            return deck_reference.fixed_rates(deck.w, at.A, at.E)
     return 0.0, 0.0
 
 

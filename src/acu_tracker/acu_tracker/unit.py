@@ -4,23 +4,29 @@ The node `acu`, the closed loop and the recomputation run this unit (pedestal_co
 converts the messages to the inputs of `control_unit.step`, and the outputs to messages. Between the steps it executes
 the commands of clients.
 """
+import datetime
 import functools
 import math
 import typing
 
 import numpy as np
 
-from acu_tracker import control_unit, modes, signals
+from acu_tracker import control_unit, measurements, modes, signals
 from acu_tracker.alarms import annunciator, report, table
+from acu_tracker.geometry import direction
 from acu_tracker.mode import mode_change
 from acu_tracker.modes import Mode, Reason
 from acu_tracker.operating import announcement, diagnosis
 from acu_tracker.operating.alarm_desk import AlarmDesk
 from acu_tracker.operating.authority import Authority
 from acu_tracker.operating.command_table import ACU_COMMANDS, ALARM_COMMAND_NAMES, ARGUMENT_SETTERS
+from acu_tracker.pointing import model
+from acu_tracker.pointing.params import PointingParameters
 from acu_tracker.program import segments, tables
+from acu_tracker.program.air import WEATHER_QUANTITIES, Air
 from acu_tracker.program.prediction import Predictor
 from pedestal_common.compiled import compiled
+from pedestal_common.geometry import pointing_model
 from pedestal_common.graph import nodes, topics
 from pedestal_common.node.unit import NEVER_DUE_NS, Unit, joined
 from pedestal_common.wire import messages
@@ -34,6 +40,7 @@ RANGE_TOPIC, RATE_COMMAND_TOPIC = 'tracking_receiver/range', 'acu/rate_command'
 ESTIMATE_TOPIC, REFERENCE_TOPIC, FILTER_TOPIC = 'acu/estimate', 'acu/reference', 'acu/filter'
 MODE_TOPIC, KEYHOLE_TOPIC, BLOCKAGE_TOPIC, ALARMS_TOPIC = 'acu/mode', 'acu/keyhole', 'acu/blockage', 'acu/alarms'
 DRIVE_STATE_TOPIC, INS_STATE_TOPIC, STOW_PINS_TOPIC = 'adu/state', 'ins/state', 'acu/stow_pins'
+POINTING_TOPIC = 'acu/pointing'
 
 FILTER_COLUMN_COUNT, MODEL_COUNT = len(topics.FILTER_UNITS), len(topics.MOTION_MODELS)
 """Number of the values of an axis on acu/filter; the last MODEL_COUNT are the probabilities of the motion models."""
@@ -53,6 +60,9 @@ invalid: bits of signals.INVALID_INPUTS that were set since the last diagnosis.
 
 SILENCE_REFUSAL = f'no {JOINT_STATES_TOPIC}, the drive is silent'
 """Text with which every mode except standby is refused while the drive is silent."""
+
+BEND_INTERVAL_S = 0.1
+"""Time after which the refraction of a direction of the mode slave is computed again [s]."""
 
 RESET_REQUEST_DURATION_S = 0.2
 """Time after a reset by an operator during which the reset of the drive is requested [s]."""
@@ -92,11 +102,11 @@ def decode(u, stamp, inputs):
 
 
 @compiled
-def encode(o, lookahead, stamp, outputs):
-    """Convert the outputs of the control unit and the counts of the look-ahead into the records of its messages.
+def encode(o, s, stamp, outputs):
+    """Convert the outputs of the control unit and the counts of its reports into the records of its messages.
 
-    o: record of signals.OUTPUTS_DTYPE; lookahead: record of planner.PLANNER_DTYPE; stamp: of the step [ns]; outputs:
-    record of the output topics.
+    o, s: records of signals.OUTPUTS_DTYPE and of control_unit.STATE_DTYPE; stamp: of the step [ns]; outputs: record of
+    the output topics.
     """
     command, estimate, reference = outputs[RATE_COMMAND_TOPIC], outputs[ESTIMATE_TOPIC], outputs[REFERENCE_TOPIC]
     command.stamp = estimate.stamp = reference.stamp = outputs[FILTER_TOPIC].stamp = stamp
@@ -111,11 +121,13 @@ def encode(o, lookahead, stamp, outputs):
         numbers[3], numbers[4] = math.sqrt(o.covariance[i, 0]), math.sqrt(o.covariance[i, 2])
         numbers[5] = o.covariance[i, 1] / (numbers[3] * numbers[4])
         numbers[6] = o.innovation_sigma[i]
-        for model in range(MODEL_COUNT):
-            numbers[FILTER_COLUMN_COUNT - MODEL_COUNT + model] = o.probability[i, model]
+        for j in range(MODEL_COUNT):
+            numbers[FILTER_COLUMN_COUNT - MODEL_COUNT + j] = o.probability[i, j]
+    lookahead = s.guidance.lookahead
     (outputs[MODE_TOPIC], outputs[KEYHOLE_TOPIC], outputs[BLOCKAGE_TOPIC]) = (o.mode, lookahead.forecasts - 1,
                                                                               lookahead.blockages - 1)
     outputs[ALARMS_TOPIC], outputs[STOW_PINS_TOPIC] = o.alarms, o.pins
+    outputs[POINTING_TOPIC] = s.tracking.pointing.report
 
 
 @compiled
@@ -123,10 +135,11 @@ def law(memory, stamp, inputs, outputs):
     """Run one step; the arguments are those of the law of a unit (pedestal_common.node.unit.Unit)."""
     m = memory.record[0]
     decode(m.inputs, stamp, inputs)
+    measurements.correct_error(m.constants.p.tracker.matrix, m.inputs)
     control_unit.step(m.state, m.constants, m.inputs, m.outputs, memory.tables)
     m.inputs.preset_valid = 0
     m.invalid |= m.outputs.invalid_input
-    encode(m.outputs, m.state.guidance.lookahead, stamp, outputs)
+    encode(m.outputs, m.state, stamp, outputs)
 
 
 @compiled
@@ -134,6 +147,13 @@ def laws(memory, stamps, inputs, outputs):
     """Run `law` for arrays of stamps, inputs and outputs."""
     for k in range(len(stamps)):
         law(memory, stamps[k], inputs[k], outputs[k])
+
+
+@compiled
+def _encoder_angles(m, azimuth, elevation):
+    """Return the encoder angles [rad] of a direction; m: record of pointing_model.MODEL_DTYPE."""
+    A, E, _ = pointing_model.encoder_of(m, azimuth, elevation)
+    return A, E
 
 
 @functools.lru_cache(1)
@@ -169,10 +189,14 @@ class Acu(Unit):
         self.authority = Authority()
         self.segments = segments.Segments([(axis.limits.rate, axis.limits.acceleration) for axis in (
             parameters.azimuth, parameters.elevation)])
-        self.predictor, self.predicted = Predictor(parameters.prediction), {}
+        self.air = Air(parameters.refraction)
+        self.predictor, self.predicted = Predictor(parameters.prediction, air=self.air), {}
+        self._apparent, self._slave, self._bend_due = {}, None, NEVER_DUE_NS
         self.offset, self._tables_valid = (0.0, 0.0, 0.0), (NEVER_DUE_NS, NO_STAMP)
         self.desk = AlarmDesk(self.parts['state'], control_unit.reset)
         self._silent, self._reset_stamp = False, -math.inf
+        self.pointing, self.refused_model = parameters.pointing, ''
+        self.pointing_reports = [self.pointing.report()]
 
     @property
     def silent(self):
@@ -195,6 +219,7 @@ class Acu(Unit):
         self.encode(ALARMS_TOPIC, 0)
         annunciator.set_condition(self.alarms, DRIVE_SILENT_ALARM, True, 0.0)
         self.diagnose()
+        self.air.raised(np.zeros(2), np.zeros((2, 2)))
         self.memory.record[...] = before
 
     def prepare_ahead(self):
@@ -204,16 +229,31 @@ class Acu(Unit):
         self.diagnose()
 
     def configure(self, parameters):
-        """Put new values of the LIVE parameters into the constants; the state stays as it is."""
+        """Put new values of the LIVE parameters into the constants; the state stays as it is.
+
+        A state without a step, as after a reset, begins with the pointing model that was in force, at its last terms.
+        """
         super().configure(parameters)
+        if not math.isfinite(self.parts['state']['stamp']):
+            model.initialise(self.parts['state']['tracking']['pointing'], self.pointing.terms, self.pointing.named)
+            self.pointing_reports = [self.pointing.report()]
+            self.bend(None)
         self.memory.record['constants'] = control_unit.constants(parameters)
         self._tables_valid = NEVER_DUE_NS, NO_STAMP
 
     def decode(self, topic, message):
-        """Take a message on acu/program_track; raise ValueError for a bad message.
+        """Take a message on acu/program_track, or a reading of the weather station.
 
-        Two or more points are a segment of the program track in earth angles. One point is a preset in deck angles.
+        A bad message on acu/program_track raises ValueError; Air counts the readings that it drops. Two or more points
+        are a segment of the program track in earth angles. One point is a preset in deck angles.
         """
+        if topic in WEATHER_QUANTITIES:
+            stamp = messages.nanoseconds(message.header.stamp)
+            self.air.take(topic, stamp * 1e-9 if stamp else None, message,
+                          self.now * 1e-9 if math.isfinite(self.parts['state']['stamp']) else None)
+            if self.air.due == -math.inf:
+                self._tables_valid = NEVER_DUE_NS, NO_STAMP
+            return
         times, angles = rows(message)
         if len(angles) == 1:
             self.parts['inputs']['preset'], self.parts['inputs']['preset_valid'] = angles[0], 1
@@ -238,8 +278,8 @@ class Acu(Unit):
 
     @property
     def next_due(self):
-        """Time [ns] of the next command of the schedule, or of the next update of the tables."""
-        return min(super().next_due, self._tables_valid[1])
+        """Time [ns] of the next command of the schedule, or of the next update of a table or of the refraction."""
+        return min(super().next_due, self._tables_valid[1], self._bend_due)
 
     def execute_due(self, stamp):
         """Execute the scheduled commands that are due before the step of a stamp [ns].
@@ -247,10 +287,13 @@ class Acu(Unit):
         The tables of the law are brought to this stamp before.
         """
         if self.epoch != self.predictor.epoch:
-            self._predict_by(Predictor(self.predictor.parameters, self.epoch))
+            self._predict_by(self.predictor.with_epoch(self.epoch))
+            self._check_model()
         since, until = self._tables_valid
         if not since <= stamp < until:
             self.update_tables(stamp)
+        if stamp >= self._bend_due:
+            self._bend(int(stamp) * 1e-9)
         super().execute_due(stamp)
 
     @property
@@ -259,6 +302,12 @@ class Acu(Unit):
         stamp = float(self.parts['state']['stamp'])
         return round(stamp * 1e9) if math.isfinite(stamp) else 0
 
+    @property
+    def utc(self):
+        """UTC of the last step, a datetime; None in lockstep, whose stamps are no UTC."""
+        since = datetime.timedelta(microseconds=(self.epoch + self.now) // 1000)
+        return datetime.datetime(1970, 1, 1) + since if self.epoch else None
+
     def _predict_by(self, predictor):
         """Replace the Predictor and discard its predictions."""
         self.predictor, self.predicted, self._tables_valid = predictor, {}, (NEVER_DUE_NS, NO_STAMP)
@@ -266,22 +315,88 @@ class Acu(Unit):
     def update_tables(self, stamp=None):
         """Bring the tables of the law to a stamp [ns]; None: the stamp of the last step.
 
-        The tables are the piece of the program track that is due, and the predictions of satellite and sun. All are
-        shifted by the offset that an operator has commanded.
+        The tables are the piece of the program track that is due, and the predictions of satellite and sun. The
+        refraction is added to true directions. All are shifted by the offset that an operator has commanded.
         """
         stamp = self.now if stamp is None else int(stamp)
         inputs, t = self.parts['inputs'], stamp * 1e-9
+        self.air.update(t)
         for place, row in enumerate(tables.TABLE_MODES):
             known = self.predicted.get(row.name)
             if row.predicted and (known is None or not known.since <= t < known.until):
                 known = self.predicted[row.name] = getattr(self.predictor, row.predicted)(t)
             inputs['unpredicted'][place] = known.reason if known else Reason.NONE
         piece, inputs['gap'], ends = self.segments.at(t - self.offset[0])
-        until = min(ends + self.offset[0], *(known.until for known in self.predicted.values()))
+        until = min(ends + self.offset[0], self.air.due, *(known.until for known in self.predicted.values()))
         self._tables_valid = stamp, max(math.ceil(until * 1e9), stamp + 1) if until < math.inf else NEVER_DUE_NS
         self.memory = self.memory._replace(tables=tables.Tables(*(
-            tables.shifted(self.predicted[row.name].track if row.predicted else piece, self.offset)
+            tables.shifted(self._apparent_track(row, self.predicted[row.name].track if row.predicted else piece),
+                           self.offset)
             for row in tables.TABLE_MODES)))
+
+    def _apparent_track(self, row, track):
+        """Return the table of a row of TABLE_MODES with apparent elevations; the last result is kept.
+
+        A new weather changes neither the first nor the last elevation of a table. The planner recognises a program by
+        these rows (planner.another_program), and a new program would restart the mode.
+        """
+        if not self.air.on or not (row.predicted or self.parameters.refraction.program == 'geometric'):
+            return track
+        known, revision, apparent = self._apparent.get(row.name, (None, None, None))
+        if known is not track or revision != self.air.revision:
+            before, apparent = apparent, self.air.apparent(track)
+            if known is track and len(track.times):
+                apparent.angles[[0, -1]] = before.angles[[0, -1]]
+            self._apparent[row.name] = track, self.air.revision, apparent
+        return apparent
+
+    def bend(self, slave):
+        """Add the refraction to a direction of the mode slave, from now on and again every BEND_INTERVAL_S.
+
+        slave: the commanded direction, direction.DIRECTION_DTYPE; None: there is no direction.
+        """
+        self._slave, self._bend_due = slave, NEVER_DUE_NS
+        if (slave is not None and math.isfinite(slave['stamp']) and self.air.on
+                and self.parameters.refraction.slave == 'geometric'):
+            self._bend(float(slave['stamp']))
+
+    def _bend(self, t):
+        """Add the refraction to the direction of the mode slave for BEND_INTERVAL_S from t [s] on.
+
+        Between both times the elevation moves on a straight line, which meets the next one without a step.
+        """
+        ends = t + BEND_INTERVAL_S
+        times = np.array((t, ends))
+        elevations = self.air.bent(np.ascontiguousarray(direction.moved(self._slave, times)[:, 1]), times)
+        direction.set_chord(self.parts['state']['guidance']['slave'], 1, t, ends, elevations)
+        self._bend_due = round(ends * 1e9) if t <= self._slave['stamp'] + self._slave['holds'] else NEVER_DUE_NS
+
+    def _check_model(self):
+        """Discard a model of the parameters whose date is later than now; the pedestal then counts as ideal.
+
+        The date can be judged in realtime only, before the first step, when the epoch of the stamps is known.
+        """
+        try:
+            self.pointing.check_date(self.utc)
+        except ValueError as error:
+            self.refused_model, self.pointing = str(error), PointingParameters()
+            model.initialise(self.parts['state']['tracking']['pointing'], self.pointing.terms, False)
+
+    def take_model(self, arguments):
+        """Take another pointing model, gradually, and return the Reply. Raise ValueError if it is refused.
+
+        arguments: {name of a field of PointingParameters: value}.
+        """
+        pointing = PointingParameters(**arguments)
+        pointing.check_antenna(self.parameters.antenna)
+        pointing.check_date(self.utc)
+        state = self.parts['state']['tracking']['pointing']
+        begins = self.now * 1e-9
+        duration = model.replace(state, pointing.terms, begins)
+        changing = pointing.report(state['before'], begins, begins + duration)
+        self.pointing_reports = [*self.pointing_reports[:int(state['report'])], changing, pointing.report()]
+        self.pointing, self.refused_model = pointing, ''
+        return Reply(True, f'pointing model {changing.title}; it is in force in {duration:.1f} s')
 
     def take_text(self, topic, text):
         """Take the text of a text topic; the text of adu/state is also kept for the diagnosis."""
@@ -299,6 +414,8 @@ class Acu(Unit):
             return report.message(self.alarms, tripped, self.desk.reasons)
         if topic == BLOCKAGE_TOPIC:
             return announcement.hidden(lookahead)
+        if topic == POINTING_TOPIC:
+            return self.pointing_reports[code].text
         return modes.MODES[code] if topic == MODE_TOPIC else super().encode(topic, code)
 
     def schedule(self):
@@ -323,10 +440,12 @@ class Acu(Unit):
             self.offset = (arguments['time'], *(arguments[axis] for axis in topics.AXES))
             self.update_tables()
             return Reply(True, 'program track shifted by {:g} s, {:g} and {:g} rad'.format(*self.offset))
+        if verb == 'pointing':
+            return self.take_model(arguments)
         if verb == 'elements':
             self.take_elements(*arguments.values())
             return Reply(True, f'elements of satellite {self.predictor.number}')
-        guidance, predictor = state['guidance'], self.predictor
+        guidance, predictor, slave = state['guidance'], self.predictor, (self._slave, self._bend_due)
         before = {name: guidance[name].copy() for name in ('preset', 'manual', 'slave')}
         if verb in ARGUMENT_SETTERS:
             ARGUMENT_SETTERS[verb](self, arguments)
@@ -334,6 +453,7 @@ class Acu(Unit):
         if not reply.granted:
             for name, value in before.items():
                 guidance[name] = value
+            self._slave, self._bend_due = slave
             if self.predictor is not predictor:
                 self._predict_by(predictor)
                 self.update_tables()
@@ -390,6 +510,15 @@ class Acu(Unit):
         return modes.REASONS[reason] + (f', {more}' if more else beyond)
 
     @property
+    def pointing_model(self):
+        """The pointing model in force, in words; '' without a model."""
+        state = self.parts['state']['tracking']['pointing']
+        if state['report'] == topics.NO_TEXT_CODE:
+            return ''
+        title = self.pointing_reports[int(state['report'])].title
+        return f'{title}; in force from {state["ends"]:.1f} s on' if state['changing'] else title
+
+    @property
     def drive_status(self):
         """State of the drive as the drive published it, or 'silent'."""
         return 'silent' if self.silent else self.drive_state
@@ -412,8 +541,9 @@ class Acu(Unit):
 
     def _beyond_limits(self, mode):
         """Return the details of the reason OUTSIDE_LIMITS for the modes preset and stow; '' for another mode."""
-        p = self.parameters
-        angles = {'preset': self.parts['state']['guidance']['preset']['angle'],
+        p, state = self.parameters, self.parts['state']
+        angles = {'preset': _encoder_angles(state['tracking']['pointing']['model'],
+                                            *state['guidance']['preset']['angle'].tolist()),
                   'stow': (p.azimuth.stow, p.elevation.stow)}.get(mode)
         return '' if angles is None else f', {diagnosis.beyond_limits(p, angles)}'
 

@@ -11,7 +11,8 @@ from acu_tracker.params import AcuParameters
 from acu_tracker.program.program_track import NO_TRACK, ProgramTrack
 from acu_tracker.program.tables import Tables
 from acu_tracker.signals import INVALID_INPUTS
-from pedestal_common.geometry import line_of_sight
+from pedestal_common.compiled import compiled
+from pedestal_common.geometry import line_of_sight, pointing_model
 from pedestal_common.graph.modes import MODES
 from pedestal_common.parameters import as_dict, build
 
@@ -128,6 +129,35 @@ class Rig:
         return {name for i, name in enumerate(INVALID_INPUTS) if self.outputs['invalid_input'][0] >> i & 1}
 
 
+@compiled
+def _direction_of(m, A, E):
+    return pointing_model.direction_of(m[0], A, E)
+
+
+class Leaning(Rig):
+    """A Rig on a pedestal with the errors `terms` [deg]; `model`: terms of the control unit, None: the same."""
+
+    def __init__(self, terms, *args, model=None, **changes):
+        values = {f'pointing.{name}': value for name, value in terms.items()}
+        pedestal = build(AcuParameters, values).pointing.terms
+        self.pedestal = pointing_model.model(dict(zip(pointing_model.TERMS, pedestal)))
+        super().__init__(*args, **changes, **(values if model is None else {
+            f'pointing.{name}': value for name, value in model.items()}))
+
+    def beam(self, angle=None):
+        """The direction of the beam on the sky, as deck angles."""
+        return np.array(_direction_of(self.pedestal, *(self.angle if angle is None else angle)))
+
+    def error(self, t, angle):
+        """The receiver measures from the beam."""
+        return super().error(t, self.beam(angle))
+
+
 @pytest.fixture(name='Rig')
 def rig():
     return Rig
+
+
+@pytest.fixture(name='Leaning')
+def leaning():
+    return Leaning

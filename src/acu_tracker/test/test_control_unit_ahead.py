@@ -52,7 +52,7 @@ def test_through_the_keyhole(Rig, mode, with_program):
     before = pointing_errors(rig, 18.0)
     text = announcement.keyhole(rig.state[0]['guidance']['lookahead'], rig.params)
     numbers = dict(announcement.numbers(rig.state[0]['guidance']['lookahead']))
-    plan = rig.state['guidance']['lookahead']['slew'][0].copy()
+    plan, announced = (rig.state['guidance']['lookahead'][name][0].copy() for name in ('slew', 'announced'))
     assert before[:, 1].max() < 1e-3 and plan['t1'] > before[-1, 0]
     during = pointing_errors(rig, 25.0)
     assert rig.mode == mode
@@ -64,11 +64,62 @@ def test_through_the_keyhole(Rig, mode, with_program):
     assert after[:, 1].max() < 1e-3 and rig.mode == mode
     A, E = rig.target((rig.k - 1) * rig.T)
     np.testing.assert_allclose(rig.outputs['estimate'][0, :, 0], [A, E], atol=2e-3)
-    assert f'expected loss {plan["loss"]:.1f} s' in text and 'clockwise' in text and 'rough' not in text
+    assert announced['loss'] == pytest.approx(plan['loss'], abs=planner.MAX_UNANNOUNCED_LOSS_S)
+    assert f'expected loss {announced["loss"]:.1f} s' in text and 'clockwise' in text and 'rough' not in text
     assert numbers['keyhole_loss_s'] == f'{plan["loss"]:.3f}' and float(numbers['deck_motion_deg']) == 0.0
     moving = rig.state[0]['guidance']['lookahead'].copy()
     moving['deck_motion'] = 0.5 * BEAMWIDTH
     assert f'the deck moves by {math.degrees(0.5 * BEAMWIDTH):.2f} deg rms' in announcement.keyhole(moving, rig.params)
+
+
+@pytest.mark.parametrize('late, moved', [(0.5, 0.0), (-0.5, 0.0), (0.0, 0.004)])
+def test_the_plan_follows_the_tracked_target_and_not_its_program(Rig, late, moved):
+    """The plan is made on a program that is late, or beside the target; autotrack begins after it. The plan before the
+    slew is then the plan of a right program, and the measured loss is the announced loss."""
+    E0 = math.radians(88.0)
+
+    def announced_and_lost(program):
+        rig = Rig(overhead(E0), at=overhead(E0)(0.0), initial_mode='program', sigma=2e-5, **SLOW,
+                  **{'tracker.receiver.sigma_floor': 2e-5, 'tracker.lock_count': 20})
+        rig.program(start=-2.0, rows=90, target=program)
+        # The receiver has no signal before 9 s. The plan is made before, because the slew begins within `notice`.
+        rig.receiver_on = False
+        rig.run(9.0)
+        assert rig.mode == 'program' and rig.state['guidance']['lookahead']['forecasts'][0] == 1
+        texts = [announcement.keyhole(rig.state[0]['guidance']['lookahead'], rig.params)]
+        pointing_errors(rig, 3.0)
+        before = pointing_errors(rig, 3.0)
+        assert rig.mode == 'autotrack'
+        after = pointing_errors(rig, 32.0)
+        h = rig.state[0]['guidance']['lookahead']
+        texts.append(announcement.keyhole(h, rig.params))
+        assert rig.mode == 'autotrack' and after[-200:, 1].max() < 1e-3
+        # Until the slew begins, the antenna follows the target, whatever the plan.
+        calm = np.concatenate((before, after))
+        assert calm[calm[:, 0] < h['slew']['t1'] - 0.05, 1].max() < 1e-3
+        return h['slew'].copy(), np.sum(after[:, 1] > 0.5 * BEAMWIDTH) * rig.T, texts
+    right, least, _ = announced_and_lost(overhead(E0))
+    plan, lost, texts = announced_and_lost(lambda t: overhead(E0 - moved)(t - late))
+    print(f'late {late} s, moved {moved} rad: planned {plan["loss"]:.2f} s, lost {lost:.2f} s; on the truth '
+          f'{right["loss"]:.2f} s, lost {least:.2f} s; {texts}')
+    assert plan['loss'] == pytest.approx(right['loss'], abs=0.1) and lost < least + 0.15
+    assert lost == pytest.approx(plan['loss'], abs=0.2)
+
+
+def test_a_cancelled_slew_is_announced(Rig):
+    """A program through the zenith plans a slew; the tracked target stays low enough for the azimuth."""
+    rig = Rig(overhead(math.radians(84.6)), at=overhead(math.radians(84.6))(0.0), initial_mode='program', sigma=2e-5,
+              **SLOW, **{'tracker.receiver.sigma_floor': 2e-5, 'tracker.lock_count': 20})
+    rig.program(start=-2.0, rows=90, target=overhead(math.radians(85.1)))
+    texts = []
+    for k in range(round(36.0 / rig.T)):
+        rig.receiver_on = k * rig.T > 12.0
+        rig.step()
+        h = rig.state[0]['guidance']['lookahead']
+        if h['forecasts'] > len(texts):
+            texts.append(announcement.keyhole(h, rig.params))
+    print(texts)
+    assert rig.mode == 'autotrack' and 'expected loss' in texts[0] and 'cancelled' in texts[-1]
 
 
 def slewing(Rig, **parameters):

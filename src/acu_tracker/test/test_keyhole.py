@@ -33,14 +33,17 @@ class Planned(typing.NamedTuple):
     slew: np.void
 
 
-def planned(E0, turn=0.0, low=-LIMIT, high=LIMIT, rate=RATE, start=0.0, above=0.0, tilt=0.0):
-    """Return the Planned; turn: azimuth of the axis at the start, relative to the path [rad]."""
+def planned(E0, turn=0.0, low=-LIMIT, high=LIMIT, rate=RATE, start=0.0, above=0.0, tilt=0.0, previous=None):
+    """Return the Planned; turn: azimuth of the axis at the start, relative to the path [rad]; previous: the slew that
+    was planned before, or None."""
     path = Path(np.zeros((ROWS, 6)), start, H)
     path.rows[:, :3] = target(start + H * np.arange(ROWS), E0)
     complete(path, Travel(0.0, above))
     limits = np.array([(rate, ACCELERATION, low, high, HIGHEST, HALF_BEAM)], keyhole.SLEW_LIMITS_DTYPE)[0]
     slews = np.zeros(2, slew.SLEW_DTYPE)
-    return Planned(keyhole.plan(slews, path, path.rows[0, AZIMUTH_COLUMN] + turn, limits, tilt), slews[0])
+    outcome = keyhole.plan(slews, path, path.rows[0, AZIMUTH_COLUMN] + turn, limits, tilt,
+                           slews[0] if previous is None else previous, previous is not None)
+    return Planned(outcome, slews[0])
 
 
 @pytest.mark.parametrize('E0_deg, keyhole_ahead', [(80.0, False), (84.9, False), (85.1, True), (89.0, True)])
@@ -126,6 +129,23 @@ def test_the_limits_choose_the_side_and_the_other_way_costs_more():
     # What the pass still travels once the path has ended needs its room too.
     assert planned(E0, low=-5.5, above=LIMIT).slew['long_way'] == 1
     assert planned(E0, low=-1.5, high=0.5).outcome == keyhole.PLAN_NO_WRAP
+
+
+def test_a_renewed_plan_changes_only_for_a_gain():
+    """The slew with the same loss stays; after the pass has moved it costs nearly as little as the best new plan."""
+    first = planned(math.radians(88.0)).slew
+    again = planned(math.radians(88.0), start=5.0, previous=first).slew
+    assert (again['t1'], again['long_way']) == (pytest.approx(first['t1'], abs=1e-9), first['long_way'])
+    assert again['loss'] == pytest.approx(first['loss'], abs=0.02)
+    for E0_deg in (87.0, 88.2, 89.5):
+        best = planned(math.radians(E0_deg), start=5.0).slew
+        renewed = planned(math.radians(E0_deg), start=5.0, previous=first).slew
+        assert renewed['cost'] < best['cost'] + keyhole.MIN_GAIN_S
+    # The pass now culminates on the other side, so that the previous direction is the long way.
+    turned = first.copy()
+    turned['peak'] *= -1.0
+    renewed = planned(math.radians(88.0), previous=turned).slew
+    assert renewed['long_way'] == first['long_way'] and renewed['peak'] * first['peak'] > 0.0
 
 
 def test_over_the_top_either_way_is_as_good():

@@ -13,6 +13,7 @@
     wind_field        one wind over both axes, which depends on their angles
     gimbal            rigid bodies that turn about two axes on a moving deck
     mount             direction of the beam from the angles of the axes
+    angle_drive                   base of the units of drives that follow angles
     electronic_beam, beam_unit    law and unit of a beam of a phased array, which takes the place of the drive
 
 Angles, rates and torques of the load are deck angles: azimuth clockwise from the bow seen from above

@@ -18,10 +18,10 @@ from pedestal_common.node.unit import LEVEL_WARN
 class AduNode(Timekeeper):
     """A drive with a state file, which keeps the state of the plant over a restart."""
 
-    def __init__(self):
+    def __init__(self, module='adu_drive.adu_node'):
         self.unsaved = ''
         self.saved = None
-        super().__init__('adu_drive.adu_node')
+        super().__init__(module)
 
     def prepare(self, unit):
         """Compile the laws, then resume the plant state in the state file."""

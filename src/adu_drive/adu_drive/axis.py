@@ -26,18 +26,18 @@ SECOND_PINION_OFFSET_RAD = 0.5 * math.pi
 """Angle by which the second pinion is mounted ahead of the first [rad], so that the runouts of both do not add."""
 
 
-def _motor_constants(m, loop, heat, per_rad, h):
+def _motor_constants(m, loop, heat, per_rad, h, period):
     """Return the constants of a motor; psi, K_t, R are true values, psi_hat, K_t_hat values in the controller.
 
     m, loop, heat: MotorParameters, CurrentLoopParameters, ThermalParameters; per_rad: counts of the motor encoder per
-    rad; h: sub-step of the plant [s].
+    rad; h: sub-step of the plant [s]; period: of the speed loop [s].
     """
     w = 2.0 * math.pi * loop.bandwidth
     R, psi = m.resistance * (1.0 + m.drift.resistance), m.flux_linkage * (1.0 + m.drift.flux_linkage)
     return {'p': float(m.pole_pairs), 'psi': psi, 'L': m.inductance, 'K_t': 1.5 * m.pole_pairs * psi,
             'h_L': h / m.inductance, 'h_R_L': h * R / m.inductance,
             'rise': thermal.COPPER_COEFFICIENT_PER_K * heat.rise, 'per_rated': 1.0 / heat.rated_torque,
-            'heat_gain': 1.0 - math.exp(-SPEED_LOOP_PERIOD_S / heat.time_constant),
+            'heat_gain': 1.0 - math.exp(-period / heat.time_constant),
             'h_brake_J': h * m.brake / m.inertia, 'T_c': m.friction, 'per_v': 1.0 / m.friction_speed,
             'h_J': h / m.inertia, 'q_B': 1.0 / (1.0 + h * m.viscous / m.inertia),
             'T_cog': m.cogging, 'cogs': float(m.cogging_per_turn),
@@ -45,7 +45,7 @@ def _motor_constants(m, loop, heat, per_rad, h):
             'gain': 1.0 + m.drift.current_gain, 'offset': m.drift.current_offset,
             'K_p': w * m.inductance, 'K_iT': w * m.resistance * CURRENT_LOOP_PERIOD_S, 'v_max': m.voltage,
             'limit': m.torque_limit, 'per_rad': per_rad, 'rad': 1.0 / per_rad,
-            'speed': 1.0 / per_rad / SPEED_LOOP_PERIOD_S}
+            'speed': 1.0 / per_rad / period}
 
 
 def _dish(p):
@@ -61,10 +61,11 @@ def _uneven(p):
             'tooth_error': g.tooth_error, 'teeth': float(g.pinion_teeth), 'per_reducer': 1.0 / g.reducer_ratio}
 
 
-def constants(p, h, varying=False):
+def constants(p, h, varying=False, period=SPEED_LOOP_PERIOD_S):
     """Return the constants of an axis (AxisParameters) for a plant sub-step h [s], computed once: nested dictionary.
 
-    varying: True if the inertia of the load varies; `change_inertia` then sets it before each control period.
+    varying: True if the inertia of the load varies; `change_inertia` then sets it before each control period. period:
+    of the speed loop [s].
 
     The docstrings of the laws define their constants. The names follow these rules:
 
@@ -84,16 +85,16 @@ def constants(p, h, varying=False):
     J_dish, k_dish, c_dish = _dish(p)
     J_base = p.load.inertia - J_dish
     final, emergency, buffer = p.limits.switches
-    l_1, l_2 = disturbance_observer.gains(p.speed_loop.disturbance_observer, SPEED_LOOP_PERIOD_S)
+    l_1, l_2 = disturbance_observer.gains(p.speed_loop.disturbance_observer, period)
     return {
-        'motor_1': _motor_constants(p.motor_1, p.current_loop, p.thermal, motor_per_rad, h),
-        'motor_2': _motor_constants(p.motor_2, p.current_loop, p.thermal, motor_per_rad, h),
+        'motor_1': _motor_constants(p.motor_1, p.current_loop, p.thermal, motor_per_rad, h, period),
+        'motor_2': _motor_constants(p.motor_2, p.current_loop, p.thermal, motor_per_rad, h, period),
         'N': N, 'per_N': 1.0 / N, 'per_2N': 0.5 / N, 'per_rad': per_rad, 'rad': 1.0 / per_rad,
-        'K_p': p.speed_loop.proportional, 'K_iT': p.speed_loop.integral * SPEED_LOOP_PERIOD_S,
+        'K_p': p.speed_loop.proportional, 'K_iT': p.speed_loop.integral * period,
         'K_d': p.speed_loop.differential_damping, 'independent': int(p.speed_loop.structure == 'independent'),
-        'l_1': l_1, 'l_2': l_2, 'h_J_shaft': SPEED_LOOP_PERIOD_S / J_shaft,
+        'l_1': l_1, 'l_2': l_2, 'h_J_shaft': period / J_shaft,
         'T_b': T_b, 'out': out, 'per_fade': per_fade,
-        'bias_gain': 1.0 - math.exp(-SPEED_LOOP_PERIOD_S / p.bias.lag) if p.bias.lag > 0.0 else 1.0,
+        'bias_gain': 1.0 - math.exp(-period / p.bias.lag) if p.bias.lag > 0.0 else 1.0,
         'k': p.gear_train.stiffness, 'c': p.gear_train.damping, 'half_lash': 0.5 * p.gear_train.lash,
         'pinion_ratio': p.gear_train.pinion_ratio, **_uneven(p),
         'flexible': int(J_dish > 0.0), 'k_dish': k_dish, 'c_dish': c_dish,
@@ -104,13 +105,13 @@ def constants(p, h, varying=False):
         'per_v2': p.friction.stribeck_rate ** -2, 'sigma_0': p.friction.stiffness,
         'h_sigma_0': h * p.friction.stiffness, 'sigma_1_h': p.friction.damping / h,
         'encoder': encoder.errors(p.encoder.error),
-        'rate_max': p.limits.rate, 'a': p.limits.deceleration, 'ramp': p.limits.deceleration * SPEED_LOOP_PERIOD_S,
+        'rate_max': p.limits.rate, 'a': p.limits.deceleration, 'ramp': p.limits.deceleration * period,
         'lower': p.limits.lower, 'upper': p.limits.upper, 'K': p.limits.approach,
         'stop_lower': p.limits.lower - buffer, 'stop_upper': p.limits.upper + buffer,
         'k_stop': p.limits.buffer_stiffness, 'c_stop': p.limits.buffer_damping,
         'faults': {'current_2': p.faults.overcurrent ** 2, 'omega': N * p.faults.overspeed,
                    'disagreement': p.faults.encoder_disagreement, 'error': N * p.faults.following_error,
-                   'late_periods': math.ceil(p.faults.following_time / SPEED_LOOP_PERIOD_S - 1e-6),
+                   'late_periods': math.ceil(p.faults.following_time / period - 1e-6),
                    'heat': p.faults.overtemperature, 'final_low': p.limits.lower - final,
                    'final_high': p.limits.upper + final, 'emergency_low': p.limits.lower - emergency,
                    'emergency_high': p.limits.upper + emergency}}
@@ -174,7 +175,7 @@ def initial_state(p, theta, external):
 
 
 @inlined
-def _load_counts(s, c):
+def load_counts(s, c):
     """Return the reading of the load encoder [counts]."""
     return s.reading if s.stuck else encoder.counts(encoder.reading(s.theta, c.encoder), c.per_rad) + s.jump
 
@@ -186,7 +187,7 @@ def _measured_speed(m, k):
 
 
 @inlined
-def _read_motor_sensors(m, k):
+def read_motor_sensors(m, k):
     """Measure the speed of a motor and advance its thermal load by a speed-loop period; m, k: state and constants."""
     m.measured = _measured_speed(m, k)
     m.heat = thermal.load(m.heat, k.K_t * m.i_q, k.per_rated, k.heat_gain)
@@ -200,13 +201,13 @@ def _measured_torque(m, k):
 
 
 @inlined
-def _realised_torque(m, k):
+def realised_torque(m, k):
     """Return the torque [Nm] that the motor made: its reference, or by its current if the voltage was limited."""
     return _measured_torque(m, k) if m.limited else m.torque_ref
 
 
 @inlined
-def _mean_motor_speed(s, omega_1, omega_2):
+def mean_motor_speed(s, omega_1, omega_2):
     """Return the mean speed [rad/s] of the working motors."""
     if s.faults & faults.Bit.MOTOR_1_LOST:
         return omega_2
@@ -241,7 +242,7 @@ def _torque_control(s, c, omega, feed_forward):
     limited = m1.torque_ref != T_1 or m2.torque_ref != T_2
     excess_1 = excess_2 = 0.0
     if limited or m1.limited or m2.limited:
-        excess_1, excess_2 = T_1 - _realised_torque(m1, k1), T_2 - _realised_torque(m2, k2)
+        excess_1, excess_2 = T_1 - realised_torque(m1, k1), T_2 - realised_torque(m2, k2)
         if alone or not c.independent:
             excess_1 = excess_2 = 0.5 * (excess_1 + excess_2)
     m1.sum = pi.integral(m1.sum, error_1, c.K_iT, excess_1)
@@ -267,7 +268,7 @@ def _supervise(s, c, omega, free):
     s.present |= faults.measured_faults(
         max(_squared_current(m1, c.motor_1), _squared_current(m2, c.motor_2)),
         max(abs(m1.measured), abs(m2.measured)),
-        c.rad * _load_counts(s, c) - c.encoder.zero - c.per_2N * (c.motor_1.rad * m1.count + c.motor_2.rad * m2.count),
+        c.rad * load_counts(s, c) - c.encoder.zero - c.per_2N * (c.motor_1.rad * m1.count + c.motor_2.rad * m2.count),
         s.late, max(m1.heat, m2.heat), s.faults, k)
     s.present |= faults.lost_motor_faults(s.motor_lost) | faults.end_switch_faults(s.theta, c.per_N * omega, k)
     s.faults |= s.present
@@ -296,18 +297,28 @@ def speed_control(s, c, rate, torque, enable, powered, free):
     powered        True if the motors may make torque
     free           True if no brake holds the motors
     """
+    m1, m2 = s.motor_1, s.motor_2
+    read_motor_sensors(m1, c.motor_1)
+    read_motor_sensors(m2, c.motor_2)
+    control_measured(s, c, 0.5 * (realised_torque(m1, c.motor_1) + realised_torque(m2, c.motor_2)), rate, torque,
+                     enable, powered, free)
+
+
+@inlined
+def control_measured(s, c, made, rate, torque, enable, powered, free):
+    """Run one speed-loop period with the speeds, counts and thermal loads of the motors that the state contains.
+
+    made: mean torque that the motors have made since the last period [Nm]; other arguments: as of `speed_control`.
+    """
     m1, m2, k1, k2 = s.motor_1, s.motor_2, c.motor_1, c.motor_2
-    _read_motor_sensors(m1, k1)
-    _read_motor_sensors(m2, k2)
-    omega = _mean_motor_speed(s, m1.measured, m2.measured)
+    omega = mean_motor_speed(s, m1.measured, m2.measured)
     _supervise(s, c, omega, powered and free)
     if not powered or faults.removes_torque(s.faults):
         _remove_torque(s, omega, free)
         return
     m1.inhibited, m2.inhibited = s.faults & faults.Bit.MOTOR_1_LOST, s.faults & faults.Bit.MOTOR_2_LOST
     s.omega_hat, s.d_hat = disturbance_observer.update(
-        s.omega_hat, s.d_hat, omega, 0.5 * (_realised_torque(m1, k1) + _realised_torque(m2, k2)), c.l_1, c.l_2,
-        c.h_J_shaft)
+        s.omega_hat, s.d_hat, omega, made, c.l_1, c.l_2, c.h_J_shaft)
 
     feed_forward = 0.0
     if enable:
@@ -321,7 +332,7 @@ def speed_control(s, c, rate, torque, enable, powered, free):
     else:
         wanted = s.rate - min(max(s.rate, -c.ramp), c.ramp)
         s.stopping = s.ramping = 1
-    position = c.rad * _load_counts(s, c)
+    position = c.rad * load_counts(s, c)
     s.rate = min(max(wanted, -travel.approach_rate(position - c.lower, c.K, c.a)),
                  travel.approach_rate(c.upper - position, c.K, c.a))
     if s.rate != wanted:
@@ -434,13 +445,13 @@ def plant_step(s, c, external):
 def read(s, c, y):
     """Write the present outputs y of the axis: values of its sensors and controllers, and the true load."""
     m1, m2, k1, k2 = s.motor_1, s.motor_2, c.motor_1, c.motor_2
-    s.reading = _load_counts(s, c)
+    s.reading = load_counts(s, c)
     y.position = c.rad * s.reading
     y.motor_position[0] = k1.rad * encoder.counts(m1.theta, k1.per_rad)
     y.motor_position[1] = k2.rad * encoder.counts(m2.theta, k2.per_rad)
     y.motor_velocity[0] = _measured_speed(m1, k1)
     y.motor_velocity[1] = _measured_speed(m2, k2)
-    y.velocity = c.per_N * _mean_motor_speed(s, y.motor_velocity[0], y.motor_velocity[1])
+    y.velocity = c.per_N * mean_motor_speed(s, y.motor_velocity[0], y.motor_velocity[1])
     y.motor_torque[0] = _measured_torque(m1, k1)
     y.motor_torque[1] = _measured_torque(m2, k2)
     y.torque = c.N * (y.motor_torque[0] + y.motor_torque[1])

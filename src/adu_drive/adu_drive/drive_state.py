@@ -98,8 +98,8 @@ def is_moving(axis, c):
 
 
 @compiled
-def _next(s, c):
-    """Return the phase of the next period."""
+def _next(s, c, ready):
+    """Return the phase of the next period. ready: True if the amplifiers of the motors are on."""
     allowed = permitted(s)
     if faults.removes_torque(s.azimuth.faults) or faults.removes_torque(s.elevation.faults):
         return PHASE_DISABLED
@@ -117,7 +117,7 @@ def _next(s, c):
         return PHASE_RELEASING_BRAKES if allowed else PHASE_DISABLED
     if not allowed:
         return PHASE_ENGAGING_BRAKES
-    return PHASE_ENABLED if s.brake_age >= c.release_periods else PHASE_RELEASING_BRAKES
+    return PHASE_ENABLED if ready and s.brake_age >= c.release_periods else PHASE_RELEASING_BRAKES
 
 
 @compiled
@@ -132,11 +132,14 @@ def _advance_pins(s, c, wanted):
 
 
 @compiled
-def advance(s, c, pins):
-    """Advance the phase by a control period. Return True if the brakes grip. pins: code of acu/stow_pins."""
+def advance(s, c, pins, ready):
+    """Advance the phase by a control period. Return True if the brakes grip.
+
+    pins: code of acu/stow_pins; ready: True if the amplifiers of the motors are on.
+    """
     if c.pins.fitted:
         _advance_pins(s, c, pins)
-    phase = _next(s, c)
+    phase = _next(s, c, ready)
     s.age = s.age + 1 if phase == s.phase else 0
     s.phase = phase
     applied = phase == PHASE_DISABLED or phase == PHASE_ENGAGING_BRAKES

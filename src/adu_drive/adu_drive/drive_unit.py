@@ -9,7 +9,7 @@ import numpy as np
 
 from adu_drive import axis, drive_state, stow_pins
 from adu_drive.lanes import at, count
-from adu_drive.params import AduParameters, whole_speed_periods
+from adu_drive.params import SPEED_LOOP_PERIOD_S, AduParameters, whole_speed_periods
 from adu_drive.plant import gimbal, mount, wind, wind_field
 from pedestal_common.compiled import compiled, inlined
 
@@ -88,12 +88,12 @@ def _record(values):
     return record
 
 
-def _constants(params, substeps):
+def _constants(params, substeps, speed_period=SPEED_LOOP_PERIOD_S):
     """Return the record (1,) of `constants`; each call makes a new dtype object."""
     h = axis.CURRENT_LOOP_PERIOD_S / substeps
     bodies = gimbal.constants(params)
-    return _record({'azimuth': axis.constants(params.azimuth, h, bodies['rigid']),
-                    'elevation': axis.constants(params.elevation, h), 'bodies': bodies,
+    return _record({'azimuth': axis.constants(params.azimuth, h, bodies['rigid'], speed_period),
+                    'elevation': axis.constants(params.elevation, h, period=speed_period), 'bodies': bodies,
                     'wind': wind.constants(params.wind), 'field': wind_field.constants(params.wind.field),
                     'mount': mount.constants(params.mount), 'pins': stow_pins.constants(params),
                     'period': params.period,
@@ -139,9 +139,10 @@ A record with an equal copy would cost 3 us in each call, because numba then com
 """
 
 
-def constants(params: AduParameters, substeps: int = 2) -> np.ndarray:
-    """Return the constants, record (1,). substeps: number of plant sub-steps in a current-loop period (2: 50 us)."""
-    return _constants(params, substeps).view(CONSTANTS_DTYPE)
+def constants(params: AduParameters, substeps: int = 2, speed_period: float = SPEED_LOOP_PERIOD_S) -> np.ndarray:
+    """Return the constants, record (1,). substeps: number of plant sub-steps in a current-loop period (2: 50 us);
+    speed_period: period of the speed loops [s]."""
+    return _constants(params, substeps, speed_period).view(CONSTANTS_DTYPE)
 
 
 def initial_state(params: AduParameters) -> np.ndarray:
@@ -187,7 +188,7 @@ def _apply_rigid_body_torques(s, c, w, w_dot):
 
 
 @compiled
-def _external(s, c, u):
+def external_torques(s, c, u):
     """Return the external torques [Nm] on both loads, constant over the period, and True for valid inputs."""
     x, y, z = u.base_acceleration[0], u.base_acceleration[1], u.base_acceleration[2]
     azimuth, elevation = s.azimuth.theta, s.elevation.theta
@@ -208,7 +209,7 @@ def _external(s, c, u):
 
 
 @compiled
-def _receive(s, u, disturbance_valid):
+def receive_command(s, u, disturbance_valid):
     """Put the command of step k into the ring. Return True if the command and the disturbance are valid."""
     slot = s.k % COMMAND_RING_SIZE
     valid = (disturbance_valid and _plausible(u.azimuth.rate) and _plausible(u.azimuth.torque)
@@ -252,9 +253,9 @@ def request(s, c, y, what):
 @compiled
 def _begin_period(s, c, u, y):
     """Begin a period: external torques, command, brakes and windings."""
-    s.azimuth.external, s.elevation.external, valid = _external(s, c, u)
-    y.invalid_command = 0 if _receive(s, u, valid) else 1
-    s.braked = drive_state.advance(s, c, u.pins)
+    s.azimuth.external, s.elevation.external, valid = external_torques(s, c, u)
+    y.invalid_command = 0 if receive_command(s, u, valid) else 1
+    s.braked = drive_state.advance(s, c, u.pins, True)
     axis.begin_period(s.azimuth, c.azimuth, s.braked)
     axis.begin_period(s.elevation, c.elevation, s.braked)
     s.azimuth.braked |= stow_pins.holds(s.pins, c.pins, 0)
@@ -262,7 +263,7 @@ def _begin_period(s, c, u, y):
 
 
 @compiled
-def _apply_command(s, c, u, j):
+def apply_command(s, c, u, j):
     """Take the command of speed-loop period j out of the ring. s.following is then 1 if it enables the drive."""
     # While an injected delay begins, `max` repeats the last command. Before the first command, a slot has rate 0.
     s.tick = max(s.tick, s.k * c.speed_ticks + j - c.delay_ticks - s.late_ticks)
@@ -308,7 +309,7 @@ def step(s, c, u, y):
         _begin_period(at(s, i), at(c, i), at(u, i), at(y, i))
     for j in range(at(c, 0).speed_ticks):
         for i in drives:
-            _apply_command(at(s, i), at(c, i), at(u, i), j)
+            apply_command(at(s, i), at(c, i), at(u, i), j)
         for i in drives:
             _speed_control(at(s, i), at(s, i).azimuth, at(c, i).azimuth)
         for i in drives:

@@ -105,7 +105,7 @@ class SpeedLoopParameters(Parameters):
 class BiasParameters(Parameters):
     """Bias torque by which the two motors of an axis pull against each other."""
     schedule: str = choice('hold_fade', ('off', 'constant', 'fade', 'hold_fade'), 'schedule over the torque '
-                           'demand; fade: decreasing from 0 on')
+                           'demand; fade: the bias falls from demand 0 on')
     torque: float = parameter(12.0, 0.0, 1000.0, 'Nm', 'bias torque per motor')
     hold: float = parameter(14.0, 0.0, 10000.0, 'Nm', 'hold_fade: torque demand per motor up to which bias is full')
     out: float = parameter(45.0, 0.1, 20000.0, 'Nm', 'fade, hold_fade: torque demand per motor with zero bias')
@@ -146,7 +146,7 @@ class LoadParameters(Parameters):
 @dataclasses.dataclass(frozen=True)
 class StructureParameters(Parameters):
     """Flexible structure: the dish swings on the rest of the load, to which gear and encoder are attached."""
-    inertia_share: float = parameter(0.0, 0.0, 0.9, '', 'share of the dish in the load inertia; 0: rigid; above 0 '
+    inertia_share: float = parameter(0.0, 0.0, 0.9, '', 'share of the dish in the load inertia; 0: rigid; if above 0, '
                                    '`pedestal tune --loops` finds loops and filter')
     frequency: float = parameter(12.0, 1.0, 200.0, 'Hz', 'frequency of the dish on a locked base')
     damping: float = parameter(0.01, 0.0, 1.0, '', 'damping ratio of the dish on a locked base')
@@ -375,7 +375,8 @@ class MountParameters(Parameters):
     tilt_forward: float = parameter(0.0, -0.1, 0.1, 'rad', "azimuth axis leans to azimuth 0, the bow; katpoint's P5")
     tilt_starboard: float = parameter(0.0, -0.1, 0.1, 'rad', 'azimuth axis leans to azimuth 90 deg; P6')
     non_perpendicularity: float = parameter(0.0, -0.1, 0.1, 'rad', 'deviation of the two axes from 90 deg; P3')
-    collimation: float = parameter(0.0, -0.1, 0.1, 'rad', 'beam to the normal of the elevation axis; P4')
+    collimation: float = parameter(0.0, -0.1, 0.1, 'rad', 'angle from the beam to the plane perpendicular to the '
+                                   'elevation axis; P4')
     sag: float = parameter(0.0, -0.1, 0.1, 'rad', 'droop of the beam at elevation 0, cosine of elevation; P8')
 
 
@@ -498,7 +499,8 @@ class BeamParameters(RunParameters):
     initial_elevation: float = parameter(0.0, -20.0, 20.0, 'rad', 'elevation of every beam at t = 0')
 
     def check(self):
-        """Raise ParameterError for a delay that is no whole number of periods or too long for the ring."""
+        """Raise ParameterError for a delay that is no whole number of periods, or during which more commands arrive
+        than the ring buffer holds."""
         super().check()
         periods = self.transport_delay / self.period
         if abs(periods - round(periods)) > 1e-6:

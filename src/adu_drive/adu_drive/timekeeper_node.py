@@ -32,6 +32,9 @@ class Timekeeper(unit_node.UnitNode):
     late_ticks      steps that began more than half a period late
     """
 
+    FIRST_STEP = 0
+    """Number of the first step of realtime; a step before 0 publishes nothing."""
+
     PRECEDENCE = 1
     """Priority above that of the other nodes, whose searches and predictions may take longer than a step."""
 
@@ -62,7 +65,7 @@ class Timekeeper(unit_node.UnitNode):
 
     def _count_from_first_step(self):
         """Reset the numbers of steps, and the newest messages and stamps of commands."""
-        self.k, self.made = -1, 0
+        self.k, self.made = (-1 if self.graph.lockstep else self.FIRST_STEP - 1), 0
         self.lost_steps = self.missed_steps = self.late_ticks = 0
         self.newest, self.command_stamps = {}, {}
         self.begun = self.last_step_time = time.monotonic_ns()
@@ -110,6 +113,8 @@ class Timekeeper(unit_node.UnitNode):
         """
         for port in self.ports:
             port.step(stamp, values)
+        if self.k < 0:
+            return
         self.begin_step(stamp)
         self.made += 1
         if self.graph.lockstep and self.k % ACKNOWLEDGE_INTERVAL_STEPS == 0:
@@ -139,7 +144,7 @@ class Timekeeper(unit_node.UnitNode):
         now, utc = self.clock()
         start = self.epoch(utc)
         k, min_wait = (utc - start) // self.period_ns, 0.0
-        if k >= 0 and k > self.k:
+        if k >= self.FIRST_STEP and k > self.k:
             self._make_realtime_step(k, start + k * self.period_ns, now)
             min_wait = MIN_RECEIVE_FRACTION * self.parameters.period
         _, utc = self.clock()

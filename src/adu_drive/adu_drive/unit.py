@@ -80,17 +80,29 @@ def supervise(u, link):
 
 
 @compiled
+def take_command(u, link, command):
+    """Write a command into the inputs u of the drive, and stop the axes if the newest command is stale.
+
+    command: record of acu/rate_command, with stamp NO_STAMP if the step had no command.
+    """
+    if command.stamp != NO_STAMP:
+        link.command_stamp = command.stamp
+        u.azimuth.rate, u.elevation.rate = command.velocity[0], command.velocity[1]
+        u.azimuth.torque, u.elevation.torque = command.effort[0], command.effort[1]
+    supervise(u, link)
+
+
+@compiled
 def decode(u, link, dropped, command, ship):
     """Write the messages of the last step into the inputs u of the drive.
 
     dropped: 1 if an injected fault removes the command; command, ship: records of acu/rate_command and ship/truth,
     with stamp NO_STAMP if the step had no such message.
     """
-    if command.stamp != NO_STAMP and dropped == 0:
-        link.command_stamp = command.stamp
-        u.azimuth.rate, u.elevation.rate = command.velocity[0], command.velocity[1]
-        u.azimuth.torque, u.elevation.torque = command.effort[0], command.effort[1]
-    supervise(u, link)
+    if dropped == 0:
+        take_command(u, link, command)
+    else:
+        supervise(u, link)
     if ship.stamp != NO_STAMP:
         deck_acceleration(u, link, ship)
 
@@ -104,19 +116,27 @@ def record_invalid_topic(u, link):
 
 
 @compiled
-def encode(y, stamp, outputs):
-    """Write the outputs y of the drive into the records of its messages, with a stamp [ns]."""
-    joints, truth, motors = outputs[JOINT_STATES_TOPIC], outputs[DRIVE_TRUTH_TOPIC], outputs[MOTOR_STATES_TOPIC]
-    joints.stamp = truth.stamp = motors.stamp = outputs[CLOCK_TOPIC].stamp = stamp
+def encode_truth(y, stamp, truth):
+    """Write the true angles and rates of the beam into the record of adu/truth, with a stamp [ns]."""
+    truth.stamp = stamp
+    for i in range(2):
+        axis = y.azimuth if i == 0 else y.elevation
+        truth.position[i], truth.velocity[i] = axis.load_position, axis.load_velocity
+
+
+@compiled
+def encode_measured(y, stamp, outputs):
+    """Write the measured outputs y of the drive into the records of its messages, with a stamp [ns]."""
+    joints, motors = outputs[JOINT_STATES_TOPIC], outputs[MOTOR_STATES_TOPIC]
+    joints.stamp = motors.stamp = outputs[CLOCK_TOPIC].stamp = stamp
     for i in range(2):
         axis = y.azimuth if i == 0 else y.elevation
         joints.position[i], joints.velocity[i], joints.effort[i] = axis.position, axis.velocity, axis.torque
-        truth.position[i], truth.velocity[i] = axis.load_position, axis.load_velocity
         for j in range(2):
             motors.position[2 * i + j] = axis.motor_position[j]
             motors.velocity[2 * i + j] = axis.motor_velocity[j]
             motors.effort[2 * i + j] = axis.motor_torque[j]
-    outputs[DRIVE_STATE_TOPIC], outputs[PIN_STATES_TOPIC] = y.condition, y.pins
+    outputs[DRIVE_STATE_TOPIC] = y.condition
 
 
 @compiled
@@ -136,7 +156,9 @@ def report(m, stamp, moved, outputs):
     if moved and m.outputs.invalid_command:
         record_invalid_topic(m.inputs, m.link)
     m.link.stamp = stamp
-    encode(m.outputs, stamp, outputs)
+    encode_measured(m.outputs, stamp, outputs)
+    encode_truth(m.outputs, stamp, outputs[DRIVE_TRUTH_TOPIC])
+    outputs[PIN_STATES_TOPIC] = m.outputs.pins
 
 
 @compiled

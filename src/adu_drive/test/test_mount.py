@@ -10,6 +10,7 @@ from adu_drive import drive_unit
 from adu_drive.params import AduParameters, MountParameters
 from adu_drive.plant import mount
 from pedestal_common.compiled import compiled
+from pedestal_common.geometry import pointing_model
 from pedestal_common.geometry.line_of_sight import direction
 from pedestal_common.parameters import build
 
@@ -119,3 +120,22 @@ def test_a_wrong_zero_is_no_disagreement_of_the_encoders(drive):
                                   **{f'azimuth.encoder.error.{name}': value for name, value in errors.items()}})
         return drive(p).run(0.1, azimuth=0.0).log['azimuth']['faults'].any()
     assert not faults(zero=0.05) and faults(eccentricity_cos=0.006)
+
+
+@compiled
+def _direction_motion(m, A, E, A_dot, E_dot):
+    return pointing_model.direction_motion(m[0], A, E, A_dot, E_dot)
+
+
+@pytest.mark.parametrize('A', [-4.0, -0.3, 1.1, 7.5])
+@pytest.mark.parametrize('E', [0.0, 0.6, 1.4, 1.7, 2.5])
+@pytest.mark.parametrize('terms', [TERMS, LARGE], ids=['small', 'large'])
+def test_the_pointing_model_is_the_law_of_the_mount(terms, A, E):
+    """The model of the control unit and the simulated pedestal are written apart; zeros shift the encoders."""
+    names = {'non_perpendicularity': 'p3', 'collimation': 'p4', 'tilt_forward': 'p5', 'tilt_starboard': 'p6',
+             'sag': 'p8'}
+    zeros = {'p1': 0.03, 'p7': -0.02}
+    m = pointing_model.model(zeros | {names[name]: math.radians(value) for name, value in terms.items()})
+    angles, rates = beam(terms, A, E, 0.3, -0.2)
+    on_sky, on_sky_rates = _direction_motion(m, A + zeros['p1'], E + zeros['p7'], 0.3, -0.2)
+    assert on_sky == pytest.approx(angles, abs=1e-12) and on_sky_rates == pytest.approx(rates, abs=1e-10)

@@ -9,6 +9,7 @@ from pedestal import stop  # first, because a signal during the imports below mu
 import argparse
 import contextlib
 import importlib
+import importlib.metadata
 import os
 import re
 import shlex
@@ -18,13 +19,14 @@ import types
 from collections.abc import Sequence
 
 from pedestal_analysis.console import STDOUT_PATH
-from pedestal_common.parameters import ParameterError
+from pedestal_common.parameters import ParameterError, did_you_mean
 
 VERBS = {'run': 'antenna', 'scenarios': 'design', 'samples': 'design', 'new': 'design', 'parameters': 'design',
          'status': 'antenna', 'mode': 'antenna', 'ask': 'antenna', 'operate': 'antenna', 'live': 'antenna',
-         'program': 'antenna', 'verify': 'recordings', 'recover': 'recordings', 'rerun': 'recordings',
-         'report': 'recordings', 'study': 'design', 'trials': 'design', 'export': 'recordings',
-         'recompute': 'recordings', 'tune': 'design', 'replay': 'recordings', 'bench': 'design'}
+         'program': 'antenna', 'simulate': 'simulation', 'verify': 'recordings', 'recover': 'recordings',
+         'rerun': 'recordings', 'report': 'recordings', 'study': 'design', 'trials': 'design',
+         'export': 'recordings', 'recompute': 'recordings', 'tune': 'design', 'calibrate': 'calibration',
+         'replay': 'recordings', 'bench': 'design'}
 """{verb: its package in `verbs`}, in the order of the help."""
 
 
@@ -43,10 +45,12 @@ def main(args: Sequence[str] | None = None) -> int:
     Return its exit code: 0; 1 with a line on stderr for an error; 2 for a wrong command line; 130 after a stop.
     """
     given = sys.argv[1:] if args is None else args
-    parser = _parser()
+    parser = _parser(next((word for word in given if word in VERBS), ''))
     if not given:
         parser.print_help()
         return 0
+    if given[0][:1] not in ('-', '') and given[0] not in VERBS:
+        parser.error(f"no verb '{given[0]}':{did_you_mean(given[0], VERBS)} pedestal --help lists the verbs")
     options = parser.parse_args(given)
     options.command = shlex.join(('pedestal', *given))
     stop.on_stop(signal.default_int_handler)     # from here on a signal raises KeyboardInterrupt
@@ -87,16 +91,19 @@ class Parser(argparse.ArgumentParser):
         return super().parse_known_args(joined, namespace)
 
 
-def _parser() -> argparse.ArgumentParser:
-    """Return the parser of the command line with all verbs."""
+def _parser(named: str = '') -> argparse.ArgumentParser:
+    """Return the parser of the command line with all verbs. named: the only verb that gets its arguments, because the
+    arguments of `run` import the code of a graph; '' for all."""
     parser = Parser(prog='pedestal', description='Run, record and analyse the control system of a tracking antenna.')
+    parser.add_argument('--version', action='version', version=f'pedestal {importlib.metadata.version("pedestal")}')
     verbs = parser.add_subparsers(title='verbs', required=True, metavar='VERB')
     for name in VERBS:
         verb = module_of(name)
         description = (verb.__doc__ or '').strip()
         verb_parser = verbs.add_parser(name, help=description.partition('\n\n')[0], description=description,
                                        formatter_class=argparse.RawDescriptionHelpFormatter)
-        verb.add_arguments(verb_parser)
+        if named in ('', name):
+            verb.add_arguments(verb_parser)
         verb_parser.set_defaults(main=verb.main)
     return parser
 

@@ -81,7 +81,8 @@ class Run:
         (['standby'], ['granted=true; reply=mode is standby'])
         """
         if topic not in self.topics:
-            raise KeyError(f'{topic!r} is not in {self.name}; there are {", ".join(self.topics)}')
+            hint = '; pedestal export writes its texts' if topic in self._source.topics else ''
+            raise KeyError(f'{topic!r} forms no table of {self.name}{hint}; there are {", ".join(self.topics)}')
         arrays = {name: np.asarray(values) for name, values in self._source.table(topic).items()}
         kind = self._source.topics[topic]
         return Table(arrays, {name: 's' if name == 't' else layouts.unit(topic, kind, name) for name in arrays})

@@ -274,9 +274,13 @@ def show_tried(key, unit, tried):
     from pedestal_analysis.trials.solve import reason
     table = Table(box=SIMPLE_HEAD, padding=(0, 1, 0, 0), pad_edge=False)
     for name in (f'{key} {f"[{unit}]" if unit else ""}'.strip().replace('[', r'\['), 'mean', '95 % interval', 'unit',
-                 'trials'):
+                 'tracked', 'trials'):
         table.add_column(name, justify='left' if name in ('unit', 'trials') else 'right', no_wrap=True)
     for one in tried:
-        cells = (number(one.row['value']), interval(one.row), one.row['unit']) if one.row else ('', '', '')
+        cells = ('', '', '', '')
+        if one.row:
+            share = one.row['tracked_percent']
+            cells = (number(one.row['value']), interval(one.row), one.row['unit'],
+                     '' if share is None else f'{share:.3g} %')
         table.add_row(f'{one.value:.6g}', *cells, reason(one))
     Console(width=max(Console().width, MIN_TABLE_COLUMNS)).print(table)

@@ -146,6 +146,16 @@ def test_a_flexible_dish_gets_the_models_that_do_not_follow_its_swing():
         assert last <= 2.0 * math.pi * frequency / 7.0 < following and 1 < rungs < bank.rungs
 
 
+def test_the_models_of_a_scenario_count_with_its_own_white_jerk():
+    """A first model with 5.2 times the default white jerk leaves room for one model fewer."""
+    structure = [f'adu.azimuth.structure.{key}' for key in ('inertia_share=0.4', 'frequency=4.0')]
+    count = lambda *more: loops.filter_gains(loops.Loops('leo_pass', [*structure, *more]).plants[  # noqa: E731
+        'azimuth'])['filter.imm.rungs']
+    noise = FilterParameters().imm.ca.noise
+    assert count(f'acu.azimuth.filter.imm.ca.noise={5.2 * noise}') == count() - 1
+    assert count('acu.azimuth.filter.imm.rungs=1') == count()
+
+
 def test_the_design_is_that_of_a_rigid_drive():
     """J dw/dt = T for one motor and its half of the load: crossover of K_p / (J s) at w_s."""
     plant = loops.Loops('leo_pass').plants['azimuth']

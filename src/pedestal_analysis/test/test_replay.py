@@ -88,7 +88,8 @@ def test_start_and_duration_count_from_the_first_step_and_keep_what_holds(tmp_pa
 
 
 HEARD_BY_ACU = (ERROR, 'tracking_receiver/angle_rate', 'tracking_receiver/range', 'ship/imu/data', 'ins/state',
-                'ins/error', 'acu/program_track', 'acu/command')
+                'ins/error', 'weather/temperature', 'weather/pressure', 'weather/humidity', 'acu/program_track',
+                'acu/command')
 
 
 @pytest.mark.parametrize('nodes, expected', [

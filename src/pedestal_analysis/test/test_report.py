@@ -162,6 +162,12 @@ def page_of(bag, **options):
     return Page(write_report(bag, **options).read_text())
 
 
+@pytest.fixture
+def texts_only(monkeypatch):
+    """For tests of texts and tables: every figure is made, and none is rendered, which takes most of the time."""
+    monkeypatch.setattr(figures, 'store', lambda figure, output, dpi: output.write('<svg></svg>'))
+
+
 @pytest.fixture(scope='module')
 def whole(tmp_path_factory):
     return make_bag(tmp_path_factory.mktemp('report') / 'whole')
@@ -228,7 +234,7 @@ def test_numbers_are_those_of_the_summary(page, whole):
     assert rows['recording'][0].startswith('complete')
 
 
-def test_the_page_says_when_where_what_and_through_which_beam(page, tmp_path):
+def test_the_page_says_when_where_what_and_through_which_beam(page, texts_only, tmp_path):
     assert 'beamwidth' not in page[0].rows
     leo = page_of(REFERENCES / 'leo_pass', output=tmp_path / 'leo.html')
     assert leo.rows['target'] == ['satellite 25544, from its TLE']
@@ -256,7 +262,7 @@ def story(tmp_path_factory):
     return make_bag(tmp_path_factory.mktemp('story') / 'story', STORY)
 
 
-def test_the_events_are_a_table_with_senders_reasons_and_durations(story, tmp_path):
+def test_the_events_are_a_table_with_senders_reasons_and_durations(story, texts_only, tmp_path):
     rows = page_of(story, output=tmp_path / 'story.html').rows
     found = [rows[str(number)] for number in range(1, 7)]
     assert found == [
@@ -364,7 +370,7 @@ def test_missing_topics(tmp_path, names, drawn, said):
     assert sorted(path.stem for path in tmp_path.glob('*.png')) == sorted(drawn)
 
 
-def test_a_recording_from_before_the_truth_says_that_its_errors_are_those_of_the_encoders(page, tmp_path):
+def test_a_recording_from_before_the_truth_says_that_its_errors_are_those_of_the_encoders(page, texts_only, tmp_path):
     old = page_of(make_bag(tmp_path / 'old', [name for name in ASHORE if name != 'adu/truth']))
     assert f'Pointing errors are those of the encoders: {tracking.ENCODER_BEAM_NOTE}.' in old.text
     assert 'pointing error by the encoders, rms' not in old.rows
@@ -394,7 +400,7 @@ def test_drive_that_gives_no_torque(tmp_path):
     assert page.rows['load torque, rms of the run'] == ['not measured', 'not measured', '']
 
 
-def test_lost_steps_are_shown(tmp_path):
+def test_lost_steps_are_shown(texts_only, tmp_path):
     page = page_of(make_bag(tmp_path / 'holes', steps=300, skip=(100, 101, 102)))
     assert page.rows['steps missing in the recording'] == ['3']
     assert 'gaps' in page.ids
@@ -412,7 +418,7 @@ def test_labels_in_the_page_are_those_drawn(whole):
     assert any(re.fullmatch(r'.?0\.\d{3,}', label) for label in plain)
 
 
-def test_wall_jitter_of_realtime(tmp_path):
+def test_wall_jitter_of_realtime(texts_only, tmp_path):
     page = page_of(make_bag(tmp_path / 'wall', steps=301, pacing='realtime'))
     assert page.rows['loop rate achieved (wall time)'] == ['200.0\N{NO-BREAK SPACE}Hz']
     assert page.rows['jitter of the step, wall time'][0].startswith('1 ms rms')
@@ -462,7 +468,7 @@ def test_azimuth_is_unwrapped():
     assert np.isnan(out[20]) and np.nanmax(np.abs(out - np.degrees(angle))) < 1e-9
 
 
-def test_an_aborted_run_and_lost_steps_stand_on_the_first_page(tmp_path):
+def test_an_aborted_run_and_lost_steps_stand_on_the_first_page(texts_only, tmp_path):
     path = make_bag(tmp_path / 'aborted', planned_end_ns=10_000_000_000)
     page = page_of(path)
     first = page.text[:page.text.index('Results')]

@@ -169,9 +169,9 @@ def test_the_same_numbers_whoever_works_and_a_plan_that_goes_on(tmp_path):
 
 
 def start_many(folder):
-    """The command that makes 120 trials in a folder: enough to be stopped before it ends."""
-    return subprocess.Popen([sys.executable, '-m', 'pedestal.cli', 'trials', 'leo_pass', '--runs', '120',
-                             '--duration', '8', '--workers', '1', '--vary', VARY[0], '--output', folder.name],
+    """The command that makes 96 trials in a folder: three batches, so that it can be stopped after the first."""
+    return subprocess.Popen([sys.executable, '-m', 'pedestal.cli', 'trials', 'leo_pass', '--runs', '96',
+                             '--duration', '3', '--workers', '1', '--vary', VARY[0], '--output', folder.name],
                             cwd=folder.parent, start_new_session=True, text=True, stdout=subprocess.PIPE,
                             stderr=subprocess.PIPE)
 
@@ -207,10 +207,10 @@ def test_a_command_that_was_stopped_goes_on(never_stopped, tmp_path, number):
         if process.poll() is None:
             os.killpg(process.pid, signal.SIGKILL)
     done = rows()
-    assert 4 <= done < 120
+    assert 4 <= done < 96
     if number == signal.SIGINT:
         assert process.returncode == 130
-        assert errors == f'pedestal: {done} of 120 trials are in cut; the same command continues\npedestal: stopped\n'
+        assert errors == f'pedestal: {done} of 96 trials are in cut; the same command continues\npedestal: stopped\n'
     assert finish_many(tmp_path / 'cut') == never_stopped
 
 

@@ -80,8 +80,9 @@ class Rig(solve.Search):
         self.law = law
 
     def _try(self, values):
-        found = [solve.Tried(value, {'value': self.law(value), 'runs': 3, 'of': 3, 'left_out': {}}, '',
-                             math.isfinite(self.law(value))) for value in values]
+        found = [solve.Tried(value, {'value': self.law(value), 'runs': 3, 'of': 3, 'left_out': {},
+                                     'tracked_percent': None}, '', math.isfinite(self.law(value)))
+                 for value in values]
         self.tried = sorted((*self.tried, *found), key=lambda one: one.value)
         return found
 

@@ -2,12 +2,14 @@
 import math
 import re
 
+import numpy as np
 import pytest
 
 from pedestal_bringup.scenario import scenario
 from pedestal_bringup.scenario.program import Plan
 from pedestal_common import parameters
 from pedestal_common.graph import nodes
+from tracking_receiver_sim import target
 
 
 def lines(name, duration):
@@ -76,3 +78,18 @@ def test_a_stow_angle_that_the_drive_does_not_reach_is_refused_with_both_limits(
         scenario.load('uav_flyby', ['adu.elevation.limits.upper=1.5'])
     assert 'elevation.stow = 1.5708 rad: must be limits.low to limits.high' in str(error.value)
     assert 'adu.elevation.limits.upper = 1.5 rad (85.9 deg) holds' in str(error.value)
+
+
+def test_a_program_with_light_time_leads_to_where_the_wave_left():
+    """The direction of a table with light time is that of the table without it, earlier by range / speed of light."""
+    def table(light_time):
+        plan = Plan(scenario.load('leo_pass', [f'scenario.program.light_time={light_time}'], duration=20.0))
+        return plan.targets[''], *plan.tables['']
+    built, times, plain = table('false')
+    _, _, seen = table('true')
+    delay = scenario.load('leo_pass').header.program.time_offset
+    *_, distance = target.look_angles(built, times - delay)
+    azimuth, elevation, _ = target.look_angles(built, times - delay - distance / 299792458.0)
+    inside = times - delay > 1.0
+    assert seen[inside, 1] == pytest.approx(elevation[inside], abs=1e-12)
+    assert np.abs(seen - plain)[inside].max() > 1e-6

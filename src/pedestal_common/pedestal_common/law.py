@@ -51,10 +51,19 @@ class _Translation(JITCodeLibrary):
         self._final_module.link_in(ll_module)
 
     def finalize(self):
-        """Complete the code of this law with the functions of numba's libraries that it calls."""
+        """Complete the code of this law with the functions of numba's libraries that it calls.
+
+        Numba numbers its own functions in the order of their use, so two processes give different functions the same
+        symbol. The functions of numba are therefore internal to this module. Otherwise the linker would take the
+        function of another translation for them.
+        """
+        own = {function.name for function in self._final_module.functions if not function.is_declaration}
         for library in self._linking_libraries:
             if not isinstance(library, _Translation) and library is not rtsys.library:
                 self._final_module.link_in(library._get_module_for_linking(), preserve=True)
+        for function in self._final_module.functions:
+            if not function.is_declaration and function.name not in own:
+                function.linkage = 'internal'
         _relink(self._final_module, Linkage.external, 'weak_odr')
         self._finalize_dynamic_globals()
         self._finalized = True

@@ -26,7 +26,7 @@ COLUMN_PACKAGES = ('ship_motion_sim', 'tracking_receiver_sim', 'acu_tracker', 'a
 """Packages of the nodes that have laws. Such a package is called a column: its laws call only laws of the same package
 and of pedestal_common."""
 
-UPPER_PACKAGES = ('pedestal_bringup', 'pedestal_analysis', 'pedestal_studies')
+UPPER_PACKAGES = ('pedestal_hardware', 'pedestal_bringup', 'pedestal_analysis', 'pedestal_studies')
 """Packages above the columns; their laws may also call the laws of the columns, and of the packages that stand earlier
 in this tuple."""
 
@@ -39,11 +39,17 @@ if not _ROOT.is_absolute():
 
 
 def digest(packages) -> str:
-    """Return a digest of the code of packages, without docstrings and comments, and of numba's version.
+    """Return a digest of the code of packages, without docstrings and comments, and of numba's version."""
+    return _sha((package, _digest_of(package).encode()) for package in packages)
 
-    Because parsing all sources takes 0.4 s, the digest is stored in a file whose name is a digest of their bytes.
+
+def _digest_of(package):
+    """Return the digest of the code of one package.
+
+    Because parsing the sources of all packages takes more than a second, the digest is stored in a file whose name is
+    a digest of their bytes. After an edit of one package, only the sources of this package are parsed again.
     """
-    sources = list(_sources(packages))
+    sources = list(_sources(package))
     kept = _ROOT / f'digest-{_sha(sources)}'
     with contextlib.suppress(OSError):
         return kept.read_text()
@@ -56,14 +62,13 @@ def digest(packages) -> str:
     return of_code
 
 
-def _sources(packages):
-    """Yield (name, bytes) of each module of packages."""
-    for package in packages:
-        spec = importlib.util.find_spec(package) if package != '__main__' else None
-        if spec is not None and spec.origin is not None:
-            folder = pathlib.Path(spec.origin).parent
-            for path in sorted(folder.rglob('*.py')):
-                yield f'{package}/{path.relative_to(folder)}', path.read_bytes()
+def _sources(package):
+    """Yield (name, bytes) of each module of a package."""
+    spec = importlib.util.find_spec(package) if package != '__main__' else None
+    if spec is not None and spec.origin is not None:
+        folder = pathlib.Path(spec.origin).parent
+        for path in sorted(folder.rglob('*.py')):
+            yield f'{package}/{path.relative_to(folder)}', path.read_bytes()
 
 
 def _sha(named):
@@ -89,6 +94,15 @@ def _is_text(statement):
             and isinstance(statement.value.value, str))
 
 
+def _path_of(package) -> pathlib.Path:
+    """Return the path of the folder of a package, whose name contains the digest of its present sources."""
+    # The laws of a package that is in neither tuple, such as a test, may call the laws of all packages in them.
+    below = () if package == 'pedestal_common' or package in COLUMN_PACKAGES else (
+        *COLUMN_PACKAGES, *(UPPER_PACKAGES[:UPPER_PACKAGES.index(package)] if package in UPPER_PACKAGES
+                            else UPPER_PACKAGES))
+    return _ROOT / f'{package}-{digest(("pedestal_common", *below, package))}'
+
+
 @functools.cache
 def _folder_of(package) -> str | None:
     """Return the folder of the laws of a package, None if it cannot be written.
@@ -96,13 +110,10 @@ def _folder_of(package) -> str | None:
     The folder is named after the sources of the package, and of all packages whose laws its laws may call. Folders and
     files of the cache that were not used for MAX_CACHE_AGE_DAYS are deleted.
     """
-    # The laws of a package that is in neither tuple, such as a test, may call the laws of all packages in them.
-    below = () if package == 'pedestal_common' or package in COLUMN_PACKAGES else (
-        *COLUMN_PACKAGES, *(UPPER_PACKAGES[:UPPER_PACKAGES.index(package)] if package in UPPER_PACKAGES
-                            else UPPER_PACKAGES))
-    folder = _ROOT / f'{package}-{digest(("pedestal_common", *below, package))}'
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        _ROOT.mkdir(parents=True, exist_ok=True)    # first, because the digest has no use without a cache
+        folder = _path_of(package)
+        folder.mkdir(exist_ok=True)
         os.utime(folder)
         for other in _ROOT.iterdir():
             if time.time() - other.stat().st_mtime > MAX_CACHE_AGE_DAYS * 86400:
@@ -180,5 +191,10 @@ class Cache(FunctionCache):
             return self._load_overload(sig, target_context)
 
     def _save_overload(self, sig, data):
-        with locked_file(pathlib.Path(self.cache_path).with_name('index.lock')):
+        """Save a law, except after an edit of its sources since this process chose the folder. This avoids new code
+        in the folder of the old sources."""
+        path = pathlib.Path(self.cache_path)
+        if path.parent != _path_of(path.name.partition('.')[0]):
+            return
+        with locked_file(path.with_name('index.lock')):
             super()._save_overload(sig, data)

@@ -34,7 +34,7 @@ def test_a_reply_without_its_verdict_is_refused():
 
 
 @pytest.mark.parametrize(('arguments', 'said'), (
-    ({f'a{i}': '1' for i in range(21)}, '21 arguments: must be at most 20'),
+    ({f'a{i}': '1' for i in range(31)}, '31 arguments: must be at most 30'),
     ({'azimuth': 'x' * 1001}, 'a text of 1001 characters'),
     ({'azimuth': 'one\ntwo'}, 'all of them printable'),
     ({'granted': 'true'}, 'none may be named granted')))

@@ -1,4 +1,5 @@
 """The cache of compiled laws, shared by processes that start together."""
+import contextlib
 import os
 import shutil
 import subprocess
@@ -7,6 +8,7 @@ import sys
 import pytest
 from numba.core import types
 
+from pedestal_common import law_cache
 from pedestal_common.compiled import compiled, inlined
 from pedestal_common.law import by_type
 
@@ -19,10 +21,11 @@ import numpy
 from numba.core.caching import IndexDataCacheFile
 
 from pedestal_common.compiled import compiled, compiled_once
+from pedestal_common.law import Law
 
 @compiled
 def law(x):
-    return x.sum() + x.mean()
+    return x[0] + x[1]
 
 class Memory(typing.NamedTuple):
     pass
@@ -37,10 +40,12 @@ if __name__ == '__main__':
     from one_law import law as module
     unit = module.Unit()
     if len(sys.argv) > 1:
-        read = IndexDataCacheFile._load_index
-        IndexDataCacheFile._load_index = lambda index: (read(index), time.sleep(1.0))[0]
+        write = IndexDataCacheFile._save_index
+        IndexDataCacheFile._save_index = lambda *index: (time.sleep(1.0), write(*index))
         module.law(numpy.ones(3, sys.argv[1]))
     else:
+        translate = Law._translate
+        Law._translate = lambda *law: (time.sleep(1.0), translate(*law))[1]
         with compiled_once(unit):
             unit.prepare()
     print(sum(module.law.stats.cache_misses.values()))
@@ -50,6 +55,11 @@ TYPES = ('f8', 'f4')
 
 
 def environment(folder, cache):
+    """Of a process that has a cache without laws, with the digests of the sources of the product."""
+    with contextlib.suppress(OSError):
+        (cache / 'pedestal').mkdir(parents=True)
+        for kept in law_cache._ROOT.glob('digest-*'):
+            shutil.copy(kept, cache / 'pedestal')
     return {**os.environ, 'XDG_CACHE_HOME': str(cache),
             'PYTHONPATH': os.pathsep.join([str(folder), *filter(None, sys.path)])}
 
@@ -92,10 +102,22 @@ def test_a_checkout_finds_what_another_of_the_same_sources_compiled(folder):
     shutil.copytree(folder / 'one_law', folder / 'elsewhere' / 'one_law')
     assert compilations(folder / 'elsewhere', folder / 'cache', [()]) == [0]
     law.write_text('"""A module."""\n# It holds one law.\n' + law.read_text().replace(
-        'def law(x):', 'def law(x):\n    """Return the sum and the mean."""'))
+        'def law(x):', 'def law(x):\n    """Return a sum."""'))
     assert compilations(folder, folder / 'cache', [()]) == [0]
-    law.write_text(law.read_text().replace('x.mean()', 'x.min()'))
+    law.write_text(law.read_text().replace('x[1]', 'x[2]'))
     assert compilations(folder, folder / 'cache', [()]) == [1]
+
+
+def test_a_process_saves_no_law_of_sources_that_changed_under_it(folder):
+    """The second module is imported after the edit, so its new law would be saved in the folder of the old sources."""
+    (folder / 'one_law' / 'late.py').write_text(LAW)
+    code = ('import numpy, pathlib, one_law.law; path = pathlib.Path(one_law.law.__file__).with_name("late.py"); '
+            'text = path.read_text(); path.write_text(text.replace("x[1]", "x[2]")); import one_law.late; '
+            'one_law.late.law(numpy.ones(3)); path.write_text(text)')
+    subprocess.run([sys.executable, '-c', code], env=environment(folder, folder / 'cache'), check=True, timeout=120.0)
+    saved = lambda: [str(path) for path in (folder / 'cache').rglob('*.nbc') if 'one_law' in str(path)]  # noqa: E731
+    assert saved() == []
+    assert compilations(folder, folder / 'cache', [()]) == [1] and saved()
 
 
 def test_laws_saved_at_once_are_all_kept(folder):
@@ -103,6 +125,34 @@ def test_laws_saved_at_once_are_all_kept(folder):
     types = [(name,) for name in TYPES]
     assert compilations(folder, folder / 'cache', types) == [1] * len(types)
     assert compilations(folder, folder / 'cache', types) == [0] * len(types)
+
+
+POWERS = """
+from pedestal_common.compiled import compiled
+
+@compiled
+def real(x, n):
+    return x ** n
+
+@compiled
+def whole(x, n):
+    return x ** n
+
+@compiled
+def total(x, i, n):
+    return real(x, n) + whole(i, n)
+"""
+
+
+def test_laws_translated_by_different_processes_keep_their_own_functions_of_numba(folder):
+    """Numba gives its powers of floats and of integers the same symbol if each is the first in its process."""
+    (folder / 'one_law' / 'powers.py').write_text(POWERS)
+    for call, value in (('real(1.5, 3)', 3.375), ('whole(7, 3)', 343), ('total(1.5, 7, 3)', 346.375),
+                        ('(real(1.5, 3), whole(7, 3), total(1.5, 7, 3))', (3.375, 343, 346.375))):
+        done = subprocess.run([sys.executable, '-c', f'from one_law.powers import *; print({call})'],
+                              env=environment(folder, folder / 'cache'), stdout=subprocess.PIPE, text=True,
+                              timeout=120.0)
+        assert done.stdout == f'{value}\n'
 
 
 def test_without_a_cache_everyone_compiles(folder):

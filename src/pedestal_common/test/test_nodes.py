@@ -7,7 +7,8 @@ from pedestal_common.graph import nodes, topics
 from pedestal_common.node import unit
 
 SHARED = {'clock', 'adu/state', 'ship/truth', 'ship/imu/data_raw', 'ship/imu/data', 'ins/state', 'ins/error',
-          'diagnostics', *(f'{node}/{name}' for node in ('ship_motion', 'ins') for name in ('inject', 'injected'))}
+          'diagnostics', 'weather/pressure', 'weather/temperature', 'weather/humidity',
+          *(f'{node}/{name}' for node in ('ship_motion', 'ins') for name in ('inject', 'injected'))}
 
 
 def test_every_topic_is_written_by_one_node_and_every_name_is_in_the_table_of_topics():
@@ -61,7 +62,8 @@ def test_several_beams_share_what_belongs_to_the_ship_and_the_clock():
 
 def test_a_node_hears_what_may_be_real_equipment_and_no_ship_where_none_is_named():
     acu = nodes.row('acu')
-    ashore = ('joint_states', 'tracking_receiver/angle_error', 'adu/state', 'acu/program_track')
+    ashore = ('joint_states', 'tracking_receiver/angle_error', 'adu/state', 'acu/program_track', 'weather/pressure',
+              'weather/temperature', 'weather/humidity')
     assert nodes.reads(acu, ()) == ashore == nodes.reads(acu, ('acu', 'adu', 'recorder'))
     aboard = nodes.reads(acu, ('beam_1/acu', 'ins'), ('receiver_range',))
     assert set(aboard) - set(ashore) == {'ship/imu/data', 'ins/state', 'tracking_receiver/range'}

@@ -94,6 +94,34 @@ def test_realtime_goes_on_without_a_silent_follower():
     assert answers[-1] == (10, 2, {'a': 'late'})
 
 
+def test_realtime_waits_only_for_messages_that_can_be_due():
+    """A follower with a message every third step: only this step waits for it."""
+    steps, answers = collect({'a': 0}, lockstep=False)
+    for k in range(12):
+        steps.take('trigger', 5 * k * MS, k)
+        if k % 3 == 0:
+            assert steps.pending_stamp == 5 * k * MS
+            steps.take('a', 5 * k * MS, f'a{k}')
+            assert answers[-1] == (5 * k, k, {'a': f'a{k}'})
+        elif k > 3:         # two messages show the interval
+            assert answers[-1] == (5 * k, k, {'a': None})
+
+
+def test_realtime_a_lost_message_of_each_step_is_waited_for():
+    """The shortest of the last intervals counts, so a gap makes no step early."""
+    steps, answers = collect({'a': 0}, lockstep=False)
+    for k in range(4):
+        steps.take('trigger', 5 * k * MS, k)
+        steps.take('a', 5 * k * MS, f'a{k}')
+    steps.take('trigger', 20 * MS, 4)           # its message is lost
+    steps.take('trigger', 25 * MS, 5)
+    assert steps.pending_stamp == 25 * MS
+    steps.take('a', 25 * MS, 'a5')
+    assert answers[-2:] == [(20, 4, {'a': None}), (25, 5, {'a': 'a5'})]
+    steps.take('trigger', 30 * MS, 6)
+    assert steps.pending_stamp == 30 * MS
+
+
 def test_realtime_gives_up_the_step_that_waits():
     steps, answers = collect({'a': 0}, lockstep=False)
     steps.answer_incomplete()

@@ -5,7 +5,13 @@ The antenna is a running graph (remote_node.Remote), or a recording (pedestal_an
 import abc
 import math
 
+import numpy as np
+
+from pedestal_common.geometry import pointing_report
 from pedestal_common.graph import nodes
+
+POINTING_TOPIC = 'acu/pointing'
+"""Topic with the report of the pointing model in force."""
 
 MAX_MESSAGE_AGE_S = 2.5
 """Age after which the last message is stale [s]."""
@@ -47,9 +53,31 @@ class Antenna(abc.ABC):
         """Return the name under which a node publishes its diagnostics: with the beam, for a node of a beam."""
         return self.beam + node if nodes.row(node).of_beam else node
 
-    def angles(self, topic):
-        """Return (azimuth, elevation) [deg] of joint_states or acu/reference, NaN if stale."""
+    def encoder_angles(self, topic):
+        """Return the encoder angles (azimuth, elevation) [deg] of joint_states or acu/reference, NaN if stale."""
         return self._degrees(topic, 0)
+
+    def directions(self, topic):
+        """Return the direction of the beam on the sky, deck angles (azimuth, elevation) [deg], NaN if stale.
+
+        topic: joint_states, or acu/reference for the commanded direction. The pointing model in force converts the
+        encoder angles.
+        """
+        angles, report = self.encoder_angles(topic), self.pointing_model
+        if report is None:
+            return angles
+        # The time of a change of the model is counted from the arrival of its report.
+        t = np.array([report.begins_s + self.age(POINTING_TOPIC)])
+        azimuth, elevation = np.degrees(pointing_report.directions(report, t, np.radians([angles])))[0].tolist()
+        return azimuth, elevation
+
+    @property
+    def pointing_model(self):
+        """The pointing_report.Report of the model in force; None without a model, or with a text that is no report."""
+        try:
+            return pointing_report.read(self.texts.get(POINTING_TOPIC, ''))
+        except ValueError:
+            return None
 
     def rates(self):
         """Return (azimuth, elevation) rates [deg/s] of the axes, NaN if stale."""

@@ -182,9 +182,11 @@ def _alarm_lines(remote, width):
 
 def _axis_lines(remote):
     """Return the table of the axes."""
-    actual, commanded, rates = remote.angles('joint_states'), remote.angles('acu/reference'), remote.rates()
+    actual, commanded, rates = remote.directions('joint_states'), remote.directions('acu/reference'), remote.rates()
     rows = {'actual [deg]': actual, 'commanded [deg]': commanded,
-            'error [deg]': [a - b for a, b in zip(commanded, actual)], 'rate [deg/s]': rates}
+            'error [deg]': [a - b for a, b in zip(commanded, actual)],
+            **({'encoder [deg]': remote.encoder_angles('joint_states')} if remote.pointing_model else {}),
+            'rate [deg/s]': rates}
     lines = [Text(f'{"":16}' + ''.join(f'{axis:>{VALUE_COLUMN_CHARS}}' for axis in topics.AXES), style='dim')]
     lines += [Text(f'{name:16}' + ''.join(f'{_number(value):>{VALUE_COLUMN_CHARS}}' for value in values))
               for name, values in rows.items()]

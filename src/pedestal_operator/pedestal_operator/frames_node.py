@@ -1,6 +1,6 @@
 """ROS node for the viewer RViz: it publishes the model of the pedestal on `robot_description`, and its frames on `tf`.
 
-In the folder viewers, frames.py computes the frames, and the folder files holds the model.
+In the folder `viewers`, frames.py computes the frames, and the subfolder `files` contains the model.
 
 The module imports `entry` before anything else, so that a signal during the other imports ends the process cleanly.
 """

@@ -17,13 +17,13 @@ from pedestal_common.node import middleware
 from pedestal_common.node.shell import Shell
 from pedestal_common.wire import commands, messages, records
 from pedestal_common.wire.commands import Reply
-from pedestal_operator.antenna import Antenna
+from pedestal_operator.antenna import POINTING_TOPIC, Antenna
 from pedestal_operator.requests import JOG_REPEAT_PERIOD_S, Requests
 
 NUMBER_TOPICS = ('joint_states', 'acu/reference', 'tracking_receiver/angle_error')
 """Topics of numbers that every client receives."""
 
-TEXT_TOPICS = ('acu/mode', 'adu/state', 'acu/keyhole')
+TEXT_TOPICS = ('acu/mode', 'adu/state', 'acu/keyhole', POINTING_TOPIC)
 """Topics of text that every client receives."""
 
 REPLY_TIMEOUT_S = 5.0

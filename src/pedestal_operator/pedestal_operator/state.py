@@ -23,7 +23,8 @@ FREE_COMMANDS = ('standby', 'take')
 REFUSAL_PREFIX = 'refused '
 """Start of a key in the diagnostics of the control unit, before the name of a mode."""
 
-ACU_STATUS_KEYS = ('mode', 'reason', 'fallback', 'control', 'drive', 'faults', 'locked', 'coasting', 'keyhole')
+ACU_STATUS_KEYS = ('mode', 'reason', 'fallback', 'control', 'drive', 'faults', 'locked', 'coasting', 'keyhole',
+                   'pointing_model')
 """Keys in the diagnostics of the control unit that `rows` shows."""
 
 GRAPH_NODES = ('acu', 'adu', 'tracking_receiver', 'ins', 'ship_motion')
@@ -71,11 +72,13 @@ class Shown(typing.NamedTuple):
 
 def rows(antenna) -> list:
     """Return the Rows of the present state."""
-    actual, commanded = antenna.angles('joint_states'), antenna.angles('acu/reference')
+    actual, commanded = antenna.directions('joint_states'), antenna.directions('acu/reference')
     acu = antenna.diagnostics_of('acu')
     found = [Row('angle', axis, angle, 'deg') for axis, angle in zip(topics.AXES, actual)]
     found += [Row('commanded', axis, angle, 'deg') for axis, angle in zip(topics.AXES, commanded)]
     found += [Row('deviation', axis, a - b, 'deg') for axis, a, b in zip(topics.AXES, commanded, actual)]
+    found += [Row('encoder', axis, angle, 'deg') for axis, angle in zip(
+        topics.AXES, antenna.encoder_angles('joint_states'))]
     found += [Row('rate', axis, rate, 'deg/s') for axis, rate in zip(topics.AXES, antenna.rates())]
     found += [Row('receiver', name, value, unit) for name, value, unit in _receiver(antenna)]
     found += [Row('acu', key, acu.get(key)) for key in ACU_STATUS_KEYS]

@@ -4,6 +4,7 @@ import types
 
 import pytest
 
+from pedestal_common.geometry import pointing_report
 from pedestal_common.wire import messages
 from pedestal_operator import console, state
 from pedestal_operator.antenna import Antenna
@@ -166,3 +167,23 @@ def test_a_key_whose_command_would_be_refused_shows_the_reason_instead(key, comm
     shown.update(1.0)
     assert remote.sent == [command] * sent
     assert shown.last_reply == ('' if sent else f'{"jog" if command == "rate" else command}: held by {control}')
+
+
+def test_the_operator_sees_the_direction_on_the_sky_and_the_encoders():
+    """With P1 0.3 and P7 -0.2 deg the azimuth encoder shows 0.3 deg too much, the elevation encoder 0.2 too little."""
+    station = Station(ages={'acu/reference': 0.0})
+    station.numbers['acu/reference'] = (0.5, 0.6, 0.0, 0.0)
+    encoders = math.degrees(0.5), math.degrees(0.6)
+    assert station.directions('joint_states') == station.encoder_angles('joint_states') == pytest.approx(encoders)
+    assert not any('encoder' in str(line) for line in console._axis_lines(station))
+    station.texts['acu/pointing'] = pointing_report.Report('', 'north.yaml', '', 0.0, {'p1': 0.3, 'p7': -0.2}).text
+    assert station.encoder_angles('joint_states') == pytest.approx(encoders)
+    sky = encoders[0] - 0.3, encoders[1] + 0.2
+    assert station.directions('joint_states') == pytest.approx(sky, abs=1e-9)
+    rows = {(row.group, row.name): row.value for row in state.rows(station)}
+    for i, axis in enumerate(('azimuth', 'elevation')):
+        assert rows['angle', axis] == rows['commanded', axis] == pytest.approx(sky[i])
+        assert rows['encoder', axis] == pytest.approx(encoders[i]) and rows['deviation', axis] == 0.0
+    assert any('encoder [deg]' in str(line) for line in console._axis_lines(station))
+    station.texts['acu/pointing'] = 'no report'
+    assert station.directions('joint_states') == pytest.approx(encoders)

@@ -41,7 +41,7 @@ class Remote:
     def exists(self, topic):
         return topic in self.seen
 
-    def angles(self, topic):
+    def directions(self, topic):
         return self.joints
 
     def request(self, verb, arguments=None):

@@ -386,9 +386,20 @@ class Bag:
         return planned_end(self.metadata_records)
 
     @property
+    def servo(self) -> bool:
+        """True if simulated servo drives took the place of the drive unit."""
+        return self.metadata.get('servo') == '1'
+
+    @property
+    def iq(self) -> bool:
+        """True if a receiver of I/Q samples took the place of the receiver."""
+        given = self.configuration['parameters'].get('tracking_receiver', {})
+        return self.metadata.get('iq') == '1' or any(key.startswith('source.') for key in given)
+
+    @property
     def graph(self) -> dict[str, nodes.Link]:
         """Topics of the recorded graph, {name: nodes.Link} with type, rate, publishers and subscribers."""
-        return nodes.links(self.beams)
+        return nodes.links(self.beams, self.servo, self.iq)
 
     def view(self, beam: str = '') -> 'Bag':
         """Return this Bag reduced to one of the beams of an array, by the name of the beam; '' for the first beam.

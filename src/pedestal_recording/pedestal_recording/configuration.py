@@ -13,7 +13,7 @@ from pedestal_common import parameters
 from pedestal_common.text_files import plain_yaml
 
 VERSIONED_PACKAGES = ('pedestal_common', 'ship_motion_sim', 'tracking_receiver_sim', 'acu_tracker', 'adu_drive',
-                      'pedestal_bringup', 'numpy', 'numba', 'rclpy')
+                      'pedestal_hardware', 'pedestal_bringup', 'numpy', 'numba', 'rclpy')
 """Packages whose versions are recorded."""
 
 GIT_TIMEOUT_S = 5.0

@@ -109,7 +109,7 @@ def unpacked(chunk) -> bytes:
 def _zstd(data, size):
     """Return the decompressed bytes of a zstd frame, b'' if the frame states another length than `size`.
 
-    This avoids memory for a frame of a false length.
+    Memory for a frame that states a false length is therefore never allocated.
     """
     if not size or zstandard.frame_content_size(data) not in (-1, size):
         return b''

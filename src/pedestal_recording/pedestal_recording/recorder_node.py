@@ -131,11 +131,13 @@ class RecorderNode(shell.Shell):
         beams, flags = self.graph.beams, [flag for flag in topics.TOPIC_FLAGS if getattr(self.parameters, flag)]
         recorded = nodes.recorded(names, flags, beams) if names else list(self.links.values())
         if self.graph.lockstep:  # a command belongs to no step; its reply does, and repeats the command
-            recorded = [link for link in recorded if link.rate != 'command']
+            recorded = [link for link in recorded if link.rate not in topics.REALTIME_RATES]
         self._end = round(self.parameters.duration * NS_PER_SECOND) or None
         self._bag = Writer(self.parameters.bag, recorded, {
             'scenario': self.parameters.scenario, 'pacing': self.graph.pacing, 'seed': self.parameters.seed,
             'beamwidth': self.parameters.beamwidth, **({'beams': beams} if beams else {}),
+            **({'servo': 1} if nodes.SIMULATED_DRIVES.name in names else {}),
+            **({'iq': 1} if nodes.SIMULATED_IQ.name in names else {}),
             **({} if self.graph.lockstep else {'start': self.epoch(self.clock()[1])}),
             **({'planned_end_ns': self._end} if self._end else {}),
             'git': configuration.git_revision(), **configuration.versions()},
@@ -183,7 +185,7 @@ class RecorderNode(shell.Shell):
         """Return the function take(CDR bytes, message info of rclpy) that checks, counts and writes each message."""
         put = self._into_step(index, topic) if self.graph.lockstep else self._on_arrival(index, topic)
         count = self._lockstep_counter(index, topic) if self.graph.lockstep else self._realtime_counter(index, topic)
-        checked = len(topic.writers) == 1 and (self.graph.lockstep or topic.rate != 'once')
+        checked = len(topic.writers) == 1 and (self.graph.lockstep or topic.rate not in topics.UNSTEPPED_RATES)
         received = self._received
 
         def take(data, info):

@@ -19,7 +19,7 @@ from pedestal_recording.writer import Writer
 T = 5_000_000
 METADATA = {'scenario': 'test', 'pacing': 'lockstep', 'seed': 7}
 NODES = ('ship_motion', 'ins', 'tracking_receiver', 'acu', 'adu', 'recorder', 'operator')
-RECORDED = [topic for topic in nodes.recorded(NODES) if topic.rate != 'command']
+RECORDED = [topic for topic in nodes.recorded(NODES) if topic.rate not in topics.REALTIME_RATES]
 NAMES = [topic.name for topic in RECORDED]
 
 

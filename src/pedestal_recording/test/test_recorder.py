@@ -105,10 +105,10 @@ class Graph:
             self.publishers[topic.name] = self.node.create_publisher(message_class(topic.type), topic.name, profile)
 
     def await_recorder(self):
-        """Until it reads everything but commands, of which a lockstep recorder has the replies only."""
+        """Until it reads everything but samples, and commands, of which a lockstep recorder has the replies only."""
         end = time.monotonic() + LIMIT
         while any(not self.publishers[topic.name].get_subscription_count() for topic in RECORDED
-                  if topic.rate != 'command'):
+                  if topic.rate not in topics.REALTIME_RATES):
             assert time.monotonic() < end, 'the recorder never subscribed'
             time.sleep(0.01)
         time.sleep(0.3)  # the recorder's side of the discovery

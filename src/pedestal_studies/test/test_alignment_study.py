@@ -1,4 +1,5 @@
-"""The accuracy that an alignment states, on the sea of the study `alignment`."""
+"""The accuracy that an alignment states, on the sea of the study `alignment`, and its price of speed."""
+import json
 import math
 
 import numpy as np
@@ -33,3 +34,16 @@ def test_the_stated_sigma_is_honest_on_swell_without_log_or_gnss(on_swell, metho
     shown = {t: round(float(alignment.value_at(ratio, t)), 2) for t in (150, 200, 250, 300)}
     print(f'{method}: error over its 1 sigma {shown}')
     assert all(1.0 / 1.3 < value < 1.3 for value in shown.values())
+
+
+def test_higher_bandwidths_level_faster_and_less_precisely(pedestal, tmp_path):
+    """Paper 001, section 6. White noise of the velocity: the noise of the tilt grows with the bandwidth^1.5."""
+    code, _, errors = pedestal('study', 'alignment-speed', '--runs', 4, '--workers', 1, '--json', 'rows.json')
+    assert (code, errors) == (0, '')
+    values = {(row['case'], row['metric']): row['value']
+              for row in json.loads((tmp_path / 'rows.json').read_text())['rows']}
+    level = [values[f'adrc/{speed}', 'level_rms_arcmin'] for speed in ('0.5', '1', '2', '4')]
+    settled = [values[f'adrc/{speed}', 'level_settling_s'] for speed in ('0.5', '1', '2', '4')]
+    assert settled == sorted(settled, reverse=True) and level == sorted(level)
+    assert level[3] / level[1] == pytest.approx(4.0**1.5, rel=0.15)
+    assert values['adrc/4', 'time_to_12arcmin_rms_s'] > 0.25 * values['adrc/1', 'time_to_12arcmin_rms_s']

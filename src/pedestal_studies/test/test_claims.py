@@ -1,5 +1,6 @@
 """The numbers that the readings of the papers' claims state are computed again."""
 import math
+import pathlib
 
 import numpy as np
 import pytest
@@ -7,12 +8,14 @@ import pytest
 from acu_tracker.estimation.filters import axis_filter
 from acu_tracker.estimation.params import FilterParameters
 from adu_drive.params import AduParameters
-from pedestal_studies.numbers import claims
+from pedestal_analysis.results.intervals import missed
+from pedestal_studies.numbers import claims, published
 from pedestal_studies.papers import alignment, backlash, servo
 from pedestal_studies.rigs import feedforward_loop as loop
 from ship_motion_sim import earth
 from ship_motion_sim.navigation import navigator
 
+ROOT = pathlib.Path(__file__).parents[3]
 LATITUDE = math.radians(alignment.SHIP_PARAMETERS.latitude_deg)
 
 
@@ -105,3 +108,19 @@ def test_constant_rate_and_acceleration_leave_no_error(rate, acceleration, late,
     miss = math.degrees(out['miss'][0, -1])
     assert miss == pytest.approx(acceleration * late / loop.K_P, rel=1e-4, abs=1e-7)
     assert shown.format(miss) in reading('003', '(17)')
+
+
+VERDICTS = 'reproduced', 'not reproduced', 'holds', 'without effect', 'our IMM'
+
+
+@pytest.mark.parametrize('paper', claims.CLAIMS_BY_PAPER)
+def test_a_verdict_agrees_with_the_target_of_its_row(paper):
+    rows = published.read(ROOT)
+    for claim in claims.CLAIMS_BY_PAPER[paper]:
+        assert claim.verdict.startswith(VERDICTS) or not claim.verdict, claim
+        if claim.study and missed(rows[claim.study, claim.case, claim.metric]):
+            assert claim.verdict.startswith('not reproduced'), claim
+    judged = {claim.claim for claim in claims.CLAIMS_BY_PAPER[paper] if claim.verdict}
+    measured = {claim.claim for claim in claims.CLAIMS_BY_PAPER[paper] if claim.study}
+    assert measured - judged <= {'figure 11: azimuth of the flight (no number)',
+                                 'figure 9: sway 10 deg in 8 s (no number)'}

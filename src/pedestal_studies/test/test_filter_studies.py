@@ -6,15 +6,16 @@ import math
 import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
+from scipy.signal import savgol_coeffs
 
 from acu_tracker.estimation.filters import axis_filter
 from acu_tracker.estimation.params import FilterParameters
 from pedestal_analysis.tuning import parameter_search
-from pedestal_common.parameters import as_dict
+from pedestal_common.parameters import as_dict, build
 from pedestal_studies.papers import manoeuvre, pareto
-from pedestal_studies.rigs import drawing, ensemble
+from pedestal_studies.rigs import drawing, ensemble, window_filter
 from pedestal_studies.rigs.ensemble import Noise
-from pedestal_studies.system import filters
+from pedestal_studies.system import filter_families, filters
 
 RUNS = 6
 
@@ -165,6 +166,44 @@ def test_tuning_of_many_parameters_begins_where_they_are():
 def test_a_criterion_that_never_works_is_refused():
     with pytest.raises(ValueError, match='no cv.noise gives a finite criterion'):
         parameter_search.tuned(FilterParameters(kind='cv'), lambda params: math.nan)
+
+
+@pytest.mark.parametrize('n, degree', [(7, 1), (40, 1), (40, 2)])
+def test_least_squares_weights_are_those_of_savitzky_and_golay(n, degree):
+    ours = window_filter.least_squares(n, degree)
+    for i in range(2):
+        theirs = savgol_coeffs(n, degree, deriv=i, delta=ensemble.MEASUREMENT_PERIOD_S, pos=n - 1, use='dot')[::-1]
+        assert ours[i] == pytest.approx(theirs, rel=1e-6, abs=1e-9 * np.abs(theirs).max())
+
+
+def test_the_wiener_filter_is_the_steady_kalman_filter_of_its_model():
+    """Variances of angle and rate that a singer filter states after 6 s, and those of the Wiener weights."""
+    alpha, sigma, noise = 1.0, math.radians(1.0), math.radians(0.03)
+    params = build(FilterParameters, {'kind': 'singer', 'singer.alpha': alpha, 'singer.sigma': sigma})
+    out, t = np.zeros(600, axis_filter.ESTIMATE_DTYPE), ensemble.MEASUREMENT_PERIOD_S * np.arange(600)
+    axis_filter.estimates(axis_filter.constants(params), t, 0.0 * t, np.full(600, noise**2), np.full(600, math.nan),
+                          0.0 * t, 1.0, out)
+    covariance = sigma**2 * window_filter.displacement(600, alpha) + noise**2 * np.eye(600)
+    w = window_filter.wiener(600, alpha, sigma, noise)
+    assert w[0] @ covariance @ w[0] == pytest.approx(out['variance'][-1], rel=0.02)
+    assert w[1] @ covariance @ w[1] == pytest.approx(out['rate_variance'][-1], rel=0.02)
+
+
+def test_window_estimates_follow_a_line_exactly():
+    t = ensemble.MEASUREMENT_PERIOD_S * np.arange(900)
+    for of in (window_filter.least_squares(50, 2), window_filter.wiener(300, 0.5, 0.01, 1e-3)):
+        angle, rate = window_filter.estimates(of, np.tile(0.3 + 0.2 * t, (2, 1)))
+        assert np.isnan(angle[:, :of.shape[1] - 1]).all()
+        assert angle[:, 400:] == pytest.approx(np.tile(0.3 + 0.2 * t[400:], (2, 1)), abs=1e-9)
+        assert rate[:, 400:] == pytest.approx(np.full((2, 500), 0.2), abs=1e-7)
+
+
+def test_tuned_equally_well_the_wiener_filter_equals_the_kalman_filter():
+    values = by_case(filter_families.run(quiet, 4, motions=('flyby-60m',)).rows)
+    ratio = {name: values[f'flyby-60m/{name}/own-tuning', 'angle_ratio_to_kalman']
+             for name in filter_families.FILTER_MEANINGS if name not in ('kalman', 'imm')}
+    assert [ratio['wiener'], ratio['alpha_beta_gamma']] == pytest.approx([1.0, 1.0], abs=0.03)
+    assert ratio['alpha_beta'] > 1.15 and ratio['least_squares'] > 1.02
 
 
 def test_the_reversals_follow_each_other_smoothly():

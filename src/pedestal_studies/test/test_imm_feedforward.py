@@ -12,6 +12,7 @@ from acu_tracker.estimation.filters import axis_filter
 from acu_tracker.estimation.params import FilterParameters
 from pedestal_analysis.results import intervals, tracking
 from pedestal_analysis.trials import monte_carlo
+from pedestal_studies.papers import feedforward_speed
 from pedestal_studies.papers import imm_feedforward as study
 from pedestal_studies.rigs import drawing
 from pedestal_studies.rigs import feedforward_loop as loop
@@ -156,3 +157,45 @@ def test_batches_are_added_as_they_come():
     outcome = loop.statistics({'case': ('azimuth', loop.cv(0.1))}, runs, Pool())['case']
     assert most <= 3
     assert outcome.miss_mean == pytest.approx(66.0 / runs) and outcome.values.shape == (runs, len(loop.METRIC_UNITS))
+
+
+@pytest.mark.parametrize('steps', [1, 15])
+def test_differences_are_those_of_a_parabola(steps):
+    """A rate is that of the middle of its span, `steps` / 2 before the miss; an acceleration is exact."""
+    t = T * np.arange(200)
+    known = loop.differenced(0.2 + 0.1 * t + 0.05 * t * t, steps)
+    first = 2 * steps + loop.MISS_DELAY_STEPS
+    middle = t[first:] - T * (loop.MISS_DELAY_STEPS + 0.5 * steps)
+    assert known[first:, 0] == pytest.approx(0.1 + 0.1 * middle, rel=1e-9)
+    assert known[first:, 1] == pytest.approx(np.full(len(middle), 0.1), rel=1e-6)
+    assert not known[:first, 1].any()
+
+
+def test_the_noise_of_a_difference_is_that_of_its_two_angles():
+    axis, rate = 'azimuth', loop.S_MOTION_RATE_RAD_S
+    source = feedforward_speed.sources(axis)['difference-1']
+    errors = feedforward_speed.estimate_errors(axis, loop.steps_of(axis, source, 0, 3), rate)
+    sigma = math.degrees(loop.MISS_SIGMA_RAD)
+    assert errors.mean(axis=0) == pytest.approx((math.sqrt(2.0) * sigma / T, math.sqrt(6.0) * sigma / T**2), rel=0.02)
+
+
+@pytest.fixture(scope='module')
+def speed_rows():
+    found = feedforward_speed.run(lambda share, text: None, runs=3)
+    assert len(found.figures['rates']().axes) == 4
+    return {(row['case'], row['metric']): row for row in found.rows}
+
+
+def test_at_50_m_s_the_imm_still_is_three_times_as_good(speed_rows):
+    for axis in study.REVERSAL_S_BY_AXIS:
+        slow, fast = (speed_rows[f'{axis}/{speed}/imm', 'miss_rms_deg']['value'] for speed in ('30m_s', '50m_s'))
+        assert slow < fast < 3.0 * slow
+        assert not intervals.missed(speed_rows[f'{axis}/50m_s/imm', 'miss_ratio_to_kalman_cv'])
+        assert speed_rows[f'{axis}/50m_s/drive-imm', 'autotrack_percent']['value'] == 100.0
+    assert ('azimuth/50m_s/drive-imm', 'miss_ratio_to_kalman_cv') not in speed_rows     # kalman-cv leaves autotrack
+
+
+def test_differences_are_worse_estimates(speed_rows):
+    for axis in study.REVERSAL_S_BY_AXIS:
+        for name in ('difference-1', 'difference-15'):
+            assert speed_rows[f'{axis}/30m_s/{name}', 'rate_ratio_to_imm']['value'] > 1.2

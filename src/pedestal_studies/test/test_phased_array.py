@@ -162,3 +162,26 @@ def test_paper_loop_against_its_equations_written_out(smoothing):
             R, v = predicted + 0.2 * nu, v + 0.04 / 1.8 / 0.005 * nu
         beams.append(R)
     np.testing.assert_allclose(loop.run(target, noise=noise)[0], in_force, atol=1e-13)
+
+
+def test_a_steeper_slope_divides_the_lag(values):
+    """Without smoothing the true lag is that of slope 1 over the slope, and the reading stays v T."""
+    for case in ('ramp/30deg_s/T=10ms', 'sine'):
+        steep = values[f'{case}/slope=2/S0', 'true_lag_deg']
+        assert values[f'{case}/S0', 'true_lag_deg'] / steep == pytest.approx(2.0, rel=2e-3)
+        assert values[f'{case}/slope=2', 'lag_deg'] == pytest.approx(values[case, 'lag_deg'], rel=2e-3)
+    assert (values['delay-limit/alpha=0.1/T=10ms/S1/slope=2', 'delay_ms']
+            < values['delay-limit/alpha=0.1/T=10ms/S1', 'delay_ms'])
+
+
+def test_a_larger_gain_is_faster_and_noisier(values):
+    alphas = [f'alpha={alpha:g}' for alpha in phased_array.ALPHA_GAINS]
+    rise = [values[f'step/{alpha}/T=10ms/S1', 'rise_90percent_s'] for alpha in alphas]
+    jitter = [values[f'noise/{alpha}', 'jitter_rms_deg'] for alpha in alphas]
+    assert rise == sorted(rise, reverse=True) and jitter == sorted(jitter) and rise[0] > 4.0 * rise[-1]
+
+
+def test_a_delay_hardly_changes_the_rise_and_adds_overshoot(values):
+    step, delayed = 'step/alpha=0.1/T=10ms/S0', 'step/alpha=0.1/T=10ms/S0/delay=20ms'
+    assert values[delayed, 'rise_90percent_s'] == pytest.approx(values[step, 'rise_90percent_s'], abs=0.01)
+    assert 1.2 < values[delayed, 'overshoot_percent'] / values[step, 'overshoot_percent'] < 1.5

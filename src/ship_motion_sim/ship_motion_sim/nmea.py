@@ -1,4 +1,5 @@
-"""Attitude as NMEA 0183 sentences for third-party equipment: HEHDT (heading) and PASHR (attitude).
+"""Attitude as NMEA 0183 sentences for third-party equipment: HEHDT (heading), PASHR and PRDID (attitude), HEROT (rate
+of turn).
 
 Signs of PASHR: roll positive with the port side up, pitch positive with the bow up, heave positive upwards. Because a
 positive pitch in FLU has the bow down, its sign changes.
@@ -35,3 +36,13 @@ def attitude(stamp, roll, pitch, yaw, heave):
     return sentence(f'HEHDT,{psi:.3f},T') + sentence(
         f'PASHR,{time_of_day(stamp)},{psi:.3f},T,{math.degrees(roll):+.3f},{-math.degrees(pitch):+.3f},{heave:+.3f},'
         '0.000,0.000,0.000,1,0')
+
+
+def angles(roll, pitch, yaw):
+    """Return PRDID for roll, pitch, yaw [rad] (REP 103: FLU in ENU). It has no time."""
+    return sentence(f'PRDID,{-math.degrees(pitch):+.3f},{math.degrees(roll):+.3f},{heading(yaw):.3f}')
+
+
+def turn(yaw_rate):
+    """Return HEROT of a yaw rate [rad/s] (REP 103, to port positive). ROT is in deg/min, to starboard positive."""
+    return sentence(f'HEROT,{-60.0 * math.degrees(yaw_rate):.1f},A')

@@ -40,3 +40,13 @@ def test_a_changed_byte_is_found():
     broken = nmea.attitude(0, 0.1, 0.0, 0.0, 0.0).decode().splitlines()[1].replace('+5.730', '+5.731')
     with pytest.raises(pynmea2.ChecksumError):
         pynmea2.parse(broken, check=True)
+
+
+def test_prdid_begins_with_the_pitch():
+    found = pynmea2.parse(nmea.angles(math.radians(3.2), math.radians(-1.5), math.radians(50.0)).decode(), check=True)
+    assert (found.pitch, found.roll, found.heading) == (1.5, 3.2, 40.0)
+
+
+def test_a_turn_to_starboard_is_positive_in_degrees_per_minute():
+    found = pynmea2.parse(nmea.turn(math.radians(-2.0)).decode(), check=True)
+    assert (found.talker, float(found.rate_of_turn), found.status) == ('HE', 120.0, 'A')

@@ -57,7 +57,19 @@ def test_cross_coupling_rotates_the_error(beta):
 
 
 def test_detector_is_the_real_part_of_difference_times_conjugate_sum():
-    phi, sum_voltage, noise = 0.7, 1.3 - 0.4j, 0.2 + 0.5j
-    expected = ((0.9 * cmath.exp(1j * phi) + noise) * sum_voltage.conjugate()).real
-    got = monopulse.detect(0.9, 0.0, sum_voltage.real, sum_voltage.imag, math.cos(phi), math.sin(phi), 0.2, 0.5)
-    assert got == pytest.approx(expected, abs=1e-12)
+    difference, total = 0.9 * cmath.exp(0.7j) + 0.2 + 0.5j, 1.3 - 0.4j
+    got = monopulse.detect(difference.real, difference.imag, total.real, total.imag)
+    assert got == pytest.approx((difference * total.conjugate()).real, abs=1e-12)
+
+
+@pytest.mark.parametrize('v_x, v_e', [(0.0, 0.0), (0.3, -0.2), (-0.9, 0.4), (1.3, 0.0)])
+@pytest.mark.parametrize('radius', [0.2, 0.75, 1.0])
+def test_a_disk_of_noise_against_an_integral_over_it(v_x, v_e, radius):
+    """Power of the sum, and its product with a difference, against 40 000 equal parts of the disk."""
+    r, angle = np.meshgrid(radius * np.sqrt((np.arange(200) + 0.5) / 200), 2.0 * math.pi * np.arange(200) / 200)
+    points = np.column_stack(((v_x + r * np.cos(angle)).ravel(), (v_e + r * np.sin(angle)).ravel()))
+    parts = np.array([monopulse.channels(x, e, 1.6, 0.9, math.sqrt(0.19)) for x, e in points])
+    S, D_x, D_e = monopulse.disk_channels(v_x, v_e, radius, 1.6, 0.9, math.sqrt(0.19))
+    assert S * S == pytest.approx((parts[:, 0]**2).mean(), rel=2e-3, abs=1e-5)
+    assert S * D_x == pytest.approx((parts[:, 0] * parts[:, 1]).mean(), abs=2e-4)
+    assert S * D_e == pytest.approx((parts[:, 0] * parts[:, 2]).mean(), abs=2e-4)

@@ -439,3 +439,29 @@ def test_no_signal_through_the_superstructure(Bench):
     bench.inputs['mat_ed'] = Rotation.from_euler('Z', math.pi / 2 - 0.2).as_matrix()
     bench.point(0.1, 0.6)
     assert bench.run(200)[-1]['status'] == receiver.Status.LOCKED
+
+
+SUN = {'target.kind': 'sun', 'target.leo_pass.start_time': '2019-12-10T11:00:00Z', 'receiver.cn0_dbhz': 60.0,
+       'target.noise_source.bandwidth': 1e5, 'antenna.beamwidth': 6.2e-3}
+
+
+def test_the_level_of_the_sun_is_that_of_its_disk_and_fluctuates(Bench):
+    """The disk is 1.5 beamwidths wide. At 30 dB above the noise the fluctuation is that of the source itself, which a
+    carrier of this level does not have."""
+    bench = Bench(SUN | {'path.light_time': True, 'target.polarisation.axial_ratio_db': 60.0})
+    azimuth, elevation, distance = target.look_angles(bench.target, np.full(1, 4.5))
+    assert distance[0] == pytest.approx(1.473e11, rel=1e-3)     # perihelion is near
+    for off in (0.0, 0.5, 1.0):
+        bench = Bench(SUN)
+        bench.point(azimuth[0], elevation[0] + off * 6.2e-3)
+        found = 10.0**(0.1 * bench.run(1400, np.random.default_rng(1))['cn0_dbhz'][400:])
+        S, *_ = monopulse.disk_channels(0.0, -off, 0.5 * 9.25e-3 / 6.2e-3, 1.6, 1.0, 0.0)
+        assert found.mean() == pytest.approx(1e6 * S * S, rel=0.01)
+        # The level is smoothed over 0.1 s, as a mean over 0.2 s. Off the axis the motion of the sun changes it too.
+        if off == 0.0:
+            assert found.std() / found.mean() == pytest.approx(1.0 / math.sqrt(1e5 * 0.2), rel=0.5)
+
+
+def test_a_body_needs_its_date(Bench):
+    with pytest.raises(target.TargetError, match="leo_pass.start_time = '': must be the UTC of the start"):
+        Bench({'target.kind': 'moon'})

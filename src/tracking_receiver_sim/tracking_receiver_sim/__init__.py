@@ -8,6 +8,7 @@ unit.py holds the unit of the node. receiver.py holds the `step` of the receiver
     path            refraction, light time, multipath, scintillation, polarisation
     monopulse.py    voltages of the channels for an error
     error_rate.py   rate of the error
+    detector.py     voltages to angle errors, C/N0 and lock
     smoothing.py    smoothing of the errors
     injected.py     effects of injected faults
     params.py       every parameter

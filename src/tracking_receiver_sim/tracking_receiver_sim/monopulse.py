@@ -21,6 +21,11 @@ U_PER_BEAMWIDTH = 2.0 * 1.8676215105779688
 D: diameter [m]; lambda: wavelength [m]; theta: angle off the axis [rad].
 """
 
+DISK_DISTANCES = math.sqrt(0.5 - math.sqrt(0.15)), math.sqrt(0.5), math.sqrt(0.5 + math.sqrt(0.15))
+DISK_WEIGHTS, DISK_ANGLES = (5.0 / 18.0, 8.0 / 18.0, 5.0 / 18.0), 12
+"""Distances from the centre of a disk [radii] and weights of the rings whose mean is that over the disk, and number of
+points on a ring. The squares of the distances are the nodes of the Gauss-Legendre quadrature."""
+
 
 @compiled
 def sinc(x):
@@ -58,13 +63,30 @@ def channels(v_x, v_e, k_m, cos_beta, sin_beta):
 
 
 @compiled
-def detect(d_real, d_imag, s_real, s_imag, cos_phi, sin_phi, d_noise_real, d_noise_imag):
-    """Return Re(d conj(s)) of a difference voltage d, after the phase error phi and the noise of its channel.
+def disk_channels(v_x, v_e, radius, k_m, cos_beta, sin_beta):
+    """Return (sum, difference X, difference E) voltages of a disk of incoherent noise, as strong as a unit carrier.
 
-    s: sum voltage, noise included. The voltages are scaled to the noise power 1.
+    The centre of the disk is v_x, v_e beamwidths off the axis; radius: of the disk [beamwidths]; others: see
+    `channels`. The square of the sum is the mean of the power pattern over the disk. Its product with a difference is
+    the mean of the product of both patterns, which a receiver measures.
     """
-    return ((d_real * cos_phi - d_imag * sin_phi + d_noise_real) * s_real
-            + (d_real * sin_phi + d_imag * cos_phi + d_noise_imag) * s_imag)
+    power = x = e = 0.0
+    for share, distance in zip(DISK_WEIGHTS, DISK_DISTANCES):
+        for k in range(DISK_ANGLES):
+            angle = 2.0 * math.pi * k / DISK_ANGLES
+            x_part, e_part = radius * distance * math.cos(angle), radius * distance * math.sin(angle)
+            S, D_x, D_e = channels(v_x + x_part, v_e + e_part, k_m, cos_beta, sin_beta)
+            power += share / DISK_ANGLES * S * S
+            x += share / DISK_ANGLES * S * D_x
+            e += share / DISK_ANGLES * S * D_e
+    S = math.sqrt(power)
+    return S, x / S, e / S
+
+
+@compiled
+def detect(d_real, d_imag, s_real, s_imag):
+    """Return Re(d conj(s)) of a difference voltage d and a sum voltage s, noise included."""
+    return d_real * s_real + d_imag * s_imag
 
 
 def thermal_noise(beamwidth, k_m, cn0, tau):

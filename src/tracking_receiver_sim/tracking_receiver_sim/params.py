@@ -8,10 +8,11 @@ from pedestal_common.geometry.geodesy import StationParameters
 from pedestal_common.geometry.lever_arm import LeverArm
 from pedestal_common.injection import table
 from pedestal_common.parameters import ParameterError, Parameters, choice, flag, group, parameter, text
+from pedestal_common.sky import bodies
 from tracking_receiver_sim.path.params import PathParameters, PolarisationParameters
 from tracking_receiver_sim.smoothing import MAX_WINDOW_SAMPLES, SMOOTHING_KINDS
 
-TARGET_KINDS = ('leo_pass', 'track_file', 'flyby', 'sine', 'step', 'ramp')
+TARGET_KINDS = ('leo_pass', 'track_file', 'flyby', 'sine', 'step', 'ramp', *bodies.POSITIONS)
 TARGET_SINE, TARGET_STEP, TARGET_RAMP = map(TARGET_KINDS.index, ('sine', 'step', 'ramp'))
 
 BEAM_MOTIONS = ('moving', 'held')
@@ -26,12 +27,13 @@ class LeoPassParameters(Parameters):
     line_2: str = text('2 25544  51.6439 211.2001 0007417  17.6667  85.6398 15.50103472202482',
                        'second line of the TLE')
     omm: str = text('', 'elements as a CCSDS OMM in JSON, instead of the TLE')
-    start_time: str = text('', 'UTC of the start, ISO 8601; empty: the run is centred on a culmination')
+    start_time: str = text('', 'UTC of the start, ISO 8601; empty: the run is centred on a culmination; the kinds sun '
+                           'and moon need it')
     culmination_low_deg: float = parameter(30.0, 0.0, 90.0, 'deg', 'lowest culmination that the pass finder accepts')
     culmination_high_deg: float = parameter(70.0, 0.0, 90.0, 'deg', 'highest culmination that the pass finder accepts')
     search_days: float = parameter(3.0, 0.1, 30.0, 'd', 'length of the search for a pass, from the TLE epoch on')
-    ut1_offset: float = parameter(0.0, -0.9, 0.9, 's', 'UT1 - UTC (IERS Bulletin A), which turns the earth further; a '
-                                  'program track assumes 0')
+    ut1_offset: float = parameter(0.0, -0.9, 0.9, 's', 'UT1 - UTC (IERS Bulletin A), which turns the earth further, '
+                                  'also below sun and moon; a program track assumes 0')
 
     def check(self):
         """Raise ParameterError if the lower limit of the culmination is not below the upper limit."""
@@ -84,15 +86,30 @@ class AngleParameters(Parameters):
 
 
 @dataclasses.dataclass(frozen=True)
+class NoiseSourceParameters(Parameters):
+    """The sun or the moon as a source of noise: a disk that is equally bright everywhere."""
+    diameter: float = parameter(9.25e-3, 0.0, 0.1, 'rad', 'diameter of the disk; default: 0.53 deg, of the sun at '
+                                'radio frequencies and of the moon')
+    bandwidth: float = parameter(1e6, 1e3, 1e10, 'Hz', 'bandwidth B of the receiver; the noise of the source itself '
+                                 'makes the level fluctuate by 1 / sqrt(B t) in the time t')
+
+
+@dataclasses.dataclass(frozen=True)
 class TargetParameters(Parameters):
     """The target and the station."""
-    kind: str = choice('leo_pass', TARGET_KINDS, 'kind of target')
+    kind: str = choice('leo_pass', TARGET_KINDS, 'kind of target; sun, moon: sources of noise')
     station: StationParameters = group(StationParameters)
     leo_pass: LeoPassParameters = group(LeoPassParameters)
     track_file: TrackFileParameters = group(TrackFileParameters)
     flyby: FlybyParameters = group(FlybyParameters)
     angle: AngleParameters = group(AngleParameters)
+    noise_source: NoiseSourceParameters = group(NoiseSourceParameters)
     polarisation: PolarisationParameters = group(PolarisationParameters)
+
+    @property
+    def of_noise(self):
+        """True if the target is a source of noise, without a carrier."""
+        return self.kind in bodies.POSITIONS
 
 
 @dataclasses.dataclass(frozen=True)
@@ -128,7 +145,9 @@ class RangingParameters(Parameters):
 @dataclasses.dataclass(frozen=True)
 class ReceiverParameters(Parameters):
     """Level, sampling, smoothing, lock and latency of the receiver."""
-    cn0_dbhz: float = parameter(46.4, 0.0, 120.0, 'dB-Hz', 'C/N0 on the beam axis at the reference range')
+    cn0_dbhz: float = parameter(46.4, 0.0, 120.0, 'dB-Hz', 'C/N0 on the beam axis at the reference range; of sun and '
+                                'moon: bandwidth times noise above the system noise over system noise, if all of '
+                                'their noise came from a point')
     reference_range: float = parameter(500e3, 1.0, 1e10, 'm', 'range at which the C/N0 is cn0_dbhz')
     range_exponent: float = parameter(2.0, 0.0, 4.0, '1', 'power of the range with which C/N0 falls; 0: constant')
     horizon_mask: float = parameter(0.0, -math.pi / 2, math.pi / 2, 'rad', 'elevation below which there is no signal')

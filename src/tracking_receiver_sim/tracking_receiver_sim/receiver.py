@@ -5,13 +5,11 @@ line. Along the line the receiver takes `samples_per_step` samples of sum and di
 stamp. An electronic beam is held between two steps and jumps at a step. With a held beam the line begins at the offset
 of the previous target position from the present beam.
 
-A sample becomes an angle error by Re(d conj(s)) divided by the smoothed sum power (automatic gain control, AGC). d and
-s are the voltages of difference and sum. The error is limited to the full scale of the detector, then smoothed. If the
-parameters select them, each result also holds the rate of the error at the stamp and the range, with white noise.
+The module `detector` makes an angle error of each sample. If the parameters select them, each result also holds the
+rate of the error at the stamp and the range, with white noise.
 
 Voltages are scaled so that the noise of one channel has the power 1 in one sample. The carrier power on axis is then
-C/N0 tau, with the time tau of a sample. The receiver knows the noise power and subtracts 1 from the measured sum
-power.
+C/N0 tau, with the time tau of a sample.
 
 Arguments: s state, c constants, i inputs, o outputs (records of this module).
 """
@@ -25,12 +23,12 @@ from pedestal_common.compiled import compiled
 from pedestal_common.geometry import blockage
 from pedestal_common.geometry.line_of_sight import angles, earth_angles, offsets, to_deck, to_earth
 from pedestal_common.parameters import ParameterError
-from tracking_receiver_sim import smoothing, target
+from tracking_receiver_sim import detector, smoothing, target
+from tracking_receiver_sim.detector import Voltages, hertz
 from tracking_receiver_sim.error_rate import error_rate
-from tracking_receiver_sim.monopulse import channels, detect, thermal_noise
+from tracking_receiver_sim.monopulse import channels, disk_channels, thermal_noise
 from tracking_receiver_sim.params import BEAM_HELD, BEAM_MOTIONS
 from tracking_receiver_sim.path import arrival, multipath, polarisation, scintillation
-from tracking_receiver_sim.smoothing import SMOOTHING_KINDS
 
 STATUS_TEXTS = dict(
     LOCKED='locked', NO_LOCK='no lock', BELOW_HORIZON='target below the horizon', NO_TARGET='target outside its track',
@@ -43,20 +41,18 @@ NORMALS_PER_SAMPLE = 6
 """Standard normals of a sample: real and imaginary noise of the sum and of the two difference channels."""
 RESULT_RING_SIZE = 512
 """Largest number of results that wait for the latency to pass."""
-MIN_POWER_OVER_NOISE = 0.01
-"""Smallest ratio of carrier power to noise power in one sample that the C/N0 estimate reports (-20 dB)."""
-
 Result = namedtuple('Result', 'error cn0_dbhz rates range')
 """Published result of one step: error and rates (cross-elevation, elevation) [rad, rad/s], C/N0 [dB-Hz], range [m];
 NaN while not locked or if not measured."""
+Incidence = namedtuple('Incidence', 'dX dE amplitude image hidden rates range')
+"""Signal of a step as it arrives: error (cross-elevation, elevation) [rad] at the stamp, sum voltage on axis [-],
+multipath.Image, True if hidden; measured rates and range as in Result."""
 NOT_MEASURED = (math.nan, math.nan)
 """Pair of numbers that the receiver did not measure."""
 
 STATE_DTYPE = np.dtype([
     ('stamp_ns', 'i8'), ('error_known', 'i8'), ('cross_elevation', 'f8'), ('elevation', 'f8'), ('direction', 'f8', 3),
-    ('agc_power', 'f8'), ('level_power', 'f8'),
-    ('smooth_cross_elevation', smoothing.SMOOTHER_DTYPE), ('smooth_elevation', smoothing.SMOOTHER_DTYPE),
-    ('locked', 'i8'), ('timer_ns', 'i8'),
+    *detector.STATE_FIELDS,
     ('written', 'i8'), ('released', 'i8'),
     ('ring_stamp_ns', 'i8', RESULT_RING_SIZE), ('ring_locked', 'i8', RESULT_RING_SIZE),
     ('ring_cross_elevation', 'f8', RESULT_RING_SIZE), ('ring_elevation', 'f8', RESULT_RING_SIZE),
@@ -64,15 +60,12 @@ STATE_DTYPE = np.dtype([
     ('ring_rate', 'f8', (RESULT_RING_SIZE, 2)), ('ring_range', 'f8', RESULT_RING_SIZE),
     ('antenna', 'f8', 3), ('antenna_velocity', 'f8', 3), ('scintillation', 'f8', scintillation.NORMALS_PER_STEP)],
                        align=True)
-"""State of the receiver.
+"""State of the receiver, with the state of its detector.
 
-    agc_power, level_power  sum power / noise power, smoothed for the gain and for the C/N0
-    smooth_...          smoothers of both errors
     ring_...            ring of the results whose latency has not passed, see Result
     scintillation       state of scintillation.wander
     error_known         1 if cross_elevation, elevation hold the true error at stamp_ns [rad], and direction the vector
                         to the target in FLU [m]
-    timer_ns            time for which the level has been past the level that changes the lock
     written, released   numbers of results put into and taken out of the ring since the start
     antenna             position of the antenna against the station, ENU [m]
     antenna_velocity    velocity of the antenna, FLU [m/s]
@@ -80,29 +73,27 @@ STATE_DTYPE = np.dtype([
 
 CONSTANTS_DTYPE = np.dtype([
     ('target', target.TARGET_DTYPE),
-    ('beamwidth', 'f8'), ('slope', 'f8'), ('angle_scale', 'f8'), ('full_scale', 'f8'),
+    ('beamwidth', 'f8'), ('slope', 'f8'), *detector.CONSTANTS_FIELDS,
     ('cos_beta', 'f8'), ('sin_beta', 'f8'), ('cos_phi', 'f8'), ('sin_phi', 'f8'), ('sign', 'f8', 2),
     ('boresight', 'f8', 2),
     ('path', arrival.PATH_DTYPE), ('multipath', multipath.MULTIPATH_DTYPE),
     ('scintillation', scintillation.SCINTILLATION_DTYPE),
-    ('first_measured_normal', 'i8'), ('first_scintillation_normal', 'i8'),
-    ('samples', 'i8'), ('tau', 'f8'), ('period_ns', 'i8'), ('agc_gain', 'f8'), ('level_gain', 'f8'),
-    ('smoothing', 'i8'), ('smoothing_gain', 'f8'), ('smoothing_samples', 'i8'), ('held', 'i8'),
+    ('first_measured_normal', 'i8'), ('first_source_normal', 'i8'), ('first_scintillation_normal', 'i8'),
+    ('disk_radius', 'f8'), ('source_sigma', 'f8'), ('period_ns', 'i8'), ('held', 'i8'),
     ('power', 'f8'), ('reference_range', 'f8'), ('half_exponent', 'f8'), ('horizon_mask', 'f8'),
-    ('acquire_power', 'f8'), ('lose_power', 'f8'), ('acquire_ns', 'i8'), ('lose_ns', 'i8'),
     ('latency_ns', 'i8'),
     ('rate_measured', 'i8'), ('rate_sigma', 'f8'), ('range_measured', 'i8'), ('range_sigma', 'f8'),
     ('range_variance', 'f8'), ('lever_arm', 'f8', 3), ('sectors', 'f8', (blockage.MAX_SECTORS, 3))], align=True)
-"""Constants of the receiver.
+"""Constants of the receiver, with the constants of its detector.
 
     slope               true k_m
-    angle_scale         theta3 / k_m with the k_m that the receiver assumes [rad]
     sign                1 or -1, of each difference channel
     boresight           null of the differences off the beam, cross-elevation and elevation [rad]
-    first_..._normal    index of the first normal of the measured rate and range, and of the scintillation
-    power, acquire_power, lose_power    carrier power / noise power in one sample: at the reference range, and at the
-                        levels that change the lock
-    agc_gain, level_gain    share of the way to its input that a filter moves in a sample
+    first_..._normal    index of the first normal of the measured rate and range, of a source of noise, and of the
+                        scintillation
+    disk_radius         radius of a source of noise [beamwidths]; 0: a carrier
+    source_sigma        1-sigma of the power of a source of noise in one sample, as a share of it
+    power               carrier power / noise power in one sample at the reference range
     range_variance      variance of the range [m2], in single precision
 """
 
@@ -155,29 +146,29 @@ def constants(params, period, built) -> np.ndarray:
     c = np.zeros(1, CONSTANTS_DTYPE)
     c['target'], c['beamwidth'] = built.constants, antenna.beamwidth
     c['slope'] = antenna.slope * antenna.slope_factor
-    c['angle_scale'] = antenna.beamwidth / antenna.slope
-    c['full_scale'] = receiver.full_scale * antenna.beamwidth
+    detector.set_constants(c, antenna, receiver, period)
     c['cos_beta'], c['sin_beta'] = math.cos(antenna.cross_coupling), math.sin(antenna.cross_coupling)
     c['cos_phi'], c['sin_phi'] = math.cos(antenna.phase_error), math.sin(antenna.phase_error)
     c['sign'] = 1.0
-    c['samples'], c['tau'], c['period_ns'] = receiver.samples_per_step, tau, round(period * 1e9)
-    c['agc_gain'] = -math.expm1(-tau / receiver.agc_time_constant)
-    c['level_gain'] = -math.expm1(-tau / receiver.cn0_time_constant)
-    c['smoothing'] = SMOOTHING_KINDS.index(receiver.smoothing)
-    c['smoothing_gain'], c['smoothing_samples'] = 1.0 / receiver.smoothing_samples, receiver.smoothing_samples
+    c['period_ns'] = round(period * 1e9)
     c['held'] = BEAM_MOTIONS.index(receiver.beam) == BEAM_HELD
     c['boresight'] = antenna.boresight_cross_elevation, antenna.boresight_elevation
     c['path'], c['multipath'] = arrival.constants(params.path), multipath.constants(params.path.multipath)
     c['scintillation'] = scintillation.constants(params.path.scintillation, period)
     c['first_measured_normal'] = NORMALS_PER_SAMPLE * receiver.samples_per_step
-    c['first_scintillation_normal'] = _measured_normals(receiver)
-    c['power'] = _hertz(receiver.cn0_dbhz) * tau * polarisation.efficiency(params.target.polarisation,
-                                                                           antenna.polarisation)
-    c['reference_range'], c['half_exponent'] = receiver.reference_range, 0.5 * receiver.range_exponent
+    c['first_source_normal'], c['first_scintillation_normal'] = _measured_normals(receiver), _receiver_normals(params)
+    c['power'] = hertz(receiver.cn0_dbhz) * tau
+    c['reference_range'] = receiver.reference_range
+    if params.target.of_noise:
+        source = params.target.noise_source
+        c['disk_radius'] = 0.5 * source.diameter / antenna.beamwidth
+        c['source_sigma'] = 1.0 / math.sqrt(source.bandwidth * tau)
+        # The place of a body is an apparent one, and its noise has no polarisation.
+        c['path']['light_time'] = 0
+    else:
+        c['power'] *= polarisation.efficiency(params.target.polarisation, antenna.polarisation)
+        c['half_exponent'] = 0.5 * receiver.range_exponent
     c['horizon_mask'] = receiver.horizon_mask
-    c['acquire_power'] = _hertz(receiver.acquire_level_dbhz) * tau
-    c['lose_power'] = _hertz(receiver.lose_level_dbhz) * tau
-    c['acquire_ns'], c['lose_ns'] = round(receiver.acquire_time * 1e9), round(receiver.lose_time * 1e9)
     c['latency_ns'] = round(receiver.latency * 1e9)
     c['rate_measured'], c['rate_sigma'] = receiver.rate.measured, receiver.rate.sigma
     c['range_measured'], c['range_sigma'] = receiver.ranging.measured, receiver.ranging.sigma
@@ -199,16 +190,21 @@ def _measured_normals(receiver) -> int:
     return NORMALS_PER_SAMPLE * receiver.samples_per_step + 2 * receiver.rate.measured + receiver.ranging.measured
 
 
+def _receiver_normals(params) -> int:
+    """Return _measured_normals of TrackingReceiverParameters, and those of a source of noise."""
+    return _measured_normals(params.receiver) + params.receiver.samples_per_step * params.target.of_noise
+
+
 def normals_per_step(params) -> int:
     """Return the number of standard normals that `step` takes with TrackingReceiverParameters."""
-    return _measured_normals(params.receiver) + scintillation.NORMALS_PER_STEP * params.path.scintillation.on
+    return _receiver_normals(params) + scintillation.NORMALS_PER_STEP * params.path.scintillation.on
 
 
 def angle_noise(params, cn0_dbhz, period):
     """Return the predicted 1-sigma of one published error on axis [rad] at a C/N0 [dB-Hz] and a drive step [s]."""
     antenna, receiver = params.antenna, params.receiver
     tau = period / receiver.samples_per_step
-    one_sample = thermal_noise(antenna.beamwidth, antenna.slope, _hertz(cn0_dbhz), tau)
+    one_sample = thermal_noise(antenna.beamwidth, antenna.slope, hertz(cn0_dbhz), tau)
     independent = {'none': receiver.samples_per_step, 'recursion': 2.0 * receiver.smoothing_samples - 1.0,
                    'moving_average': receiver.smoothing_samples}
     return one_sample / math.sqrt(independent[receiver.smoothing])
@@ -237,11 +233,6 @@ def beam_age(params, period):
     if BEAM_MOTIONS.index(receiver.beam) != BEAM_HELD:
         return 0.0
     return smoothing.steps_back(receiver.smoothing, receiver.samples_per_step, receiver.smoothing_samples) * period
-
-
-def _hertz(cn0_dbhz):
-    """Return a C/N0 [Hz] given in dB-Hz."""
-    return 10.0**(0.1 * cn0_dbhz)
 
 
 @compiled
@@ -289,70 +280,72 @@ def carrier_amplitude(c, e, n, u, hidden):
 
 
 @compiled
-def sample(s, c, amplitude, v_x, v_e, image, normals, first):
-    """Return the (cross-elevation, elevation) error [rad] of one sample. The filters of AGC and level advance.
+def voltages(c, amplitude, v_x, v_e, image):
+    """Return the Voltages of one sample without noise.
 
     amplitude: sum voltage on axis [-]; v_x, v_e: offsets of the target from the null of the differences, in
-    beamwidths; image: multipath.Image; normals: used from index `first` on.
+    beamwidths; image: multipath.Image.
     """
-    # The noise power 1 of a channel is half in its real and half in its imaginary part. S_g, D_xg, D_eg: patterns for
-    # the image of the target in the ground.
-    half = math.sqrt(0.5)
-    S, D_x, D_e = channels(v_x, v_e, c.slope, c.cos_beta, c.sin_beta)
+    # S_g, D_xg, D_eg: patterns for the image of the target in the ground.
+    if c.disk_radius > 0.0:
+        S, D_x, D_e = disk_channels(v_x, v_e, c.disk_radius, c.slope, c.cos_beta, c.sin_beta)
+    else:
+        S, D_x, D_e = channels(v_x, v_e, c.slope, c.cos_beta, c.sin_beta)
     S_imag = D_x_imag = D_e_imag = 0.0
     if c.multipath.reflection != 0.0:
         S_g, D_xg, D_eg = channels((image.dX - c.boresight[0]) / c.beamwidth,
                                    (image.dE - c.boresight[1]) / c.beamwidth, c.slope, c.cos_beta, c.sin_beta)
         S, D_x, D_e = S + image.real * S_g, D_x + image.real * D_xg, D_e + image.real * D_eg
         S_imag, D_x_imag, D_e_imag = image.imaginary * S_g, image.imaginary * D_xg, image.imaginary * D_eg
-    s_real, s_imag = amplitude * S + half * normals[first], amplitude * S_imag + half * normals[first + 1]
-    power = s_real * s_real + s_imag * s_imag
-    s.agc_power += c.agc_gain * (power - s.agc_power)
-    s.level_power += c.level_gain * (power - s.level_power)
-    # The range of the AGC ends at a carrier as strong as the noise.
-    gain = c.angle_scale / max(s.agc_power - 1.0, 1.0)
-    x = gain * detect(c.sign[0] * amplitude * D_x, c.sign[0] * amplitude * D_x_imag, s_real, s_imag, c.cos_phi,
-                      c.sin_phi, half * normals[first + 2], half * normals[first + 3])
-    e = gain * detect(c.sign[1] * amplitude * D_e, c.sign[1] * amplitude * D_e_imag, s_real, s_imag, c.cos_phi,
-                      c.sin_phi, half * normals[first + 4], half * normals[first + 5])
-    return max(-c.full_scale, min(x, c.full_scale)), max(-c.full_scale, min(e, c.full_scale))
+    x_real, x_imag = c.sign[0] * amplitude * D_x, c.sign[0] * amplitude * D_x_imag
+    e_real, e_imag = c.sign[1] * amplitude * D_e, c.sign[1] * amplitude * D_e_imag
+    return Voltages(amplitude * S, amplitude * S_imag,
+                    x_real * c.cos_phi - x_imag * c.sin_phi, x_real * c.sin_phi + x_imag * c.cos_phi,
+                    e_real * c.cos_phi - e_imag * c.sin_phi, e_real * c.sin_phi + e_imag * c.cos_phi)
 
 
 @compiled
-def measure(s, c, amplitude, dX, dE, image, normals):
-    """Return the errors (cross-elevation, elevation) [rad] that the receiver measures in one step.
+def with_noise(v, normals, first):
+    """Return Voltages with noise, made of the normals from index `first` on."""
+    # The noise power 1 of a channel is half in its real and half in its imaginary part.
+    half = math.sqrt(0.5)
+    return Voltages(v.s_real + half * normals[first], v.s_imag + half * normals[first + 1],
+                    v.x_real + half * normals[first + 2], v.x_imag + half * normals[first + 3],
+                    v.e_real + half * normals[first + 4], v.e_imag + half * normals[first + 5])
 
-    The true error changes during the step from that of the state s to dX, dE [rad]. Other arguments: see `sample`.
+
+@compiled
+def error_at(s, seen, part):
+    """Return the true (cross-elevation, elevation) error [rad] when a part [-] of a step has passed.
+
+    The error changes during the step from that of the state s to that of `seen`, an Incidence.
     """
-    from_X, from_E = (s.cross_elevation, s.elevation) if s.error_known != 0 else (dX, dE)
-    smooth_x, smooth_e = s.smooth_cross_elevation, s.smooth_elevation
-    smoothing.begin(smooth_x)
-    smoothing.begin(smooth_e)
+    from_X, from_E = (s.cross_elevation, s.elevation) if s.error_known != 0 else (seen.dX, seen.dE)
+    return from_X + part * (seen.dX - from_X), from_E + part * (seen.dE - from_E)
+
+
+@compiled
+def voltages_at(s, c, seen, part, amplitude):
+    """Return the Voltages without noise when a part [-] of a step has passed; amplitude: sum voltage on axis [-].
+
+    s, seen: see `error_at`.
+    """
+    X, E = error_at(s, seen, part)
+    return voltages(c, amplitude, (X - c.boresight[0]) / c.beamwidth, (E - c.boresight[1]) / c.beamwidth, seen.image)
+
+
+@compiled
+def measure(s, c, seen, normals):
+    """Return the errors (cross-elevation, elevation) [rad] that the receiver measures in one step with an Incidence.
+    """
+    detector.begin(s)
     for k in range(c.samples):
-        part = (k + 1.0) / c.samples
-        x, e = sample(s, c, amplitude, (from_X + part * (dX - from_X) - c.boresight[0]) / c.beamwidth,
-                      (from_E + part * (dE - from_E) - c.boresight[1]) / c.beamwidth, image, normals,
-                      NORMALS_PER_SAMPLE * k)
-        smoothing.put(smooth_x, x, c.smoothing_gain)
-        smoothing.put(smooth_e, e, c.smoothing_gain)
-    return (smoothing.smoothed(smooth_x, c.smoothing, c.samples, c.smoothing_samples),
-            smoothing.smoothed(smooth_e, c.smoothing, c.samples, c.smoothing_samples))
-
-
-@compiled
-def lock(s, c, elapsed_ns):
-    """Update the lock: gained after acquire_ns above the upper level, lost after lose_ns below the lower level.
-
-    elapsed_ns: time since the last step.
-    """
-    power = s.level_power - 1.0
-    if s.locked != 0:
-        crossed, wait = power < c.lose_power, c.lose_ns
-    else:
-        crossed, wait = power > c.acquire_power, c.acquire_ns
-    s.timer_ns = s.timer_ns + elapsed_ns if crossed else 0
-    if crossed and s.timer_ns >= wait:
-        s.locked, s.timer_ns = 1 - s.locked, 0
+        level = seen.amplitude
+        if c.source_sigma > 0.0:
+            level *= math.sqrt(max(0.0, 1.0 + c.source_sigma * normals[c.first_source_normal + k]))
+        detector.put(s, c, with_noise(voltages_at(s, c, seen, (k + 1.0) / c.samples, level), normals,
+                                      NORMALS_PER_SAMPLE * k))
+    return detector.errors(s, c)
 
 
 @compiled
@@ -406,60 +399,83 @@ def reset_outputs(o):
 
 
 @compiled
+def incidence(s, c, i, o, true, normals):
+    """Return the Incidence of the target's true state, and set the true error in the outputs."""
+    dX, dE, amplitude = 0.0, 0.0, 0.0
+    rates, distance = NOT_MEASURED, math.nan
+    image = multipath.Image(0.0, 0.0, 0.0, 0.0)
+    hidden = False
+    if true.valid:
+        place_antenna(s, c, i)
+        seen = apparent_state(s, c, true)
+        rates, distance = rate_and_range(s, c, i, seen, normals)
+        e, n, u = seen.position
+        e, n, u = e - s.antenna[0], n - s.antenna[1], u - s.antenna[2]
+        x, y, z = to_deck(i.mat_ed, e, n, u)
+        if c.held and s.error_known:
+            s.cross_elevation, s.elevation = offsets(i.azimuth, i.elevation, s.direction[0], s.direction[1],
+                                                     s.direction[2])
+        s.direction[0], s.direction[1], s.direction[2] = x, y, z
+        dX, dE = offsets(i.azimuth, i.elevation, x, y, z)
+        hidden = blockage.blocked(c.sectors, *angles(x, y, z))
+        amplitude = carrier_amplitude(c, e, n, u, hidden)
+        image = multipath.image(c.multipath, i, e, n, u)
+        o.true_cross_elevation, o.true_elevation = dX, dE
+        if c.scintillation.on != 0:
+            sin_E = u / math.sqrt(e * e + n * n + u * u)
+            fading, X, E = scintillation.wander(c.scintillation, s.scintillation, sin_E, normals,
+                                                c.first_scintillation_normal)
+            amplitude, dX, dE = fading * amplitude, dX + X, dE + E
+    return Incidence(dX, dE, amplitude, image, hidden, rates, distance)
+
+
+@compiled
+def begin(s, c, i, o, breaks, coefficients):
+    """Begin a step: reset the outputs and set the target in them. Return (the target's true state, time since the last
+    step [ns]); the time is 0 for a stamp that is not after the last one. Arguments: see `step`."""
+    reset_outputs(o)
+    elapsed_ns = 0
+    if i.stamp_ns > s.stamp_ns:
+        elapsed_ns = i.stamp_ns - s.stamp_ns if s.stamp_ns >= 0 else c.period_ns
+        s.stamp_ns = i.stamp_ns
+    true = target.state(c.target, breaks, coefficients, 1e-9 * i.stamp_ns)
+    if elapsed_ns > 0:
+        o.target_valid = true.valid
+        o.target_position[0], o.target_position[1], o.target_position[2] = true.position
+        o.target_velocity[0], o.target_velocity[1], o.target_velocity[2] = true.velocity
+    else:
+        o.status = Status.STAMP_ORDER
+    return true, elapsed_ns
+
+
+@compiled
+def finish(s, o, true, seen):
+    """Keep the error of a step for the next step, and set the status."""
+    s.cross_elevation, s.elevation = seen.dX, seen.dE
+    s.error_known = true.valid
+    o.status = (Status.NO_TARGET if true.valid == 0 else Status.HIDDEN if seen.hidden else
+                Status.BELOW_HORIZON if seen.amplitude == 0.0 else Status.LOCKED if s.locked != 0 else Status.NO_LOCK)
+
+
+@compiled
 def step(s, c, i, o, breaks, coefficients, normals):
     """Execute one drive step. Never raises: the status of the outputs names a missing input.
 
     s, c, i, o: records STATE_DTYPE, CONSTANTS_DTYPE, INPUTS_DTYPE, OUTPUTS_DTYPE; breaks, coefficients: of the Target;
     normals: (normals_per_step,).
     """
-    reset_outputs(o)
-    if i.stamp_ns <= s.stamp_ns:
-        o.status = Status.STAMP_ORDER
+    true, elapsed_ns = begin(s, c, i, o, breaks, coefficients)
+    if elapsed_ns == 0:
         return
-    elapsed_ns = i.stamp_ns - s.stamp_ns if s.stamp_ns >= 0 else c.period_ns
-    s.stamp_ns = i.stamp_ns
-
-    true = target.state(c.target, breaks, coefficients, 1e-9 * i.stamp_ns)
-    o.target_valid = true.valid
-    o.target_position[0], o.target_position[1], o.target_position[2] = true.position
-    o.target_velocity[0], o.target_velocity[1], o.target_velocity[2] = true.velocity
-
     error, rates, distance = NOT_MEASURED, NOT_MEASURED, math.nan
     if inputs_known(i):
-        dX, dE, amplitude = 0.0, 0.0, 0.0
-        image = multipath.Image(0.0, 0.0, 0.0, 0.0)
-        hidden = False
-        if true.valid:
-            place_antenna(s, c, i)
-            seen = apparent_state(s, c, true)
-            rates, distance = rate_and_range(s, c, i, seen, normals)
-            e, n, u = seen.position
-            e, n, u = e - s.antenna[0], n - s.antenna[1], u - s.antenna[2]
-            x, y, z = to_deck(i.mat_ed, e, n, u)
-            if c.held and s.error_known:
-                s.cross_elevation, s.elevation = offsets(i.azimuth, i.elevation, s.direction[0], s.direction[1],
-                                                         s.direction[2])
-            s.direction[0], s.direction[1], s.direction[2] = x, y, z
-            dX, dE = offsets(i.azimuth, i.elevation, x, y, z)
-            hidden = blockage.blocked(c.sectors, *angles(x, y, z))
-            amplitude = carrier_amplitude(c, e, n, u, hidden)
-            image = multipath.image(c.multipath, i, e, n, u)
-            o.true_cross_elevation, o.true_elevation = dX, dE
-            if c.scintillation.on != 0:
-                sin_E = u / math.sqrt(e * e + n * n + u * u)
-                fading, X, E = scintillation.wander(c.scintillation, s.scintillation, sin_E, normals,
-                                                    c.first_scintillation_normal)
-                amplitude, dX, dE = fading * amplitude, dX + X, dE + E
-        error = measure(s, c, amplitude, dX, dE, image, normals)
-        s.cross_elevation, s.elevation = dX, dE
-        s.error_known = true.valid
-        lock(s, c, elapsed_ns)
-        o.status = (Status.NO_TARGET if true.valid == 0 else Status.HIDDEN if hidden else
-                    Status.BELOW_HORIZON if amplitude == 0.0 else Status.LOCKED if s.locked != 0 else Status.NO_LOCK)
+        seen = incidence(s, c, i, o, true, normals)
+        error, rates, distance = measure(s, c, seen, normals), seen.rates, seen.range
+        detector.lock(s, c, s.level_power - 1.0, elapsed_ns)
+        finish(s, o, true, seen)
     else:
         s.error_known, s.locked, s.timer_ns = 0, 0, 0
         o.status = Status.NO_BEAM
     if s.locked == 0:
         error, rates, distance = NOT_MEASURED, NOT_MEASURED, math.nan
-    cn0_dbhz = 10.0 * math.log10(max(s.level_power - 1.0, MIN_POWER_OVER_NOISE) / c.tau)
-    delay(s, c, o, i.stamp_ns, Result(error, cn0_dbhz, rates, distance))
+    delay(s, c, o, i.stamp_ns, Result(error, detector.cn0_dbhz(s, c), rates, distance))

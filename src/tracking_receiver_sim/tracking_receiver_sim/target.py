@@ -10,6 +10,8 @@ within 0.3 mdeg of skyfield if UT1 = UTC, the default. The true UT1 - UTC (`ut1_
 moves an ISS pass by up to 0.04 deg (7 mdeg on the default pass). The error of SGP4 itself grows to kilometres within
 days.
 
+sun, moon: directions in which they are seen, every BODY_KNOT_SPACING_S, joined by cubic Hermite pieces.
+
 track_file: a predicted orbit or a table of directions (folder `ephemeris`), or the fixes of a recorded flight joined
 by a cubic spline, with or without smoothing (folder `track`). On a real helicopter flight with fixes at 1 Hz, the
 spline predicts left-out fixes to 9 m, the jitter of the fixes. PCHIP or Akima pieces predict them equally well, but
@@ -29,11 +31,15 @@ from pedestal_common.geometry import orbit
 from pedestal_common.geometry.interval import interval
 from pedestal_common.geometry.line_of_sight import earth_angles, earth_direction
 from pedestal_common.geometry.orbit import TargetError
+from pedestal_common.graph.steps import SECONDS_PER_DAY
 from pedestal_common.parameters import record, record_type
+from pedestal_common.sky import bodies
 from tracking_receiver_sim.params import TARGET_KINDS, TARGET_RAMP, TARGET_SINE, TARGET_STEP, AngleParameters
 
 SGP4_KNOT_SPACING_S = 1.0
 """Time between two SGP4 knots [s]."""
+BODY_KNOT_SPACING_S = 10.0
+"""Time between two knots of the sun or the moon [s]; the pieces are within 1e-9 rad."""
 PASS_SEARCH_STEP_S = 20.0
 """Step of the pass finder [s]; a pass of a satellite in a low earth orbit (LEO) lasts minutes."""
 PEAK_SEARCH_POINTS = 41
@@ -146,7 +152,8 @@ def build(params, duration, horizon_mask=0.0) -> Target:
     Raises TargetError, also if the target stays below the horizon. A horizon_mask [rad] below 0 takes the place of the
     horizon.
     """
-    builders: dict[str, Callable] = {'leo_pass': _leo_pass, 'track_file': _track_file, 'flyby': _flyby}
+    builders: dict[str, Callable] = {'leo_pass': _leo_pass, 'track_file': _track_file, 'flyby': _flyby,
+                                     **dict.fromkeys(bodies.POSITIONS, _body)}
     # known: start_time and summary, as far as the kind has them.
     breaks, coefficients, *known = builders.get(params.kind, _angles)(params, duration)
     constants = np.zeros(1, TARGET_DTYPE)
@@ -164,7 +171,7 @@ def _require_above(params, built, duration, limit):
         name = (f'satellite {orbit.satellite(params.leo_pass).number}' if params.kind == 'leo_pass' else
                 params.track_file.path if params.kind == 'track_file' else f'target {params.kind}')
         station = (f' at latitude {params.station.latitude_deg:g}, longitude {params.station.longitude_deg:g} deg'
-                   if params.kind in ('leo_pass', 'track_file') else '')
+                   if params.of_noise or params.kind in ('leo_pass', 'track_file') else '')
         raise TargetError(f'{name}: below the horizon {f"from {built.start_time} " if built.start_time else ""}for '
                           f'{duration:g} s{station}: highest {math.degrees(highest):.1f} deg')
 
@@ -268,6 +275,23 @@ def _hermite(x, y, y_dot):
     slope = np.diff(y, axis=0) / h
     bend = (y_dot[:-1] + y_dot[1:] - 2.0 * slope) / h
     return np.stack((bend / h, (slope - y_dot[:-1]) / h - bend, y_dot[:-1], y[:-1]))
+
+
+# sun, moon
+
+def _body(params, duration):
+    """Return (breaks, coefficients, start_time) of the sun or the moon."""
+    if not params.leo_pass.start_time:
+        raise TargetError(f"leo_pass.start_time = '': must be the UTC of the start for a target of kind {params.kind}")
+    julian, fraction = orbit.julian_date(orbit.instant('start_time', params.leo_pass.start_time))
+    knots = np.arange(-RUN_MARGIN_S, duration + RUN_MARGIN_S + BODY_KNOT_SPACING_S, BODY_KNOT_SPACING_S)
+
+    def position(times):
+        fractions = fraction + times / SECONDS_PER_DAY
+        to_fixed = orbit.earth_fixed(julian, fractions, params.leo_pass.ut1_offset)
+        return bodies.seen(params.kind, params.station, julian, fractions, to_fixed)
+    velocity = 0.5 * (position(knots + 1.0) - position(knots - 1.0))
+    return knots, _hermite(knots, position(knots), velocity), orbit.iso(julian, fraction)
 
 
 # track_file

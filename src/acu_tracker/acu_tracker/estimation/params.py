@@ -7,6 +7,10 @@ from acu_tracker.estimation.filters.motion_models import MAX_RUNG_COUNT
 from pedestal_common.parameters import ParameterError, Parameters, choice, flag, group, parameter, text
 
 _DEG = math.pi / 180.0
+MAX_WHITE_JERK = 1e3
+"""Largest root density of a white jerk [rad/s3/sqrt(Hz)]."""
+MIN_DETERMINANT = 0.01
+"""Least size of the determinant of the matrix of the receiver's errors [-]."""
 _ALPHA = '1/s', 'manoeuvre frequency: reciprocal of the duration of an acceleration'
 
 
@@ -30,7 +34,7 @@ class CvParameters(Parameters):
 class CaParameters(Parameters):
     """Model of constant acceleration."""
 
-    noise: float = parameter(0.1 * _DEG, 1e-9, 1e3, 'rad/s3/sqrt(Hz)', 'root density of the white jerk',
+    noise: float = parameter(0.1 * _DEG, 1e-9, MAX_WHITE_JERK, 'rad/s3/sqrt(Hz)', 'root density of the white jerk',
                              grid=(1e-6, 10.0, 8))
 
 
@@ -76,10 +80,10 @@ class ImmParameters(Parameters):
         """Raise ParameterError unless `models` names two or more models, each once, and the last rung is in the range
         of a white jerk."""
         named_models(self.models)
-        last, most = self.ca.noise * self.rung_ratio**(self.rungs - 1), 1e3
-        if last > most:
+        last = self.ca.noise * self.rung_ratio**(self.rungs - 1)
+        if last > MAX_WHITE_JERK:
             raise ParameterError(f'rungs = {self.rungs}: the last model ca has a white jerk of {last:g} '
-                                 f'rad/s3/sqrt(Hz); the largest is {most:g}')
+                                 f'rad/s3/sqrt(Hz); the largest is {MAX_WHITE_JERK:g}')
 
 
 @dataclasses.dataclass(frozen=True)
@@ -131,6 +135,25 @@ class ReceiverModelParameters(Parameters):
 
 
 @dataclasses.dataclass(frozen=True)
+class ErrorMatrixParameters(Parameters):
+    """Matrix that the errors of the receiver are multiplied with: the inverse of its slopes and cross-talk.
+
+    `pedestal calibrate receiver` measures it. Without a calibration it is the identity.
+    """
+
+    xx: float = parameter(1.0, -10.0, 10.0, '', 'corrected cross-elevation error per measured cross-elevation error')
+    xe: float = parameter(0.0, -10.0, 10.0, '', 'corrected cross-elevation error per measured elevation error')
+    ex: float = parameter(0.0, -10.0, 10.0, '', 'corrected elevation error per measured cross-elevation error')
+    ee: float = parameter(1.0, -10.0, 10.0, '', 'corrected elevation error per measured elevation error')
+
+    def check(self):
+        """Raise ParameterError if the matrix is nearly singular, so that one direction on the sky is lost."""
+        determinant = self.xx * self.ee - self.xe * self.ex
+        if abs(determinant) < MIN_DETERMINANT:
+            raise ParameterError(f'xx ee - xe ex = {determinant:g}: must be at least {MIN_DETERMINANT:g} in size')
+
+
+@dataclasses.dataclass(frozen=True)
 class AttitudeModelParameters(Parameters):
     """Error model of an INS, for a ship whose INS does not publish the statistics of its error.
 
@@ -160,6 +183,7 @@ class TrackerParameters(Parameters):
     coast_time: float = parameter(3.0, 1e-3, 1000.0, 's', 'time without an error after which autotrack ends')
     handover: bool = flag(True, 'automatic hand-over from program to autotrack after lock')
     receiver: ReceiverModelParameters = group(ReceiverModelParameters)
+    matrix: ErrorMatrixParameters = group(ErrorMatrixParameters)
     attitude: AttitudeModelParameters = group(AttitudeModelParameters)
     ukf: UkfParameters = group(UkfParameters)
 

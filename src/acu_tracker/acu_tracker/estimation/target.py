@@ -168,15 +168,15 @@ def on_deck(g, p, deck, t, source):
 
 
 @compiled
-def levelled_azimuth(g, level, source):
-    """Return the AxisMotion of the azimuth of a Source on a levelled deck at rest.
+def on_levelled_deck(g, level, source):
+    """Return the Motion of a Source in deck angles of a levelled deck at rest.
 
     level: Rotation from this deck to the earth.
     """
     still = Attitude(level, ZERO_VECTOR, ZERO_VECTOR)
     if source.framed:
         still = estimate_frame.of_deck(g.frame, still)
-    return angles(deck_reference.on_deck(still, line_of_sight(source.motion))).azimuth
+    return angles(deck_reference.on_deck(still, line_of_sight(source.motion)))
 
 
 @compiled

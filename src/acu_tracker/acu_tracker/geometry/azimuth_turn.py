@@ -46,7 +46,7 @@ def watch(s, axis, target, beamwidth, t):
     """End the turn at t [s] if the azimuth of the axis is within half a beamwidth of the target.
 
     axis    azimuth of the reference of the axis [rad]
-    target  deck angles (azimuth, elevation) of the target [rad]
+    target  encoder angles (azimuth, elevation) of the target [rad]
 
     Both azimuths count revolutions: they are not reduced to one turn.
     """

@@ -14,8 +14,8 @@ The conversion is exact: it differentiates the unit vector u to the target twice
 """
 from collections import namedtuple
 
-from acu_tracker.geometry.motion import LineOfSight, angles, earth_angles
-from acu_tracker.geometry.vector import Vector, cross, minus, rotated, rotated_back, times
+from acu_tracker.geometry.motion import LineOfSight, angles, earth_angles, turned
+from acu_tracker.geometry.vector import Vector, cross, minus, rotated, times, transposed
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry import line_of_sight
 
@@ -33,8 +33,7 @@ dw   Vector of its angular acceleration, FLU [rad/s2]
 @compiled
 def on_deck(attitude, sight):
     """Return a LineOfSight on the deck (FLU); sight: the LineOfSight in the frame to which attitude.mat rotates."""
-    u, du = rotated_back(attitude.mat, sight.u), rotated_back(attitude.mat, sight.du)
-    ddu = rotated_back(attitude.mat, sight.ddu)
+    u, du, ddu = turned(transposed(attitude.mat), sight)
     wu, dwu = cross(attitude.w, u), cross(attitude.dw, u)
     return LineOfSight(u, minus(du, wu), minus(minus(ddu, cross(attitude.w, minus(times(2.0, du), wu))), dwu))
 

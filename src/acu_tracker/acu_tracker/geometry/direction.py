@@ -32,6 +32,22 @@ def set_moving(d, stamp, angles, rates, moves, holds=0.0):
     d['stamp'], d['angle'], d['rate'], d['moves'], d['holds'] = stamp, angles, rates, moves, holds
 
 
+def moved(d, times):
+    """Return the angles (n, 2) [rad] of the direction at times (n,) [s] at or after its stamp; d: view of
+    DIRECTION_DTYPE."""
+    return d['angle'] + np.minimum(times - d['stamp'], d['moves'])[:, np.newaxis] * d['rate']
+
+
+def set_chord(d, axis, begins, ends, angles):
+    """Move an axis along a straight line: its angles are `angles` (2,) [rad] at the times `begins` and `ends` [s].
+
+    axis: 0 azimuth, 1 elevation; d: view of DIRECTION_DTYPE. Both times lie at or after the stamp.
+    """
+    at, until = np.minimum((begins - d['stamp'], ends - d['stamp']), d['moves'])
+    rate = (angles[1] - angles[0]) / (until - at) if until > at else 0.0
+    d['angle'][axis], d['rate'][axis] = angles[0] - rate * at, rate
+
+
 @compiled
 def put(d, angle):
     """Replace the direction by angles (2,) [rad] that do not move."""

@@ -6,10 +6,10 @@ from acu_tracker.geometry.history import bracket, history_type, interpolated, pu
 from pedestal_common.compiled import compiled
 
 ENCODERS_DTYPE = history_type(4)
-"""History of the deck angles. Columns of a sample: azimuth, elevation [rad], then their rates [rad/s]."""
+"""History of the encoder angles. Columns of a sample: azimuth, elevation [rad], then their rates [rad/s]."""
 
 Pointing = namedtuple('Pointing', 'A E dA dE')
-"""Deck angles of the antenna [rad] and their rates [rad/s]."""
+"""Angles of the antenna [rad] and their rates [rad/s]: of the encoders, or of the beam in deck angles on the sky."""
 
 
 @compiled

@@ -14,7 +14,7 @@ import math
 import numpy as np
 
 from acu_tracker.geometry.deck_reference import Attitude
-from acu_tracker.geometry.motion import LineOfSight, earth_angles, line_of_sight
+from acu_tracker.geometry.motion import earth_angles, line_of_sight, turned
 from acu_tracker.geometry.vector import Rotation, Vector, cross, dot, rotated, rotated_back, rotation, transposed
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry.line_of_sight import earth_direction
@@ -49,16 +49,13 @@ def lay(f, u, du):
 @compiled
 def to_earth(f, motion):
     """Return the LineOfSight in ENU; motion: the Motion in the frame."""
-    sight, mat = line_of_sight(motion), rotation(f.mat)
-    return LineOfSight(rotated(mat, sight.u), rotated(mat, sight.du), rotated(mat, sight.ddu))
+    return turned(rotation(f.mat), line_of_sight(motion))
 
 
 @compiled
 def to_frame(f, sight):
     """Return the Motion in the frame; sight: the LineOfSight in ENU. The function is the inverse of to_earth."""
-    mat = rotation(f.mat)
-    return earth_angles(LineOfSight(rotated_back(mat, sight.u), rotated_back(mat, sight.du),
-                                    rotated_back(mat, sight.ddu)))
+    return earth_angles(turned(transposed(rotation(f.mat)), sight))
 
 
 @compiled

@@ -6,6 +6,10 @@ from pedestal_common.compiled import compiled
 HISTORY_LENGTH = 64
 """Number of samples in a history."""
 
+MAX_DELAY_STEPS = HISTORY_LENGTH - 4
+"""Longest delay for which a history holds the sample [steps]. Four steps are a margin for stamps between the steps and
+ahead of them."""
+
 
 def history_type(width) -> np.dtype:
     """Return the dtype of a history, a ring buffer of HISTORY_LENGTH rows.

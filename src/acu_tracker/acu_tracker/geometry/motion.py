@@ -7,7 +7,7 @@ and up of the earth therefore have the same formulas. Because earth vectors are 
 import math
 from collections import namedtuple
 
-from acu_tracker.geometry.vector import Vector, dot, minus, times
+from acu_tracker.geometry.vector import Vector, dot, minus, rotated, times
 from pedestal_common.compiled import compiled
 
 AxisMotion = namedtuple('AxisMotion', 'angle rate acceleration')
@@ -18,6 +18,12 @@ Motion = namedtuple('Motion', 'azimuth elevation')
 
 LineOfSight = namedtuple('LineOfSight', 'u du ddu')
 """Unit vector u [-] towards the target, its first [1/s] and second [1/s2] derivative."""
+
+
+@compiled
+def turned(mat, sight):
+    """Return a LineOfSight after the rotation by a Rotation."""
+    return LineOfSight(rotated(mat, sight.u), rotated(mat, sight.du), rotated(mat, sight.ddu))
 
 
 @compiled

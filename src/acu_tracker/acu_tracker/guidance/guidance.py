@@ -1,7 +1,8 @@
-"""Guidance: the reference of both axes in deck angles, from the target of the mode.
+"""Guidance: the reference of both axes in encoder angles, from the target of the mode.
 
-The target is converted to deck angles, and its azimuth is put on an azimuth wrap inside the limits. Near a keyhole the
-reference is a planned slew of the look-ahead instead. `control_unit` calls this module in each step.
+The target is converted to deck angles, the pointing model converts these to encoder angles, and the azimuth is put on
+an azimuth wrap inside the limits. Near a keyhole the reference is a planned slew of the look-ahead instead.
+`control_unit` calls this module in each step.
 
 g      record of GUIDANCE_DTYPE
 k      record of tracking.TRACKING_DTYPE
@@ -25,6 +26,7 @@ from acu_tracker.guidance import manual
 from acu_tracker.lookahead import planner
 from acu_tracker.mode import signal_level_modes
 from acu_tracker.modes import Mode, Reason
+from acu_tracker.pointing import model
 from acu_tracker.program import bridge, program_track
 from acu_tracker.search import acquisition
 from acu_tracker.servo import position_loop
@@ -34,11 +36,12 @@ GUIDANCE_DTYPE = np.dtype([
     ('preset', direction.DIRECTION_DTYPE), ('slave', direction.DIRECTION_DTYPE), ('manual', manual.MANUAL_DTYPE),
     ('bridge', bridge.BRIDGE_DTYPE), ('acquisition', acquisition.ACQUISITION_DTYPE),
     ('lookahead', planner.PLANNER_DTYPE), ('turn', azimuth_turn.TURN_DTYPE),
-    ('azimuth', 'f8'), ('target_angles', 'f8', (2,)), ('pointing_offset', 'f8'), ('held', 'f8'), ('overtravel', 'i8')],
+    ('azimuth', 'f8'), ('target_angles', 'f8', (2,)), ('direction', 'f8', (2,)), ('unreachable', 'i8'),
+    ('pointing_offset', 'f8'), ('held', 'f8'), ('overtravel', 'i8')],
     align=True)
 """State of the guidance.
 
-preset           direction of the mode preset, deck angles
+preset           direction of the mode preset, deck angles on the sky
 slave            direction of the mode slave, earth angles
 manual           point that an operator moves by hand, in the modes stop and rate
 bridge           rotation of the program to the place where the target was last tracked
@@ -46,7 +49,9 @@ acquisition      state of the modes that use the signal level
 lookahead        planned slews through keyholes, and predicted hidden sectors
 turn             turn of the azimuth to another wrap at a limit of its travel
 azimuth          azimuth of the last reference, before the shaper [rad]
-target_angles    deck angles (azimuth, elevation) of the target for that reference [rad]
+target_angles    encoder angles (azimuth, elevation) of the target for that reference [rad]
+direction        deck angles (azimuth, elevation) of the target on the sky [rad]
+unreachable      1: the beam cannot point to the direction, and points to the nearest one
 pointing_offset  intended angle between beam and target [rad]
 held             last instant [s] at which a limit held the beam off the target
 overtravel       1: no azimuth wrap holds the whole program inside the limits
@@ -109,28 +114,48 @@ def motion(g, k, c, order, way, gap, now):
 
 @compiled
 def _reference(g, k, c, order, way, gap, t):
-    """Return the reference Motion in deck angles at t [s]: the target of the mode, or a slew through a keyhole."""
-    mode = order.mode
+    """Return the reference Motion of the encoders at t [s]: the target of the mode, or a slew through a keyhole.
+
+    The angles of the modes stow, stop and rate are encoder angles. A direction of another mode goes through the
+    pointing model.
+    """
+    mode, g.unreachable = order.mode, 0
     if not modes.FOLLOWS_TARGET[mode]:
         start_from(g, order.azimuth)
     if mode == Mode.STOW:
         return Motion(AxisMotion(c.axis[0].p.stow, 0.0, 0.0), AxisMotion(c.axis[1].p.stow, 0.0, 0.0))
     if mode == Mode.PRESET:
-        return direction.motion_at(g.preset, t)
+        return _on_encoders(g, k, direction.motion_at(g.preset, t))
     if mode == Mode.STOP or mode == Mode.RATE:
         return manual.motion(g.manual, t - order.stamp)
     source = _source(g, k, c, mode, way, gap, t)
-    motion = target.on_deck(k.target, c.p, k.attitude, t, source)
+    on_sky = target.on_deck(k.target, c.p, k.attitude, t, source)
+    g.direction[0], g.direction[1] = on_sky.azimuth.angle, on_sky.elevation.angle
+    motion = _on_encoders(g, k, on_sky)
     g.target_angles[0], g.target_angles[1] = motion.azimuth.angle, motion.elevation.angle
     g.pointing_offset = 0.0
     if planner.slewing(g.lookahead, t):
         level = motion.azimuth
         if k.attitude.stabilised:
-            level = target.levelled_azimuth(k.target, rotation(g.lookahead.level), source)
+            on_level = target.on_levelled_deck(k.target, rotation(g.lookahead.level), source)
+            level = model.to_encoders(k.pointing.model, on_level)[0].azimuth
         motion, g.pointing_offset = planner.motion_at(g.lookahead, c.lookahead, t, motion, level)
         start_from(g, motion.azimuth.angle)
         return motion
-    return Motion(_wrapped(g, c.axis[0].p, order, way.program, t, motion.azimuth), motion.elevation)
+    wrapped = _wrapped(g, c.axis[0].p, order, way.program, t, motion.azimuth)
+    start_from(g, model.in_turn(k.pointing.model, on_sky, motion.azimuth.angle, wrapped.angle))
+    return Motion(AxisMotion(g.azimuth, wrapped.rate, wrapped.acceleration), motion.elevation)
+
+
+@compiled
+def _on_encoders(g, k, on_sky):
+    """Return the Motion of the encoders for a direction, and note whether the beam reaches it.
+
+    on_sky: Motion of the direction in deck angles.
+    """
+    motion, reachable = model.to_encoders(k.pointing.model, on_sky)
+    g.unreachable = 0 if reachable else 1
+    return motion
 
 
 @compiled
@@ -272,14 +297,15 @@ def _plan(g, k, c, mode, program, gap, t):
     """Plan from t [s] on along the program, or along the great circle of the target."""
     if modes.FOLLOWS_TABLE[mode]:
         bridge.clear(g.bridge)
-        planner.look_along_program(g.lookahead, c.lookahead, t, g.azimuth, bridge.way(g.bridge, program))
+        planner.look_along_program(g.lookahead, c.lookahead, k.pointing.model, t, g.azimuth,
+                                   bridge.way(g.bridge, program))
         return
     if mode == Mode.AUTOTRACK and not gap.coasting:
         bridge_to(g, k, c, program, t)
     way = bridge.way(g.bridge, program)
     if way.valid and program_track.status(program, t) == Reason.NONE:
-        planner.look_along_program(g.lookahead, c.lookahead, t, g.azimuth, way)
+        planner.look_along_program(g.lookahead, c.lookahead, k.pointing.model, t, g.azimuth, way)
         return
     sight = (line_of_sight(signal_level_modes.expected(g.acquisition, way, t)) if modes.USES_SIGNAL_LEVEL[mode] else
              tracking.sight(k, c, t))
-    planner.look_along_great_circle(g.lookahead, c.lookahead, t, g.azimuth, sight.u, sight.du)
+    planner.look_along_great_circle(g.lookahead, c.lookahead, k.pointing.model, t, g.azimuth, sight.u, sight.du)

@@ -32,6 +32,9 @@ SLEW_CANDIDATE_COUNT, REFINEMENT_COUNT, SLEW_SAMPLE_COUNT, BISECTION_COUNT = 48,
 """Effort of a plan: number of candidates for t1, of refinements of t1, of samples in which a slew is evaluated, and of
 bisections for t2."""
 
+MIN_GAIN_S = 0.02
+"""Least decrease of the cost for which a renewed plan replaces begin and direction of the previous plan [s]."""
+
 PLAN_NO_KEYHOLE, PLAN_SLEW, PLAN_NO_WRAP, PLAN_BEYOND_PATH = range(4)
 """Outcomes of `plan`: no keyhole; a planned slew; no azimuth wrap inside the limits; a keyhole that ends beyond the
 path."""
@@ -43,7 +46,8 @@ path     a completed Path
 azimuth  azimuth of the axis at the first row of the path [rad]
 limits   record of SLEW_LIMITS_DTYPE
 after    time from which the axis can follow the target again [s]
-tilt     rms tilt of the deck about one horizontal axis [rad]; it is normally distributed, and a slew cannot follow it
+tilt     rms tilt of the deck about one horizontal axis [rad]; the tilt is normally distributed. A slew follows only a
+         share of it, see _evaluate
 """
 
 Keyhole = namedtuple('Keyhole', 'first last needed')
@@ -157,7 +161,7 @@ def _attempt(slew, passage, turn, t1, samples):
 def find(path, rate, acceleration):
     """Return the first Keyhole of a path, where the target exceeds the azimuth rate [rad/s] or acceleration [rad/s2].
 
-    If the time between two excesses is longer than that of half a revolution, they are two keyholes.
+    Two excesses belong to two keyholes if the time between them is longer than the time of half a revolution.
     """
     first, last, needed, before = -1, -1, 0.0, 0.0
     for i in range(1, len(path.rows)):
@@ -172,11 +176,16 @@ def find(path, rate, acceleration):
 
 
 @compiled
-def plan(slew, path, azimuth, limits, tilt):
+def plan(slew, path, azimuth, limits, tilt, previous, planned):
     """Find the keyhole of a completed Path and the best slew through it; return one of the outcomes PLAN_.
 
-    slew: records (2,) of SLEW_DTYPE, the first for the best slew, the second for trials. The other arguments are those
-    of Passage.
+    slew      records (2,) of SLEW_DTYPE, the first for the best slew, the second for trials
+    previous  record of SLEW_DTYPE: the previous plan, if planned is True
+    planned   True if there is a previous plan whose slew has not begun
+    The other arguments are those of Passage.
+
+    Slews with different t1 may cost the same. The previous t1 and direction therefore stay in force until another slew
+    costs less by MIN_GAIN_S.
 
     The effort is bounded. For each of the two directions the first level evaluates SLEW_CANDIDATE_COUNT + 1 slews of
     SLEW_SAMPLE_COUNT samples. Each of the next REFINEMENT_COUNT - 1 levels evaluates 9 such slews. The last level
@@ -192,7 +201,8 @@ def plan(slew, path, azimuth, limits, tilt):
     # t1 is searched from t_in back by the time of a whole revolution, because an earlier t1 has no advantage.
     width = min(t_in - path.t0, 2.0 * math.pi / limits.rate) / SLEW_CANDIDATE_COUNT
     # Side 0 is the direction in which the target itself turns. least: cost of the better direction; other: cost of the
-    # other direction; feasible: a slew on side 0 meets the target within the path, inside the limits or not.
+    # other direction; feasible: True if a slew on side 0 meets the target before the path ends, even outside the
+    # limits.
     feasible, least, other = False, math.inf, math.inf
     for side in range(2):
         turn = math.copysign(1.0, own_travel) * (1.0 - 2.0 * side)
@@ -223,6 +233,11 @@ def plan(slew, path, azimuth, limits, tilt):
                 slew[0] = trial
     if least == math.inf:
         return PLAN_NO_WRAP
+    turn, t1 = math.copysign(1.0, previous.peak), min(previous.t1, t_in)
+    if planned and _attempt(trial, passage, turn, t1, 10 * SLEW_SAMPLE_COUNT)[1] < least + MIN_GAIN_S:
+        trial.long_way = 1 if turn * own_travel < 0.0 else 0
+        other = least if trial.long_way != best.long_way else other
+        slew[0] = trial
     top = first
     for i in range(first, last + 1):
         top = i if path.rows[i, paths.UP_COLUMN] > path.rows[top, paths.UP_COLUMN] else top

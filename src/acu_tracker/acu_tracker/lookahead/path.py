@@ -1,6 +1,7 @@
 """The path of the target on the levelled deck for the next seconds, as a table with constant time step.
 
 The path follows the program track, or the great circle on which the target moves. `keyhole` and `planner` search it.
+The rows are directions on the sky first; `to_encoders` converts them to encoder angles, by which the axes move.
 """
 import math
 from collections import namedtuple
@@ -9,7 +10,8 @@ from acu_tracker.geometry.great_circle import turned
 from acu_tracker.geometry.vector import Vector, dot, minus, rotated_back, rotation
 from acu_tracker.program import bridge
 from pedestal_common.compiled import compiled
-from pedestal_common.geometry.line_of_sight import wrap
+from pedestal_common.geometry import pointing_model
+from pedestal_common.geometry.line_of_sight import angles, direction, wrap
 
 PATH_ROW_COUNT, PATH_COLUMN_COUNT = 1025, 6
 """Largest number of rows of a path, and number of its columns."""
@@ -63,6 +65,17 @@ def along_great_circle(path, mat, u, du):
     for i in range(len(path.rows)):
         path.rows[i, 0], path.rows[i, 1], path.rows[i, 2] = rotated_back(level, turned(u, du, W, W * i * path.h))
     return len(path.rows)
+
+
+@compiled
+def to_encoders(path, m):
+    """Replace the unit vectors by those of the encoder angles; m: record of pointing_model.MODEL_DTYPE."""
+    if m.exact:
+        return
+    for i in range(len(path.rows)):
+        azimuth, elevation = angles(path.rows[i, 0], path.rows[i, 1], path.rows[i, 2])
+        A, E, _ = pointing_model.encoder_of(m, azimuth, elevation)
+        path.rows[i, 0], path.rows[i, 1], path.rows[i, 2] = direction(A, E)
 
 
 @compiled

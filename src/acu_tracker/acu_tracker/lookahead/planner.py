@@ -2,10 +2,11 @@
 
 The planner runs every LOOK_AHEAD_PERIOD_S, and considers the next `horizon` seconds of the path on the levelled deck,
 the mean attitude of the ship. The path is the program track, which in autotrack is rotated to begin at the estimate.
-Without a program the path is the great circle of the estimate. A planned slew keeps the levelled deck on which it was
-planned.
+Without a program the path is the great circle of the estimate. A plan is renewed in each look-ahead until its slew
+begins. Because the antenna still follows the target then, a renewal moves no axis. A planned slew keeps the levelled
+deck on which it was planned last.
 
-h, c: records of PLANNER_DTYPE and of CONSTANTS_DTYPE.
+h, c, m: records of PLANNER_DTYPE, of CONSTANTS_DTYPE and of pointing_model.MODEL_DTYPE.
 """
 import math
 
@@ -21,7 +22,9 @@ from pedestal_common.geometry import blockage
 from pedestal_common.geometry.line_of_sight import angles, rotation
 
 LOOK_AHEAD_PERIOD_S = 1.0
-"""Time between two look-aheads [s]."""
+"""Time between two look-aheads [s]. For this time before a slew begins, its plan is final."""
+MAX_UNANNOUNCED_TIME_S, MAX_UNANNOUNCED_LOSS_S = 0.5, 0.1
+"""Largest changes of a plan that are not announced: of begin or end of its slew, and of the expected loss [s]."""
 
 FORECAST_TEXTS = ('none', 'keyhole', 'no turn')
 """Names of the forecasts: no keyhole; a keyhole with a planned slew; a keyhole for which no slew fits the limits."""
@@ -29,7 +32,8 @@ FORECAST_NONE, FORECAST_KEYHOLE, FORECAST_NO_WRAP = range(len(FORECAST_TEXTS))
 
 PLANNER_DTYPE = np.dtype([
     ('deck', levelled_deck.LEVELLED_DECK_DTYPE), ('looked', 'f8'),
-    ('forecast', 'i8'), ('forecasts', 'i8'), ('slew', slews.SLEW_DTYPE), ('level', 'f8', (3, 3)),
+    ('forecast', 'i8'), ('forecasts', 'i8'), ('slew', slews.SLEW_DTYPE),
+    ('announced_forecast', 'i8'), ('announced', slews.SLEW_DTYPE), ('level', 'f8', (3, 3)),
     ('deck_motion', 'f8'), ('hidden', 'f8', (2,)), ('blockages', 'i8'), ('program', 'f8', (7,)),
     ('next_slew', slews.SLEW_DTYPE, (2,)), ('next_level', 'f8', (3, 3)),
     ('rows', 'f8', (paths.PATH_ROW_COUNT, paths.PATH_COLUMN_COUNT)),
@@ -39,8 +43,9 @@ PLANNER_DTYPE = np.dtype([
 deck         mean attitude of the ship
 looked       time of the last look-ahead [s]
 forecast     index in FORECAST_TEXTS
-forecasts    number of forecasts so far
+forecasts    number of announced forecasts so far
 slew         planned slew, while the forecast is FORECAST_KEYHOLE
+announced_forecast, announced  forecast and planned slew of the last announcement
 level        rotation levelled deck -> earth, of the deck on which the slew was planned
 deck_motion  rms tilt of the deck from the levelled deck when the slew was planned [rad]
 hidden       begin and end of the next time in which a sector will hide the target [s]; NaN: none
@@ -104,34 +109,36 @@ def another_program(h, program):
 def due(h, t):
     """Return True if a look-ahead is due at t [s].
 
-    A look-ahead is due LOOK_AHEAD_PERIOD_S after the last one, but not before the end of a planned slew.
+    A look-ahead is due LOOK_AHEAD_PERIOD_S after the last one, but not from LOOK_AHEAD_PERIOD_S before the begin of a
+    planned slew to its end.
     """
-    return not (t - h.looked < LOOK_AHEAD_PERIOD_S or (h.forecast == FORECAST_KEYHOLE and t <= h.slew.t2))
+    final = h.forecast == FORECAST_KEYHOLE and h.slew.t1 - LOOK_AHEAD_PERIOD_S < t <= h.slew.t2
+    return t - h.looked >= LOOK_AHEAD_PERIOD_S and not final
 
 
 @compiled
-def look_along_program(h, c, t, azimuth, way):
+def look_along_program(h, c, m, t, azimuth, way):
     """Search a bridge.Way from t [s] on for a keyhole and hidden sectors.
 
-    azimuth: deck azimuth of the axis at t [rad].
+    azimuth: encoder angle of the azimuth at t [rad].
     """
     path, program = _begin(h, c, t), way.program
     count = paths.along_program(path, h.next_level, way)
     travel = Travel(0.0, 0.0)
     if count >= MIN_PATH_ROW_COUNT and t + count * path.h < program.times[-1]:
         travel = program_track.azimuth_travel(program, t + (count - 1) * path.h)
-    _search(h, c, path, count, azimuth, travel)
+    _search(h, c, m, path, count, azimuth, travel)
 
 
 @compiled
-def look_along_great_circle(h, c, t, azimuth, u, du):
+def look_along_great_circle(h, c, m, t, azimuth, u, du):
     """Search the great circle of the target from t [s] on for a keyhole and hidden sectors.
 
-    azimuth: deck azimuth of the axis at t [rad]; u, du: ENU unit vector of the target at t and its rate [1/s].
+    azimuth: encoder angle of the azimuth at t [rad]; u, du: ENU unit vector of the target at t and its rate [1/s].
     """
     path = _begin(h, c, t)
     count = paths.along_great_circle(path, h.next_level, u, du)
-    _search(h, c, path, count, azimuth, Travel(0.0, 0.0))
+    _search(h, c, m, path, count, azimuth, Travel(0.0, 0.0))
 
 
 @compiled
@@ -144,30 +151,49 @@ def _begin(h, c, t):
 
 
 @compiled
-def _search(h, c, path, count, azimuth, travel):
+def _search(h, c, m, path, count, azimuth, travel):
     """Search the first `count` rows of a Path for a keyhole and hidden sectors.
 
-    travel: Travel of the azimuth after these rows. A plan becomes final when its slew begins within `notice`. A
-    keyhole without a fitting azimuth wrap is forecast at once.
+    travel: Travel of the azimuth after these rows. A plan is announced when its slew begins within `notice`. A keyhole
+    without a fitting azimuth wrap is forecast at once, except if there is a plan whose slew has not begun.
     """
     if count < MIN_PATH_ROW_COUNT:
         return
     path = paths.Path(path.rows[:count], path.t0, path.h)
-    paths.complete(path, travel)
     _find_sectors(h, c.sectors, path)
+    paths.to_encoders(path, m)
+    paths.complete(path, travel)
     # The spread is that of the tilt about two horizontal axes; half of it belongs to one axis.
-    outcome = keyhole.plan(h.next_slew, path, azimuth, c.limits, math.sqrt(0.5 * h.deck.spread))
-    if outcome == keyhole.PLAN_SLEW and h.next_slew[0].t1 - path.t0 <= c.notice:
+    tilt = math.sqrt(0.5 * h.deck.spread)
+    planned = h.forecast == FORECAST_KEYHOLE and path.t0 < h.slew.t1
+    outcome = keyhole.plan(h.next_slew, path, azimuth, c.limits, tilt, h.slew, planned)
+    if outcome == keyhole.PLAN_SLEW and (planned or h.next_slew[0].t1 - path.t0 <= c.notice):
         h.slew = h.next_slew[0]
         assign(h.level, h.next_level)
         h.deck_motion = math.sqrt(h.deck.spread)
-        h.forecast = FORECAST_KEYHOLE
-        h.forecasts += 1
-    elif outcome == keyhole.PLAN_NO_WRAP and h.forecast != FORECAST_NO_WRAP:
-        h.forecast = FORECAST_NO_WRAP
-        h.forecasts += 1
+        if not planned or _differ(h.slew, h.announced):
+            _announce(h, FORECAST_KEYHOLE)
+    elif outcome == keyhole.PLAN_NO_WRAP and h.forecast != FORECAST_NO_WRAP and not planned:
+        _announce(h, FORECAST_NO_WRAP)
     elif outcome == keyhole.PLAN_NO_KEYHOLE:
+        if planned:
+            _announce(h, FORECAST_NONE)
         h.forecast = FORECAST_NONE
+
+
+@compiled
+def _differ(slew, announced):
+    """Return True if a planned slew differs so much from the announced slew that it is announced again."""
+    return (slew.peak * announced.peak < 0.0 or abs(slew.loss - announced.loss) > MAX_UNANNOUNCED_LOSS_S
+            or max(abs(slew.t1 - announced.t1), abs(slew.t2 - announced.t2)) > MAX_UNANNOUNCED_TIME_S)
+
+
+@compiled
+def _announce(h, forecast):
+    """Set the forecast, and announce it together with the planned slew."""
+    h.forecast = h.announced_forecast = forecast
+    h.announced = h.slew
+    h.forecasts += 1
 
 
 @compiled

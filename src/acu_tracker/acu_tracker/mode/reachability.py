@@ -1,7 +1,8 @@
 """Reachable directions: whether fixed angles, or the table that a mode follows, are inside the limits of the axes.
 
 The floor, the lowest elevation of each azimuth, is one of the limits. A table is the program track, or a predicted
-track of a satellite or the sun. c, u: records of control_unit.CONSTANTS_DTYPE and of signals.INPUTS_DTYPE.
+track of a satellite or the sun. k, c, u: records of tracking.TRACKING_DTYPE, of control_unit.CONSTANTS_DTYPE and of
+signals.INPUTS_DTYPE.
 """
 import math
 
@@ -9,16 +10,18 @@ from acu_tracker import signals
 from acu_tracker.geometry import attitude, azimuth_wrap
 from acu_tracker.geometry.azimuth_wrap import Travel
 from acu_tracker.modes import Mode, Reason
+from acu_tracker.pointing import model
 from acu_tracker.program import program_track, tables
 from acu_tracker.servo import floor
 from pedestal_common.compiled import compiled
+from pedestal_common.geometry import pointing_model
 
 
 @compiled
 def outside(c, A, E):
-    """Return OUTSIDE_LIMITS if the deck angles A (azimuth) and E (elevation) [rad] cannot be reached, else NONE.
+    """Return OUTSIDE_LIMITS if the encoder angles A (azimuth) and E (elevation) [rad] cannot be reached, else NONE.
 
-    A direction can be reached if both angles are inside the limits of their axes, and the floor at the azimuth A is
+    They can be reached if both angles are inside the limits of their axes, and the floor at the azimuth A is
     not above the elevation E. NaN counts as outside.
     """
     a, e = c.axis[0].p.limits, c.axis[1].p.limits
@@ -27,17 +30,28 @@ def outside(c, A, E):
 
 
 @compiled
-def _judge_track(deck, c, track, t, azimuth):
+def judge_direction(m, c, azimuth, elevation):
+    """Return OUTSIDE_LIMITS if a direction (deck angles on the sky [rad]) cannot be reached, else NONE.
+
+    m: record of pointing_model.MODEL_DTYPE.
+    """
+    A, E, _ = pointing_model.encoder_of(m, azimuth, elevation)
+    return outside(c, A, E)
+
+
+@compiled
+def _judge_track(k, c, track, t, azimuth):
     """Return (NONE or the reason why a table cannot be followed, signals.Flag.PROGRAM or 0).
 
-    track: the table; deck, t, azimuth and the flag: as in judge_table. The table must cover t. The direction is
-    judged at t + c.lead, the instant at which the next command is in force.
+    track: the table; t, azimuth and the flag: as in judge_table. The table must cover t. The direction is judged
+    at t + c.lead, the instant at which the next command is in force.
     """
     obstacle = program_track.status(track, t)
     if obstacle != Reason.NONE:
         return obstacle, 0
     t_m = t + c.lead
-    motion = attitude.on_deck(deck, c.p, t_m, program_track.motion_at(track, t_m))
+    on_sky = attitude.on_deck(k.attitude, c.p, t_m, program_track.motion_at(track, t_m))
+    motion, _ = model.to_encoders(k.pointing.model, on_sky)
     A, E, limits = motion.azimuth.angle, motion.elevation.angle, c.axis[0].p.limits
     if not math.isfinite(A + E):
         return Reason.NO_PROGRAM, signals.Flag.PROGRAM
@@ -46,10 +60,9 @@ def _judge_track(deck, c, track, t, azimuth):
 
 
 @compiled
-def judge_table(deck, c, u, mode, all_tables, t, azimuth):
+def judge_table(k, c, u, mode, all_tables, t, azimuth):
     """Return (NONE or the reason why the table of a mode cannot be followed at t [s], signals.Flag.PROGRAM or 0).
 
-    deck        record of ATTITUDE_DTYPE
     all_tables  tables.Tables of all modes
     azimuth     azimuth of the last reference as it was before the shaper limited it [rad]; the azimuth wrap is chosen
                 near it
@@ -64,7 +77,7 @@ def judge_table(deck, c, u, mode, all_tables, t, azimuth):
         if (program_track.status(track, t) == Reason.NONE
                 and program_track.motion_at(track, t).elevation.angle < 0.0):
             return Reason.BELOW_HORIZON, 0
-    obstacle, flag = _judge_track(deck, c, track, t, azimuth)
+    obstacle, flag = _judge_track(k, c, track, t, azimuth)
     # In a gap between two pieces of the program (u.gap) the table is the next piece, which has not begun.
     if mode == Mode.PROGRAM and u.gap and obstacle == Reason.BEFORE_PROGRAM:
         return Reason.PROGRAM_GAP, flag

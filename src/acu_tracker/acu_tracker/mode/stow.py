@@ -101,7 +101,7 @@ def step(s, c, u, mode):
         if u.pins == BOTH_PINS_OUT and not _at_rest(c, u):
             s.not_stowed = t
         elif u.pins != BOTH_PINS_OUT or t - s.not_stowed >= MIN_REST_TIME_S:
-            # A pin that is not out already keeps the axes from moving. The control unit therefore requests the pins in
+            # A pin that is not out prevents any motion of the axes. The control unit therefore requests the pins in
             # without waiting for rest.
             _request_pins(s, REQUEST_PINS_IN, t)
     else:

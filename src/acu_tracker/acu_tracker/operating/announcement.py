@@ -12,14 +12,16 @@ from acu_tracker.program import tables
 
 
 def keyhole(h, parameters):
-    """Return the text of acu/keyhole: the planned slew, or that no azimuth wrap holds the pass.
+    """Return the text of acu/keyhole: the announced slew, its cancellation, or that no azimuth wrap holds the pass.
 
     parameters: AcuParameters.
     """
     beamwidth = parameters.tracker.receiver.beamwidth
-    if h['forecast'] == planner.FORECAST_NO_WRAP:
+    if h['announced_forecast'] == planner.FORECAST_NO_WRAP:
         return f'keyhole ahead: no azimuth wrap holds the pass; {_at_the_end(parameters.azimuth, "")}'
-    slew = h['slew']
+    if h['announced_forecast'] == planner.FORECAST_NONE:
+        return 'no keyhole ahead: the azimuth can follow the target; the announced slew is cancelled'
+    slew = h['announced']
     way = 'clockwise' if slew['peak'] > 0.0 else 'counter-clockwise'
     if slew['other_cost'] == math.inf:
         other = 'limits forbid the opposite direction'

@@ -11,9 +11,10 @@ from acu_tracker.geometry import direction
 from acu_tracker.guidance import manual
 from acu_tracker.modes import FALLBACK_MODES
 from acu_tracker.operating.authority import CONTROL_ROLES
+from acu_tracker.pointing.params import PointingParameters
 from pedestal_common.graph.modes import MODE_ROWS, MODES
 from pedestal_common.graph.topics import AXES
-from pedestal_common.parameters import ParameterError
+from pedestal_common.parameters import ParameterError, flatten
 from pedestal_common.wire.commands import Argument, CommandDefinition
 
 
@@ -27,6 +28,10 @@ _MOTION_ARGUMENTS = (*_of_axes('rate of the angle', -10.0, 10.0, 'rad/s', 0.0, '
 
 _ELEMENT_ARGUMENTS = (*(Argument(f'line_{i}', f'line {i} of the TLE, _ for blanks', default='') for i in (1, 2)),
                       Argument('omm', 'OMM in JSON, instead of the lines', default=''))
+
+_MODEL_ARGUMENTS = tuple(
+    Argument(name, field.metadata['doc'], field.metadata.get('low', -math.inf), field.metadata.get('high', math.inf),
+             field.metadata.get('unit', ''), default=field.default) for name, field in flatten(PointingParameters))
 
 MODE_ARGUMENTS = {
     'preset': (*_of_axes('deck angle; default: unchanged', -20.0, 20.0, 'rad', math.nan), *_MOTION_ARGUMENTS,
@@ -60,6 +65,8 @@ ACU_COMMANDS = (
     CommandDefinition('offset', 'shift the table of `program`, `tle` and `sun`, also while the antenna follows it', (
         Argument('time', 'delay of the table; positive: follow it later', -3600.0, 3600.0, 's', default=0.0),
         *_of_axes('offset of the angle', -1.0, 1.0, 'rad', 0.0))),
+    CommandDefinition('pointing', 'take another pointing model, gradually; terms that are not given are 0',
+                      _MODEL_ARGUMENTS),
     CommandDefinition('take', 'take control; other clients can then send only `stop` and `standby`', (
         Argument('role', 'role of the client; a supervisor takes control from any holder', options=CONTROL_ROLES,
                  default='operator'),)),
@@ -114,10 +121,12 @@ def _take_rate(unit, arguments):
 
 
 def _take_slave(unit, arguments):
-    """Set the direction of the mode slave."""
+    """Set the direction of the mode slave. The refraction is added to a true elevation."""
     state = unit.parts['state']
-    direction.set_moving(state['guidance']['slave'], state['stamp'], [arguments[axis] for axis in AXES],
-                         _rates(arguments), arguments['moves'], arguments['holds'])
+    slave = state['guidance']['slave']
+    direction.set_moving(slave, state['stamp'], [arguments[axis] for axis in AXES], _rates(arguments),
+                         arguments['moves'], arguments['holds'])
+    unit.bend(slave.copy())
 
 
 def _take_tle(unit, arguments):

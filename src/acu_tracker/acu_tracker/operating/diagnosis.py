@@ -22,6 +22,9 @@ GATED_ERROR_TEXTS = {('error_gated',): 'an error of the receiver was outside the
                      ('error_gated', 'error_noisy'): 'the errors of the receiver are noise and are not used'}
 """{names in signals.INVALID_INPUTS: text of the diagnosis}; the text is used if exactly these inputs are invalid."""
 
+DIRECTED_MODES = tuple(i for i, row in enumerate(modes.MODE_ROWS) if row.follows or row.name == 'preset')
+"""Codes of the modes that point to a direction on the sky."""
+
 NEEDED_FIELDS = {'encoder': ('joint_states', ('position', 'velocity')),
                  'attitude': ('ship/imu/data', ('orientation', 'angular_velocity')),
                  'attitude_error': ('ins/error', ('position', 'velocity'))}
@@ -49,7 +52,7 @@ def missing(unit, name):
 
 
 def beyond_limits(parameters, angles):
-    """Return the reason why deck angles [rad] cannot be reached: the axes outside their limits, or else the floor.
+    """Return the reason why encoder angles [rad] cannot be reached: the axes outside their limits, or else the floor.
 
     The floor is the lowest elevation that is allowed at an azimuth. parameters: AcuParameters.
     """
@@ -70,6 +73,9 @@ def of(unit):
     if faults:
         text = FAULT_TEXTS[faults[0]].format(motion=_uncommanded_motion(state['unasked']))
         return Diagnosis(LEVEL_ERROR, text, values)
+    if unit.refused_model:
+        return Diagnosis(LEVEL_ERROR, f'pointing model refused, the pedestal counts as ideal: {unit.refused_model}',
+                         values)
     if invalid in GATED_ERROR_TEXTS:
         return Diagnosis(LEVEL_WARN, GATED_ERROR_TEXTS[invalid], values)
     if invalid:
@@ -78,6 +84,9 @@ def of(unit):
     mode, reason = modes.MODES[outputs['mode']], modes.REASONS[outputs['reason']]
     if state['guidance']['turn']['under_way']:
         return Diagnosis(LEVEL_WARN, f'{mode} ({reason}): {announcement.turn(unit)}', values)
+    if outputs['mode'] in DIRECTED_MODES and state['guidance']['unreachable']:
+        return Diagnosis(LEVEL_WARN, f'{mode} ({reason}): the direction is in the cone about the zenith that the axes '
+                         'cannot reach (P3, P4); the beam points to the nearest direction', values)
     # held: last instant at which a limit held the beam off the target [s]; the instant of a command is not before the
     # stamp of its step.
     if state['guidance']['held'] >= state['stamp']:
@@ -87,6 +96,9 @@ def of(unit):
         return Diagnosis(LEVEL_WARN, announcement.overtravel(unit), values)
     if announcement.reaches_end(unit):
         return Diagnosis(LEVEL_WARN, f'{mode} ({reason}): {announcement.end_of_travel(unit)}', values)
+    now = unit.now * 1e-9
+    if inaccurate := [*unit.predictor.problems(now), *unit.air.problems(now)]:
+        return Diagnosis(LEVEL_WARN, f'{mode} ({reason}): {"; ".join(inaccurate)}', values)
     return Diagnosis(LEVEL_WARN if outputs['coasting'] else LEVEL_OK, f'{mode} ({reason})', values)
 
 
@@ -111,8 +123,10 @@ def _values(unit, faults, invalid):
                for i, axis in enumerate(topics.AXES)]
     for axis, innovation, nis in zip(topics.AXES, outputs['innovation'], outputs['nis']):
         values += [(f'{axis} innovation_deg', f'{math.degrees(innovation):.4g}'), (f'{axis} nis', f'{nis:.4g}')]
+    if unit.pointing_model:
+        values.append(('pointing_model', unit.pointing_model))
     return [*values, ('blocked', str(int(outputs['blocked']))), *announcement.numbers(state['guidance']['lookahead']),
-            *unit.predictor.diagnostic_values(unit.now * 1e-9),
+            *unit.predictor.diagnostic_values(unit.now * 1e-9), *unit.air.diagnostic_values(unit.now * 1e-9),
             *((f'refused {mode}', why) for mode, why in unit.refusals().items())]
 
 

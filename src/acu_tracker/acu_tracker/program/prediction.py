@@ -2,7 +2,10 @@
 
 `unit.Acu` calls the Predictor and gives the tables to the law. A table begins shortly before the time at which it is
 made. The table is replaced in its second half, if possible while its target is below the horizon, because then no mode
-follows the table. Refraction is neglected.
+follows the table.
+
+The directions of a table are true ones, without refraction; `air` adds it to the rows later. They contain UT1 and the
+polar motion of a file (earth_orientation), and the travel time of the wave if a parameter requests it.
 
 Stamps [s] count from an epoch. In realtime the UTC of the epoch is known, in lockstep only by the parameter
 start_time.
@@ -15,15 +18,17 @@ import typing
 import numpy as np
 
 from acu_tracker.modes import Mode, Reason
-from acu_tracker.program import sun
+from acu_tracker.program.air import Air, RefractionParameters
 from acu_tracker.program.program_track import NO_TRACK, ProgramTrack
-from pedestal_common.geometry import orbit
-from pedestal_common.geometry.geodesy import StationParameters, station_frame
+from pedestal_common.geometry import earth_orientation, orbit
+from pedestal_common.geometry.earth_orientation import MJD_ZERO_JULIAN_DATE, EarthOrientationParameters
+from pedestal_common.geometry.geodesy import StationParameters
 from pedestal_common.geometry.orbit import TargetError
 from pedestal_common.graph import topics
 from pedestal_common.graph.steps import NS_PER_SECOND, SECONDS_PER_DAY
-from pedestal_common.parameters import ParameterError, Parameters, group, parameter, text
-from pedestal_common.reproducible import arctan2, turned
+from pedestal_common.parameters import ParameterError, Parameters, flag, group, parameter, text
+from pedestal_common.reproducible import arctan2
+from pedestal_common.sky import bodies
 
 TABLE_ROW_COUNT = 2400
 """Number of rows of a table."""
@@ -52,6 +57,9 @@ class PredictionParameters(Parameters):
     omm: str = text('', 'elements of mode tle as a CCSDS OMM in JSON, instead of the TLE')
     start_time: str = text('', 'UTC of stamp 0, ISO 8601; empty: in realtime the UTC of the stamps')
     oldest: float = parameter(14.0, 0.1, 365.0, 'd', 'largest allowed time between the epoch of the elements and now')
+    light_time: bool = flag(False, 'travel time of the wave: the satellite is seen where it was when the wave left '
+                            'it; the sun always is')
+    earth_orientation: EarthOrientationParameters = group(EarthOrientationParameters)
     station: StationParameters = group(StationParameters)
 
     def check(self):
@@ -82,18 +90,28 @@ class Predicted(typing.NamedTuple):
 class Predictor:
     """Predictions by PredictionParameters.
 
-    epoch: UTC of stamp 0 [ns since 1970]; 0: unknown, then only the parameter start_time can give it.
+    epoch  UTC of stamp 0 [ns since 1970]; 0: unknown, then only the parameter start_time can give it
+    air    the air.Air by which a target is above the horizon or not
+
+    Raise ParameterError for a file of the earth's orientation that cannot be read.
     """
 
-    def __init__(self, parameters, epoch=0):
+    def __init__(self, parameters, epoch=0, air=None):
         self.parameters, self.epoch = parameters, epoch
+        self.air = air or Air(RefractionParameters())
+        self._orientation = earth_orientation.load(parameters.earth_orientation)
         self._satellite = (orbit.satellite(parameters) if parameters.line_1 or parameters.omm else None)
 
     def with_elements(self, line_1, line_2, omm):
         """Return a Predictor with other elements: a TLE, or an OMM in JSON. Raise ValueError if they are invalid."""
         if bool(line_1 or line_2) == bool(omm):
             raise ValueError('elements: must be line_1 and line_2, or omm')
-        return Predictor(dataclasses.replace(self.parameters, line_1=line_1, line_2=line_2, omm=omm), self.epoch)
+        return Predictor(dataclasses.replace(self.parameters, line_1=line_1, line_2=line_2, omm=omm), self.epoch,
+                         self.air)
+
+    def with_epoch(self, epoch):
+        """Return a Predictor with another UTC of stamp 0 [ns since 1970]."""
+        return Predictor(self.parameters, epoch, self.air)
 
     @property
     def number(self):
@@ -112,23 +130,43 @@ class Predictor:
         interval = max(round(2.0 * math.pi * 60.0 / self._satellite.no_kozai / ROWS_PER_ORBIT, 1), 1.0)
         if abs(self._age(stamp)) > self.parameters.oldest:
             return Predicted(NO_TRACK, Reason.TOO_OLD, stamp, stamp + TABLE_ROW_COUNT * interval)
-        return _table(self._satellite_angles, stamp, interval)
+        return self._table(self._satellite_angles, stamp, interval)
 
     def sun(self, stamp) -> Predicted:
         """Return the Predicted of the sun for a stamp [s]."""
         if not self._utc_known:
             return Predicted(NO_TRACK, Reason.NO_UTC)
-        return _table(self.sun_angles, stamp, SUN_ROW_INTERVAL_S)
+        return self._table(self._sun_angles, stamp, SUN_ROW_INTERVAL_S)
 
     def diagnostic_values(self, stamp):
         """Return the values for the diagnostics [(key, text)] at a stamp [s].
 
-        The values are azimuth and elevation of the sun, if UTC is known, and the elements of the satellite, if any.
+        The values are azimuth and elevation of the sun, if UTC is known, the file of the earth's orientation and its
+        values, if any, and the elements of the satellite, if any.
         """
         sun_now = np.degrees(self.sun_angles(np.array([stamp]))[0]) if self._utc_known else ()
         lines = () if self._satellite is None else ('omm',) if self.parameters.omm else ('line_1', 'line_2')
         return [*((f'sun_{axis}_deg', f'{angle:.2f}') for axis, angle in zip(topics.AXES, sun_now)),
-                *((line, getattr(self.parameters, line)) for line in lines)]
+                *self._orientation_values(stamp), *((line, getattr(self.parameters, line)) for line in lines)]
+
+    def _orientation_values(self, stamp):
+        """Return the values of the earth's orientation for the diagnostics [(key, text)] at a stamp [s]."""
+        if self._orientation is None:
+            return []
+        if not self._utc_known:
+            return [('earth_orientation', f'{self._orientation.name}, unused: the UTC is unknown')]
+        mjd = self._mjd(stamp)
+        [ut1], [pole] = self._orientation.at(np.array([mjd]))
+        return [('earth_orientation', self._orientation.description(mjd)), ('ut1_utc_s', f'{ut1:.4f}'),
+                *((f'pole_{axis}_arcsec', f'{angle / earth_orientation.ARCSECOND_RAD:.3f}')
+                  for axis, angle in zip('xy', pole))]
+
+    def problems(self, stamp):
+        """Return texts on the inaccurate orientation of the earth at a stamp [s]; [] if all is well."""
+        if self._orientation is None or not self._utc_known:
+            return []
+        text = self._orientation.problem(self._mjd(stamp), self.parameters.earth_orientation.oldest)
+        return [f'earth_orientation: {text}'] if text else []
 
     def refusal_details(self, mode, reason, stamp):
         """Return details of the reason for which a mode is refused at a stamp [s]; '' if there are none."""
@@ -137,7 +175,7 @@ class Predictor:
         if reason == Reason.TOO_OLD:
             return f'epoch {abs(self._age(stamp)):.1f} days from now; must be at most {self.parameters.oldest:g}'
         if reason == Reason.BELOW_HORIZON:
-            rises = _next_rise(self._satellite_angles if mode == Mode.TLE else self.sun_angles, stamp)
+            rises = self._next_rise(self._satellite_angles if mode == Mode.TLE else self._sun_angles, stamp)
             if math.isnan(rises):
                 return f'no rise within {RISE_SEARCH_SPAN_S / SECONDS_PER_DAY:g} days'
             return f'next rise at {orbit.iso(*self._julian(rises))}'
@@ -157,57 +195,72 @@ class Predictor:
         julian, fraction = self._julian(stamp)
         return julian - self._satellite.jdsatepoch + fraction - self._satellite.jdsatepochF
 
-    def _satellite_angles(self, times):
-        """Return azimuth and elevation (n, 2) [rad] of the satellite at stamps (n,) [s]; raise TargetError."""
-        julian, fraction = self._julian(0.0)
-        return _angles(orbit.enu(self._satellite, self.parameters.station, julian, fraction, times)[0])
+    def _mjd(self, stamp):
+        """Return the modified Julian date of a stamp [s]."""
+        julian, fraction = self._julian(stamp)
+        return julian - MJD_ZERO_JULIAN_DATE + fraction
 
-    def sun_angles(self, times):
-        """Return azimuth and elevation (n, 2) [rad] of the sun at stamps (n,) [s]."""
+    def _to_fixed(self, julian, fractions):
+        """Return the rotations (n, 3, 3) of orbit.earth_fixed at the Julian dates julian + fractions (n,)."""
+        if self._orientation is None:
+            return orbit.earth_fixed(julian, fractions)
+        return orbit.earth_fixed(julian, fractions, *self._orientation.at(julian - MJD_ZERO_JULIAN_DATE + fractions))
+
+    def _satellite_angles(self, times):
+        """Return azimuth and true elevation (n, 2) [rad] of the satellite at stamps (n,) [s]; raise TargetError."""
         julian, fraction = self._julian(0.0)
         fractions = fraction + times / SECONDS_PER_DAY
-        origin, to_enu = station_frame(self.parameters.station)
-        fixed = np.einsum('nij,nj->ni', orbit.earth_fixed(julian, fractions),
-                          sun.position(julian - sun.J2000 + fractions))
-        return _angles(turned(to_enu, fixed - origin))
+        return _angles(orbit.seen(self._satellite, self.parameters.station, julian, fractions,
+                                  self._to_fixed(julian, fractions), self.parameters.light_time))
+
+    def _sun_angles(self, times):
+        """Return azimuth and true elevation (n, 2) [rad] of the sun at stamps (n,) [s]."""
+        julian, fraction = self._julian(0.0)
+        fractions = fraction + times / SECONDS_PER_DAY
+        return _angles(bodies.seen('sun', self.parameters.station, julian, fractions,
+                                   self._to_fixed(julian, fractions)))
+
+    def sun_angles(self, times):
+        """Return azimuth and apparent elevation (n, 2) [rad] of the sun at stamps (n,) [s]."""
+        return self.air.raised(times, self._sun_angles(times))
+
+    def _table(self, angles_at, stamp, interval):
+        """Return the Predicted for a stamp [s].
+
+        angles_at: function of times (n,) [s] that returns the angles (n, 2) [rad], with the true elevation; interval:
+        time between two rows [s].
+        """
+        times = np.floor(stamp) - TABLE_LEAD_TIME_S + interval * np.arange(TABLE_ROW_COUNT)
+        try:
+            angles = angles_at(times)
+        except TargetError:
+            return Predicted(NO_TRACK, Reason.NO_ELEMENTS)
+        # The table is replaced at a row between its middle and 19/20 of its rows: at the last one of these rows with
+        # the target below the horizon. Without such a row it is replaced at 19/20, so that it is never followed to its
+        # end.
+        late = np.arange(TABLE_ROW_COUNT // 2, TABLE_ROW_COUNT * 19 // 20)
+        down = late[self.air.raised(times, angles)[late, 1] < 0.0]
+        return Predicted(ProgramTrack(times, angles), Reason.NONE, float(times[0]),
+                         float(times[down[-1] if down.size else late[-1]]))
+
+    def _next_rise(self, angles_at, stamp):
+        """Return the stamp [s] at which the target next rises after a stamp, accurate to a second.
+
+        The result is NaN without a rise within RISE_SEARCH_SPAN_S. angles_at: as in _table.
+        """
+        times = stamp + np.arange(0.0, RISE_SEARCH_SPAN_S, RISE_SEARCH_STEP_S)
+        try:
+            elevation = self.air.raised(times, angles_at(times))[:, 1]
+        except TargetError:
+            return math.nan
+        rises = np.flatnonzero((elevation[:-1] < 0.0) & (elevation[1:] >= 0.0))
+        if not rises.size:
+            return math.nan
+        i = rises[0]
+        return times[i] - RISE_SEARCH_STEP_S * elevation[i] / (elevation[i + 1] - elevation[i])
 
 
 def _angles(enu):
     """Return azimuth and elevation (n, 2) [rad] of ENU positions (n, 3)."""
     east, north, up = enu.T
     return np.stack((arctan2(east, north), arctan2(up, np.hypot(east, north))), axis=-1)
-
-
-def _table(angles_at, stamp, interval):
-    """Return the Predicted for a stamp [s].
-
-    angles_at: function of times (n,) [s] that returns the angles (n, 2) [rad]; interval: time between two rows [s].
-    """
-    times = np.floor(stamp) - TABLE_LEAD_TIME_S + interval * np.arange(TABLE_ROW_COUNT)
-    try:
-        angles = angles_at(times)
-    except TargetError:
-        return Predicted(NO_TRACK, Reason.NO_ELEMENTS)
-    # The table is replaced at a row between its middle and 19/20 of its rows: at the last one of these rows with the
-    # target below the horizon. Without such a row it is replaced at 19/20, so that it is never followed to its end.
-    late = np.arange(TABLE_ROW_COUNT // 2, TABLE_ROW_COUNT * 19 // 20)
-    down = late[angles[late, 1] < 0.0]
-    return Predicted(ProgramTrack(times, angles), Reason.NONE, float(times[0]),
-                     float(times[down[-1] if down.size else late[-1]]))
-
-
-def _next_rise(angles_at, stamp):
-    """Return the stamp [s] at which the target next rises after a stamp, accurate to a second.
-
-    The result is NaN without a rise within RISE_SEARCH_SPAN_S. angles_at: as in _table.
-    """
-    times = stamp + np.arange(0.0, RISE_SEARCH_SPAN_S, RISE_SEARCH_STEP_S)
-    try:
-        elevation = angles_at(times)[:, 1]
-    except TargetError:
-        return math.nan
-    rises = np.flatnonzero((elevation[:-1] < 0.0) & (elevation[1:] >= 0.0))
-    if not rises.size:
-        return math.nan
-    i = rises[0]
-    return times[i] - RISE_SEARCH_STEP_S * elevation[i] / (elevation[i + 1] - elevation[i])

@@ -4,7 +4,7 @@ The floor keeps the dish clear of structures around the antenna. A table of poin
 the floor. Where the floor rises, the azimuth waits until the elevation is above the floor ahead.
 
 c, u: records of control_unit.CONSTANTS_DTYPE and of signals.INPUTS_DTYPE; floor: record of FLOOR_DTYPE; limits: record
-of the LimitsParameters of an axis; A, E: azimuth and elevation in deck angles [rad].
+of the LimitsParameters of an axis; A, E: azimuth and elevation in encoder angles [rad].
 """
 import math
 

@@ -83,8 +83,8 @@ class ShaperParameters(Parameters):
 class LimitsParameters(Parameters):
     """Limits of the axis. The rate command never exceeds them, and stops the axis before low and high."""
 
-    low: float = parameter(-1.5 * math.pi, -20.0, 20.0, 'rad', 'lowest deck angle')
-    high: float = parameter(1.5 * math.pi, -20.0, 20.0, 'rad', 'highest deck angle')
+    low: float = parameter(-1.5 * math.pi, -20.0, 20.0, 'rad', 'lowest encoder angle')
+    high: float = parameter(1.5 * math.pi, -20.0, 20.0, 'rad', 'highest encoder angle')
     rate: float = parameter(2.45, 1e-4, 100.0, 'rad/s', 'largest rate command')
     acceleration: float = parameter(40.0, 1e-4, 1e5, 'rad/s2', 'largest change of the rate command over time')
     braking: float = parameter(0.0, 0.0, 1e5, 'rad/s2', 'deceleration before low and high that the drive has in any '

@@ -7,19 +7,17 @@ import typing
 
 import numpy as np
 
+from adu_drive.angle_drive import DRIVE_STATE_TOPIC, EMERGENCY_STOP_TEXT, ENABLED_TEXT, REFERENCE_TOPIC, AngleDrive
 from adu_drive.array import electronic_beam
 from pedestal_common.compiled import compiled
 from pedestal_common.graph import nodes, topics
-from pedestal_common.node.unit import LEVEL_ERROR, LEVEL_OK, LEVEL_WARN, Diagnosis, Unit, joined
-from pedestal_common.wire.commands import Reply
+from pedestal_common.node.unit import LEVEL_ERROR, LEVEL_OK, LEVEL_WARN, Diagnosis, joined
 from pedestal_common.wire.records import NO_STAMP
 
-REFERENCE_TOPIC, JOINT_STATES_TOPIC, DRIVE_TRUTH_TOPIC = 'acu/reference', 'joint_states', 'adu/truth'
-CLOCK_TOPIC, DRIVE_STATE_TOPIC = 'clock', 'adu/state'
+JOINT_STATES_TOPIC, DRIVE_TRUTH_TOPIC, CLOCK_TOPIC = 'joint_states', 'adu/truth', 'clock'
 
-STATE_TEXTS = topics.TOPIC_BY_NAME[DRIVE_STATE_TOPIC].texts
 STATE_CODE_ENABLED, STATE_CODE_DISABLED, STATE_CODE_EMERGENCY_STOP = (
-    STATE_TEXTS.index(text) for text in ('enabled', 'disabled', 'emergency stop'))
+    AngleDrive.STATE_TEXTS.index(text) for text in (ENABLED_TEXT, 'disabled', EMERGENCY_STOP_TEXT))
 """Codes of the texts of adu/state."""
 
 SWITCHES_DTYPE = np.dtype([('wanted', 'i8'), ('emergency', 'i8'), ('stamp', 'i8'), ('invalid', 'i8')])
@@ -96,10 +94,9 @@ def laws(memory, stamps, inputs, outputs):
         law(memory, stamps[k], inputs[k], outputs[k])
 
 
-class Beam(Unit):
+class Beam(AngleDrive):
     """One beam of a BeamParameters. The motion of the ship has no effect on a beam."""
-    NODE, COMMAND, LAWS = nodes.ARRAY_DRIVE, REFERENCE_TOPIC, {Memory: (law, laws)}
-    REQUESTS = ('adu/enable', 'adu/disable', 'adu/emergency_stop', 'adu/reset_faults')
+    NODE, LAWS = nodes.ARRAY_DRIVE, {Memory: (law, laws)}
 
     def __init__(self, parameters, reads):
         super().__init__(parameters, reads)
@@ -111,40 +108,10 @@ class Beam(Unit):
                                     state=electronic_beam.initial_state(p.initial_azimuth, p.initial_elevation)))
         electronic_beam.read(self.parts['state'], self.parts['outputs'])
 
-    def latency(self, topic):
-        """Return the age [s] of the command in a step: one period."""
-        return self.parameters.period
-
-    rests = True
-    """True always, because an array has no moving parts."""
-
-    def encode(self, topic, code):
-        """Return the text of a code of adu/state."""
-        return STATE_TEXTS[code]
-
     @property
-    def condition(self):
-        """Present text of adu/state, also between two steps."""
-        return STATE_TEXTS[condition(self.parts['switches'])]
-
-    def request(self, name):
-        """Execute one of REQUESTS. Return the Reply with the resulting state, or with the reason for a refusal."""
-        m = self.parts['switches']
-        if name == 'adu/enable' and m['emergency']:
-            return Reply(False, 'refused: an emergency stop is latched (adu/reset_faults); '
-                         f'drive is {self.condition}')
-        if name in ('adu/enable', 'adu/disable'):
-            m['wanted'] = name == 'adu/enable'
-        else:
-            m['emergency'] = name == 'adu/emergency_stop'
-        return Reply(True, f'drive is {self.condition}')
-
-    def requests_for(self, topic, text):
-        """Return the services that lead to a text of adu/state."""
-        if text == STATE_TEXTS[STATE_CODE_EMERGENCY_STOP]:
-            return ['adu/emergency_stop']
-        latched = self.parts['switches']['emergency']
-        return [*(['adu/reset_faults'] if latched else []), 'adu/enable' if text == 'enabled' else 'adu/disable']
+    def condition_code(self):
+        """Present code of STATE_TEXTS, also between two steps."""
+        return condition(self.parts['switches'])
 
     def diagnose(self):
         """Return the Diagnosis: ERROR in an emergency stop or after an invalid command, WARN while disabled."""
@@ -152,7 +119,7 @@ class Beam(Unit):
         invalid, switches['invalid'] = switches['invalid'], 0
         values = [*((f'{axis}_deg', f'{math.degrees(angle):.4f}')
                     for axis, angle in zip(topics.AXES, outputs['position'])), ('state', self.condition)]
-        if self.condition != 'enabled':
+        if self.condition != ENABLED_TEXT:
             return Diagnosis(LEVEL_ERROR if switches['emergency'] else LEVEL_WARN, self.condition, values)
         if invalid:
             limit = electronic_beam.MAX_COMMAND_ANGLE_RAD

@@ -28,8 +28,9 @@ AXIS_FAULTS = (
     Fault('overtemperature', 'the thermal load (I2t) of a motor is above the limit (1: steady state at rated '
           'torque); reset possible below 0.8',
           ('faults.overtemperature', 'thermal')),
-    *(Fault(f'motor {i} lost', 'its amplifier reports that it is off; the other motor continues alone, without bias '
-            'torque. If both motors are lost: torque off, brakes on', (), stops=False) for i in (1, 2)),
+    *(Fault(f'motor {lost} lost', f'the amplifier of motor {lost} reports that it is off; motor {other} continues '
+            'alone, without bias torque. If both motors are lost: torque off, brakes on', (), stops=False)
+      for lost, other in ((1, 2), (2, 1))),
     Fault('final limit', 'the axis moves outwards on the switch beyond the end of travel, which is independent of the '
           'encoders; torque off at once, brakes on; after a reset the drive moves the axis back', ('limits.final',)),
     Fault('emergency limit', 'the axis is on the switch beyond the final switch; torque off at once, brakes on. A '

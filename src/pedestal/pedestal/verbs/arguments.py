@@ -2,10 +2,28 @@
 import argparse
 import os
 import pathlib
+import types
 import typing
+from collections.abc import Mapping
+
+from pedestal_analysis import console
 
 if typing.TYPE_CHECKING:
     from pedestal_operator.remote_node import RemoteSession
+
+
+def add_subcommands(parser: argparse.ArgumentParser, title: str, modules: Mapping[str, types.ModuleType]) -> None:
+    """Add a subcommand for each module; its main function is the value `subcommand` of the options.
+
+    title: noun for the help; modules: {name: module with a docstring, add_arguments and main}.
+    """
+    found = parser.add_subparsers(title=title, required=True, metavar=title.upper())
+    for name, module in modules.items():
+        description = (module.__doc__ or '').strip()
+        subparser = found.add_parser(name, help=description.partition('\n\n')[0], description=description,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+        module.add_arguments(subparser)
+        subparser.set_defaults(subcommand=module.main)
 
 
 def add_scenario(parser: argparse.ArgumentParser) -> None:
@@ -133,3 +151,48 @@ def changes(options: argparse.Namespace) -> list[str]:
     """Return the texts 'node.key=value' of --params-file, then of --param. Raises ValueError."""
     from pedestal_bringup.scenario import scenario
     return [change for file in options.params_file for change in scenario.file_overrides(file)] + options.param
+
+
+def check_recording(options: argparse.Namespace) -> None:
+    """Raise ValueError for parameters with --bag, whose run is over."""
+    for name in ('param', 'params_file'):
+        if options.bag is not None and getattr(options, name):
+            raise ValueError(f'--{name.replace("_", "-")}: has no effect with --bag')
+
+
+def recording(options: argparse.Namespace) -> tuple[typing.Any, str]:
+    """Return (recording, name) of --bag, or of a run in memory of --scenario with --params-file and --param.
+
+    Raises ValueError.
+    """
+    check_recording(options)
+    if options.bag is not None:
+        from pedestal_recording import bag as bags
+        return bags.read(options.bag, ''), str(options.bag)
+    from pedestal_bringup.loop import memory_recording
+    from pedestal_bringup.scenario import scenario
+    chosen = scenario.load(options.scenario, changes(options))
+    return memory_recording.record(chosen), chosen.name
+
+
+def add_result_files(parser: argparse.ArgumentParser, output: str, report: str) -> None:
+    """Add --output, --report and --json; output, report: texts of the help."""
+    parser.add_argument('--output', type=pathlib.Path, metavar='FILE', help=output)
+    parser.add_argument('--report', type=pathlib.Path, metavar='FILE', help=report)
+    console.add_json(parser)
+
+
+def check_result_files(options: argparse.Namespace, *more: str) -> None:
+    """Check --output and --report, and the options `more` that name new files. Raises ValueError."""
+    for name in ('output', 'report', *more):
+        check_new_file(f'--{name.replace("_", "-")}', getattr(options, name))
+
+
+def check_new_file(option: str, path: pathlib.Path | None) -> None:
+    """Raise ValueError if the file of an option exists already, or if its directory is missing."""
+    if path is None:
+        return
+    if path.exists():
+        raise ValueError(f'{option} {path}: exists already; the file is not overwritten')
+    if not path.parent.is_dir():
+        raise ValueError(f'{option} {path}: must be a file in a directory that exists')

@@ -4,6 +4,7 @@ import contextlib
 import math
 import typing
 
+from pedestal_analysis.results import tracking
 from pedestal_common.graph import nodes
 from pedestal_common.graph.steps import NS_PER_SECOND
 from pedestal_common.injection.table import CLEAR_COMMAND, INJECT_COMMANDS, INJECTED_FAULTS
@@ -48,9 +49,8 @@ def _replies(bag):
     """Return the events of all replies: commands, refusals and injected faults; a repeated jog is one event."""
     events, log = [], Log()
     for node in nodes.NODES:
-        for t, message in _messages(bag, node.replies, 'diagnostic_msgs/msg/DiagnosticStatus'):
-            with contextlib.suppress(ValueError):  # the message is no reply
-                command, reply = commands.of_reply(message)
+        for t, command, reply in tracking.replies(bag, node.replies):
+            with contextlib.suppress(ValueError):  # the command has a wrong argument
                 logged = log.revision
                 log.replied(t, command, reply)
                 if log.revision > logged:
@@ -91,8 +91,9 @@ def _alarms(bag):
                   if alarm['state'] in RAISED_STATES}
         for name in [name for name in raised if name not in listed]:
             events.append(raised.pop(name)._replace(end=t))
-        for name in listed.keys() - raised.keys():
-            alarm = listed[name]
+        for name, alarm in listed.items():
+            if name in raised:
+                continue
             text = f'{name}, {alarm["priority"]}: {alarm["meaning"]}'
             text += f' ({alarm["detail"]})' if alarm['detail'] else ''
             text += f', a consequence of {alarm["cause"]}' if alarm['cause'] else ''

@@ -170,8 +170,8 @@ def _results(bag, data, check):
         parts.append('<p class="soft">Pointing and noise are computed over the evaluated part: autotrack, from '
                      f'{tracking.HANDOVER_SETTLING_S:g} s after the first hand-over. "Both axes" pools the samples of '
                      'both axes.</p>')
-        rows = _labelled(known, 'single_sample_noise_deg', 'lock_time_s', 'autotrack_time_s', 'evaluated_time_s',
-                         'loss_s')
+        rows = _labelled(known, 'pointing_loss_mean_db', 'pointing_loss_max_db', 'single_sample_noise_deg',
+                         'lock_time_s', 'autotrack_time_s', 'evaluated_time_s', 'loss_s')
     return [*parts, elements.table(None, rows + _loop(bag, check), 'n')]
 
 

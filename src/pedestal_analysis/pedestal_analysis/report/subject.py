@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 
+from pedestal_analysis.results import beam_direction
 from pedestal_common import parameters
 from pedestal_common.geometry import orbit
 from pedestal_common.graph import nodes
@@ -48,7 +49,7 @@ def changed_parameters(bag):
     for name, values in bag.configuration['parameters'].items():
         if nodes.plain(name) not in nodes.NODE_NAMES:
             continue
-        kind = nodes.row(name, bag.beams > 0).parameters_type()
+        kind = nodes.row(name, bag.beams > 0, bag.servo).parameters_type()
         defaults, units = parameters.defaults(kind), {key: field.metadata.get('unit', '')
                                                       for key, field in parameters.flatten(kind)}
         rows += [[f'{name}.{key}', _shown(value), _shown(defaults[key]), units[key]] for key, value in values.items()
@@ -70,7 +71,9 @@ def place(station):
 
 def rows(bag, data):
     """Return rows [name, text] on a bag.Bag of one beam and its run_data.RunData, as far as the bag states them."""
+    models = [['pointing model', title] for title in beam_direction.titles(bag)]
     beamwidth = [['beamwidth', f'{math.degrees(data.beamwidth):.4g} deg']] if math.isfinite(data.beamwidth) else []
+    beamwidth = [*models, *beamwidth]
     values = bag.configuration['parameters'].get('tracking_receiver', {})
     try:
         target = parameters.build(TargetParameters, {name.removeprefix('target.'): value for name, value in

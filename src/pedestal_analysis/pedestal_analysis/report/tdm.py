@@ -1,9 +1,10 @@
 """`pedestal export --format tdm`: write the measured directions of the target as a CCSDS Tracking Data Message.
 
 A program for orbit determination reads this message. The format is CCSDS 503.0-B-2 in keyword = value notation. A
-record contains azimuth and elevation (encoders plus receiver error), the range if it was measured, and C/N0. Only
-steps in autotrack with a locked receiver are written. On a ship, the attitude of the INS rotates the deck angles to
-earth angles. Nothing is corrected for refraction. Times are UTC.
+record contains azimuth and elevation (direction of the beam plus receiver error), the range if it was measured, and
+C/N0. The direction of the beam follows from the encoders and the pointing model in force. Only steps in autotrack with
+a locked receiver are written. On a ship, the attitude of the INS rotates the deck angles to earth angles. Nothing is
+corrected for refraction. Times are UTC.
 """
 import json
 import pathlib
@@ -11,7 +12,7 @@ import re
 
 import numpy as np
 
-from pedestal_analysis.results import measured_direction, tracking
+from pedestal_analysis.results import beam_direction, measured_direction, tracking
 from pedestal_common.geometry import orbit
 from pedestal_common.graph import nodes
 from pedestal_recording import bag as bags
@@ -63,14 +64,14 @@ def export(path, created, output=None, rate=10.0, participants=(), overwrite=Fal
             raise ValueError(f'--participants {name!r:.60}: must be 1 to 80 ASCII characters')
     bag = bags.read(path)
     for file, view in _files(bag, output, overwrite).items():
-        tracks = _Tracks(view, rate)
+        tracks, models = _Tracks(view, rate), beam_direction.titles(view)
         file.parent.mkdir(parents=True, exist_ok=True)
         records = 0
         with atomic_file(file) as part, open(part, 'w', encoding='ascii', newline='') as stream:
             stream.write(_header(view, created))
             for segment in tracks.segments():
                 records += len(segment[0])
-                stream.write(_segment(segment, _participants(view, participants)))
+                stream.write(_segment(segment, _participants(view, participants), models))
             if not records:
                 raise bags.BagError(f'{path}: nothing to export: no step is in autotrack with a locked receiver')
         yield file, records
@@ -124,8 +125,10 @@ class _Tracks:
             stamps = self.stamps[at:at + SEGMENT_STEPS]
             beam, error = self._at('joint_states', stamps), self._at('tracking_receiver/angle_error', stamps)
             attitude = self._at('ship/imu/data', stamps) if 'ship/imu/data' in self.rows else None
+            t = (stamps - self.bag.start) / 1e9
+            beam = beam_direction.on_sky(self.bag, t, beam)
             angles = np.degrees(measured_direction.earth_angles(beam, error[:, :2], attitude))
-            mode = tracking.modes(self.bag, (stamps - self.bag.start) / 1e9)
+            mode = tracking.modes(self.bag, t)
             # Without lock the receiver errors, and so the angles, are NaN. A bag without acu/mode states no mode.
             exported = np.isfinite(angles).all(axis=1) & ((mode == 'autotrack') | ('acu/mode' not in self.bag.topics))
             if exported.any():
@@ -193,14 +196,15 @@ def _participants(bag, names):
                       if PARTICIPANT_PATTERN.fullmatch(target) else 'TARGET')[len(names):])
 
 
-def _segment(segment, participants):
+def _segment(segment, participants, models):
     """Return the text of a segment of _Tracks.segments, with the keywords in the order of table 3-3 of CCSDS
     503.0-B-2.
 
-    participants: names of station and target.
+    participants: names of station and target; models: pointing models in words.
     """
     times, angles, distance, cn0 = segment
     lines = ['META_START', 'COMMENT angles = encoders + error of the receiver, not corrected for refraction',
+             *(f'COMMENT pointing model: {title}' for title in models),
              'TIME_SYSTEM = UTC', f'START_TIME = {times[0]}', f'STOP_TIME = {times[-1]}',
              f'PARTICIPANT_1 = {participants[0]}', f'PARTICIPANT_2 = {participants[1]}',
              'MODE = SEQUENTIAL', 'PATH = 2,1', 'TIMETAG_REF = RECEIVE',

@@ -33,7 +33,7 @@ ANSWER_TIMEOUT_S = 20.0
 STOP_TIMEOUT_S = 10.0
 """Grace period between SIGINT and SIGKILL [s]."""
 NODE_DISCOVERY_TIME_S = 0.5
-"""Time after the discovery of the node by the Feeder, in which the node discovers the Feeder [s]."""
+"""Wait after the Feeder has discovered the node, so that the node can discover the Feeder too [s]."""
 
 
 class Feeder(Operator):

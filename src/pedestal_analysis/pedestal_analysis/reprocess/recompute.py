@@ -39,8 +39,9 @@ RECOMPUTABLE_NODES = tuple(node.name for node in nodes.NODES if node.unit)
 
 
 def row_of(recording, node) -> nodes.Node:
-    """Return the nodes.Node of the name of a node, for a recording whose drive may be an array."""
-    return nodes.row(node, recording.bag.beams > 0)
+    """Return the nodes.Node of the name of a node, for a recording whose drive may be an array or servo drives, and
+    whose receiver may be one of I/Q samples."""
+    return nodes.row(node, recording.bag.beams > 0, recording.bag.servo, recording.bag.iq)
 
 
 def publishing_node(topic) -> nodes.Node:
@@ -116,11 +117,14 @@ class Recording:
         """Return the stamps (n,) [ns] of the steps to which the messages of a topic without stamps belong.
 
         In a lockstep recording of this software this is the log time. In other recordings a message belongs to the
-        step that its publisher answers next. The stamp is AFTER_LAST_STAMP if no answer follows, and the log time if
-        no answers were recorded.
+        step that its publisher answers next, and a message of rate `sample` to the step that its subscriber answers
+        next. The stamp is AFTER_LAST_STAMP if no answer follows, and the log time if no answers were recorded.
         """
         log = self.rows(topic).log - self.bag.start
-        answer = publishing_node(topic).writes[0]
+        node = publishing_node(topic)
+        if topics.TOPIC_BY_NAME[topic].rate == 'sample':
+            node = next(reader for reader in nodes.NODES if topic in reader.reads)
+        answer = node.writes[0]
         if self.bag.metadata.get('pacing') == 'lockstep' or not self.has(answer):
             return log
         after = np.searchsorted(self.arrival(answer), self.arrival(topic))
@@ -404,9 +408,17 @@ def chosen(recording, names, file_values):
                                  f'{nodes.beam_of(name)} --node {nodes.plain(name)}')
         if name not in RECOMPUTABLE_NODES:
             raise RecomputeError(f'--node {name}: must be one of {", ".join(RECOMPUTABLE_NODES)}')
+        if name == nodes.DRIVE_NODE and recording.bag.servo:
+            raise RecomputeError(f'--node {name}: the drives of this recording were on a bus, which is not recorded')
+        if name == nodes.MONOPULSE_RECEIVER.name and recording.bag.iq:
+            raise RecomputeError(f'--node {name}: the I/Q samples of this recording are not in the bag; give their '
+                                 'file with --iq')
     known = file_values if file_values is not None else recording.bag.configuration['parameters']
 
     def able(name):
+        if (name == nodes.DRIVE_NODE and recording.bag.servo
+                or name == nodes.MONOPULSE_RECEIVER.name and recording.bag.iq):
+            return False
         row = row_of(recording, name)
         begun = recording.feeds(row.reads[0]) or row.reads[0] in row.writes and recording.has(row.writes[0])
         return begun and name in (known or ('acu',)) and (name == 'acu' or any(map(recording.has, row.writes)))

@@ -13,7 +13,7 @@ import numpy as np
 from pedestal_common.graph.steps import NS_PER_SECOND
 from pedestal_common.wire import commands, messages, records
 from pedestal_operator import remote_node
-from pedestal_operator.antenna import Antenna
+from pedestal_operator.antenna import POINTING_TOPIC, Antenna
 from pedestal_operator.page import page_log, page_sky, page_state
 from pedestal_operator.page.page_log import Log
 from pedestal_operator.page.page_passes import UpcomingPasses
@@ -102,6 +102,8 @@ class Recording(Antenna):
         """Go to a position [s], with the topics of numbers only, which is faster."""
         self.position = min(max(position, 0.0), self.length)
         self.numbers, self.texts, self.status, self._received = {}, {}, {}, {}
+        for text in self._messages(POINTING_TOPIC, 1):
+            self.texts[POINTING_TOPIC] = text.data
         for name in NUMBER_TOPICS:
             for time_of, data in self._last(name, 1):
                 self.numbers[name] = self._decoders[name].decoded(data)[1]

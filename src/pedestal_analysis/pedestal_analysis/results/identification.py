@@ -93,18 +93,39 @@ def response(commanded, position, T, delay, w):
 
 
 @compiled
-def _drive(state, constants, inputs, outputs, rate, torque, position):
-    """Run the drive with n commands, and fill position (n, 2) [rad] with the encoder angles before each command.
+def _drive(state, constants, inputs, outputs, rate, torque, position, motors):
+    """Run the drive with n commands. Fill position (n, 2) with the encoder angles [rad] before each command.
 
     rate (n, 2): rate commands [rad/s]; torque (n, 2): torque feed-forward [Nm]. The columns are azimuth and elevation.
+    motors (n, 2, 4): filled for both axes with angles [rad] and torques [Nm] of motors 1 and 2 on the motor shaft.
     The other arguments are the records of the unit of the drive, each in an array of one.
     """
     u, y = inputs[0], outputs[0]
     for k in range(len(rate)):
         position[k, 0], position[k, 1] = y.azimuth.position, y.elevation.position
+        for j in range(2):
+            motors[k, 0, j], motors[k, 0, 2 + j] = y.azimuth.motor_position[j], y.azimuth.motor_torque[j]
+            motors[k, 1, j], motors[k, 1, 2 + j] = y.elevation.motor_position[j], y.elevation.motor_torque[j]
         u.azimuth.rate, u.elevation.rate = rate[k, 0], rate[k, 1]
         u.azimuth.torque, u.elevation.torque = torque[k, 0], torque[k, 1]
         drive_unit.step(state[0], constants[0], inputs[0], outputs[0])
+
+
+def respond(drive, rate, torque):
+    """Return (encoder angles (n, 2) [rad], motors (n, 2, 4)) of a drive that receives n commands in still air.
+
+    drive: AduParameters with the angles at the start; rate (n, 2): rate commands [rad/s]; torque (n, 2): torque
+    feed-forward [Nm]; motors: angles [rad] and torques [Nm] of motors 1 and 2 of both axes. Row k is the time of
+    command k.
+    """
+    drive = dataclasses.replace(drive, wind=WindParameters(), initially_enabled=True)
+    state, constants = drive_unit.initial_state(drive), drive_unit.constants(drive)
+    inputs, outputs = np.zeros(1, drive_unit.INPUTS_DTYPE), np.zeros(1, drive_unit.OUTPUTS_DTYPE)
+    inputs['enable'] = 1
+    drive_unit.read(state[0], constants[0], outputs[0])
+    position, motors = np.empty_like(rate), np.empty((len(rate), 2, 4))
+    _drive(state, constants, inputs, outputs, rate, torque, position, motors)
+    return position, motors
 
 
 def identify(scenario, torque=True) -> dict:
@@ -118,7 +139,7 @@ def identify(scenario, torque=True) -> dict:
     duration = (SETTLING_PERIODS + MEASURED_PERIODS) * COMMON_PERIOD_S
     start = {f'initial_{name}': 0.5 * (axis.limits.lower + axis.limits.upper - rate * duration)
              for name, axis, rate in zip(topics.AXES, axes, IDENTIFICATION_RATES_RAD_S)}
-    drive = dataclasses.replace(drive, wind=WindParameters(), initially_enabled=True, **start)
+    drive = dataclasses.replace(drive, **start)
     w = 2.0 * math.pi * SINE_FREQUENCIES_HZ
     steps = round(COMMON_PERIOD_S / drive.period)
     if abs(steps * drive.period - COMMON_PERIOD_S) > 1e-9:
@@ -138,12 +159,7 @@ def identify(scenario, torque=True) -> dict:
     for i, name in enumerate(topics.AXES if torque else ()):
         known = record(getattr(acu, name).feedforward)[0]
         torques[:, i] = [feedforward.torque(*motion, known) for motion in zip(rate[:, i], acceleration)]
-    state, constants = drive_unit.initial_state(drive), drive_unit.constants(drive)
-    inputs, outputs = np.zeros(1, drive_unit.INPUTS_DTYPE), np.zeros(1, drive_unit.OUTPUTS_DTYPE)
-    inputs['enable'] = 1
-    drive_unit.read(state[0], constants[0], outputs[0])
-    position = np.empty_like(rate)
-    _drive(state, constants, inputs, outputs, rate, torques, position)
+    position, _ = respond(drive, rate, torques)
     kept = slice(SETTLING_PERIODS * steps, None)
     loops = {}
     for i, name in enumerate(topics.AXES):

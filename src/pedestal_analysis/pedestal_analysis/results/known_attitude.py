@@ -64,11 +64,12 @@ def read(bag):
     error = (Rotation.from_quat(reported[both]) * true.inv()).as_rotvec() * (1.0, 1.0, -1.0)
     # The INS states equal variances for roll and pitch, so x stands for both level axes; z is the heading.
     sigma = np.sqrt(np.column_stack([table[f'orientation_variance.{axis}'] for axis in 'xz'])[both])
-    return KnownAttitude(t, error, sigma, _aligned(bag, t[0]))
+    return KnownAttitude(t, error, sigma, aligned_from(bag, t[0]))
 
 
-def _aligned(bag, first):
-    """Return KnownAttitude.aligned [s]; first: first stamp of the attitude [s]."""
+def aligned_from(bag, first):
+    """Return the stamp [s] at which the INS became aligned, as KnownAttitude.aligned; first: first stamp of the
+    attitude [s]."""
     if INS_STATE_TOPIC not in bag.topics or not bag.rows(INS_STATE_TOPIC).size:
         return float(first)
     states = bag.table(INS_STATE_TOPIC)

@@ -13,14 +13,15 @@ the begin of the mode.
 import numpy as np
 
 from acu_tracker.operating.command_table import ACU_COMMANDS
+from acu_tracker.program.air import WEATHER_QUANTITIES, Air, RefractionParameters
 from acu_tracker.program.prediction import PredictionParameters, Predictor
 from pedestal_analysis.results import tracking
 from pedestal_analysis.results.tracking import DEG_PER_RAD
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry import line_of_sight
-from pedestal_common.graph.topics import AXES
-from pedestal_common.parameters import build
-from pedestal_common.wire import commands
+from pedestal_common.graph.topics import AXES, TOPIC_BY_NAME
+from pedestal_common.parameters import ParameterError, build
+from pedestal_common.wire import commands, messages
 
 FOLLOWED_DIRECTIONS = {'program': 'true target', 'tle': 'true target', 'preset': 'requested angles',
                        'steptrack': 'true target', 'slave': 'commanded direction', 'sun': 'direction of the sun'}
@@ -69,7 +70,7 @@ def _to_target(run):
 
 
 @compiled
-def _fill_offsets(beam, directions, error):
+def fill_offsets(beam, directions, error):
     """Fill error (n, 2) [rad] with the offsets of earth directions (n, 2) from the beam (n, 2)."""
     for k in range(len(beam)):
         x, y, z = line_of_sight.direction(directions[k, 0], directions[k, 1])
@@ -79,7 +80,7 @@ def _fill_offsets(beam, directions, error):
 def _to_earth_direction(run, directions):
     """Return the error (n, 2) [rad] of the true beam against earth angles (n, 2)."""
     error = np.empty_like(directions)
-    _fill_offsets(run.beam_earth, directions, error)
+    fill_offsets(run.beam_earth, directions, error)
     return error
 
 
@@ -104,16 +105,17 @@ def _after_slew(error, run, inside):
 def _settled(error, run):
     """Return the mask (n,) of the steps at which the error (n, 2) [rad] has been still for SETTLING_TIME_S."""
     window = _window(run)
-    still = _moved(error, window) < MAX_DRIFT * SETTLING_TIME_S * run.beamwidth
-    return np.convolve(still, np.ones(window, int))[:len(error)] == window
+    return np.convolve(_still(error, run), np.ones(window, int))[:len(error)] == window
+
+
+def _still(error, run):
+    """Return the mask (n,) of the steps at which the error (n, 2) [rad] drifts by less than MAX_DRIFT."""
+    return _moved(error, _window(run)) < MAX_DRIFT * SETTLING_TIME_S * run.beamwidth
 
 
 def _of_steps(_, run, inside):
     """Return (error (n, 2) [rad], mask (n,) of the settled steps) of step track, whose steps are the mask `inside`."""
-    on = np.zeros(run.t.size, bool)
-    for first, last in tracking.stretches(inside):
-        on[first:last] = run.t[first:last] >= run.t[first] + tracking.HANDOVER_SETTLING_S
-    return _to_target(run), on
+    return _to_target(run), tracking.settled(inside, run.t)
 
 
 def _of_preset(bag, run, inside):
@@ -128,23 +130,53 @@ def _of_preset(bag, run, inside):
     for first, last in tracking.stretches(inside):
         part = slice(first, last)
         on[part] = ((_moved(run.reference[part], window) < MAX_REFERENCE_STEP_RAD)
-                    & (_moved(error[part], window) < MAX_DRIFT * SETTLING_TIME_S * run.beamwidth))
+                    & _still(error[part], run))
     return error, on
 
 
 def _of_slave(bag, run, inside):
     """Return (error (n, 2) [rad] against the commanded direction, mask (n,) of its settled steps)."""
-    directions = np.full((run.t.size, 2), np.nan)
-    for t, command, reply in tracking.replies(bag, 'acu/command_result'):
-        if command.verb == 'slave' and reply.granted:
-            given, later = commands.values(ACU_COMMANDS, command), run.t >= t
-            moved = np.minimum(run.t[later] - t, given['moves'])
-            for i, axis in enumerate(AXES):
-                directions[later, i] = given[axis] + given[f'{axis}_rate'] * moved
+    directions, air = np.full((run.t.size, 2), np.nan), None
+    known = bag.configuration['parameters'].get('acu', {})
+    if known.get('refraction.slave') != 'apparent':
+        air = air_of(bag, known)
+    granted = [(t, commands.values(ACU_COMMANDS, command)) for t, command, reply in
+               tracking.replies(bag, 'acu/command_result') if command.verb == 'slave' and reply.granted]
+    begins = np.searchsorted(run.t, [t for t, _ in granted])
+    for (t, given), first, last in zip(granted, begins, [*begins[1:], run.t.size]):
+        moved = np.minimum(run.t[first:last] - t, given['moves'])
+        for i, axis in enumerate(AXES):
+            directions[first:last, i] = given[axis] + given[f'{axis}_rate'] * moved
+    known_steps = np.isfinite(directions[:, 1])
+    if air and known_steps.any():
+        directions[known_steps, 1] = air.bent(directions[known_steps, 1], run.t[known_steps])
     error, on = _to_earth_direction(run, directions), np.zeros(run.t.size, bool)
     for first, last in tracking.stretches(inside):
         on[first:last] = _settled(error[first:last], run)
     return error, on
+
+
+def air_of(bag, known):
+    """Return the Air of a recorded run, with the weather that was published; known: parameters of the ACU."""
+    air = Air(build(RefractionParameters, {key: value for key, value in known.items()
+                                           if key.startswith('refraction.')}, 'refraction.'))
+    readings = [(bag.rows(topic).log[row], topic, data) for topic in WEATHER_QUANTITIES if topic in bag.topics
+                for row, (_, _, _, data) in enumerate(bag.raw(topic))]
+    for log, topic, data in sorted(readings, key=lambda reading: reading[0]):
+        message, now = messages.deserialize(data, TOPIC_BY_NAME[topic].type), (log - bag.start) * 1e-9
+        stamp = messages.nanoseconds(message.header.stamp)
+        air.take(topic, (stamp - bag.start) * 1e-9 if stamp else None, message, now)
+        air.update(now)
+    return air
+
+
+def predictor_of(bag, known):
+    """Return the Predictor of a recorded run; known: parameters of the ACU.
+
+    Raises ParameterError, for example for a file of the earth's orientation that is not on this machine.
+    """
+    given = {key: value for key, value in known.items() if key.startswith('prediction.')}
+    return Predictor(build(PredictionParameters, given, 'prediction.'), bag.start, air_of(bag, known))
 
 
 def _of_sun(bag, run, inside):
@@ -152,9 +184,11 @@ def _of_sun(bag, run, inside):
     known = bag.configuration['parameters'].get('acu', {})
     if not known:
         return np.full((run.t.size, 2), np.nan), inside
-    given = {key: value for key, value in known.items() if key.startswith('prediction.')}
-    sun = Predictor(build(PredictionParameters, given, 'prediction.'), bag.start).sun_angles(run.t)
-    return _after_slew(_to_earth_direction(run, sun), run, inside)
+    try:
+        predictor = predictor_of(bag, known)
+    except ParameterError:      # the file of the earth's orientation is not on this machine
+        return np.full((run.t.size, 2), np.nan), inside
+    return _after_slew(_to_earth_direction(run, predictor.sun_angles(run.t)), run, inside)
 
 
 _PARTS = {'program': _of_table, 'tle': _of_table, 'preset': _of_preset, 'steptrack': _of_steps, 'slave': _of_slave,

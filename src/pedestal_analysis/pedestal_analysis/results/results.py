@@ -79,10 +79,10 @@ RESULTS = (
            'Largest true pointing error of either axis in settled autotrack.', brief=True),
     Result('pointing_loss_mean_db', 'dB', 'tracking', pointing_loss.mean_db,
            'Loss of the mean received power by the true pointing error, from the pattern of the beam, in settled '
-           'autotrack.', brief=True),
+           'autotrack.', 'loss of the mean received power by the pointing error', brief=True),
     Result('pointing_loss_max_db', 'dB', 'tracking', pointing_loss.max_db,
            'Largest loss of received power by the true pointing error, from the pattern of the beam, in settled '
-           'autotrack.', brief=True),
+           'autotrack.', 'largest loss of received power by the pointing error', brief=True),
     *itertools.chain.from_iterable(map(_of_mode, mode_pointing.FOLLOWED_DIRECTIONS)),
     Result('cross_elevation_rms_deg', 'deg', 'tracking', lambda run: run.pointing(known_rms, 0),
            'Rms of the true pointing error in cross-elevation, in settled autotrack.'),

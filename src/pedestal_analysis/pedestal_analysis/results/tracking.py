@@ -11,6 +11,7 @@ import math
 
 import numpy as np
 
+from pedestal_analysis.results import beam_direction
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry import line_of_sight
 from pedestal_common.graph.steps import NS_PER_SECOND
@@ -25,6 +26,14 @@ DEG_PER_RAD = math.degrees(1.0)
 ENCODER_BEAM_NOTE = ('the recording has no adu/truth, so the direction of the beam is taken from joint_states: errors '
                      'between encoders and dish do not show')
 """Note on the results of an old recording, whose drive did not publish the true direction of its dish."""
+
+
+MAX_AGE_STEPS, MAX_AGE_INTERVALS = 4.0, 2.5
+"""Largest age of a value of real equipment [steps, intervals between its messages]; the larger one counts."""
+ERROR_MATRIX_NAMES = ('xx', 'xe'), ('ex', 'ee')
+"""Names of the elements of the matrix of the receiver's errors, by row and column."""
+MIN_ON_GRID_SHARE = 0.5
+"""Share of the messages with the stamp of a step, from which on a topic counts as one of the steps [-]."""
 
 
 @compiled
@@ -99,11 +108,12 @@ class Tracking:
     no following error.
 
     t                               (n,) time of the step [s]
-    azimuth, elevation              (n,) deck angles of the encoders, or of an electronic beam
-    reference                       (n, 2) deck angles of the ACU's reference; NaN in standby or for an electronic beam
+    azimuth, elevation              (n,) deck angles of the beam by encoders and pointing model, or of an
+                                    electronic beam
+    reference                       (n, 2) the same of the ACU's reference; NaN in standby or for an electronic beam
     cross_elevation,
     elevation_error                 (n,) true pointing error at the stamps: target minus direction of the beam
-    encoder_error                   (n, 2) target minus direction of the encoders; NaN for an electronic beam, and for
+    encoder_error                   (n, 2) target minus `azimuth`, `elevation`; NaN for an electronic beam, and for
                                     a bag without adu/truth
     measured, cn0                   (n, 2) receiver error; (n,) C/N0 [dB-Hz]
     filtered                        (n, 2) direction of the filter's estimate minus direction of the beam
@@ -237,6 +247,13 @@ def beamwidth(bag):
         return math.nan
 
 
+def error_matrix(bag):
+    """Return the matrix (2, 2) [-] with which the control unit of a bag.Bag multiplied the errors of the receiver."""
+    known = bag.configuration['parameters'].get('acu', {})
+    return np.array([[known.get(f'tracker.matrix.{name}', float(i == j)) for j, name in enumerate(names)]
+                     for i, names in enumerate(ERROR_MATRIX_NAMES)])
+
+
 def on_grid(bag, t, topic, columns):
     """Return columns (n, m) of a topic, by their m names, at the stamps t (n,) [s].
 
@@ -251,6 +268,29 @@ def on_grid(bag, t, topic, columns):
         for i, column in enumerate(columns):
             if column in table:
                 out[here, i] = table[column][there]
+    return out
+
+
+def of_equipment(bag, t, topic, columns):
+    """Return columns (n, m) of a topic of the receiver or of the INS, by their m names, at the stamps t (n,) [s].
+
+    Simulated equipment stamps its messages with the steps; the result is that of on_grid. Real equipment has stamps
+    or an interval of its own; the result is then that of its newest message, NaN where this message is too old.
+    """
+    stamps = bag.table(topic)['t'] if topic in bag.topics else np.zeros(0)
+    if not len(stamps) or t.size < 2:
+        return on_grid(bag, t, topic, columns)
+    step, interval = np.median(np.diff(t)), np.median(np.diff(stamps)) if len(stamps) > 1 else 0.0
+    on_steps = np.isin(np.round(stamps * 1e9), np.round(t * 1e9)).mean() >= MIN_ON_GRID_SHARE
+    if on_steps and interval < 1.5 * step:
+        return on_grid(bag, t, topic, columns)
+    oldest = max(MAX_AGE_STEPS * step, MAX_AGE_INTERVALS * interval)
+    index = np.searchsorted(stamps, t + 1e-9, side='right') - 1
+    known = (index >= 0) & (t - stamps[np.maximum(index, 0)] < oldest)
+    table, out = bag.table(topic), np.full((t.size, len(columns)), np.nan)
+    for i, column in enumerate(columns):
+        if column in table:
+            out[known, i] = np.asarray(table[column])[index[known]]
     return out
 
 
@@ -279,7 +319,7 @@ def _arriving(bag, relative, velocity):
 
 
 def by_encoders(bag):
-    """Return True if Tracking takes the direction of the beam from the encoders, for want of adu/truth in a bag.
+    """Return True if Tracking takes the direction of the beam from the encoders, because the bag has no adu/truth.
 
     ENCODER_BEAM_NOTE is the note for this case. An array has no encoders: the angles to which it steers its beam are
     the true direction.
@@ -298,17 +338,19 @@ def read(bag) -> Tracking:
     t = joints['t']
     at_steps = functools.partial(on_grid, bag, t)
     encoders = np.column_stack((joints['azimuth.position'], joints['elevation.position']))
+    encoders = beam_direction.on_sky(bag, t, encoders)
     beam = at_steps('adu/truth', ('azimuth.position', 'elevation.position')) if 'adu/truth' in bag.topics else encoders
     target = at_steps('target/truth', ('position.x', 'position.y', 'position.z'))
     quaternion = ('orientation.x', 'orientation.y', 'orientation.z', 'orientation.w')
     if 'ship/truth' in bag.topics:
         ship = at_steps('ship/truth', ('position.x', 'position.y', 'position.z'))
-        attitude, known_attitude = at_steps('ship/truth', quaternion), at_steps('ship/imu/data', quaternion)
+        attitude = at_steps('ship/truth', quaternion)
+        known_attitude = of_equipment(bag, t, 'ship/imu/data', quaternion)
         ship = ship + _lever_arm(bag, attitude)
     else:
         ship = np.zeros((t.size, 3))
         attitude = known_attitude = np.tile(line_of_sight.ASHORE_ATTITUDE, (t.size, 1))
-    measured = at_steps('tracking_receiver/angle_error', ('x', 'y', 'z'))
+    measured = of_equipment(bag, t, 'tracking_receiver/angle_error', ('x', 'y', 'z'))
     estimate = at_steps('acu/estimate', ('azimuth.position', 'elevation.position'))
     error, encoder_error, filtered, beam_earth = np.full((4, t.size, 2), np.nan)
     velocity = at_steps('target/truth', ('twist.linear.x', 'twist.linear.y', 'twist.linear.z'))
@@ -322,7 +364,7 @@ def read(bag) -> Tracking:
     mode = modes(bag, t)
     automatic = mode == 'autotrack'
     start = t[automatic][0] + HANDOVER_SETTLING_S if automatic.any() else math.inf
-    reference = at_steps('acu/reference', ('azimuth.position', 'elevation.position'))
+    reference = beam_direction.on_sky(bag, t, at_steps('acu/reference', ('azimuth.position', 'elevation.position')))
     reference[(mode == 'standby') | (mode == '') | (bag.beams > 0)] = np.nan
     return Tracking(t, encoders[:, 0], encoders[:, 1], reference, error[:, 0], error[:, 1], encoder_error,
                     measured[:, :2], measured[:, 2], filtered, beam_earth, target_earth,
@@ -354,8 +396,9 @@ def _first_mode(bag, change):
 
 
 def replies(bag, topic):
-    """Yield (time [s], Command, Reply) of the replies on a topic of a bag."""
-    for _, log, _, message in bag.messages(topic) if topic in bag.topics else ():
+    """Yield (time [s], Command, Reply) of the replies on a topic of a bag; nothing for a topic of another type."""
+    there = bag.topics.get(topic) == 'diagnostic_msgs/msg/DiagnosticStatus'
+    for _, log, _, message in bag.messages(topic) if there else ():
         with contextlib.suppress(ValueError):  # the message is no reply
             yield ((log - bag.start) / NS_PER_SECOND, *commands.of_reply(message))
 
@@ -363,22 +406,38 @@ def replies(bag, topic):
 def keyholes(bag):
     """Return [(begin, end, loss)] of the slews through a keyhole that the ACU predicted in its diagnostics, each once.
 
-    begin, end: times of the slew [s]; loss: predicted time with the target off the beam [s].
+    begin, end: times of the slew [s]; loss: predicted time with the target off the beam [s]. A renewed plan replaces
+    the earlier plan of the same slew. A plan that is cancelled before its slew begins does not count.
     """
-    slews = {}
-    for _, _, _, array in bag.messages('diagnostics') if 'diagnostics' in bag.topics else ():
+    slews = []
+    for _, log, _, array in bag.messages('diagnostics') if 'diagnostics' in bag.topics else ():
         for status in array.status:
             values = {value.key: value.value for value in status.values}
+            if values.get('keyhole') == 'none' and slews and (log - bag.start) / NS_PER_SECOND < slews[-1][0]:
+                slews.pop()
             with contextlib.suppress(KeyError, ValueError):  # the status is of another node or predicts no slew
                 begin, end, loss = (float(values[f'keyhole_{name}_s']) for name in ('begins', 'ends', 'loss'))
-                slews[begin] = begin, end, loss
-    return list(slews.values())
+                if slews and begin < slews[-1][1]:
+                    slews.pop()
+                slews.append((begin, end, loss))
+    return slews
 
 
 def stretches(flags):
     """Return [(first, last + 1)] of the stretches of neighbouring rows in which flags (n,) bool are true."""
     edges = np.flatnonzero(np.diff(np.concatenate(([0], flags.astype(int), [0]))))
     return list(zip(edges[::2].tolist(), edges[1::2].tolist()))
+
+
+def settled(inside, t):
+    """Return the mask (n,) of the rows of `inside` (n,) bool without the first HANDOVER_SETTLING_S of each stretch.
+
+    t (n,): times [s].
+    """
+    mask = np.zeros(t.size, bool)
+    for first, last in stretches(inside):
+        mask[first:last] = t[first:last] >= t[first] + HANDOVER_SETTLING_S
+    return mask
 
 
 def rms(values, axis=None):

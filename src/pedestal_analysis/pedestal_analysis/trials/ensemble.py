@@ -27,7 +27,7 @@ TRIAL_RESULTS = tuple(result.name for result in results.RESULTS if result.part n
 """Names of the results of a trial: all results of `pedestal run`, except those on its processes."""
 
 MEASURED_TOPICS = ('joint_states', 'adu/truth', 'tracking_receiver/angle_error', 'target/truth', 'acu/rate_command',
-                   'acu/estimate', 'acu/reference', 'acu/filter', 'acu/mode', 'adu/state')
+                   'acu/estimate', 'acu/reference', 'acu/filter', 'acu/mode', 'acu/pointing', 'adu/state')
 """Topics that the results and verdicts of trials ashore need.
 
 No result reads the numbers of acu/rate_command. Because a change of acu/mode has the stamp of the acu/rate_command of

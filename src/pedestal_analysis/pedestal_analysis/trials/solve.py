@@ -34,6 +34,8 @@ MAX_LINEAR_RATIO = 20.0
 
 The values of a wider range have equal ratios.
 """
+TRACKED_RESULT, MIN_TRACKED_PERCENT = 'tracked_percent', 99.0
+"""Result that states the share of a run in autotrack; share below which the found value gets a warning [%]."""
 MIN_MEASURED_SHARE = 0.5
 """Smallest share of the trials at a value that must have the result, so that the mean at this value counts [-]."""
 
@@ -56,7 +58,8 @@ class Range(typing.NamedTuple):
 class Tried(typing.NamedTuple):
     """Trials at one value of the parameter.
 
-    row        row of --json of the mean (intervals.estimated); None if the scenario refused the value
+    row        row of --json of the mean (intervals.estimated), with the field `tracked_percent`: mean share of the run
+               in autotrack [%], None where it is not measured. None if the scenario refused the value
     why        text of the refusal, or ''
     measured   True if the mean counts, see MIN_MEASURED_SHARE
     """
@@ -171,7 +174,7 @@ class Search:
         estimate = intervals.interval(values[known]) if known.any() else (math.nan,) * 3
         row = {**intervals.estimated(f'{self._wanted.key}={value:.6g}', f'{nodes.plain(name)}/mean', estimate,
                                      statistics.unit(name), int(known.sum())),
-               **statistics.coverage_fields(table, name, known)}
+               **statistics.coverage_fields(table, name, known), 'tracked_percent': _tracked(table, name)}
         return Tried(value, row, '', bool(known.mean() >= MIN_MEASURED_SHARE))
 
     def run(self) -> Solution:
@@ -193,7 +196,7 @@ class Search:
         value = round(value) if wanted.whole else value
         return Solution(value, self.tried, f'{wanted.key} = {value:.4g} {wanted.unit}'.rstrip()
                         + f': {what} is reached between {low.value:.4g} and {high.value:.4g}, with '
-                        f'{statistics.coverage(low.row)} trials{self._gaps()}')
+                        f'{statistics.coverage(low.row)} trials{self._gaps()}{_losses(low, high)}')
 
     def _crossings(self, tried):
         """Return the pairs of neighbouring Tried whose means lie on different sides of the limit.
@@ -265,6 +268,22 @@ class Search:
             if not measured:
                 parts.append(f'at {values[0]}' if len(values) == 1 else f'from {values[0]} to {values[-1]}')
         return f'; most trials have no {self._aim.result} {", ".join(parts)}' if parts else ''
+
+
+def _losses(low, high):
+    """Return a warning for a pair of Tried whose trials have lost the target for a part of the time, else ''."""
+    shares = [one.row['tracked_percent'] for one in (low, high) if one.row['tracked_percent'] is not None]
+    if not shares or min(shares) >= MIN_TRACKED_PERCENT:
+        return ''
+    return f'; there the target is tracked for {min(shares):.3g} % of the time only'
+
+
+def _tracked(table, name):
+    """Return the mean of tracked_percent [%] over the trials of a table.Table, for the beam of the result `name`; None
+    if the trials do not measure it."""
+    column = f'{nodes.beam_of(name)}/{TRACKED_RESULT}'.lstrip('/')
+    values = table.column(column) if column in table.results else np.full(1, math.nan)
+    return float(np.nanmean(values)) if np.isfinite(values).any() else None
 
 
 def reason(one):

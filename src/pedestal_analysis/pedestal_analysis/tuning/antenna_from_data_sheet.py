@@ -17,6 +17,7 @@ motors of paper 000 and a load of 210 kg m2. The scaling keeps the resonance fre
 If an axis cannot reach the rate of the data sheet, the scenario has RATE_SHARE of the rate that the axis reaches.
 """
 import dataclasses
+import functools
 import math
 
 from acu_tracker.servo import ends
@@ -98,7 +99,7 @@ def _plant(sheet, name, values):
     known = getattr(AduParameters(), name)
     try:
         return loops.Plant(name, build(type(known), {**as_dict(known), **values}), beamwidth=sheet.theta,
-                           noise=loops.receiver_noise(sheet.theta, _receiver(sheet).antenna.slope, cn0(sheet)))
+                           noise=loops.receiver_noise(sheet.theta, _receiver(sheet.like).antenna.slope, cn0(sheet)))
     except ParameterError as error:
         raise ParameterError(f'adu.{name}: {error}') from None
 
@@ -145,20 +146,21 @@ def _motors(name, values):
 def cn0(sheet):
     """Return the C/N0 [dB-Hz] on the beam axis at the reference range: of the DataSheet, else by the area of the
     mirror."""
-    known = _receiver(sheet).receiver.cn0_dbhz
+    known = _receiver(sheet.like).receiver.cn0_dbhz
     return sheet.cn0 or float(f'{known + 20.0 * math.log10(sheet.mirror / KNOWN_MIRROR_M):.4g}')
 
 
-def _receiver(sheet):
-    """Return the TrackingReceiverParameters of the scenario of a DataSheet."""
-    return scenario.load(sheet.like).node_parameters('tracking_receiver')
+@functools.cache
+def _receiver(name):
+    """Return the TrackingReceiverParameters of the scenario of this name."""
+    return scenario.load(name).node_parameters('tracking_receiver')
 
 
 def _assumed(sheet):
     """Return a line for each assumed value."""
     lines = []
     if not sheet.cn0:
-        receiver = _receiver(sheet).receiver
+        receiver = _receiver(sheet.like).receiver
         lines.append(f'no --cn0: {cn0(sheet):.3g} dB-Hz at {1e-3 * receiver.reference_range:g} km, that of '
                      f'{sheet.like} for the area of the mirror, is taken; the receiver locks at '
                      f'{receiver.acquire_level_dbhz:g} dB-Hz')

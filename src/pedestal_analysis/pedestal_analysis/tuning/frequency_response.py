@@ -115,10 +115,14 @@ class Response:
     frequency   (n,) [Hz]
     open_loop   (n,) complex open loop L [-]
     deviation   (n,) standard deviation of L over the measured periods, divided by |L| [-]
+    lowest      lowest frequency of a crossover [Hz]. In a speed loop it is that of the structure on a free axis:
+                at the frequency of the structure on locked motors the dish holds the axis, and |L| falls below 1 long
+                before the crossover
     """
     frequency: np.ndarray
     open_loop: np.ndarray
     deviation: np.ndarray
+    lowest: float = 0.0
 
     @property
     def closed_loop(self):
@@ -195,8 +199,15 @@ def speed(drive, sweep=SPEED_SWEEP, axes=AXES):
         rate = _rate(i, getattr(drive, name).limits.rate)
         command = rate + _at_most(sweep, rate).signal(axis.SPEED_LOOP_PERIOD_S)
         measured, _, _ = _run_inner(drive, i, command, np.zeros(len(command) * axis.CURRENT_LOOP_STEP_COUNT))
-        responses[f'speed/{name}'] = response(sweep, command - measured, measured)
+        responses[f'speed/{name}'] = dataclasses.replace(response(sweep, command - measured, measured),
+                                                         lowest=free_frequency(getattr(drive, name)))
     return responses
+
+
+def free_frequency(axis_parameters):
+    """Return the frequency of the structure on a free axis [Hz], 0 if no structure is declared."""
+    structure = axis_parameters.structure
+    return structure.frequency / math.sqrt(1.0 - structure.inertia_share) if structure.inertia_share > 0.0 else 0.0
 
 
 def _at_most(sweep, *rates):
@@ -259,10 +270,10 @@ def without_gain_margin(names):
             'higher gain makes the loop unstable there']
 
 
-def margins(measured, above=0.0):
+def margins(measured):
     """Return {metric: (value, unit)} of a Response; NaN if the measured band has no such frequency.
 
-    crossover_hz       first frequency from `above` [Hz] on at which the open loop |L| falls below 1
+    crossover_hz       first frequency from `lowest` on at which the open loop |L| falls below 1
     phase_margin_deg   smallest phase shift, of either sign, that moves a point with |L| = 1 to -1
     gain_margin_db     smallest gain that moves a point of L to -1
     bandwidth_hz       first frequency at which the closed loop |T| falls below -3 dB
@@ -271,7 +282,7 @@ def margins(measured, above=0.0):
     f, L, T = measured.frequency, measured.open_loop, np.abs(measured.closed_loop)
     gain, from_minus_one = np.log(np.abs(L)), np.angle(-L)
     crossover, margin = _crossings(f, gain, from_minus_one)
-    crossover = crossover[crossover >= above]
+    crossover = crossover[crossover >= measured.lowest]
     margin = np.abs(np.angle(np.exp(1j * margin)))
     # Points of L on the negative real axis, by the logarithm of their gain; a gain above 1 (log above 0) is left out.
     near = np.where(np.abs(from_minus_one) < 0.5 * math.pi, from_minus_one, np.nan)

@@ -46,7 +46,7 @@ import pathlib
 
 import numpy as np
 
-from acu_tracker.estimation.params import FilterParameters
+from acu_tracker.estimation.params import FilterParameters, ImmParameters
 from adu_drive.params import SPEED_LOOP_PERIOD_S
 from pedestal_analysis.tuning import frequency_response as frequency
 from pedestal_bringup.scenario import scenario
@@ -135,6 +135,7 @@ class Plant:
     wind        mean wind torque at the load [Nm]
     beamwidth   half-power beamwidth of the antenna [rad]
     noise       root density of the receiver's noise on the beam axis [rad/sqrt(Hz)], see receiver_noise
+    bank        ImmParameters of the axis's filter
 
     Raises LoopError if the motors cannot move the axis.
     """
@@ -143,6 +144,7 @@ class Plant:
     wind: float = 0.0
     beamwidth: float = math.inf
     noise: float = math.inf
+    bank: ImmParameters = FilterParameters().imm
 
     def __post_init__(self):
         if self.acceleration <= 0.0:
@@ -169,11 +171,6 @@ class Plant:
         """Frequency f of the structure on locked motors [Hz], 0 if no structure is declared."""
         structure = self.axis.structure
         return structure.frequency if structure.inertia_share > 0.0 else 0.0
-
-    @property
-    def free_mode(self):
-        """Frequency of the structure on a free axis [Hz], 0 if no structure is declared."""
-        return self.mode / math.sqrt(1.0 - self.axis.structure.inertia_share)
 
     @property
     def gear_inertia(self):
@@ -209,9 +206,9 @@ def filter_gains(plant):
     """Return {key of acu.AXIS: value} of the target filter: the number of models that do not follow the structure."""
     if not plant.mode:
         return {}
-    bank = FilterParameters().imm
     fastest = plant.noise * (2.0 * math.pi * plant.mode / FILTER_RATIO)**3
-    noises = bank.ca.noise * bank.rung_ratio**np.arange(bank.rungs)
+    # Because an earlier design may have lowered the number of the scenario, the default number is the largest.
+    noises = plant.bank.ca.noise * plant.bank.rung_ratio**np.arange(ImmParameters().rungs)
     return {'filter.imm.rungs': max(1, int(np.sum(noises <= fastest)))}
 
 
@@ -294,8 +291,9 @@ class Loops:
         drive = chosen.node_parameters('adu')
         known = chosen.node_parameters('tracking_receiver')
         noise = receiver_noise(known.antenna.beamwidth, known.antenna.slope, known.receiver.cn0_dbhz)
+        control = chosen.node_parameters('acu')
         self.plants = {name: Plant(name, getattr(drive, name), getattr(drive.wind, name), known.antenna.beamwidth,
-                                   noise) for name in AXES}
+                                   noise, getattr(control, name).filter.imm) for name in AXES}
         self.gains = {}
 
     def set(self, node, name, gains):
@@ -354,11 +352,7 @@ class Loops:
     def measured(self, loop, name, corner=(1.0, 1.0)):
         """Return the frequency.margins of `response`, None if the drive trips."""
         found = self.response(loop, name, corner)
-        if found is None:
-            return None
-        # At the frequency of the structure on locked motors the dish holds the axis. There the gain |L| of the open
-        # loop falls below 1 long before the crossover. The crossover is therefore searched above the free frequency.
-        return frequency.margins(found, above=corner[1] * self.plants[name].free_mode if loop == 'speed' else 0.0)
+        return frequency.margins(found) if found is not None else None
 
     def close(self, loop, name, required, set_to, fastest):
         """Return (w, rows) of the fastest loop that meets the LoopRequirements `required`; w: its crossover [rad/s].

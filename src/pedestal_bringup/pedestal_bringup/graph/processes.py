@@ -103,7 +103,7 @@ class Graph:
         self.bag = pathlib.Path(bag)
         self.log = log_folder(bag)
         self.file = self.log / 'parameters.yaml'
-        self.processes = {}
+        self.processes, self._begun = {}, set()
         self._log_starts = {}
         with self._disk_errors_named():
             self.log.mkdir(parents=True, exist_ok=True)
@@ -162,11 +162,13 @@ class Graph:
         with self._disk_errors_named():
             self.file.write_text(parameters)
 
-    def begin(self, parameters):
-        """Start all held nodes. parameters: text of the ROS 2 parameter file with which every node starts."""
+    def begin(self, parameters, names=None):
+        """Start the held nodes. parameters: text of the ROS 2 parameter file with which they start; names: nodes to
+        start, None for all that do not run yet."""
         self.write(parameters)
         for node, process in self.processes.items():
-            if node not in self.servers:
+            if node not in self.servers and node not in self._begun and (names is None or node in names):
+                self._begun.add(node)
                 process.begin()
 
     def start(self, node):

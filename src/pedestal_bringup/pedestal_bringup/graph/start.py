@@ -13,6 +13,12 @@ START_LEAD_TIME_S = 5.0
 """Time from the start of the processes of a realtime run to time 0 of the run [s]. A start with compiled laws takes
 2 s. A node that is ready only after time 0 loses steps, but does no other harm."""
 
+DRIVES_LEAD_TIME_S = 5.0
+"""Additional time of servo drives that the launch file starts [s]. `pedestal run` waits for their answer instead."""
+
+LATEST_START_S = 600.0
+"""Longest time in which servo drives or a receiver must answer [s]. Before their answer, time 0 is this far ahead."""
+
 
 @dataclasses.dataclass
 class Outcome:
@@ -34,14 +40,18 @@ class Outcome:
 def begins(scenario):
     """Return graph.start of a run whose nodes start now: the UTC at which its time is 0 [ns]. In lockstep, where the
     steps alone determine the time, return 0."""
-    return time.time_ns() + round(START_LEAD_TIME_S * NS_PER_SECOND) if scenario.header.pacing == 'realtime' else 0
+    if scenario.header.pacing != 'realtime':
+        return 0
+    lead = START_LEAD_TIME_S + (DRIVES_LEAD_TIME_S if scenario.header.servo else 0.0)
+    return time.time_ns() + round(lead * NS_PER_SECOND)
 
 
-def parameters_of_all(scenario, bag, start):
+def parameters_of_all(scenario, bag, start, changes=None):
     """Return the text of the ROS 2 parameter file of a run: the values of a Scenario for each node, and the parameters
     `graph.` that all its nodes share.
 
-    bag: folder of the recording; start: graph.start, see `begins`.
+    bag: folder of the recording; start: graph.start, see `begins`; changes: {node: {name: value}} that the scenario
+    does not contain.
     """
     names = ','.join(dict.fromkeys(map(nodes.plain, scenario.nodes)))
     shared = {'graph.pacing': scenario.header.pacing, 'graph.nodes': names, 'graph.beams': scenario.header.graph_beams,
@@ -49,6 +59,8 @@ def parameters_of_all(scenario, bag, start):
               'graph.priority': scenario.header.priority}
     # The operator runs in this process and reads no parameter file.
     sections = {node: {**scenario.given(node), **shared} for node in scenario.nodes if node != 'operator'}
+    for node, values in (changes or {}).items():
+        sections[node].update(values)
     sections['recorder'].update(bag=str(bag), **configuration.recorder_parameters(scenario))
     # In realtime a drive that is started again continues at its last angles; an array has no angles to keep.
     if start and not scenario.header.beam:

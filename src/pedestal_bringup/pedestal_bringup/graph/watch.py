@@ -2,17 +2,24 @@
 program track and watches the other nodes.
 
 In lockstep a node that dies or is silent ends the run with an error that names the node (module lockstep). In realtime
-such a node is started again (module supervisor).
+such a node is started again (module supervisor). Simulated equipment and its node start before the other nodes,
+because time 0, a parameter of every node, follows the answer of the equipment.
 """
+import socket
+import time
+
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
 
 from pedestal_bringup.graph import lockstep, supervisor
 from pedestal_bringup.graph.operator_node import Operator, sole_run
-from pedestal_bringup.graph.start import Outcome, begins, parameters_of_all
+from pedestal_bringup.graph.processes import RunError, exit_description
+from pedestal_bringup.graph.start import LATEST_START_S, START_LEAD_TIME_S, Outcome, begins, parameters_of_all
 from pedestal_common.graph import nodes
+from pedestal_common.graph.steps import NS_PER_SECOND
 from pedestal_common.node import middleware
 from pedestal_common.wire import messages
+from pedestal_hardware.params import START_KEY
 
 
 def run(graph, tracks, progress):
@@ -50,10 +57,15 @@ def _in_lockstep(graph, operator, tracks, progress):
 def _in_realtime(graph, operator, tracks, progress):
     """Run a graph in realtime and return its Outcome; arguments as of `run`, operator: Operator."""
     supervisor.prepare(graph.scenario)
-    start = begins(graph.scenario)
+    start, changes = begins(graph.scenario), _addresses(graph.scenario)
+    if graph.scenario.header.simulated_parts:
+        try:
+            start = _equipment_begun(graph, operator, changes)
+        except KeyboardInterrupt:
+            return Outcome({}, {}, stopped=True)
     for track in tracks.values():
         messages.put_stamp(track.header.stamp, start)
-    graph.begin(parameters_of_all(graph.scenario, graph.bag, start))
+    graph.begin(parameters_of_all(graph.scenario, graph.bag, start, changes))
     supervised = supervisor.Supervisor(graph, operator, start)
     try:
         supervised.watch(tracks, progress)
@@ -64,6 +76,80 @@ def _in_realtime(graph, operator, tracks, progress):
     recorder = graph.result('recorder') if stopped else graph.outcome('recorder')
     return Outcome(graph.result(nodes.DRIVE_NODE), recorder, supervised.restarts.count, supervised.losses.count,
                    stopped)
+
+
+def _free_port(kind):
+    """Return a port of this machine that no program uses. kind: socket.SOCK_STREAM for TCP, SOCK_DGRAM for UDP."""
+    with socket.socket(socket.AF_INET, kind) as free:
+        free.bind(('127.0.0.1', 0))
+        return free.getsockname()[1]
+
+
+def _addresses(scenario):
+    """Return {node: {name: value}} of the free ports between simulated equipment and its nodes, where a Scenario gives
+    no port."""
+    found = {}
+    for part in scenario.header.simulated_parts:
+        node = nodes.SIMULATED_PARTS[part]
+        if part == nodes.SIMULATED_DRIVES.name:
+            changes = {'bus.port': _free_port(socket.SOCK_STREAM)}
+        elif scenario.node_parameters(node).source.kind == 'vita49':
+            changes = {'source.address': f'udp://127.0.0.1:{_free_port(socket.SOCK_DGRAM)}'}
+        else:
+            changes = {'source.address': f'tcp://127.0.0.1:{_free_port(socket.SOCK_STREAM)}'}
+        given = scenario.given(node)
+        found[node] = found[part] = {name: value for name, value in changes.items() if name not in given}
+    return found
+
+
+ANSWER_PARAMETERS = {
+    nodes.SIMULATED_DRIVES.name: {'bus.connect_time': LATEST_START_S, 'drives.start_after': START_LEAD_TIME_S},
+    nodes.SIMULATED_IQ.name: {'source.start_after': START_LEAD_TIME_S}}
+"""{simulated equipment: parameters with which its node chooses time 0 at the answer of the equipment}."""
+
+
+def _equipment_begun(graph, operator, changes):
+    """Let simulated equipment and its node begin, wait for the answer of the equipment, and return graph.start [ns],
+    which its node chooses then. If several are simulated, time 0 follows the answer of the drives.
+
+    graph: processes.Graph; operator: operator_node.Operator; changes: see parameters_of_all. Raises RunError.
+    """
+    part = graph.scenario.header.simulated_parts[0]
+    chooser = nodes.SIMULATED_PARTS[part]
+    provisional = time.time_ns() + round((LATEST_START_S + START_LEAD_TIME_S) * NS_PER_SECOND)
+    waiting = {node: {**values, **(ANSWER_PARAMETERS[part] if node in (chooser, part) else {})}
+               for node, values in changes.items()}
+    graph.begin(parameters_of_all(graph.scenario, graph.bag, provisional, waiting), (chooser, part))
+    executor = SingleThreadedExecutor()
+    executor.add_node(operator)
+    # A drive node ends by itself after LATEST_START_S, with an error that names the drives.
+    chosen = chosen_start(graph, operator, executor.spin_once, part, LATEST_START_S + START_LEAD_TIME_S)
+    executor.remove_node(operator)
+    return chosen
+
+
+def chosen_start(graph, operator, spin, part, limit):
+    """Wait until the node of simulated equipment chooses time 0, and return it [ns].
+
+    graph, operator: see `run`; spin: function spin(timeout_sec) that lets the operator take diagnostics; part: name
+    of the equipment; limit: longest wait [s]. Raises RunError that names the node and what it awaits.
+    """
+    chooser, chosen, heard = nodes.SIMULATED_PARTS[part], [], ['no diagnostics']
+
+    def note(status, _now):
+        if status.name == chooser:
+            heard[:] = [status.message]
+            chosen.extend(int(value.value) for value in status.values if value.key == START_KEY)
+    operator.on_diagnostics = note
+    end = time.monotonic() + limit
+    while not chosen:
+        spin(timeout_sec=0.1)
+        for node, code in graph.ended().items():
+            if node in (chooser, part):
+                raise RunError(graph.exit_report(node, exit_description(code)))
+        if not chosen and time.monotonic() > end:
+            raise RunError(graph.exit_report(chooser, f'has no answer of {part} after {limit:g} s: {heard[0]}'))
+    return chosen[0]
 
 
 def send_program(plan, start=None, ros_arguments=()) -> int:

@@ -38,19 +38,19 @@ class MemoryRecording:
                                              'acu': as_dict(run.units['acu'].parameters)}}
         self._run, self.start, self.end = run, 0, run.t[-1]      # time 0 of the scenario, time of the last step [s]
         self._tables = {}
-        self._keyholes = [(stamp, values) for stamp, values in run.forecasts if KEYHOLE_ENTRY in values]
+        self._forecasts = run.forecasts if any(KEYHOLE_ENTRY in values for _, values in run.forecasts) else []
 
     @functools.cached_property
     def topics(self):
         """{name: type} of the topics in this recording."""
-        of_diagnostics = {DIAGNOSTICS_TOPIC: messages.DiagnosticArray.__msgtype__} if self._keyholes else {}
+        of_diagnostics = {DIAGNOSTICS_TOPIC: messages.DiagnosticArray.__msgtype__} if self._forecasts else {}
         of_replies = dict.fromkeys(self._run.replies, messages.DiagnosticStatus.__msgtype__)
         return {**self._run.topics, **of_replies, **of_diagnostics}
 
     def table(self, topic):
         """Return {column: array (n,)} of a topic with a row per message, like columns.table of a bag."""
         if topic == DIAGNOSTICS_TOPIC:
-            return {'t': np.array([stamp for stamp, _ in self._keyholes]) / NS_PER_SECOND}
+            return {'t': np.array([stamp for stamp, _ in self._forecasts]) / NS_PER_SECOND}
         if topic in self._run.replies:
             return columns.table([messages.serialize(message) for *_, message in self.messages(topic)],
                                  self.topics[topic], [stamp for stamp, *_ in self._run.replies[topic]])
@@ -73,7 +73,7 @@ class MemoryRecording:
             yield topic, stamp, stamp, commands.reply_message(command, reply)
         if topic != DIAGNOSTICS_TOPIC:
             return
-        for stamp, values in self._keyholes:
+        for stamp, values in self._forecasts:
             status = messages.DiagnosticStatus(level=0, name='acu', message='', hardware_id='',
                                                values=[messages.KeyValue(key=key, value=value) for key, value in
                                                        values])

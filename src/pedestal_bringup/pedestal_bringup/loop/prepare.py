@@ -17,9 +17,14 @@ from pedestal_bringup.loop import closed_loop, side_by_side
 from pedestal_bringup.scenario import scenario
 from pedestal_common.compiled import compiled_once, done_file, is_compiled
 
+SERVO_DRIVES = 'scenario.drives=simulated', 'scenario.pacing=realtime'
+"""Changes of a scenario with which four servo drives take the place of the drive unit."""
+
 COMPILED_UNITS = (('leo_pass', 'acu'), ('leo_pass', 'adu'), ('leo_pass', 'tracking_receiver'), ('ship_pass', 'ins'),
-                  ('ship_pass', 'ship_motion'), ('phased_array_sway', 'adu'))
-"""(scenario, node): units that together use every law of a node, those with the longest compilation first."""
+                  ('ship_pass', 'ship_motion'), ('phased_array_sway', 'adu'),
+                  ('servo_step', 'drives', *SERVO_DRIVES), ('servo_step', 'adu', *SERVO_DRIVES))
+"""(scenario, node, changes of the scenario ...): units that together use every law of a node, those with the longest
+compilation first. The node of a rotator belongs to no scenario."""
 
 COMPILED_LOOPS = (('leo_pass', side_by_side.MIN_PARALLEL_LOOPS), ('ship_pass', 1), ('leo_pass', 1))
 """(scenario, number of parallel loops): closed loops that together use the laws on lanes, on a ship and ashore, those
@@ -39,16 +44,17 @@ def compile_unit(unit):
         ahead.join()
 
 
-def _unit_of_scenario(name, node):
-    """Return the unit of a node of the scenario `name`."""
-    return scenario.load(name).unit(node)
+def _unit_of_scenario(name, node, *changes):
+    """Return the unit of a node of the scenario `name` with changes."""
+    return scenario.load(name, changes).unit(node)
 
 
-def _compile_unit(name, node):
-    """Compile the laws of a node of the scenario `name`. Return (text that names them, time that this took [s])."""
+def _compile_unit(name, node, *changes):
+    """Compile the laws of a node of the scenario `name` with changes. Return (text that names them, time that this
+    took [s])."""
     begun = time.perf_counter()
-    compile_unit(_unit_of_scenario(name, node))
-    return f'{node} of {name}', time.perf_counter() - begun
+    compile_unit(_unit_of_scenario(name, node, *changes))
+    return f'{node} of {name}{" with servo drives" * bool(changes)}', time.perf_counter() - begun
 
 
 def _loop_done(name, count):

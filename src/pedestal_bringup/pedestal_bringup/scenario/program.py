@@ -8,6 +8,7 @@ import numpy as np
 
 from pedestal_bringup.scenario.scenario import Scenario
 from pedestal_common.geometry import orbit
+from pedestal_common.geometry.geodesy import SPEED_OF_LIGHT_M_S
 from pedestal_common.wire import messages
 from ship_motion_sim.sea import motion
 from tracking_receiver_sim import target
@@ -49,10 +50,10 @@ class Plan:
                 last bit to the times that the ACU reads from the message
         angles  (n, 2) rad: earth azimuth (unwrapped), elevation
 
-        The prediction omits two effects of the true target: UT1 - UTC and the travel time of the signal. It includes
-        refraction only if `program.refractivity` of the header is above 0. `program` may also add an intended error of
-        time, azimuth and elevation. Before or after its known path the target stays at
-        the first or last known place.
+        The prediction omits UT1 - UTC of the true target. It includes the travel time of the wave only if
+        `program.light_time` of the header is set, and refraction only if `program.refractivity` is above 0. `program`
+        may also add an intended error of time, azimuth and elevation. Before or after its known path the target stays
+        at the first or last known place.
         """
         program, duration = self.scenario.header.program, self.scenario.header.duration
         nanoseconds = np.round(np.arange(0.0, duration + 2.0 * program.interval, program.interval) * 1e9)
@@ -61,7 +62,10 @@ class Plan:
         for prefix in self.scenario.prefixes:
             built = self._nominal_target(prefix)
             known = np.clip(times - program.time_offset, built.breaks[0], built.breaks[-1])
-            azimuth, elevation, _ = target.look_angles(built, known)
+            azimuth, elevation, distance = target.look_angles(built, known)
+            if program.light_time:
+                left = np.maximum(known - distance / SPEED_OF_LIGHT_M_S, built.breaks[0])
+                azimuth, elevation, _ = target.look_angles(built, left)
             if program.refractivity > 0.0:
                 elevation = elevation + [arrival.refraction(program.refractivity, E)[0] for E in elevation]
             tables[prefix] = times, np.column_stack((np.unwrap(azimuth) + program.azimuth_offset,

@@ -47,7 +47,9 @@ class ProgramParameters(parameters.Parameters):
     azimuth_offset: float = parameters.parameter(0.0, -0.2, 0.2, 'rad', 'error of the predicted azimuth')
     elevation_offset: float = parameters.parameter(0.0, -0.2, 0.2, 'rad', 'error of the predicted elevation')
     refractivity: float = parameters.parameter(0.0, 0.0, 500.0, 'N', 'measured refractivity of the air, whose '
-                                               'refraction is added to the prediction; 0: no refraction')
+                                               'refraction is added to the prediction; 0: no refraction; only for an '
+                                               'ACU with refraction.kind none or refraction.program apparent')
+    light_time: bool = parameters.flag(False, 'travel time of the wave is part of the prediction')
 
 
 PROGRAM_ERRORS = {'program.time_offset': 's', 'program.azimuth_offset': 'rad', 'program.elevation_offset': 'rad'}
@@ -83,17 +85,41 @@ class ScenarioParameters(parameters.Parameters):
     seed: int = parameters.parameter(1, 0, 2**31 - 1, '', 'seed of every noise stream')
     ship: bool = parameters.flag(False, 'the pedestal is on a ship: the nodes ship_motion and ins take part')
     beam: bool = parameters.flag(False, 'the drive is an electronically steered array: beam_steering_node')
-    beams: int = parameters.parameter(1, 1, nodes.MAX_BEAMS, '', 'number of beams of the array; each of several has '
-                                      'receiver and ACU in a namespace beam_1 ...')
+    drives: str = parameters.choice('adu', ('adu', 'simulated'), 'adu: the drive unit with its simulated mechanics; '
+                                    'simulated: drive_node with four simulated CiA 402 drives on a CAN bus')
+    receiver: str = parameters.choice('simulated', ('simulated', 'simulated-iq'), 'simulated: the receiver with its '
+                                      'simulated target; simulated-iq: monopulse_receiver_node with simulated I/Q '
+                                      'samples')
+    beams: int = parameters.parameter(1, 1, nodes.MAX_BEAMS, '', 'number of beams of the array; with several beams, '
+                                      'each has receiver and ACU in a namespace beam_1 ...')
     deadline: float = _of_graph('deadline')
     priority: int = _of_graph('priority')
     program: ProgramParameters = parameters.group(ProgramParameters)
     restart: RestartParameters = parameters.group(RestartParameters)
 
     def check(self) -> None:
-        """Raise ParameterError for several beams of a drive with motors."""
+        """Raise ParameterError for several beams of a drive with motors, and for servo drives or I/Q of an array."""
+        if self.servo and self.beam:
+            raise parameters.ParameterError(f'drives = {self.drives}: must be adu with beam = true')
+        if self.iq and self.beam:
+            raise parameters.ParameterError(f'receiver = {self.receiver}: must be simulated with beam = true')
         if self.beams > 1 and not self.beam:
             raise parameters.ParameterError(f'beams = {self.beams}: must be 1 unless beam = true')
+
+    @property
+    def servo(self) -> bool:
+        """True if drive_node takes the place of the drive unit."""
+        return self.drives != 'adu'
+
+    @property
+    def iq(self) -> bool:
+        """True if monopulse_receiver_node takes the place of the simulated receiver."""
+        return self.receiver != 'simulated'
+
+    @property
+    def simulated_parts(self) -> tuple[str, ...]:
+        """Nodes that simulate a part of the equipment for a node that is made for real equipment."""
+        return ((nodes.SIMULATED_DRIVES.name,) if self.servo else ()) + ((nodes.SIMULATED_IQ.name,) if self.iq else ())
 
     @property
     def graph_beams(self) -> int:
@@ -133,8 +159,15 @@ not set it."""
 
 MEASUREMENT_FLAGS = tuple((node.name, topic.measured, topic.flag) for node in nodes.NODES if node.name != 'acu'
                           for topic in map(topics.TOPIC_BY_NAME.__getitem__, node.writes) if topic.measured)
-"""(publisher, its parameter `measured`, the subscribers' parameter `flag`) of each optional topic. Both are names of
-parameters, which are true if the topic exists (topics.Topic)."""
+"""(publisher, its parameter `measured`, the subscribers' parameter `flag`) of each optional topic. `measured` and
+`flag` stand for the names of two parameters. Both parameters are true if the topic exists (topics.Topic)."""
+
+
+SCANS_BEFORE_COAST = 2.5
+"""Number of errors of a feed with one output that must be missing before autotrack coasts."""
+
+IQ_LATENCY_STEPS = 2
+"""Latency of a receiver of I/Q samples for the control unit, in steps of the drive."""
 
 
 class ScenarioError(ValueError):
@@ -146,7 +179,7 @@ class ScenarioError(ValueError):
 class Scenario:
     """Checked scenario: its header and, for each node that takes part, the values that differ from the defaults.
 
-    With several beams the section `acu` holds for the control unit of each beam. The section of one beam, such as
+    With several beams the section `acu` applies to the control unit of every beam. The section of one beam, such as
     `beam_2/acu`, replaces its values. The receivers have sections of the same form.
 
     values: {node: {dotted name: value}}; notes: lines on limits that `checked` has changed.
@@ -162,7 +195,8 @@ class Scenario:
         program track."""
         ship = ('ship_motion', 'ins') if self.header.ship else ()
         operator = ('operator',) if self.header.program.source != 'none' else ()
-        return nodes.members((*ship, 'tracking_receiver', 'acu', 'adu', 'recorder', *operator),
+        return nodes.members((*ship, 'tracking_receiver', 'acu', *self.header.simulated_parts, 'adu', 'recorder',
+                              *operator),
                               self.header.graph_beams)
 
     @property
@@ -172,7 +206,7 @@ class Scenario:
 
     def row(self, node: str) -> Node:
         """Return the nodes.Node of one of its nodes."""
-        return nodes.row(node, self.header.beam)
+        return _row(node, self.header)
 
     def given(self, node: str) -> dict[str, typing.Any]:
         """Return {dotted name: value} of the values of this scenario for a node."""
@@ -192,6 +226,11 @@ class Scenario:
         """Return the scenario as a ROS 2 parameter file."""
         sections = {'scenario': parameters.as_dict(self.header), **self.values}
         return plain_yaml.dump({node: {'ros__parameters': values} for node, values in sections.items()})
+
+
+def _row(node: str, header: ScenarioParameters) -> Node:
+    """Return the nodes.Node of a node in the graph of a header."""
+    return nodes.row(node, header.beam, header.servo, header.iq)
 
 
 def _folder() -> 'Traversable':
@@ -228,13 +267,14 @@ def text(name_or_path: str | pathlib.Path) -> tuple[str, str]:
 
 def _values_of(sections: Sections, node: str) -> dict[str, typing.Any]:
     """Return the values of a node such as beam_2/acu: those of the section `acu` for every beam, replaced by those of
-    its own section."""
-    return {**sections.get(nodes.plain(node), {}), **sections.get(node, {})}
+    its own section. A simulated part of equipment has the values of its node, replaced by those of its own section."""
+    general = nodes.SIMULATED_PARTS.get(node) or nodes.plain(node)
+    return {**sections.get(general, {}), **sections.get(node, {})}
 
 
 def _is_node(name: str) -> bool:
     """Return True if a name is that of a node with a section in a scenario, such as acu or beam_2/acu."""
-    return nodes.plain(name) in (BEAM_NODES if nodes.beam_of(name) else SECTION_NODES)
+    return nodes.plain(name) in (BEAM_NODES if nodes.beam_of(name) else (*SECTION_NODES, *nodes.SIMULATED_PARTS))
 
 
 def _sections(name: str, content: str) -> Sections:
@@ -260,7 +300,8 @@ def by_node(sections: Sections, namespace: str = '') -> Sections:
 
 
 def _not_of_the_graph(section: str, namespace: str) -> str:
-    """Return the text why a section is for no node of a graph, with a name of the section that would be correct."""
+    """Return a text that states why a section is for no node of a graph, and which name of the section would be
+    correct."""
     _, name = parameter_file.divided(section)
     if name == 'scenario' or _is_node(name):
         graph = f'in the namespace {namespace}' if namespace else 'without a namespace'
@@ -340,9 +381,20 @@ def _check_each(node: str, values: Mapping[str, typing.Any]) -> None:
     except parameters.ParameterError:
         with contextlib.suppress(parameters.ParameterError):
             if node == nodes.DRIVE_NODE:
-                parameters.check_each(parameters_of('beam_steering'), own)
+                _check_each_of_other_drives(own)
+                return
+            if node == nodes.MONOPULSE_RECEIVER.name:
+                parameters.check_each(parameters_of(nodes.SIMULATED_IQ.name), own)
                 return
         raise
+
+
+def _check_each_of_other_drives(values: Mapping[str, typing.Any]) -> None:
+    """Raise ParameterError for the first value that is neither of an array nor of servo drives."""
+    with contextlib.suppress(parameters.ParameterError):
+        parameters.check_each(parameters_of(nodes.SIMULATED_DRIVES.name), values)
+        return
+    parameters.check_each(parameters_of('beam_steering'), values)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -363,7 +415,7 @@ class Draft:
             sections.setdefault(node, {})[key] = value
         given = {f'{node}.{key}': value for node, key, value in changes}
         if given.get('ship_motion.ship.motion') == 'recorded' and 'ship_motion.ship.heading_deg' not in given:
-            # The recording holds the heading, so that of the scenario ends.
+            # The recording contains the heading, so the heading of the scenario is removed.
             sections['ship_motion'].pop('ship.heading_deg', None)
         for node, key, value in changes:
             absent = node in OPTIONAL_NODES and not sections['scenario'].get('ship')
@@ -380,8 +432,7 @@ class Draft:
     @property
     def target(self) -> typing.Any:
         """Target parameters of the section `tracking_receiver`."""
-        return _checked(self.name, 'tracking_receiver', nodes.row('tracking_receiver').parameters_type(),
-                        self.sections.get('tracking_receiver', {})).target
+        return _target(self.name, self.sections.get('tracking_receiver', {}), self.sections['scenario'])
 
 
 def draft(name_or_path: str | pathlib.Path) -> Draft:
@@ -430,17 +481,19 @@ def checked(new_draft: Draft, seed: int | None = None, duration: float | None = 
     if header.beam:
         for axis in ('azimuth', 'elevation'):
             sections.setdefault('acu', {}).setdefault(f'{axis}.controller', 'beam')
-    for node in (*SECTION_NODES, *of_beams):
+    for part, key in ((nodes.SIMULATED_DRIVES.name, 'drives'), (nodes.SIMULATED_IQ.name, 'receiver')):
+        if part in sections and part not in header.simulated_parts:
+            raise ScenarioError(f'scenario {name}: section {part!r}: the scenario has {key} = {getattr(header, key)}')
+    for node in (*SECTION_NODES, *of_beams, *header.simulated_parts):
         sections.setdefault(node, {})
-        _checked(name, node, nodes.row(node, header.beam).parameters_type(), _values_of(sections, node))
+        _checked(name, node, _row(node, header).parameters_type(), _values_of(sections, node))
     _share_parameters(name, sections, header, seed)
     for node in of_beams:
         _share_with_beam(name, node, sections, header, seed)
     notes = _narrow(sections, header)
     for node, values in sections.items():
         try:
-            node_parameters = _checked(name, node, nodes.row(node, header.beam).parameters_type(),
-                                       _values_of(sections, node))
+            node_parameters = _checked(name, node, _row(node, header).parameters_type(), _values_of(sections, node))
         except ScenarioError as error:
             raise ScenarioError('; '.join((str(error), *notes))) from None
         with _errors_named(f'scenario {name}, {node}'):
@@ -477,12 +530,19 @@ def _narrow(sections: Sections, header: ScenarioParameters) -> tuple[str, ...]:
     return tuple(notes)
 
 
+def _target(name: str, receiver_values: Mapping[str, typing.Any],
+            header_values: Mapping[str, typing.Any]) -> typing.Any:
+    """Return the target parameters of the section `tracking_receiver`."""
+    iq = header_values.get('receiver', 'simulated') != 'simulated'
+    return _checked(name, 'tracking_receiver', nodes.row('tracking_receiver', iq=iq).parameters_type(),
+                    receiver_values).target
+
+
 def _derive_from_flight(name: str, receiver_values: dict[str, typing.Any],
                         header_values: dict[str, typing.Any]) -> None:
-    """Set the parameters that the scenario lacks and that the file of a target's path gives: station, reference range,
-    duration, and the start in the file of an orbit. Raises ScenarioError, TableError."""
-    target = _checked(name, 'tracking_receiver', nodes.row('tracking_receiver').parameters_type(),
-                      receiver_values).target
+    """Set the parameters that the scenario lacks, from the file of a target's path: station, reference range,
+    duration, and for the file of an orbit also the start time. Raises ScenarioError, TableError."""
+    target = _target(name, receiver_values, header_values)
     if target.track_file.path and target.kind != 'track_file':
         raise ScenarioError(f'scenario {name}, tracking_receiver: target.track_file.path = '
                             f'{target.track_file.path!r:.60}: has no effect with target.kind = {target.kind}; take '
@@ -523,7 +583,7 @@ def _share_parameters(name: str, sections: Sections, header: ScenarioParameters,
             share('ins', key, value)
 
     def value_of(node: str, key: str, otherwise: typing.Any = None) -> typing.Any:
-        default = parameters.defaults(nodes.row(node, header.beam).parameters_type()).get(key, otherwise)
+        default = parameters.defaults(_row(node, header).parameters_type()).get(key, otherwise)
         return sections[node].get(key, default)
 
     for node in ('acu', 'tracking_receiver'):
@@ -543,6 +603,17 @@ def _share_parameters(name: str, sections: Sections, header: ScenarioParameters,
         section, key = modelled[0]
         raise ScenarioError(f'scenario {name}, {section}: {key}: the INS publishes its errors; this parameter needs '
                             'ins.error_told = false')
+    if header.iq:
+        # The error of a block of samples has the stamp of its middle, and arrives one step after its end.
+        receiver = _checked(name, 'tracking_receiver', nodes.MONOPULSE_RECEIVER.parameters_type(),
+                            _values_of(sections, 'tracking_receiver'))
+        latency = (IQ_LATENCY_STEPS + 0.5 * (receiver.steps_per_error - 1)) * receiver.period
+        sections['acu'].setdefault('receiver_latency', latency)
+        if receiver.feed.scanned:
+            _share_scan(name, receiver, latency, sections['acu'])
+    if header.servo:
+        # A command acts with the synchronisation after the one that its joint states belong to.
+        sections['acu'].setdefault('command_delay', value_of('adu', 'period'))
     for owner, key, node, known_as in SHARED_PARAMETERS:
         if key in sections[owner]:
             sections[node].setdefault(known_as, sections[owner][key])
@@ -557,6 +628,25 @@ def _share_parameters(name: str, sections: Sections, header: ScenarioParameters,
                                ('beam_age', receiver.beam_age(tracking, tracking.period))):
                 if f'tracker.receiver.{key}' not in sections['acu']:
                     sections[f'{prefix}acu'].setdefault(f'tracker.receiver.{key}', value)
+
+
+def _share_scan(name: str, receiver: typing.Any, latency: float, values: dict[str, typing.Any]) -> None:
+    """Give the section `acu` the parameters that follow from a feed with one output: the noise of its errors, and the
+    time between them.
+
+    receiver: MonopulseParameters; latency: of the errors [s]. Raises ScenarioError for a scan that is too slow.
+    """
+    # Imported late, because their laws take half a second to import.
+    from acu_tracker.geometry.history import MAX_DELAY_STEPS
+    from pedestal_hardware.monopulse import feed
+    oldest = MAX_DELAY_STEPS * receiver.period
+    if latency > oldest:
+        raise ScenarioError(f'scenario {name}, tracking_receiver: feed.scan_rate = {receiver.feed.scan_rate:g} Hz: '
+                            f'its errors are up to {latency:g} s old, must be at most {oldest:g} s')
+    values.setdefault('tracker.receiver.integration', feed.effective_integration(receiver))
+    coast_after = SCANS_BEFORE_COAST * receiver.steps_per_error * receiver.period
+    if coast_after > parameters.defaults(nodes.row('acu').parameters_type())['tracker.coast_after']:
+        values.setdefault('tracker.coast_after', coast_after)
 
 
 def _share_with_beam(name: str, node: str, sections: Sections, header: ScenarioParameters, seed: int | None) -> None:
@@ -590,7 +680,7 @@ def _built(parameters_type: type[_P], values: Mapping[str, typing.Any]) -> _P:
     hashable = all(isinstance(value, int | float | str | None) for value in values.values())
     if not hashable:
         return parameters.build(parameters_type, values)
-    return _built_once(parameters_type, key)  # type: ignore[arg-type]  # mypy takes a class of fields for unhashable
+    return _built_once(parameters_type, key)  # type: ignore[arg-type]  # mypy regards a dataclass type as unhashable
 
 
 @functools.lru_cache(256)

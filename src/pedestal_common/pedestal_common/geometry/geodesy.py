@@ -1,4 +1,5 @@
-"""Geodesy on the WGS84 ellipsoid: the place of the pedestal, earth-fixed positions, the east-north-up frame."""
+"""Geodesy on the WGS84 ellipsoid: the place of the pedestal, earth-fixed positions, the east-north-up frame; also the
+constants of the turning earth and of the light."""
 import dataclasses
 import math
 
@@ -13,6 +14,13 @@ EARTH_RADIUS_M, EARTH_FLATTENING = 6378137.0, 1.0 / 298.257223563
 EARTH_RATE = 7.29211514670698e-5
 """Rate of the earth against TEME, the frame of SGP4, per second of UT1 [rad/s]; Vallado et al., AIAA 2006-6753,
 appendix C."""
+
+SIDEREAL_RATE = 1.00273790935 * 2.0 * math.pi / 86400.0
+"""Rate of the sidereal time of `gstime`, per second of UT1 [rad/s]. It exceeds EARTH_RATE by the precession of the
+equinox, 3.5e-5 deg a day."""
+
+SPEED_OF_LIGHT_M_S = 299792458.0
+"""Speed of light [m/s]."""
 
 
 @dataclasses.dataclass(frozen=True)

@@ -1,7 +1,7 @@
 """Orbit of a satellite: its elements from a TLE or an OMM, its position over a station by SGP4, and Julian dates.
 
 The earth turns with UT1. Without a ut1_offset, UT1 is taken as equal to UTC; tracking_receiver_sim.target states the
-resulting error.
+resulting error. earth_orientation reads UT1 and the polar motion from a file.
 """
 import datetime
 import re
@@ -12,7 +12,7 @@ from sgp4.io import compute_checksum
 from sgp4.propagation import gstime
 
 from pedestal_common.geometry import omm
-from pedestal_common.geometry.geodesy import EARTH_RATE, station_frame
+from pedestal_common.geometry.geodesy import EARTH_RATE, SIDEREAL_RATE, SPEED_OF_LIGHT_M_S, station_frame
 from pedestal_common.graph.steps import SECONDS_PER_DAY
 from pedestal_common.reproducible import arctan2, cos, sin, turned
 
@@ -87,17 +87,45 @@ def satellite(leo_pass) -> Satellite:
     return satrec
 
 
-def earth_fixed(julian, fractions, ut1_offset=0.0):
+def earth_fixed(julian, fractions, ut1_offset=0.0, pole=None):
     """Return rotations (n, 3, 3) from TEME, the frame of SGP4 (true equator and mean equinox of date), to the
     earth-fixed frame.
 
-    The times are the Julian dates julian + fractions (n,), in UTC. ut1_offset: UT1 - UTC [s].
+    The times are the Julian dates julian + fractions (n,), in UTC. ut1_offset: UT1 - UTC [s], one or (n,); pole: polar
+    motion x, y (n, 2) [rad], None for the pole of TEME.
     """
-    theta = gstime(julian) + EARTH_RATE * SECONDS_PER_DAY * fractions + EARTH_RATE * ut1_offset
+    theta = gstime(julian) + SIDEREAL_RATE * (SECONDS_PER_DAY * fractions + ut1_offset)
     c, s = cos(theta), sin(theta)
     to_fixed = np.zeros((len(fractions), 3, 3))
     to_fixed[:, 0, 0], to_fixed[:, 0, 1], to_fixed[:, 1, 0], to_fixed[:, 1, 1], to_fixed[:, 2, 2] = c, s, -s, c, 1.0
+    if pole is not None:
+        # The angles are below 3e-6 rad, so their squares do not matter.
+        x, y = pole[:, :1], pole[:, 1:]
+        to_fixed = np.stack((to_fixed[:, 0] + x * to_fixed[:, 2], to_fixed[:, 1] - y * to_fixed[:, 2],
+                             to_fixed[:, 2] - x * to_fixed[:, 0] + y * to_fixed[:, 1]), axis=1)
     return to_fixed
+
+
+def apparent(fixed, origin):
+    """Return the vectors (n, 3) [m] to the places at which an observer sees targets, earth-fixed.
+
+    fixed: positions (n, 3) [m] of the targets when the light left them, turned with the earth to its arrival; origin:
+    position (3,) [m] of the observer. The observer moves with the earth, which adds the diurnal aberration.
+    """
+    relative = fixed - origin
+    travel = np.sqrt(np.einsum('ni,ni->n', relative, relative)) / SPEED_OF_LIGHT_M_S
+    return relative + np.outer(travel, np.cross([0.0, 0.0, EARTH_RATE], origin))
+
+
+def _teme(satrec, julian, fractions):
+    """Return position and velocity (n, 3) [km, km/s] of a satellite in TEME; arguments as in `enu`. Raises
+    TargetError."""
+    error, position, velocity = satrec.sgp4_array(np.full(len(fractions), julian), fractions)
+    if error.any():
+        i = int(np.argmax(error != 0))
+        raise TargetError(f'{satrec.form} of satellite {satrec.number}: {iso(julian, fractions[i])}: '
+                          f'{SGP4_ERRORS[int(error[i])]}')
+    return position, velocity
 
 
 def enu(satrec, station, julian, fraction, times, ut1_offset=0.0):
@@ -107,16 +135,31 @@ def enu(satrec, station, julian, fraction, times, ut1_offset=0.0):
     ut1_offset: UT1 - UTC [s]. Raises TargetError where SGP4 fails.
     """
     fractions = fraction + times / SECONDS_PER_DAY
-    error, position, velocity = satrec.sgp4_array(np.full(len(times), julian), fractions)
-    if error.any():
-        i = int(np.argmax(error != 0))
-        raise TargetError(f'{satrec.form} of satellite {satrec.number}: {iso(julian, fractions[i])}: '
-                          f'{SGP4_ERRORS[int(error[i])]}')
+    position, velocity = _teme(satrec, julian, fractions)
     to_fixed = earth_fixed(julian, fractions, ut1_offset)
     r = np.einsum('nij,nj->ni', to_fixed, 1e3 * position)
     v = np.einsum('nij,nj->ni', to_fixed, 1e3 * velocity) - np.cross([0.0, 0.0, EARTH_RATE], r)
     origin, to_enu = station_frame(station)
     return turned(to_enu, r - origin), turned(to_enu, v)
+
+
+def seen(satrec, station, julian, fractions, to_fixed, light_time):
+    """Return the vectors (n, 3) [m], ENU of a station, in which a satellite is seen without refraction.
+
+    satrec, station  as in `enu`
+    julian, fractions, to_fixed  the Julian dates julian + fractions (n,) in UTC, and `earth_fixed` at these times
+    light_time       True to include the travel time of the wave
+
+    Raises TargetError where SGP4 fails.
+    """
+    origin, to_enu = station_frame(station)
+    fixed = np.einsum('nij,nj->ni', to_fixed, 1e3 * _teme(satrec, julian, fractions)[0])
+    if not light_time:
+        return turned(to_enu, fixed - origin)
+    relative = fixed - origin
+    travel = np.sqrt(np.einsum('ni,ni->n', relative, relative)) / SPEED_OF_LIGHT_M_S
+    left, _ = _teme(satrec, julian, fractions - travel / SECONDS_PER_DAY)
+    return turned(to_enu, apparent(np.einsum('nij,nj->ni', to_fixed, 1e3 * left), origin))
 
 
 def elevations(satrec, station, julian, fraction, times):

@@ -41,10 +41,11 @@ class GraphParameters(parameters.Parameters):
 
     def check(self) -> None:
         """Raise ParameterError for a name in `nodes` that is no node."""
+        known = (*nodes.NODE_NAMES, *nodes.SIMULATED_PARTS)
         for name in self._names:
-            if name not in nodes.NODE_NAMES:
+            if name not in known:
                 raise parameters.ParameterError(f"nodes = '{self.nodes}': '{name}': must be one of "
-                                                f'{", ".join(nodes.NODE_NAMES)}')
+                                                f'{", ".join(known)}')
 
     @property
     def members(self) -> tuple[str, ...]:

@@ -48,6 +48,15 @@ LAYOUTS = {
     'sensor_msgs/msg/Range': (
         Field('range', r'(range)', ('range',), '{}', 'm'),
         Field('variance', r'(variance)', ('variance',), '{}', 'm2')),
+    'sensor_msgs/msg/FluidPressure': (
+        Field('fluid_pressure', r'(fluid_pressure)', ('fluid_pressure',), '{}', 'Pa'),
+        Field('variance', r'(variance)', ('variance',), '{}', 'Pa2', recorded=False)),
+    'sensor_msgs/msg/Temperature': (
+        Field('temperature', r'(temperature)', ('temperature',), '{}', 'deg C'),
+        Field('variance', r'(variance)', ('variance',), '{}', 'K2', recorded=False)),
+    'sensor_msgs/msg/RelativeHumidity': (
+        Field('relative_humidity', r'(relative_humidity)', ('relative_humidity',), '{}'),
+        Field('variance', r'(variance)', ('variance',), '{}', recorded=False)),
     'geometry_msgs/msg/Vector3Stamped': (
         Field('vector', r'vector\.([xyz])', _XYZ, '{}'),),
     'nav_msgs/msg/Odometry': (

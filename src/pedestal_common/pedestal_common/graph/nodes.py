@@ -10,7 +10,7 @@ import re
 import typing
 from collections.abc import Collection, Iterable
 
-from pedestal_common.graph.topics import TOPIC_BY_NAME, TOPICS
+from pedestal_common.graph.topics import REALTIME_RATES, TOPIC_BY_NAME, TOPICS
 
 MAX_BEAMS = 16
 """Largest number of beams of an electronic array."""
@@ -99,9 +99,9 @@ NODES = (
     Node('acu', 'acu_tracker.acu_node', 'acu_tracker.params:AcuParameters', 'acu_tracker.unit:Acu',
          reads=('joint_states', 'tracking_receiver/angle_error', 'tracking_receiver/angle_rate',
                 'tracking_receiver/range', 'ship/imu/data', 'ins/error', 'adu/state', 'adu/stow_pins', 'ins/state',
-                'acu/program_track'),
+                'acu/program_track', 'weather/pressure', 'weather/temperature', 'weather/humidity'),
          writes=('acu/rate_command', 'acu/estimate', 'acu/reference', 'acu/filter', 'acu/mode', 'acu/keyhole',
-                 'acu/blockage', 'acu/alarms', 'acu/stow_pins'),
+                 'acu/blockage', 'acu/alarms', 'acu/stow_pins', 'acu/pointing'),
          answer='acu/rate_command',
          obeys='acu/command', replies='acu/command_result',
          doc='antenna control unit: filter, modes, position loop',
@@ -118,6 +118,9 @@ NODES = (
     Node('operator', reads=('diagnostics',), writes=('acu/program_track',),
          doc='sends the program track, receives diagnostics; runs inside `pedestal run`, or as `pedestal program`',
          stands_for='the operator'),
+    Node('weather_station', writes=('weather/pressure', 'weather/temperature', 'weather/humidity'),
+         doc='measures the weather for the refraction; no program of this project, and not simulated',
+         stands_for='the weather station'),
 )
 """Rows of the nodes, in the order in which a graph is started. Nodes with a unit also publish `diagnostics`."""
 
@@ -130,6 +133,78 @@ ARRAY_DRIVE = Node(DRIVE_NODE, 'adu_drive.beam_steering_node', 'adu_drive.params
                    stands_for='beam steering computer and array')
 """Drive of an array: it follows angles instead of rates, and the motion of the ship exerts no torque on it."""
 
+SERVO_DRIVE = Node(DRIVE_NODE, 'pedestal_hardware.drive_node', 'pedestal_hardware.params:ServoDriveParameters',
+                   'pedestal_hardware.unit:ServoDrives',
+                   reads=('clock', 'acu/rate_command'),
+                   writes=('joint_states', 'clock', 'adu/motor_states', 'adu/state'),
+                   answer='joint_states', replies='adu/injected',
+                   doc='four CiA 402 servo drives on a CAN bus in place of the drive; two drives for each axis',
+                   stands_for='nothing: this node commands the real drives')
+"""Drive of an antenna with servo drives on a bus. Real drives publish no true direction of the dish."""
+
+SIMULATED_DRIVES = Node('drives', 'pedestal_hardware.simulated.drives_node',
+                        'pedestal_hardware.params:ServoDriveParameters',
+                        'pedestal_hardware.simulated.unit:SimulatedDrives',
+                        reads=('clock', 'ship/truth'), writes=('adu/truth',),
+                        obeys='adu/inject', replies='adu/injected',
+                        doc='four simulated CiA 402 drives with the simulated mechanics, on a socketcand server',
+                        stands_for='servo drives and pedestal')
+"""Simulated drives of SERVO_DRIVE. A graph that names them has servo drives."""
+
+ROTATOR_DRIVE = Node(DRIVE_NODE, 'pedestal_hardware.rotator_node',
+                     'pedestal_hardware.rotator_params:RotatorParameters', 'pedestal_hardware.rotator.unit:Rotator',
+                     reads=('clock', 'acu/reference', 'acu/mode'),
+                     writes=('joint_states', 'clock', 'adu/state'),
+                     answer='joint_states',
+                     doc='rotator with its own position loop in place of the drive, by rotctld, GS-232, EasyComm or '
+                     'Rot2Prog',
+                     stands_for='nothing: this node drives a real rotator')
+"""Drive of a rotator: it follows angles, as an array does."""
+
+MONOPULSE_RECEIVER = Node('tracking_receiver', 'pedestal_hardware.monopulse.monopulse_receiver_node',
+                          'pedestal_hardware.monopulse.params:MonopulseParameters',
+                          'pedestal_hardware.monopulse.unit:MonopulseReceiver',
+                          reads=('clock',), writes=('tracking_receiver/angle_error',),
+                          doc='monopulse receiver of I/Q samples (VITA 49, GNU Radio by ZMQ, SigMF) in place of the '
+                          'simulated receiver',
+                          stands_for='nothing: this node receives the samples of a real front end')
+"""Receiver of the I/Q samples of an antenna."""
+
+SIMULATED_IQ = Node('iq', 'pedestal_hardware.monopulse.iq_node',
+                    'pedestal_hardware.monopulse.params:MonopulseParameters',
+                    'pedestal_hardware.monopulse.iq_unit:SimulatedIq',
+                    reads=('adu/truth', 'ship/truth'), writes=('target/truth',),
+                    obeys='tracking_receiver/inject', replies='tracking_receiver/injected',
+                    doc='simulated I/Q samples of target, antenna and front end, sent to the monopulse receiver',
+                    stands_for='feed, front end and RF')
+"""Simulated samples for MONOPULSE_RECEIVER. A graph that names them has such a receiver."""
+
+DRIVE_ROWS = (ARRAY_DRIVE, SERVO_DRIVE, SIMULATED_DRIVES, ROTATOR_DRIVE)
+"""Rows of the nodes that take the place of the drive in NODES, or simulate a part of it."""
+
+LEVEL_RECEIVER = Node('tracking_receiver', 'pedestal_hardware.level.level_receiver_node',
+                      'pedestal_hardware.level.params:LevelReceiverParameters',
+                      writes=('tracking_receiver/angle_error',),
+                      doc='receiver with a level only, for step track: lines by UDP, TCP or a serial line',
+                      stands_for='nothing: this node reads a real receiver', of_beam=True)
+"""Receiver without error channels."""
+
+INS_INPUT = Node('ins', 'pedestal_hardware.ins.ins_input_node', 'pedestal_hardware.ins.params:InsInputParameters',
+                 writes=('ship/imu/data', 'ins/state'),
+                 doc='attitude and deck rate of a real INS: NMEA sentences, or the `sensor_msgs/Imu` of its driver',
+                 stands_for='nothing: this node reads a real INS', optional=True)
+"""Input of a real INS. The INS publishes no statistics of its error."""
+
+EQUIPMENT_ROWS = (LEVEL_RECEIVER, INS_INPUT)
+"""Rows of the nodes that take the place of the simulated receiver or INS. They have no unit: each message of the
+equipment becomes a message of the graph."""
+
+HARDWARE_ROWS = (*DRIVE_ROWS, MONOPULSE_RECEIVER, SIMULATED_IQ, *EQUIPMENT_ROWS)
+"""Rows of all nodes that take the place of a node in NODES, or simulate a part of it."""
+
+SIMULATED_PARTS = {SIMULATED_DRIVES.name: DRIVE_NODE, SIMULATED_IQ.name: MONOPULSE_RECEIVER.name}
+"""{name of a node that simulates a part of the equipment: node that commands or receives this part}."""
+
 NODE_NAMES = tuple(node.name for node in NODES)
 UNIT_NODES = (*(node for node in NODES if node.unit), ARRAY_DRIVE)
 """Nodes that run a unit."""
@@ -141,17 +216,24 @@ BEAM_TOPICS = frozenset(('joint_states', 'adu/truth', 'acu/program_track',
 beam."""
 
 
-def row(name: str, array: bool = False) -> Node:
-    """Return the Node of a name, 'beam_2/acu' as well as 'acu'; array: True for a graph whose drive is an electronic
-    array."""
-    if array and name == DRIVE_NODE:
-        return ARRAY_DRIVE
+def row(name: str, array: bool = False, servo: bool = False, iq: bool = False) -> Node:
+    """Return the Node of a name, 'beam_2/acu' as well as 'acu'.
+
+    array: True for a graph whose drive is an electronic array; servo: True for a graph with servo drives; iq: True for
+    a graph with a receiver of I/Q samples.
+    """
+    if name in SIMULATED_PARTS:
+        return SIMULATED_DRIVES if name == SIMULATED_DRIVES.name else SIMULATED_IQ
+    if name == MONOPULSE_RECEIVER.name and iq:
+        return MONOPULSE_RECEIVER
+    if name == DRIVE_NODE and (array or servo):
+        return ARRAY_DRIVE if array else SERVO_DRIVE
     return NODES[NODE_NAMES.index(plain(name))]
 
 
 def of_executable(module: str) -> Node:
     """Return the Node of an executable."""
-    return next(node for node in (*NODES, ARRAY_DRIVE) if node.module == module)
+    return next(node for node in (*NODES, *HARDWARE_ROWS) if node.module == module)
 
 
 def beam_of(name: str) -> str:
@@ -186,10 +268,13 @@ class Link(typing.NamedTuple):
 
 
 @functools.cache
-def links(beams: int = 0) -> dict[str, Link]:
-    """Return {name: Link} of a graph, in the order of TOPICS; beams: number of beams of an electronic array, 0 for a
-    drive with motors."""
-    rows = [row(node.name, beams > 0) for node in NODES]
+def links(beams: int = 0, servo: bool = False, iq: bool = False) -> dict[str, Link]:
+    """Return {name: Link} of a graph, in the order of TOPICS.
+
+    beams: number of beams of an electronic array, 0 for a drive with motors; servo: True for a graph with simulated
+    servo drives; iq: True for a graph with simulated I/Q samples.
+    """
+    rows = [row(node.name, beams > 0, servo, iq) for node in NODES] + [SIMULATED_DRIVES] * servo + [SIMULATED_IQ] * iq
     links = {}
     for topic in TOPICS:
         writers = [node.name for node in rows if topic.name in (*node.writes, node.replies)
@@ -205,11 +290,16 @@ def links(beams: int = 0) -> dict[str, Link]:
     return links
 
 
+def links_of(names: Collection[str], beams: int = 0) -> dict[str, Link]:
+    """Return {name: Link} of a graph of these nodes, see `links`."""
+    return links(beams, SIMULATED_DRIVES.name in names, SIMULATED_IQ.name in names)
+
+
 def recorded(names: Collection[str], flags: Collection[str] = (), beams: int = 0) -> list[Link]:
     """Return the Links that have a publisher in a graph of these nodes, or to which any client may publish. These are
     recorded. flags: those of topics.TOPIC_FLAGS that are set."""
-    return [link for link in links(beams).values()
-            if any(name in names for name in (link.readers if link.rate == 'command' else link.writers))
+    return [link for link in links_of(names, beams).values()
+            if any(name in names for name in (link.readers if link.rate in REALTIME_RATES else link.writers))
             and (not link.flag or link.flag in flags)]
 
 

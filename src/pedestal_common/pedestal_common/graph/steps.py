@@ -19,6 +19,9 @@ NS_PER_SECOND = 1_000_000_000
 SECONDS_PER_DAY = 86_400
 """Seconds in a day [s]."""
 
+RECENT_INTERVALS = 8
+"""Number of intervals between the messages of a follower of which the shortest counts."""
+
 
 class GraphError(RuntimeError):
     """Error in the graph around a node. Its text is one line that names topic, stamp or node. silent: names of the
@@ -43,7 +46,8 @@ class Steps:
 
     In lockstep a step waits for exactly the messages due. Triggers that arrive before the answer are queued. In
     realtime the step t_k is answered at the latest when the trigger of the next step arrives. Its answer receives the
-    newest messages, and None for a follower without a new message.
+    newest messages, and None for a follower without a new message. Real equipment may have fewer messages than steps.
+    Therefore a realtime step waits only if the next message, by the shortest of the last intervals, is due.
 
     _ahead     triggers (stamp, message) whose step has not begun
     _pending   trigger of the step that waits for its inputs, or None
@@ -51,6 +55,7 @@ class Steps:
     _due       {follower: stamp of its message due in the pending step, or None}
     _arrived   {follower: messages (stamp, message) that no step has used}
     _last      {topic: stamp of its newest message}
+    _intervals {follower: last intervals between its stamps [ns]}
     """
 
     def __init__(self, trigger: str, followers: Mapping[str, int], lockstep: bool,
@@ -64,6 +69,8 @@ class Steps:
         self._due: dict[str, int | None] = dict.fromkeys(followers)
         self._arrived: dict[str, collections.deque] = {topic: collections.deque() for topic in followers}
         self._last: dict[str, int | None] = dict.fromkeys((trigger, *followers))
+        self._intervals: dict[str, collections.deque[int]] = {topic: collections.deque(maxlen=RECENT_INTERVALS)
+                                                              for topic in followers}
         self._pending: tuple[int, typing.Any] | None = None
         self._ahead: collections.deque[tuple[int, typing.Any]] = collections.deque()
         self._period: int | None = None
@@ -89,6 +96,8 @@ class Steps:
             if self._pending is not None and not self._lockstep:
                 self._close()
         else:
+            if last is not None:
+                self._intervals[topic].append(stamp - last)
             self._arrived[topic].append((stamp, message))
         while self._pending or self._ahead:
             if self._pending is None:
@@ -114,6 +123,7 @@ class Steps:
             if name in self._due:
                 self._awaited[name].clear()
                 self._arrived[name].clear()
+                self._intervals[name].clear()
                 self._due[name] = None
         if topic == self.trigger:
             self._pending = self._period = None
@@ -137,13 +147,18 @@ class Steps:
             return True
         while arrived and arrived[0][0] < due and len(arrived) > 1:
             arrived.popleft()
-        if not arrived:
-            return False
-        if self._lockstep and arrived[0][0] != due:
+        if not self._lockstep:
+            return bool(arrived) and arrived[0][0] >= due or self._next_stamp(topic) > due
+        if arrived and arrived[0][0] != due:
             raise GraphError(f'{topic} is stamped {arrived[0][0] / NS_PER_SECOND:.6f} s where '
                              f'{due / NS_PER_SECOND:.6f} s is due; is its latency the one of this node '
                              f'({self._latency[topic] / NS_PER_SECOND:.6f} s)?')
-        return arrived[0][0] >= due
+        return bool(arrived)
+
+    def _next_stamp(self, topic: str) -> int:
+        """Return the stamp that the next message of a follower has at the earliest, 0 for one without two messages."""
+        last, intervals = self._last[topic], self._intervals[topic]
+        return 0 if last is None or not intervals else last + min(intervals)
 
     def answer_incomplete(self) -> None:
         """Answer the pending realtime step, if there is one, without its missing inputs."""

@@ -6,6 +6,7 @@ Rate
     once    one message before the first step
     second  one message of each publisher at every whole second of the drive's time
     change  a message at each change; it belongs to the next step that its publisher answers
+    sample  a message whenever its publisher has measured, in realtime only; a lockstep run takes none
     command a message for each command; the reply states the result, and the step before which the command took effect
     reply   a message for each command that the node accepted or refused
 The rate determines the quality of service: see QOS_BY_RATE.
@@ -62,7 +63,14 @@ QOS_BY_RATE = {'step': Qos(latched=False, lockstep=0, written=1000, read=8, reli
                'change': Qos(latched=True, lockstep=1, written=1, read=8, reliable=True, recorded=1000),
                'command': Qos(latched=False, lockstep=100, written=100, read=100, reliable=True, recorded=1000),
                'reply': Qos(latched=False, lockstep=100, written=100, read=100, reliable=True, recorded=1000),
-               'second': Qos(latched=False, lockstep=10, written=10, read=100, reliable=True, recorded=1000)}
+               'second': Qos(latched=False, lockstep=10, written=10, read=100, reliable=True, recorded=1000),
+               'sample': Qos(latched=False, lockstep=10, written=10, read=10, reliable=False, recorded=1000)}
+
+UNSTEPPED_RATES = 'once', 'sample'
+"""Rates of messages that belong to no step, and that a unit takes by `decode`."""
+
+REALTIME_RATES = 'command', 'sample'
+"""Rates of messages that any client may publish, and that are recorded in realtime only."""
 
 EVENT_RATES = 'change', 'reply'
 """Rates of messages that are published between two steps, when there is a change or a reply."""
@@ -173,7 +181,7 @@ TOPICS = (
           'one point: filter estimate of the target, earth angles at t_k; NaN without an estimate',
           frame='earth'),
     Topic('acu/reference', 'trajectory_msgs/msg/JointTrajectory', 'step',
-          'one point: reference of the position loop, deck angles at t_k', frame='base_link'),
+          'one point: reference of the position loop, encoder angles at t_k', frame='base_link'),
     Topic('acu/filter', 'sensor_msgs/msg/JointState', 'step',
           'numbers of the filter of each axis, all in `position`: innovation, NIS, 1-sigma, correlation of angle and '
           'rate, and the probability of each motion model; NaN for a number without a value in this step: '
@@ -190,12 +198,23 @@ TOPICS = (
           '`keyhole_loss_s`, `keyhole_worst_deg`, `keyhole_needed_deg_s`, `deck_motion_deg`)'),
     Topic('acu/blockage', 'std_msgs/msg/String', 'change',
           'predicted beginning and end of the blockage of the target by the superstructure'),
+    Topic('acu/pointing', 'std_msgs/msg/String', 'change',
+          'pointing model in force, as JSON: `antenna`, `file`, `date`, `rms_deg`, `terms` ({name: value} [deg]; p9 '
+          'and p12 are factors). While another model takes effect: also `before`, the terms before, and the begin and '
+          'the end of the change, `begins_s` and `ends_s` [s of the graph]. No message without a model'),
     Topic('acu/alarms', 'diagnostic_msgs/msg/DiagnosticArray', 'change',
           'one status for each alarm in a state other than normal, annunciated alarms first; the section Alarms gives '
           'the meaning of `values`'),
     Topic('acu/program_track', 'trajectory_msgs/msg/JointTrajectory', 'once',
           'two or more points: program track, time-tagged azimuth and elevation (earth); one point: preset angles '
           '(deck)', frame='earth'),
+    Topic('weather/pressure', 'sensor_msgs/msg/FluidPressure', 'sample',
+          'pressure of the air at the station [Pa], not reduced to sea level; the ACU uses it for the refraction',
+          names=()),
+    Topic('weather/temperature', 'sensor_msgs/msg/Temperature', 'sample',
+          'temperature of the air at the station [deg C]', names=()),
+    Topic('weather/humidity', 'sensor_msgs/msg/RelativeHumidity', 'sample',
+          'relative humidity of the air at the station, 0 to 1', names=()),
     Topic('acu/command', 'diagnostic_msgs/msg/DiagnosticStatus', 'command',
           'name = command, hardware_id = client, message = number of the request, values = arguments; see commands'),
     Topic('acu/command_result', 'diagnostic_msgs/msg/DiagnosticStatus', 'reply',

@@ -8,15 +8,23 @@ from pedestal_common.wire.records import NO_STAMP
 
 class Simulated(Unit):
     """Unit of simulated equipment. Its record has a field `schedule` (schedule.SCHEDULE_DTYPE), which its law reads.
-    Its parameters have the field `inject`."""
+    Its parameters have the field `inject`.
+
+    FAULTS_OF    node of table.INJECTED_FAULTS whose faults it has; '': its own node
+    """
+    FAULTS_OF = ''
+
+    @property
+    def _faulty(self):
+        return self.FAULTS_OF or self.NODE.name
 
     def schedule(self):
         """Return [(at [ns], Command)] of the parameter `inject`."""
-        return table.scheduled_commands(self.NODE.name, self.parameters.inject)
+        return table.scheduled_commands(self._faulty, self.parameters.inject)
 
     def execute(self, command, arguments):
         """Inject a fault from the next step; the Reply states the stamp of the step before."""
-        part, node = self.parts['schedule'], self.NODE.name
+        part, node = self.parts['schedule'], self._faulty
         since = '' if part['stamp'] == NO_STAMP else f' from the step after {part["stamp"] / NS_PER_SECOND:.6f} s on'
         if command.verb == table.CLEAR_COMMAND.name:
             schedule.clear(part)
@@ -31,4 +39,4 @@ class Simulated(Unit):
                                                        else ''))
 
     def _fault(self, name):
-        return table.INJECTED_FAULTS[self.NODE.name][table.code(self.NODE.name, name)]
+        return table.INJECTED_FAULTS[self._faulty][table.code(self._faulty, name)]

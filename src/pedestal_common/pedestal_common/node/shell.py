@@ -140,7 +140,7 @@ class Shell(Node):
         super().__init__(name)
         self._parameters_type = parameters_type
         self._declare(live)
-        self.links = nodes.links(self.graph.beams)
+        self.links = nodes.links_of(self.graph.members, self.graph.beams)
         self._root, self.beam = self._place(name)
         self.name = self.beam + name
         self.finished = False
@@ -281,6 +281,15 @@ class Shell(Node):
         """Subscribe to a topic of the graph, and call take(message) for every message."""
         type_name = self._link(name)[0].type
         self.reader(name, lambda data: (None, messages.deserialize(data, type_name)),
+                    lambda message, after_gap: take(message))
+
+    def sample_reader(self, name, take):
+        """Subscribe to a topic of rate `sample`, and call take(message) for every message.
+
+        Unlike message_reader this also drops messages whose stamp is in the future, or not newer than the last one.
+        """
+        type_name = self._link(name)[0].type
+        self.reader(name, lambda data: (messages.stamp_of(data) or None, messages.deserialize(data, type_name)),
                     lambda message, after_gap: take(message))
 
     def every(self, period, function):

@@ -152,9 +152,10 @@ class TopicSubscriber:
         self.link, self._node, self._ros_name, self._take = link, node, ros_name, take
         is_shared = len(link.writers) > 1 or link.rate in ('once', 'command')
         self._expected = any(writer in node.graph.members for writer in link.writers)
-        text = link.rate in topics.EVENT_RATES and self._expected
+        text, sample = link.rate in topics.EVENT_RATES and self._expected, link.rate == 'sample'
+        unexpected = None if is_shared else self._surplus_count if sample else self._unexpected_count
         self.gate = publisher_gate.PublisherGate(
-            decode, round(node.graph.future * 1e9), None if is_shared else self._unexpected_count, paced=not text,
+            decode, round(node.graph.future * 1e9), unexpected, paced=not (text or sample),
             oldest=MAX_COMMAND_AGE_NS if link.rate == 'command' else None)
         self._held, self._missed = collections.deque(maxlen=MAX_HELD_TEXTS), 0
         self.callback = self._hold if text else self._receive
@@ -205,6 +206,10 @@ class TopicSubscriber:
         """Return the number of unexpected publishers for PublisherGate. A node before its discovery counts as
         unexpected."""
         return len(self.unexpected_publishers()) if self._expected else None
+
+    def _surplus_count(self):
+        """Return the number of publishers beyond one, for a topic of rate `sample`, which any one node may publish."""
+        return max(len(self._node.publishers_of(self._ros_name)) - 1, 0)
 
     def finding(self, now):
         """Return (level, text) for the diagnostics, about messages dropped within DROP_REPORT_NS; None without any.

@@ -48,7 +48,7 @@ class Unit(typing.Protocol):
     the closed loop both are one record, which holds all topics of the step. The drive is the exception: its inputs are
     the record of the step before.
 
-    NODE         row of nodes.NODES, or nodes.ARRAY_DRIVE, of the node that runs this unit
+    NODE         row of nodes.NODES or nodes.HARDWARE_ROWS of the node that runs this unit
     LAWS         {type of its memory: (law of one step, law of many steps)}, compiled. The second law takes arrays (n,)
                  of stamps and records
     LIVE         prefixes of the parameters that may change while it runs
@@ -103,8 +103,9 @@ class Unit(typing.Protocol):
 
     @classmethod
     def inputs_type(cls) -> np.dtype:
-        """Return the type of the record of its inputs, without the topics of rate `once` (see `decode`)."""
-        return records.of(*(name for name in cls.NODE.reads if topics.TOPIC_BY_NAME[name].rate != 'once'))
+        """Return the type of the record of its inputs, without the topics that `decode` takes."""
+        return records.of(*(name for name in cls.NODE.reads
+                            if topics.TOPIC_BY_NAME[name].rate not in topics.UNSTEPPED_RATES))
 
     @classmethod
     def outputs_type(cls) -> np.dtype:
@@ -159,8 +160,8 @@ class Unit(typing.Protocol):
         return self._due[0][0] if self._due else NEVER_DUE_NS
 
     def execute_due(self, stamp: int) -> None:
-        """Execute the scheduled commands for the step of a stamp [ns] and before. A unit that starts later than its
-        schedule skips the earlier commands."""
+        """Execute the scheduled commands that are due at or before the step with this stamp [ns]. A unit that starts
+        later than its schedule skips the earlier commands."""
         while self._due and self._due[0][0] <= stamp:
             at, command = self._due.popleft()
             if self._last is not None or at == stamp:
@@ -191,7 +192,7 @@ class Unit(typing.Protocol):
         raise KeyError(command.verb)
 
     def decode(self, topic: str, message: typing.Any) -> None:
-        """Take a message of a topic of rate `once`. Raises ValueError for a refused message."""
+        """Take a message of a topic of rate `once` or `sample`. Raises ValueError for a refused message."""
         raise ValueError(f'{topic} is not read')
 
     def take_text(self, topic: str, text: str) -> None:
@@ -230,7 +231,8 @@ class Unit(typing.Protocol):
 
     @staticmethod
     def idle(numbers: Mapping[str, typing.Any]) -> str:
-        """Return the reason why a recording does not exercise this unit, '' if it does.
+        """Return the reason why this unit did nothing in a recording, such as a receiver that never locked; '' if it
+        was active.
 
         numbers: the recorded topics, {topic: numbers (n, columns)} for stamped topics, {topic: texts} for the others.
         """
@@ -258,8 +260,8 @@ def announced(unit: Unit, topic: str, stamps: np.ndarray,
     """Return (stamps (m,) [ns], texts) of a text topic of a unit: a text for each change in outputs (n,).
 
     stamps: of the steps (n,) [ns]. A text has the stamp of the first stamped message that the unit writes in the same
-    step. This stamp is earlier than the step where the unit answers late. Without this message the text has the stamp
-    of the step.
+    step. If the unit answers late, this stamp is earlier than that of the step. Without such a message the text has
+    the stamp of the step.
     """
     answers = next(outputs[name]['stamp'] for name in unit.NODE.writes if not records.is_text(name))
     stamps = np.where(answers != records.NO_STAMP, answers, stamps)

@@ -172,7 +172,8 @@ class UnitNode(shell.Shell):
                                        f'{refusal}')
 
     def _listen(self, port):
-        """Subscribe to the topics that do not belong to a step: texts, topics of rate `once`, commands."""
+        """Subscribe to the topics that do not belong to a step: texts, topics of rate `once` or `sample`, commands.
+        """
         if self.row.obeys:
             self.message_reader(port.named(self.row.obeys), self._command_taker(port))
         for name in port.unit.reads:
@@ -184,6 +185,8 @@ class UnitNode(shell.Shell):
                 if self.graph.lockstep and any(writer in self.graph.members for writer in self.links[
                         self.beam + name if self.beam + name in self.links else name].writers):
                     self._waiting_for_once.add(name)
+            elif rate == 'sample' and not self.graph.lockstep:
+                self.sample_reader(port.named(name), self._sample_taker(port, name))
 
     def _command_taker(self, port):
         """Return take(message), which passes a command to the unit."""
@@ -215,6 +218,18 @@ class UnitNode(shell.Shell):
                 self.get_logger().warning(self.refused)
             self._waiting_for_once.discard(name)
             self._release()
+        return take
+
+    def _sample_taker(self, port, name):
+        """Return take(message), which passes a message of rate `sample` to the unit.
+
+        Messages before the first step are dropped, because the first step determines the epoch.
+        """
+        def take(message):
+            if not self._stamp:
+                return
+            stamp = messages.nanoseconds(message.header.stamp)
+            port.unit.decode(name, messages.since(message, self.epoch(stamp) if stamp else 0))
         return take
 
     def _settle(self):
@@ -255,7 +270,7 @@ class UnitNode(shell.Shell):
         if self.graph.lockstep:
             self.every(LOCKSTEP_POLL_S, self._watch_pending_step)
         else:
-            self._answered = self._watched = self._begun = time.monotonic_ns()
+            self._answered = self._triggered = self._watched = self._begun = time.monotonic_ns()
             self.every(TRIGGER_POLL_S, self._watch_trigger)
 
     def _look_for_replay(self):
@@ -299,6 +314,8 @@ class UnitNode(shell.Shell):
                 if name == steps.trigger and message[0] <= self._stamp:
                     for port in self.ports:
                         port.reset_after_gap()
+            if name == steps.trigger:
+                self._triggered = time.monotonic_ns()
             steps.take(name, message[0], message)
         return take
 
@@ -350,7 +367,8 @@ class UnitNode(shell.Shell):
         if self.clock()[1] < self.graph.start:
             self._answered = self._begun = now
         stalled, self._watched = now - self._watched > limit, now
-        silent = now - self._answered > limit and not stalled
+        # A step that waits for its inputs has a trigger, but no answer yet.
+        silent = now - max(self._answered, self._triggered) > limit and not stalled
         if silent and self.steps.pending_stamp is not None:
             # The pending step has the last trigger before the silence. If it waited longer for its inputs, it would be
             # answered with messages from after the silence.

@@ -99,7 +99,8 @@ def _check(events, aliases):
             if not aliases:
                 problem = f'the alias *{event.anchor} is refused; write the values themselves'
                 raise yaml.composer.ComposerError(None, None, problem, event.start_mark)
-            count += sizes.get(event.anchor, MAX_VALUES)  # an unknown anchor, or one around this alias, has no size
+            # An anchor that is unknown, or whose value contains this alias, has no size yet.
+            count += sizes.get(event.anchor, MAX_VALUES)
         elif isinstance(event, yaml.CollectionStartEvent):
             begun.append((event.anchor, count))
         elif isinstance(event, yaml.CollectionEndEvent):

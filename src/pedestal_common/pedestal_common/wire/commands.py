@@ -25,7 +25,7 @@ outside the limits; an argument is outside its range."""
 MAX_TEXT_CHARACTERS = 1000
 """Largest length of a name or value [characters]. The largest known value, an OMM in JSON, has half of it."""
 
-MAX_ARGUMENTS = 20
+MAX_ARGUMENTS = 30
 """Largest number of arguments of a command."""
 
 MAX_COMMAND_AGE_NS = 1_000_000_000

@@ -26,6 +26,7 @@ Clock = _TYPES['rosgraph_msgs/msg/Clock']
 DiagnosticArray = _TYPES['diagnostic_msgs/msg/DiagnosticArray']
 DiagnosticStatus = _TYPES['diagnostic_msgs/msg/DiagnosticStatus']
 Duration = _TYPES['builtin_interfaces/msg/Duration']
+FluidPressure = _TYPES['sensor_msgs/msg/FluidPressure']
 Header = _TYPES['std_msgs/msg/Header']
 Imu = _TYPES['sensor_msgs/msg/Imu']
 JointState = _TYPES['sensor_msgs/msg/JointState']
@@ -38,7 +39,9 @@ Pose = _TYPES['geometry_msgs/msg/Pose']
 PoseWithCovariance = _TYPES['geometry_msgs/msg/PoseWithCovariance']
 Range = _TYPES['sensor_msgs/msg/Range']
 Quaternion = _TYPES['geometry_msgs/msg/Quaternion']
+RelativeHumidity = _TYPES['sensor_msgs/msg/RelativeHumidity']
 String = _TYPES['std_msgs/msg/String']
+Temperature = _TYPES['sensor_msgs/msg/Temperature']
 Time = _TYPES['builtin_interfaces/msg/Time']
 Twist = _TYPES['geometry_msgs/msg/Twist']
 TwistWithCovariance = _TYPES['geometry_msgs/msg/TwistWithCovariance']
@@ -155,6 +158,12 @@ def _imu(row):
 _TEMPLATES = {'sensor_msgs/msg/JointState': _joint_state, 'trajectory_msgs/msg/JointTrajectory': _joint_trajectory,
               'geometry_msgs/msg/Vector3Stamped': _vector3_stamped, 'sensor_msgs/msg/Range': _range,
               'nav_msgs/msg/Odometry': _odometry, 'sensor_msgs/msg/Imu': _imu,
+              'sensor_msgs/msg/FluidPressure': lambda row: FluidPressure(header=header(row.frame), fluid_pressure=0.0,
+                                                                         variance=0.0),
+              'sensor_msgs/msg/Temperature': lambda row: Temperature(header=header(row.frame), temperature=0.0,
+                                                                     variance=0.0),
+              'sensor_msgs/msg/RelativeHumidity': lambda row: RelativeHumidity(
+                  header=header(row.frame), relative_humidity=0.0, variance=0.0),
               'rosgraph_msgs/msg/Clock': lambda row: Clock(clock=Time(sec=0, nanosec=0))}
 
 

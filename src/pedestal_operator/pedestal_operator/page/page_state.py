@@ -8,6 +8,7 @@ path            page_sky.Path of the program track, or None
 """
 import math
 
+from pedestal_common.geometry import pointing_report
 from pedestal_common.graph import topics
 from pedestal_operator import state
 from pedestal_operator.page import page_sky
@@ -49,9 +50,9 @@ def _deck(antenna):
 def now(antenna) -> dict:
     """Return the present numbers: angles and errors [deg], rates [deg/s], level [dB-Hz], torques of the motors [Nm].
 
-    `axes` are deck angles, `beam` the earth angles of the beam.
+    `axes` are deck angles of the beam on the sky, with the encoder angles; `beam` are its earth angles.
     """
-    actual, commanded = antenna.angles('joint_states'), antenna.angles('acu/reference')
+    actual, commanded = antenna.directions('joint_states'), antenna.directions('acu/reference')
     receiver, torques = (math.nan,) * 3, []
     if antenna.present(ANGLE_ERROR_TOPIC):
         x, y, level = antenna.numbers[ANGLE_ERROR_TOPIC]
@@ -60,8 +61,9 @@ def now(antenna) -> dict:
         torques = [round(float(torque), 3)
                    for torque in antenna.numbers[MOTOR_STATES_TOPIC][-len(topics.MOTOR_NAMES):]]
     return {'t': antenna.now, 'mode': antenna.texts.get('acu/mode', ''),
-            'axes': [{'actual': a, 'commanded': c, 'error': c - a, 'rate': rate}
-                     for a, c, rate in zip(actual, commanded, antenna.rates())],
+            'axes': [{'actual': a, 'commanded': c, 'error': c - a, 'encoder': encoder, 'rate': rate}
+                     for a, c, encoder, rate in zip(actual, commanded, antenna.encoder_angles('joint_states'),
+                                                    antenna.rates())],
             'receiver': [float(value) for value in receiver], 'torques': torques,
             'beam': _deck(antenna).seen(*actual)}
 
@@ -87,6 +89,7 @@ def status_section(antenna) -> dict:
             **{key: acu.get(key, '') for key in ('control', 'fallback', 'locked')},
             'header': {name: shown._asdict() for name, shown in header.items()},
             'axes': [shown._asdict() for shown in state.axis_states(antenna)],
+            'model': antenna.pointing_model.title if antenna.pointing_model else '',
             'steps': acu.get('clock_steps', ''), 'offset_ms': acu.get('offset joint_states_ms', ''),
             'first_alarm': first_alarm(antenna),
             'refused': {'holder': state.refusals(antenna, True), 'other': state.refusals(antenna, False),
@@ -131,7 +134,8 @@ def sky(antenna, coming) -> dict:
     """Return the content of the sky plot in earth angles [deg]: path, hidden sectors, lines, sun and passes.
 
     `floor` and `top` are the lines of the lowest and the highest elevation that the antenna can reach; `hole` is the
-    time of the keyhole, UTC [s]. coming: passes after the program track, from page_passes.UpcomingPasses.
+    time of the keyhole, UTC [s]. `residuals` are those of the pointing model in force [deg]: azimuth and elevation on
+    the deck, cross-elevation, elevation. coming: passes after the program track, from page_passes.UpcomingPasses.
     """
     deck, p, acu = _deck(antenna), antenna.configuration, antenna.diagnostics_of('acu')
     begin = epoch(antenna)
@@ -147,4 +151,6 @@ def sky(antenna, coming) -> dict:
             'floor': deck.line([*floor, [floor[0][0] + 360.0, floor[0][1]]]) if floor else
                      deck.line([[0.0, low], [360.0, low]]) if low > 0.0 else [],
             'top': deck.line([[0.0, high], [360.0, high]]) if high < 90.0 else [],
+            'residuals': (pointing_report.residual_rows(antenna.pointing_model.residuals) if antenna.pointing_model
+                          else []),
             'bow': deck.seen(0.0, 0.0) if antenna.present(ATTITUDE_TOPIC) else []}

@@ -85,7 +85,7 @@ class Pointing:
         """Return earth angles (azimuth, elevation) [deg] of the antenna. Raises Refused if they are stale."""
         stale = [topic for topic in ('joint_states', *([ATTITUDE_TOPIC] if self.on_ship else []))
                  if not self._remote.present(topic, MAX_ANGLE_AGE_S)]
-        angles = self._remote.angles('joint_states')
+        angles = self._remote.directions('joint_states')
         if stale or not all(map(math.isfinite, angles)):
             raise Refused(OUTCOME_NO_POSITION, f'the position of the antenna is unknown: no {" and ".join(stale)}'
                           if stale else 'the position of the antenna is unknown: joint_states is not a number')
@@ -108,7 +108,7 @@ class Pointing:
         self.earth_angles()     # Only for its check: it raises Refused without a fresh position.
         # On a ship the first `near` is a deck angle and not an earth angle. This is sufficient, because the whole
         # turns of an earth azimuth matter only from one set-point to the next.
-        near = (self._filter.set_point if self.continues(now) else self._remote.angles('joint_states'))[0]
+        near = (self._filter.set_point if self.continues(now) else self._remote.directions('joint_states'))[0]
         if self.on_ship:
             return near + (azimuth - near + 180.0) % 360.0 - 180.0, elevation
         turned = turn(azimuth, near, limits.azimuth)

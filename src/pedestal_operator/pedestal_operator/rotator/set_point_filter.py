@@ -1,4 +1,4 @@
-"""Filter that makes one steady motion of the set-points of a rotator program. No ROS here.
+"""Filter that turns the set-points of a rotator program into one steady motion. No ROS here.
 
     P, C    set-point, and point that is commanded to the antenna: (azimuth, elevation) [deg]
     r       estimated rate of the set-points [deg/s]

@@ -15,9 +15,14 @@ function showAxes({now, status, fixed}) {
     setText(find(`${name}-actual`), `${number(axis.actual, 3)}°`);
     setText(find(`${name}-commanded`), `${number(axis.commanded, 3)}°`);
     setText(find(`${name}-error`), `${number(axis.error, 4)}°`, wide ? 'warn' : '');
+    setText(find(`${name}-encoder`), `${number(axis.encoder, 3)}°`);
     setText(find(`${name}-rate`), `${number(axis.rate, 3)} °/s`);
     if (status) setText(find(`${name}-state`), status.axes[i].text, status.axes[i].level);
   });
+  // Without a pointing model the encoders show the direction of the beam.
+  const encoders = find('encoder');
+  encoders.hidden = !(status && status.model);
+  encoders.title = status ? status.model : '';
 }
 
 // A bar from limit to limit. Its scale is in degrees and shows whole turns.
@@ -48,9 +53,11 @@ class Travel {
     this.actual = draw(this.svg, 'line', {y1: 1, y2: 14, class: 'here'});
   }
 
-  show({actual, commanded}) {
+  // The limits are encoder angles.
+  show({encoder, error}) {
     if (!this.actual) return;
-    for (const [line, angle] of [[this.actual, actual], [this.commanded, commanded]]) {
+    const commanded = encoder === null || error === null ? null : encoder + error;
+    for (const [line, angle] of [[this.actual, encoder], [this.commanded, commanded]]) {
       show(line, angle !== null);
       if (angle === null) continue;
       const x = this.x(angle).toFixed(1);

@@ -5,6 +5,9 @@ import {draw, keepTextSize, points, set, show} from './svg.js';
 import {day, find, make, minute, number, setText, time} from './text.js';
 
 const RADIUS = 96;
+const ARROW = 24;     // length of the longest arrow
+
+let shown = false;    // true while the residuals take the place of the sky
 
 function place([azimuth, elevation]) {
   const r = RADIUS * (90 - elevation) / 90;
@@ -84,6 +87,32 @@ function drawSky(svg, sky) {
   }
 }
 
+const size = ([, , across, upward]) => Math.hypot(across, upward);
+const largest = (rows) => Math.max(...rows.map(size), 1e-9);
+const rms = (rows) => Math.sqrt(rows.reduce((sum, row) => sum + size(row) ** 2, 0) / (2 * rows.length));
+
+// Draw the residuals [deg] of the pointing model in force: as arrows, and as dots whose size grows with the residual.
+function drawResiduals(svg, rows) {
+  svg.replaceChildren();
+  grid(svg);
+  for (const row of rows) {
+    const [azimuth, elevation, across, upward] = row;
+    const angle = azimuth * Math.PI / 180;
+    const [x, y] = place([azimuth, elevation]);
+    const scale = ARROW / largest(rows);
+    // Cross-elevation points along the azimuth, elevation to the middle.
+    const dx = scale * (across * Math.cos(angle) - upward * Math.sin(angle));
+    const dy = scale * (across * Math.sin(angle) + upward * Math.cos(angle));
+    const barb = (turn) => [x + 0.75 * dx - turn * 0.15 * dy, y + 0.75 * dy + turn * 0.15 * dx];
+    draw(svg, 'polyline', {points: points([[x, y], [x + dx, y + dy], barb(1), [x + dx, y + dy], barb(-1)]),
+                           class: 'residual'});
+    draw(svg, 'circle', {cx: x, cy: y, r: 1 + 2.5 * size(row) / largest(rows), class: 'residual-place'});
+  }
+}
+
+const residualLine = (rows) =>
+  `rms ${number(rms(rows), 4)}°, longest arrow ${number(largest(rows), 4)}°`;
+
 // Show the passes, and the predictions of the control unit.
 function showPasses({passes, coming}, {status, now}) {
   const lines = passes.map(passLine);
@@ -96,6 +125,9 @@ function showPasses({passes, coming}, {status, now}) {
 // Return the text alternative of the plot.
 function skyText({now, sky}) {
   const direction = ([azimuth, elevation]) => `azimuth ${number(azimuth, 1)}°, elevation ${number(elevation, 1)}°`;
+  if (shown && sky && sky.residuals.length) {
+    return `${sky.residuals.length} residuals of the pointing model in force, ${residualLine(sky.residuals)}`;
+  }
   const parts = [known(now.beam) ? `beam at ${direction(now.beam)}` : 'beam unknown'];
   if (!sky) return parts[0];
   const [first, last] = [sky.path[0], sky.path.at(-1)];
@@ -114,15 +146,31 @@ export function begin() {
   const still = draw(svg, 'g', {});
   const past = draw(svg, 'polyline', {class: 'past'});
   const beam = draw(svg, 'circle', {r: 5, class: 'beam'});
+  const button = find('show-residuals');
+  let sky = null;
+  const redraw = () => {
+    const rows = sky.residuals;
+    button.hidden = !rows.length;
+    if (!rows.length) shown = false;
+    button.setAttribute('aria-pressed', shown);
+    setText(find('sky-frame'), shown ? residualLine(rows) : sky.bow.length ? 'earth angles, on a ship' : 'north up');
+    if (shown) drawResiduals(still, rows);
+    else drawSky(still, sky);
+    show(past, !shown);
+  };
+  button.onclick = () => {
+    shown = !shown;
+    redraw();
+  };
   onDraw((sections, state) => {
     if (sections.sky) {
-      drawSky(still, sections.sky);
-      setText(find('sky-frame'), sections.sky.bow.length ? 'earth angles, on a ship' : 'north up');
+      sky = sections.sky;
+      redraw();
     }
     if (state.sky && (sections.sky || sections.status)) showPasses(state.sky, state);
     if (sections.past) set(past, {points: line(sections.past)});
     if (sections.now) {
-      show(beam, known(sections.now.beam));
+      show(beam, known(sections.now.beam) && !shown);
       if (known(sections.now.beam)) {
         const [cx, cy] = place(sections.now.beam).map((value) => value.toFixed(1));
         set(beam, {cx, cy});

@@ -19,6 +19,8 @@ from pedestal_analysis.trials import monte_carlo
 from pedestal_studies.numbers import claims
 from pedestal_studies.papers import (
     alignment,
+    alignment_speed,
+    feedforward_speed,
     imm_feedforward,
     manoeuvre,
     pareto,
@@ -28,7 +30,7 @@ from pedestal_studies.papers import (
 )
 from pedestal_studies.rigs.feedforward_loop import REVERSAL_S_BY_AXIS
 from pedestal_studies.rigs.profiles import PROFILES
-from pedestal_studies.system import acquisition, budget, filters
+from pedestal_studies.system import acquisition, budget, filter_families, filters
 
 ROWS_FILE = 'docs/rows.json'
 """File of the rows in a checkout."""
@@ -115,8 +117,10 @@ def _cells(row):
 
 
 def _target_text(row):
-    """Return the target of a row, marked MISSED if the row misses it."""
-    return f'{row["target"] or ""}{" MISSED" if missed(row) else ""}'.strip()
+    """Return the target of a row with its unit, marked MISSED if the row misses it."""
+    if row['target'] is None:
+        return ''
+    return ' '.join(filter(None, (row['target'], row['unit'].removeprefix('-'), 'MISSED' if missed(row) else '')))
 
 
 def _spread(row):
@@ -149,8 +153,8 @@ def claim_table(paper):
             if claim.study:
                 row = rows[claim.study, claim.case, claim.metric]
                 place, target, cells = f'{claim.study}: {claim.case}', _target_text(row), _cells(row)
-            lines.append((claim.claim, claim.reading, *cells, target, place))
-        return ('claim', 'reading', 'ours', '95 % interval', 'runs', 'target', 'study: case'), lines
+            lines.append((claim.claim, claim.reading, *cells, target, claim.verdict, place))
+        return ('claim', 'reading', 'ours', '95 % interval', 'runs', 'target', 'verdict', 'study: case'), lines
     return table
 
 
@@ -198,6 +202,39 @@ def feedforward_numbers(rows):
     return ('case', 'meaning', 'miss rms deg', 'rate noise deg/s',
             'miss of a conventional filter of equal rate noise, divided by this miss'), [
         (case, imm_feedforward.SOURCE_MEANINGS[case.partition('/')[2]], *numbers) for case, *numbers in lines]
+
+
+def family_numbers(rows):
+    """Return the table of the filters that paper 000 compares: geometric means of the errors over all motions."""
+    lines = []
+    for name, meaning in filter_families.FILTER_MEANINGS.items():
+        cells = [_spread(rows['filter-families', case, metric]) if ('filter-families', case, metric) in rows else ''
+                 for case in (f'{filter_families.MEAN_MOTION}/{name}/{tuning}' for tuning in filter_families.TUNINGS)
+                 for metric in ('angle_rms_deg', 'rate_rms_deg_s')]
+        lines.append((name, meaning, *cells))
+    return ('filter', 'meaning', *(f'{what}, {how}' for how in ('tuned for each motion', 'one tuning')
+                                   for what in ('angle rms deg', 'rate rms deg/s'))), lines
+
+
+def speed_numbers(rows):
+    """Return the table of paper 003's feed-forward with differences, and with targets of 30 and 50 m/s."""
+    lines = [(case, *(_spread(rows['feedforward-speed', case, metric]) for metric in (
+        'miss_rms_deg', 'rate_noise_deg_s', 'rate_rms_deg_s', 'acceleration_rms_deg_s2')))
+             for case in feedforward_speed.CASES]
+    lines += [(case, _spread(rows['feedforward-speed', case, 'miss_rms_deg'])
+               if ('feedforward-speed', case, 'miss_rms_deg') in rows else 'leaves autotrack', '', '', '')
+              for case in feedforward_speed.DRIVE_CASES]
+    return ('case', 'miss rms deg', 'rate noise deg/s', 'rate error deg/s', 'acceleration error deg/s2'), lines
+
+
+def alignment_speed_numbers(rows):
+    """Return the table of the ADRC alignment with all its times divided by a factor."""
+    lines = [(f'{speed:g}', f'{alignment_speed.faster(speed).adrc.observer:g}',
+              *(_spread(rows['alignment-speed', f'adrc/{speed:g}', metric]) for metric in alignment_speed.METRICS))
+             for speed in alignment_speed.SPEEDS]
+    return ('times divided by', 'bandwidth of the observer, rad/s', 'level below 30 arcmin after, s',
+            'azimuth below 12 arcmin after, s', 'azimuth at 100 s, arcmin', 'azimuth at 250 s, arcmin',
+            'level, arcmin', 'azimuth at 600 s, arcmin'), lines
 
 
 def matrix_table(rows):
@@ -251,13 +288,30 @@ def acquisition_numbers(rows):
         time, found, least = (rows['acquisition', case, metric] for metric in (
             'tracked_after_s', 'found_percent', 'found_percent_low'))
         lines.append((f'`{case}`: time until tracked', *_cells(time), f'{found["value"]:.0f} %',
-                      f'{least["value"]:.1f} %',
-                      _target_text(found)))
+                      f'{least["value"]:.1f} %', f'found {_target_text(found)}'))
     loss, off = (rows['acquisition', 'steptrack_geo', metric] for metric in (
         'level_loss_rms_db', 'pointing_max_beamwidths'))
     return ('case', 'result', '95 % interval', 'runs', 'found', 'found, lower limit', 'target'), [
         *lines, ('`steptrack_geo`: level lost after 90 s, rms', *_cells(loss), '', '', _target_text(loss)),
         ('`steptrack_geo`: largest error after 90 s', *_cells(off), '', '', '')]
+
+
+CALIBRATION_RESULTS = (
+    ('program track of the test pass without a model, rms', 'program track', 'raw_rms_deg'),
+    ('program track of the test pass with the model, rms', 'program track', 'calibrated_rms_deg'),
+    ('residuals of the fit, rms', 'program track', 'residual_rms_deg'),
+    ('leave-one-out rms', 'program track', 'leave_one_out_rms_deg'),
+    ('leave-one-out rms of the default terms alone', 'program track', 'leave_one_out_default_rms_deg'),
+    ('share of the terms within three of their sigmas', 'terms', 'within_3_sigma'),
+    ('number of terms, over all runs', 'terms', 'cases'))
+"""(text, case, metric) of the results of the study calibration in docs/measured.md."""
+
+
+def calibration_numbers(rows):
+    """Return the table of the calibration of a new station."""
+    of_results = [rows['calibration', case, metric] for _, case, metric in CALIBRATION_RESULTS]
+    return ('result', 'mean', '95 % interval', 'runs', 'target'), [
+        (text, *_cells(row), _target_text(row)) for (text, *_), row in zip(CALIBRATION_RESULTS, of_results)]
 
 
 ARRAY_LOOPS = ('paper', 'paper-delta', 'type-2', 'type-2-delta', 'tracked-10ms', 'best')
@@ -324,12 +378,14 @@ TABLES = {'results over seeds': results_table(SCENARIO_RESULTS), 'headline resul
           **{f'claims of paper {paper}': claim_table(paper) for paper in claims.CLAIMS_BY_PAPER},
           'filters compared': filter_numbers, 'manoeuvre': manoeuvre_numbers, 'feed forward': feedforward_numbers,
           'pareto': pareto_numbers, 'flyby with a rate': flyby_numbers, 'alignment': alignment_numbers,
-          'acquisition': acquisition_numbers, 'array loops': array_numbers, 'matrices': matrix_table}
+          'filters of paper 000': family_numbers, 'feed forward by speed': speed_numbers,
+          'speed of alignment': alignment_speed_numbers, 'acquisition': acquisition_numbers,
+          'array loops': array_numbers, 'calibration': calibration_numbers, 'matrices': matrix_table}
 """{name of a table: function(Rows) that returns (heads of the columns, lines)}."""
 
 PUBLISHED_STUDIES = tuple(dict.fromkeys((
     *(claim.study for of_paper in claims.CLAIMS_BY_PAPER.values() for claim in of_paper if claim.study),
-    'filters', 'pareto', 'scenarios', 'budget', 'acquisition')))
+    'filters', 'pareto', 'scenarios', 'budget', 'acquisition', 'calibration')))
 """Names of the studies whose rows are in the tables."""
 
 

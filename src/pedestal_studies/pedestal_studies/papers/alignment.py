@@ -335,14 +335,18 @@ def errors(estimated, attitude):
     return np.stack((x, y, z), axis=1) * (angle / np.where(size > 0.0, size, 1.0))[:, None]
 
 
-def align_batch(batch):
-    """Return {case: Sums} of a Batch, in which every method gets the same IMU samples."""
+def align_batch(item):
+    """Return {case: Sums} of an item (Batch, cases), in which every case gets the same IMU samples.
+
+    cases: {case: (method, AlignmentParameters)}.
+    """
+    batch, cases = item
     every, latitude = round(EVALUATION_PERIOD_S / IMU_PERIOD_S), math.radians(SHIP_PARAMETERS.latitude_deg)
     n, sums = round(batch.duration / EVALUATION_PERIOD_S), {}
     for i in range(batch.count):
         (angle, force, attitude), start = simulated_run(batch, batch.first + i)
-        for case, method in CASE_METHODS.items():
-            constants = navigator.constants(INS_PARAMETERS, method, 'none', latitude)
+        for case, (method, params) in cases.items():
+            constants = navigator.constants(params, method, 'none', latitude)
             state, estimates = navigator.initial_state(constants, start), np.zeros(n, ALIGNMENT_ESTIMATE)
             # This call compiles the law before the call that is timed.
             align(state.copy(), constants, angle[:2], force[:2], IMU_PERIOD_S, every, estimates)
@@ -445,20 +449,28 @@ def remarks(runs):
 
 def run(progress, runs=DEFAULT_RUNS, pool=None) -> Result:
     """Align by every method, `runs` times; pool: monte_carlo.Pool, None for this process."""
-    pool = pool or monte_carlo.Pool(1)
     quarter = -(-runs // 4)     # a quarter of the runs, rounded up
     kinds = {'': runs, 'swell': runs, **{f'quadrant-{n}': quarter for n in range(1, 5)}}
+    accuracy = accuracies(kinds, {case: (method, INS_PARAMETERS) for case, method in CASE_METHODS.items()},
+                          pool or monte_carlo.Pool(1), progress)
+    bound = limit()
+    return Result(rows(accuracy, bound), figures(accuracy, bound), remarks(runs))
+
+
+def accuracies(kinds, cases, pool, progress):
+    """Return {kind of runs: {case: Accuracy}}.
+
+    kinds: {kind of runs: number of runs}; cases: {case: (method, AlignmentParameters)}; pool: monte_carlo.Pool.
+    """
     batches = [Batch(kind, *part) for kind, count in kinds.items() for part in monte_carlo.batches(count, BATCH_RUNS)]
     parts = {(kind, case): [Sums()] * min(JACKKNIFE_PARTS, -(-count // BATCH_RUNS))
-             for kind, count in kinds.items() for case in CASE_METHODS}
-    for batch, sums in zip(batches, pool.map(align_batch, batches, progress)):
+             for kind, count in kinds.items() for case in cases}
+    for batch, sums in zip(batches, pool.map(align_batch, [(batch, cases) for batch in batches], progress)):
         for case, more in sums.items():
             of_case = parts[batch.kind, case]
             i = batch.first // BATCH_RUNS % len(of_case)
             of_case[i] = of_case[i].plus(more)
-    accuracy = {kind: {case: Accuracy(parts[kind, case]) for case in CASE_METHODS} for kind in kinds}
-    bound = limit()
-    return Result(rows(accuracy, bound), figures(accuracy, bound), remarks(runs))
+    return {kind: {case: Accuracy(parts[kind, case]) for case in cases} for kind in kinds}
 
 
 def figures(accuracy, bound):

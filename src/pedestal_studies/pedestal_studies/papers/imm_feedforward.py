@@ -100,15 +100,15 @@ CASES = {
 """{case: (axis, Source)}."""
 
 
-def drive_case(axis, tuned):
+def drive_case(axis, tuned, rate=profiles.S_MOTION_RATE_RAD_S):
     """Return the Case of the whole chain, in which the target follows a sine on an axis.
 
-    tuned: FilterParameters of this axis. The target's range of 510 m is the reference_range of the scenario uav_flyby,
-    at which the receiver has its nominal C/N0.
+    tuned: FilterParameters of this axis. rate: largest rate of the target [rad/s]. The target's range of 510 m is the
+    reference_range of the scenario uav_flyby, at which the receiver has its nominal C/N0.
     """
     w = math.pi / REVERSAL_S_BY_AXIS[axis]
     amplitudes = {f'tracking_receiver.target.angle.{name}_amplitude':
-                  profiles.S_MOTION_RATE_RAD_S / w if name == axis else 0.0 for name in REVERSAL_S_BY_AXIS}
+                  rate / w if name == axis else 0.0 for name in REVERSAL_S_BY_AXIS}
     return cases.Case(axis, 'uav_flyby', {
         'tracking_receiver.target.kind': 'sine', 'tracking_receiver.target.angle.frequency': 0.5 * w / math.pi,
         'tracking_receiver.target.angle.range': 510.0, 'tracking_receiver.target.angle.elevation': DRIVE_ELEVATION_RAD,
@@ -126,21 +126,20 @@ DRIVE_CASES = {
 """{case: Case} of the whole chain."""
 
 
-def drive_error(item):
+def drive_error(case, seed):
     """Return (times [s], true pointing error of the axis [rad]), each (n,), from DRIVE_EVALUATION_START_S on.
 
-    An item is (name of DRIVE_CASES, seed). The errors are NaN if the run left autotrack.
+    case: as `drive_case` returns. The errors are NaN if the run left autotrack.
     """
-    name, seed = item
-    record = DRIVE_CASES[name].with_seed(seed).run()
+    record = case.with_seed(seed).run()
     record = record.where(record.t >= DRIVE_EVALUATION_START_S)
-    error = record.truth['error'][:, list(REVERSAL_S_BY_AXIS).index(name.partition('/')[0])]
+    error = record.truth['error'][:, list(REVERSAL_S_BY_AXIS).index(case.name)]
     return record.t, error if np.all(record['acu/mode'] == Mode.AUTOTRACK) else np.full_like(error, math.nan)
 
 
 def drive_misses(item):
-    """Return (rms, largest) miss [deg] of an item as of `drive_error`."""
-    _, error = drive_error(item)
+    """Return (rms, largest) miss [deg] of an item (case as `drive_case` returns, seed)."""
+    _, error = drive_error(*item)
     return math.degrees(tracking.rms(error)), math.degrees(metrics.peak(error))
 
 
@@ -335,7 +334,7 @@ def drive_figure():
     figure, axes = new_panels(2, height=4.8, y='miss [deg]', sharex=True)
     for axis, panel in zip(REVERSAL_S_BY_AXIS, axes[:, 0]):
         for name, colour in (('kalman-cv', TRUTH_COLOUR), ('imm', MOTOR_1_COLOUR), ('imm-default', FILTERED_COLOUR)):
-            t, miss = drive_error((f'{axis}/drive-{name}', NOISE_SEED))
+            t, miss = drive_error(DRIVE_CASES[f'{axis}/drive-{name}'], NOISE_SEED)
             panel.plot(t, np.degrees(miss), color=colour, label=name)
         panel.set_xlim(DRIVE_EVALUATION_START_S, DRIVE_EVALUATION_START_S + 8.0)
         panel.set_title(f'{axis}: control unit, motors and gears, reversals of {REVERSAL_S_BY_AXIS[axis]:g} s')
@@ -346,7 +345,7 @@ def run(progress, runs=DEFAULT_RUNS, pool=None) -> Result:
     """Run CASES and DRIVE_CASES `runs` times; pool: monte_carlo.Pool, None for this process."""
     pool = pool or monte_carlo.Pool(1)
     misses = statistics(CASES, runs, pool, lambda share, text: progress(0.5 * share, text))
-    items = [(name, NOISE_SEED + i) for name in DRIVE_CASES for i in range(runs)]
+    items = [(case, NOISE_SEED + i) for case in DRIVE_CASES.values() for i in range(runs)]
     done = np.array(list(pool.map(drive_misses, items, lambda share, text: progress(
         0.5 + 0.5 * share, f'the whole chain, {text}'))))
     of_drive = dict(zip(DRIVE_CASES, done.reshape(len(DRIVE_CASES), runs, 2)))

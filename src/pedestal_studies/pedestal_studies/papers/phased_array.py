@@ -11,6 +11,7 @@ lag_deg          largest error that the receiver measures, as in the paper's fig
 true_lag_deg     largest true error of the beam
 max_error_deg    largest true error without noise
 jitter_rms_deg   rms of the motion of the beam due to the noise, 0.05 deg in each millisecond
+crossings        crossings of the target by the response to a step
 """
 import dataclasses
 import functools
@@ -32,7 +33,7 @@ from pedestal_studies.rigs.angle_loop import (
     delay_limit,
     spectral_radius,
 )
-from pedestal_studies.rigs.metrics import overshoot_percent, peak
+from pedestal_studies.rigs.metrics import crossings, overshoot_percent, peak
 from pedestal_studies.rigs.rows import Result
 from tracking_receiver_sim import receiver
 from tracking_receiver_sim.params import ReceiverParameters
@@ -45,6 +46,8 @@ ALPHA_GAINS, LOOP_PERIODS_MS, LOOP_DELAYS_MS = (0.05, 0.1, 0.2, 0.3), (10, 5), (
 """Gains alpha [-], periods and delays of the loop [ms] in figures 3 to 5 and in the limits of stability."""
 SLOPE_RATIOS = 0.5, 0.7, 1.0, 1.5, 2.0
 """True slope over assumed slope of the receiver [-]."""
+STEEP_SLOPE_RATIO = 2.0
+"""Slope ratio of the cases that show the lag behind the ramp and the sine with a steeper slope [-]."""
 RAMP_RATES_DEG_S = (10, 20, 30, 40)
 """Rates of figure 6 [deg/s]."""
 
@@ -205,6 +208,7 @@ def step_rows(done):
         case = f'step/{name(loop)}'
         outside = np.flatnonzero(np.abs(y - 1.0) > 0.05)[-1] + 1
         rows += [(case, 'overshoot_percent', overshoot_percent(y, 1.0), '%'),
+                 (case, 'crossings', crossings(y, 1.0), ''),
                  (case, 'rise_90percent_s', np.argmax(y >= 0.9) * GRID_STEP_S, 's'),
                  (case, 'settling_5percent_s', outside * GRID_STEP_S if outside < len(y) else math.nan, 's')]
     return rows
@@ -265,6 +269,9 @@ def moving_rows():
         for rate in rates:
             rows += lag_rows(f'ramp/{rate}deg_s/T={T}ms', PaperLoop(period=T), ramp_target(rate))
     rows += lag_rows('sine', PaperLoop(delay=LOOP_DELAY_MS), sine_target())
+    steep = f'slope={STEEP_SLOPE_RATIO:g}'
+    rows += lag_rows(f'ramp/30deg_s/T=10ms/{steep}', PaperLoop(slope=STEEP_SLOPE_RATIO), ramp_target(30.0))
+    rows += lag_rows(f'sine/{steep}', PaperLoop(delay=LOOP_DELAY_MS, slope=STEEP_SLOPE_RATIO), sine_target())
     target, rate = sway_target()
     for delta in RATE_COMPENSATIONS:
         lags = lag_rows(f'sway/delta={delta:g}', PaperLoop(delta=delta), target, rate)
@@ -298,6 +305,9 @@ def max_error_at_ends(error, target):
 COMPARED_CASES = (*(f'{loop}/{target}' for loop in COMPARED_LOOPS for target in ('ramp', 'sine', 'sway')), *INS_LOOPS)
 """Cases of COMPARED_LOOPS on all targets, and INS_LOOPS."""
 
+ALPHA_LOOPS = {f'noise/alpha={alpha:g}': PaperLoop(alpha=alpha) for alpha in ALPHA_GAINS}
+"""{case: loop} of the paper's loop with each gain, whose jitter is measured on a target at rest."""
+
 
 def beam(case, run=None):
     """Return the beam (n,) [rad] of one of COMPARED_CASES; run: number of the run, None for a run without noise."""
@@ -316,9 +326,12 @@ def beam(case, run=None):
 def jitter(item):
     """Return the rms [deg] of the beam's motion due to noise, for every run of an item.
 
-    An item is (one of COMPARED_CASES or GRAPH_CASES, number of runs).
+    An item is (one of COMPARED_CASES, ALPHA_LOOPS or GRAPH_CASES, number of runs).
     """
     case, runs = item
+    if case in ALPHA_LOOPS:
+        at_rest = np.zeros(round(RECORD_DURATION_S / GRID_STEP_S))
+        return [math.degrees(rms(settled(ALPHA_LOOPS[case].run(at_rest, noise=noises(i)[0])[0]))) for i in range(runs)]
     if case in GRAPH_CASES:
         quiet = graph_error(case, quiet=True)
         return [math.degrees(rms((graph_error(case, seed=FIRST_SEED + i) - quiet)[:, ELEVATION_COLUMN]))
@@ -522,10 +535,11 @@ def run(progress, runs=DEFAULT_RUNS, pool=None) -> Result:
     table += limit_rows(limit)
     progress(0.4, 'ramps, sine, sway')
     table += moving_rows()
-    errors, cases = compared_errors(), (*COMPARED_CASES, *GRAPH_CASES)
+    errors, cases = compared_errors(), (*COMPARED_CASES, *ALPHA_LOOPS, *GRAPH_CASES)
     jitters = dict(zip(cases, (pool or monte_carlo.Pool(1)).map(
         jitter, [(case, runs) for case in cases], lambda share, text: progress(0.5 + 0.4 * share, f'noise, {text}'))))
     table += compared_rows(errors, jitters)
+    table += [(case, 'jitter_rms_deg', jitters[case], 'deg') for case in ALPHA_LOOPS]
     progress(0.9, 'beams that lose the target')
     table += loss_rows()
     table += graph_rows(jitters)

@@ -130,12 +130,15 @@ def _follow(target, known, f, c, lead, M, normals, out):
 
 @dataclasses.dataclass(frozen=True)
 class Source:
-    """Source of rate and acceleration: a filter, or None for the truth.
+    """Source of rate and acceleration: a filter, the differences of the measured angle, or the truth.
 
-    `predicted`: True for values predicted to the instant of the command, False for values at the time of the miss.
+    `filter`: None for differences and for the truth. `predicted`: True for values predicted to the instant of the
+    command, False for values at the time of the miss. `difference_steps`: distance of the differenced angles, in T; 0
+    for a filter and for the truth.
     """
     filter: FilterParameters | None
     predicted: bool = False
+    difference_steps: int = 0
 
 
 def filter_of(kind, **groups):
@@ -170,35 +173,53 @@ def imm(q_ca, predicted):
     return Source(filter_of('imm', imm=bank), predicted)
 
 
-def motion(axis):
-    """Return (times t (n,) [s], target (n, 3), period [s]) of the motion on an axis.
+def motion(axis, rate=S_MOTION_RATE_RAD_S):
+    """Return (times t (n,) [s], target (n, 3), period [s]) of the motion on an axis; rate: between reversals [rad/s].
 
     target: angle [rad], rate [rad/s] and acceleration [rad/s2]. The times are half a period to settle and
     EVALUATED_PERIODS.
     """
     reversal = REVERSAL_S_BY_AXIS[axis]
-    period = 2.0 * (S_MOTION_STROKE_RAD / S_MOTION_RATE_RAD_S + reversal * (1.0 - 2.0 / math.pi))
+    period = 2.0 * (S_MOTION_STROKE_RAD / rate + reversal * (1.0 - 2.0 / math.pi))
     t = T * np.arange(round((0.5 + EVALUATED_PERIODS) * period / T))
-    return t, np.column_stack(profiles.s_motion(t, S_MOTION_STROKE_RAD, S_MOTION_RATE_RAD_S, reversal)), period
+    return t, np.column_stack(profiles.s_motion(t, S_MOTION_STROKE_RAD, rate, reversal)), period
 
 
-def steps_of(axis, source, first, count):
+def differenced(y, steps):
+    """Return rate [rad/s] and acceleration [rad/s2] (n, 2) by the differences of measured angles y (n,) [rad].
+
+    steps: distance of the differenced angles, in T. The values are 0 until there are enough angles. The angle of step
+    k arrives MISS_DELAY_STEPS later, in the row k + MISS_DELAY_STEPS.
+    """
+    known, span = np.zeros((len(y), 2)), steps * T
+    rate = (y[steps:] - y[:-steps]) / span
+    acceleration = (rate[steps:] - rate[:-steps]) / span
+    known[steps + MISS_DELAY_STEPS:, 0] = rate[:-MISS_DELAY_STEPS]
+    known[2 * steps + MISS_DELAY_STEPS:, 1] = acceleration[:-MISS_DELAY_STEPS]
+    return known
+
+
+def steps_of(axis, source, first, count, rate=S_MOTION_RATE_RAD_S):
     """Return STEP_RECORD records (count, n) of runs first ... first + count - 1 of a Source on an axis.
 
-    The noise of run i depends only on i.
+    The noise of run i depends only on i. rate: as in `motion`.
     """
-    t, target, _ = motion(axis)
+    t, target, _ = motion(axis, rate)
     lead = (MISS_DELAY_STEPS + 0.5) * T if source.predicted else 0.0
     known = np.zeros((0, 2))
-    if source.filter is None:
+    if source.filter is None and not source.difference_steps:
         at = t + 0.5 * T if source.predicted else t - MISS_DELAY_STEPS * T
-        known = np.column_stack(profiles.s_motion(at, S_MOTION_STROKE_RAD, S_MOTION_RATE_RAD_S,
-                                                  REVERSAL_S_BY_AXIS[axis])[1:])
+        known = np.column_stack(profiles.s_motion(at, S_MOTION_STROKE_RAD, rate, REVERSAL_S_BY_AXIS[axis])[1:])
     [normals] = ensemble.normal_draws(NOISE_SEED, first, count, len(t), 1)
     out = np.zeros((count, len(t)), STEP_RECORD)
     c = axis_filter.constants(source.filter or FilterParameters())
-    _follow(target, known, np.zeros(1, axis_filter.FILTER_DTYPE), c, lead, rate_loop_step(*RATE_LOOP_CONSTANTS),
-            normals, out)
+    f, M = np.zeros(1, axis_filter.FILTER_DTYPE), rate_loop_step(*RATE_LOOP_CONSTANTS)
+    if not source.difference_steps:
+        _follow(target, known, f, c, lead, M, normals, out)
+        return out
+    for i in range(count):
+        known = differenced(target[:, 0] + MISS_SIGMA_RAD * normals[i], source.difference_steps)
+        _follow(target, known, f, c, lead, M, normals[i:i + 1], out[i:i + 1])
     return out
 
 
@@ -208,13 +229,16 @@ METRIC_UNITS = {'miss_rms_deg': 'deg', 'miss_worst_second_deg': 'deg', 'miss_pea
 forward while the rate of the target is uniform."""
 
 
-def measures(axis, steps):
-    """Return the metrics of METRIC_UNITS of every run, an array (runs, 4); steps: (runs, n) of STEP_RECORD."""
-    t, target, period = motion(axis)
+def measures(axis, steps, rate=S_MOTION_RATE_RAD_S):
+    """Return the metrics of METRIC_UNITS of every run, an array (runs, 4); steps: (runs, n) of STEP_RECORD.
+
+    rate: as in `motion`.
+    """
+    t, target, period = motion(axis, rate)
     counts = t >= 0.5 * period
     second = round(1.0 / T)
     # reversing: the rate is below 99.9 % of the uniform rate, or was so in the last UNIFORM_RATE_DELAY_S.
-    reversing = np.convolve(np.abs(target[:, 1]) < 0.999 * S_MOTION_RATE_RAD_S,
+    reversing = np.convolve(np.abs(target[:, 1]) < 0.999 * rate,
                             np.ones(round(UNIFORM_RATE_DELAY_S / T)))[:len(t)] > 0.5
     miss, noise = steps['miss'][:, counts], (steps['rate'] - target[:, 1])[:, counts & ~reversing]
     values = [(tracking.rms(m), math.sqrt(np.convolve(m * m, np.full(second, 1.0 / second), 'valid').max()),

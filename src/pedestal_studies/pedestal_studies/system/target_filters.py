@@ -36,7 +36,7 @@ BATCH_RUNS = 5
 """Runs that one worker makes at a time."""
 
 SHIP_SUFFIX = '-ship'
-"""End of the name of a target seen from a ship."""
+"""Part of the name of a target seen from a ship."""
 
 FLYBY_PREFIX, ANGLE_PREFIX = 'tracking_receiver.target.flyby', 'tracking_receiver.target.angle'
 FIXED_TARGET_PARAMETERS = {'tracking_receiver.target.kind': 'step', f'{ANGLE_PREFIX}.azimuth_amplitude': 0.0,
@@ -88,9 +88,14 @@ hard_targets had two seeds from 101 on. The other targets had three seeds, and a
 """
 
 
+def _ashore(target):
+    """Return the name that a target has ashore."""
+    return target.partition(SHIP_SUFFIX)[0]
+
+
 def filters(target):
     """Return {filter: parameters of the control unit} for a target of TARGET_SCENARIOS."""
-    return {'default': {}, 'tuned': TUNED_FILTERS[target.removesuffix(SHIP_SUFFIX).removesuffix('-ship-ss6')],
+    return {'default': {}, 'tuned': TUNED_FILTERS[_ashore(target)],
             'manoeuvre': _both(kind='imm', **MANOEUVRE_PARAMETERS),
             'current-statistical': _both(kind='current_statistical')}
 
@@ -112,7 +117,7 @@ def _folder():
 
 def loaded(case):
     """Return the scenario.Scenario of a Case of CASES; for a target of hard_targets its table is written first."""
-    name = case.name.partition('/')[0].removesuffix(SHIP_SUFFIX).replace('-', '_')
+    name = _ashore(case.name.partition('/')[0]).replace('-', '_')
     if name not in HARD_TARGETS:
         return case.loaded()
     path = pathlib.Path(_folder().name) / f'{name}.csv'

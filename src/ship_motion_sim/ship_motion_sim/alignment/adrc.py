@@ -30,7 +30,7 @@ CONSTANTS_DTYPE = np.dtype([
     ('start', 'f8'),                        # time after which the azimuth uses the commands [s]
     ('velocity_variance', 'f8'),            # variance of the velocity in the settled loop [m2/s2]
     ('innovation_variance', 'f8'),          # variance of the innovations in the settled loop [m2/s2]
-    ('swell', 'f8'),                        # variance of velocity / of innovations, both due to swell [-]
+    ('swell', 'f8'),                        # variance of velocity divided by that of innovations [-]
     ('level', 'f8'),                        # 1 sigma of level of the settled loop [rad]
 ], align=True)
 

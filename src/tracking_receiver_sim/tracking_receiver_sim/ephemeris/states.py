@@ -59,8 +59,8 @@ class Segment(typing.NamedTuple):
 
 
 class Ephemeris(typing.NamedTuple):
-    """The orbit of one object. midnight: instant of t = 0 [s], on the time of track files (module track.instant);
-    segments: in order of time; description: format, number of states, frame and interpolation."""
+    """The orbit of one object. midnight: instant of t = 0 [s], in the time scale of track files (module
+    track.instant); segments: in order of time; description: format, number of states, frame and interpolation."""
     path: str
     midnight: float
     segments: tuple

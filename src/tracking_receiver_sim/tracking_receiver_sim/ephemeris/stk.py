@@ -1,8 +1,9 @@
-"""Reader of STK ephemeris files (.e) about the earth.
+"""Reader of STK ephemeris files (.e) for orbits about the earth.
 
 The states are EphemerisTimePosVel, EphemerisTimePosVelAcc or EphemerisTimePos. The case of keywords does not matter,
-as in STK. Two states of one instant end a segment and begin the next. Blocks inside the ephemeris (for example
-SegmentBoundaryTimes) and the covariance after the states are passed over.
+as in STK. If two consecutive states have the same time, the first one ends a segment and the second one begins the
+next segment. Blocks inside the ephemeris (for example SegmentBoundaryTimes) and the covariance after the states are
+passed over.
 """
 import array
 import datetime
@@ -84,8 +85,8 @@ def _limits(path, head, with_velocity):
 
 
 def _ephemeris(path, head, table):
-    """Return the Ephemeris of the keywords {keyword: (line, column, value)} and a table as of states.segment, whose
-    times count from ScenarioEpoch. Raises TableError."""
+    """Return the Ephemeris from the keywords {keyword: (line, column, value)} and a table. The table has the columns
+    of states.segment, and its times count from ScenarioEpoch. Raises TableError."""
     if 'scenarioepoch' not in head:
         raise csv_table.TableError(f'{path}: ScenarioEpoch is missing')
     begin, second = _epoch(path, *head['scenarioepoch'])

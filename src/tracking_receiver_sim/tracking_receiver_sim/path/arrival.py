@@ -13,9 +13,7 @@ import math
 import numpy as np
 
 from pedestal_common.compiled import compiled
-
-SPEED_OF_LIGHT_M_S = 299792458.0
-"""Speed of light [m/s]."""
+from pedestal_common.geometry.geodesy import SPEED_OF_LIGHT_M_S
 
 MIN_ELEVATION_RAD = math.radians(1.0)
 """Elevation [rad] below which the refraction stays constant."""

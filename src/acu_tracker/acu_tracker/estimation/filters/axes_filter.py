@@ -7,7 +7,7 @@ import math
 
 from acu_tracker.estimation.filters import axis_filter
 from acu_tracker.estimation.filters.measurement import Estimate, Innovation
-from acu_tracker.geometry.motion import LineOfSight, Motion, earth_angles, line_of_sight
+from acu_tracker.geometry.motion import Motion, earth_angles, line_of_sight, turned
 from acu_tracker.geometry.vector import Vector, rotated
 from pedestal_common.compiled import compiled
 
@@ -71,9 +71,7 @@ def turn(f, c, rotation):
     axes are independent. The variance of an azimuth is that across the line of sight over cos2(elevation).
     """
     azimuth, elevation = axis_filter.corrected(f[0]), axis_filter.corrected(f[1])
-    sight = line_of_sight(Motion(azimuth.x, elevation.x))
-    motion = earth_angles(LineOfSight(rotated(rotation, sight.u), rotated(rotation, sight.du),
-                                      rotated(rotation, sight.ddu)))
+    motion = earth_angles(turned(rotation, line_of_sight(Motion(azimuth.x, elevation.x))))
     before, after = azimuth.x.angle, motion.azimuth.angle
     across = rotated(rotation, Vector(math.cos(before), -math.sin(before), 0.0))
     cos2 = (across.x * math.cos(after) - across.y * math.sin(after))**2

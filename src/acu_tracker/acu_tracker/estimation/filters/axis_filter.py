@@ -181,14 +181,12 @@ def blend(f, c, own, share, other):
     Of a model without an acceleration state only angle and rate have a covariance.
     """
     for j in range(c.count):
-        P = f.p[j]
-        P[0] = own * P[0] + share * other.p11
-        P[1] = own * P[1] + share * other.p12
-        P[3] = own * P[3] + share * other.p22
-        if c.models[j].states > 2:
-            P[2] = own * P[2] + share * other.p13
-            P[4] = own * P[4] + share * other.p23
-            P[5] = own * P[5] + share * other.p33
+        x, P = _gaussian(f.x[j], f.p[j])
+        of_acceleration = share if c.models[j].states > 2 else 0.0
+        _put(f.x, f.p, j, Gaussian(x, Symmetric(
+            own * P.p11 + share * other.p11, own * P.p12 + share * other.p12,
+            own * P.p13 + of_acceleration * other.p13, own * P.p22 + share * other.p22,
+            own * P.p23 + of_acceleration * other.p23, own * P.p33 + of_acceleration * other.p33)))
 
 
 @compiled

@@ -10,8 +10,8 @@ Each model gives the matrices F and Q of the Kalman filter for the state X = (an
 In the model cv the acceleration stays 0. The model current_statistical is that of paper 000, eq. 2, 4, 5. Several
 models ca with growing noise form a ladder; each of these models is a rung.
 
-Another model needs a row of MODEL_ROWS, a law that `discretised` selects, and its group in params.py. Its name in
-topics.MOTION_MODELS makes its probability a column of acu/filter.
+Another model needs a row of MODEL_ROWS, a law that `discretised` selects, and its group in params.py. If its name is
+in topics.MOTION_MODELS, its probability is a column of acu/filter.
 
 The print of paper 000 has two errors, which are corrected here. Its factor of q22 is 1/(2 alpha^2); correct is
 1/(2 alpha^3). Its sigma_a^2 (eq. 5) contains a_max - abar; correct is the square (a_max - abar)^2.
@@ -49,11 +49,11 @@ class MotionModel(typing.NamedTuple):
 
 
 WHITE_JERK_TIME_S = 10.0
-"""Time in which white jerk changes the acceleration by as much as it is uncertain at the start of the model ca.
+"""Time in which the white jerk of the model ca changes the acceleration by its standard deviation at the start.
 
-Each model starts with the acceleration that it expects itself. A larger one would make a quiet model as wrong about a
-target that moves steadily as a noisy model, and the bank would believe that the target stands still (Lindley's
-paradox)."""
+Each model starts with the standard deviation of the acceleration that the model itself expects. With a larger value a
+model with little noise would predict a steady target as badly as a model with much noise. The bank would then regard
+a target that moves steadily as one that stands still (Lindley's paradox)."""
 
 MODEL_ROWS = (
     MotionModel('cv', 'constant rate, disturbed by white acceleration', 2, lambda params: 0.0),
@@ -109,7 +109,7 @@ def ladder(params, rungs, ratio) -> np.ndarray:
     """
     m = np.concatenate([constants('ca', dataclasses.replace(params, noise=params.noise * ratio**rung))
                         for rung in range(rungs)])
-    m['column'] = [COLUMN_NAMES.index('ca' if rung == 0 else f'ca_{rung + 1}') for rung in range(rungs)]
+    m['column'][1:] = len(MODEL_NAMES) + np.arange(rungs - 1)
     return m
 
 

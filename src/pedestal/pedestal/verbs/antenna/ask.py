@@ -7,6 +7,7 @@ Exit code 0: the node accepted the command. Exit code 1: the node refused it; th
     pedestal ask fallback mode=memory    select the mode after a loss of the track
     pedestal ask offset time=0.5         follow the program track 0.5 s later
     pedestal ask elements --tle iss.tle  predict by the elements of a file, without a change of the mode
+    pedestal ask pointing --params-file station.yaml    take the pointing model of a parameter file
 """
 import argparse
 from collections.abc import Iterable, Mapping
@@ -22,13 +23,33 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         nargs='*', metavar='NAME=VALUE', help='arguments of the command (radians, SI units); see '
                         'docs/operating.md, Commands')
     parser.add_argument('--node', default='acu', metavar='NODE', help='node that receives the command; default: acu')
+    parser.add_argument('--params-file', metavar='FILE', help='parameter file with the arguments of the command '
+                        '`pointing`: the parameters pointing.* of the node acu')
     arguments.add_elements(parser)
     arguments.add_remote(parser)
 
 
 def main(options: argparse.Namespace) -> int:
     """Send the command. Return the exit code."""
-    return send_command(options, options.verb, with_elements(options, options.given), options.node)
+    given = with_elements(options, options.given)
+    if options.params_file is not None:
+        if options.verb != 'pointing':
+            raise ValueError(f'--params-file {options.params_file}: is for the command pointing only')
+        given = {**pointing_model(options.params_file), **given}
+    return send_command(options, options.verb, given, options.node)
+
+
+def pointing_model(path: str) -> dict[str, str | float]:
+    """Return the arguments of the command `pointing` from a parameter file. Raises ValueError."""
+    from pedestal_common.text_files import parameter_file
+    found: dict[str, str | float] = {}
+    for section, values in parameter_file.read(path).items():
+        if parameter_file.node_of(section) == 'acu':
+            found |= {name.removeprefix('pointing.'): value for name, value in values.items()
+                      if name.startswith('pointing.') and value != ''}
+    if not found:
+        raise ValueError(f'--params-file {path}: has no parameter pointing.* in a section of the node acu')
+    return found
 
 
 def pairs(texts: Iterable[str]) -> dict[str, str | float]:

@@ -6,6 +6,7 @@ Exit codes (1, 3 and 130 take precedence over 4):
 
 """
 import argparse
+import datetime
 import os
 import sys
 import typing
@@ -44,6 +45,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         'pass; N: number N of the list; a UTC such as 2019-12-10T12:35: the first pass at or after '
                         'it; list: only print the passes; default with --tle: next')
     arguments.add_params_file(parser)
+    parser.add_argument('--drives', choices=('adu', 'simulated'), help='simulated: four simulated CiA 402 '
+                        'servo drives on a CAN bus of this machine, and drive_node in place of the drive unit; needs '
+                        '--pacing realtime; default: value of the scenario')
+    parser.add_argument('--receiver', choices=('simulated', 'simulated-iq'), help='simulated-iq: simulated I/Q '
+                        'samples by UDP on this machine, and monopulse_receiver_node in place of the simulated '
+                        'receiver; needs --pacing realtime; default: value of the scenario')
     from pedestal_bringup.graph import operator_servers
     operator_servers.add_arguments(parser)
 
@@ -61,6 +68,9 @@ def main(options: argparse.Namespace) -> int:
     chosen = _chosen(options)
     if chosen is None:
         return 0
+    now = datetime.datetime.now(datetime.timezone.utc).replace(tzinfo=None)
+    for prefix in chosen.prefixes:
+        chosen.node_parameters(f'{prefix}acu').pointing.check_date(now)
     bag = graph.new_bag(options.bag, chosen.name)
     console.check_json(options.json)
     servers = operator_servers.selected(options, chosen.header)
@@ -143,7 +153,9 @@ def _some(values: dict[str, tuple], names: Collection[str]) -> dict[str, tuple]:
 def _chosen(options: argparse.Namespace) -> 'Scenario | None':
     """Return the Scenario with the satellite, station and pass of the options; None after listing the passes."""
     from pedestal_bringup.scenario import scenario
-    changes = arguments.changes(options)
+    equipment = [f'scenario.{name}={value}' for name in ('drives', 'receiver')
+                 if (value := getattr(options, name)) is not None]
+    changes = equipment + arguments.changes(options)
     duration = options.duration
     arguments.check_elements(options)
     if options.tle is options.station is options.which is None:
@@ -199,6 +211,7 @@ def _without_prediction_errors(draft: 'Draft', changes: list[str]) -> list[str]:
 def _refuse_with_list(options: argparse.Namespace) -> None:
     """Raise ValueError for an option of a run beside --pass list, which runs nothing."""
     from pedestal_bringup.graph import operator_servers
-    for name in ('bag', 'json', 'all', 'explain', 'duration', 'seed', 'pacing', *operator_servers.SERVERS):
+    for name in ('bag', 'json', 'all', 'explain', 'duration', 'seed', 'pacing', 'drives', 'receiver',
+                 *operator_servers.SERVERS):
         if not (getattr(options, name) is None or getattr(options, name) is False):
             raise ValueError(f'--{name}: has no effect with --pass list, which runs nothing')

@@ -49,12 +49,24 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         'DDS, in lockstep')
     console.add_json(parser)
     console.add_explain(parser)
+    parser.add_argument('--iq', type=pathlib.Path, metavar='FILE', help='.sigmf-meta file of the I/Q samples of this '
+                        'run: compare the angle errors that the monopulse receiver makes of them, byte by byte')
     parser.add_argument('--output', type=pathlib.Path, metavar='BAG',
                         help='new bag: the recording with recomputed outputs in place of the recorded outputs')
 
 
 def main(options: argparse.Namespace) -> int:
     """Recompute and print the comparison. Return the exit code, 1 for a failed comparison."""
+    if options.iq is not None:
+        for name in ('node', 'param', 'params_file', 'pacing', 'absolute', 'relative', 'ignore', 'allow_idle', 'live',
+                     'explain', 'output'):
+            if getattr(options, name):
+                raise ValueError(f'--{name.replace("_", "-")}: has no effect with --iq')
+        from pedestal_analysis.reprocess import iq
+        lines, rows, well = iq.main(options)
+        print('\n'.join(lines))
+        console.write_json(options.json, {'name': 'recompute', 'rows': rows})
+        return 0 if well else 1
     from pedestal_analysis.reprocess import recompute_report
     lines, rows, well = recompute_report.main(options)
     print('\n'.join(lines))

@@ -1,0 +1,1 @@
+"""Verb for the calibration of an antenna, and the steps of this verb."""

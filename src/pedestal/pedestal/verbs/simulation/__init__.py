@@ -1,0 +1,1 @@
+"""Verb that simulates equipment, and the equipment of this verb."""

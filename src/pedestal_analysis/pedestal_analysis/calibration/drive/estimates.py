@@ -1,0 +1,219 @@
+"""Estimates of an axis from its Motion: friction, lash, bias, encoder.
+
+Each estimate has an interval by the jackknife over parts of the data (results.intervals). The function of an estimate
+returns {name: (value, low, high)}, and {} for a property that the motions do not show.
+"""
+import math
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from pedestal_analysis.results import tracking
+from pedestal_analysis.results.intervals import interval, pseudo_values
+
+PART_COUNT, BLOCK_COUNT = 10, 80
+"""Numbers of parts of the jackknife, and of blocks of neighbouring steps that are distributed over the parts."""
+PLATEAU_S, PLATEAU_SETTLING_S = 0.5, 0.5
+"""Length of a piece of constant rate [s], and time after its beginning that is left out [s]."""
+PLATEAU_CHANGE = 0.08
+"""Largest change of the rate within a piece of constant rate, per rate [-]."""
+MIN_PLATEAUS, MIN_RATES = 12, 3
+"""Smallest number of pieces of constant rate, and of different rates among them."""
+SLOW_RATE_RAD_S = 6e-3
+"""Rate below which the static part of the friction shows [rad/s]."""
+MIN_LASH_ROWS = 40
+"""Smallest number of steps with each sign of the torque of a motor."""
+STRONG_TORQUE_SHARE = 0.25
+"""Share of the largest torque of a motor from which its teeth are in firm contact [-]."""
+MIN_TURN_RAD = math.radians(300.0)
+"""Smallest angle over which the error of the encoder is fitted [rad]."""
+
+
+def interleaved(rows):
+    """Return PART_COUNT parts of rows: each has every PART_COUNT-th of BLOCK_COUNT blocks, so that parts are alike."""
+    blocks = np.array_split(rows, BLOCK_COUNT)
+    return [np.concatenate(blocks[k::PART_COUNT]) for k in range(PART_COUNT)]
+
+
+def jackknife(names, parts, statistic):
+    """Return {name: (value, low, high)} of a vector statistic(list of parts) -> (len(names),) over parts."""
+    whole = np.asarray(statistic(parts))
+    values = pseudo_values(parts, lambda kept: np.asarray(statistic(kept)))
+    found = {}
+    for i, name in enumerate(names):
+        mean, low, high = interval(values[:, i])
+        found[name] = (float(whole[i]), float(whole[i] + low - mean), float(whole[i] + high - mean))
+    return found
+
+
+def plateaus(motion, torque):
+    """Return (k, 3) mean rate [rad/s], torque [Nm] and angle [rad] of the pieces of constant rate of a Motion.
+
+    torque (n,): torque on the load [Nm].
+    """
+    period = float(np.median(np.diff(motion.t)))
+    size, settling = round(PLATEAU_S / period), round(PLATEAU_SETTLING_S / period)
+    slow = np.convolve(motion.v, np.ones(size) / size, 'same')
+    steady = (np.abs(motion.v - slow) < PLATEAU_CHANGE * np.abs(slow) + 1e-4) & (np.abs(slow) > 2e-4)
+    pieces = []
+    for first, last in tracking.stretches(steady):
+        for start in range(first + settling, last - size + 1, size):
+            part = slice(start, start + size)
+            pieces.append((motion.v[part].mean(), torque[part].mean(), motion.theta[part].mean()))
+    return np.array(pieces).reshape(-1, 3)
+
+
+def friction_torque(v, coulomb, breakaway, stribeck_rate, viscous):
+    """Return the friction torque [Nm] of the load at constant rates v [rad/s]: Coulomb, Stribeck and viscous parts.
+
+    Canudas de Wit et al., IEEE Trans. Automatic Control 40 (1995) 419, at a constant rate.
+    """
+    static = (breakaway - coulomb) * np.exp(-(v / stribeck_rate)**2)
+    return np.sign(v) * (coulomb + static) + viscous * v
+
+
+FRICTION_NAMES = 'coulomb', 'breakaway', 'stribeck_rate', 'viscous', 'unbalance', 'offset'
+
+
+def friction(pieces, gravity):
+    """Return the estimates FRICTION_NAMES from pieces of constant rate (k, 3); raise ValueError for too few of them.
+
+    gravity: True if a torque of gravity at angle 0, `unbalance`, is fitted. `offset` is a torque that does not depend
+    on the rate, such as that of the wind.
+    """
+    rates = np.unique(np.round(np.log10(np.abs(pieces[:, 0])), 1)) if len(pieces) else ()
+    if len(pieces) < MIN_PLATEAUS or len(rates) < MIN_RATES:
+        raise ValueError(f'{len(pieces)} pieces of constant rate at {len(rates)} rates, must be at least '
+                         f'{MIN_PLATEAUS} at {MIN_RATES}: run the motions of --plan')
+    if not (pieces[:, 0].min() < 0.0 < pieces[:, 0].max()):
+        raise ValueError('all rates have one sign; the motions must go both ways')
+
+    def statistic(parts):
+        rows = np.concatenate(parts)
+        v, torque, theta = rows.T
+        level = np.abs(torque).mean()
+
+        def residual(x):
+            gravity_torque = x[4] * np.cos(theta) if gravity else 0.0
+            # Each rate has about the same number of pieces; a relative noise of the rate is a noise of the torque.
+            return (friction_torque(v, x[0], x[0] + abs(x[1]), math.exp(x[2]), x[3]) + gravity_torque + x[5]
+                    - torque) / level
+
+        begin = np.array([level, 0.3 * level, math.log(2e-3), 0.0, 0.0, 0.0])
+        x = least_squares(residual, begin, x_scale=np.array([level, level, 1.0, level, level, level])).x
+        return x[0], x[0] + abs(x[1]), math.exp(x[2]), x[3], x[4], x[5]
+
+    found = jackknife(FRICTION_NAMES, [pieces[k::PART_COUNT] for k in range(PART_COUNT)], statistic)
+    # Without slow rates, or without a static part, the data do not show the Stribeck rate.
+    static, slow = found['breakaway'][0] - found['coulomb'][0], np.abs(pieces[:, 0]) < SLOW_RATE_RAD_S
+    if slow.sum() < 4 or static < 0.02 * found['coulomb'][0]:
+        found.pop('breakaway'), found.pop('stribeck_rate')
+    if not gravity:
+        found.pop('unbalance')
+    return found
+
+
+def lash(motion, torque, ratio):
+    """Return the estimates `lash` [rad] and `stiffness` [Nm/rad] of a mesh on the load axis.
+
+        theta_i / N - theta = z_i + lash / 2 sign(T_i) + N T_i / k
+
+    theta_i, T_i: angle and torque of motor i on the gear, (n, 2) of `torque` [Nm]; z_i: zero of its encoder; k:
+    stiffness. A motor shows the lash only if its torque changes the sign: in a run without bias torque, or at an
+    acceleration above it. Then the teeth touch with both flanks.
+    """
+    rows, values, times = [], [], []
+    for i in range(2):
+        T = torque[:, i]
+        strong = np.abs(T) > STRONG_TORQUE_SHARE * np.percentile(np.abs(T), 99.5)
+        if min((T[strong] > 0.0).sum(), (T[strong] < 0.0).sum()) < MIN_LASH_ROWS:
+            continue
+        zeros = np.zeros((strong.sum(), 2))
+        zeros[:, i] = 1.0
+        rows.append(np.column_stack((0.5 * np.sign(T[strong]), ratio * T[strong], zeros)))
+        values.append((motion.motor_angle[:, i] - motion.theta)[strong])
+        times.append(np.flatnonzero(strong))
+    if not rows:
+        return {}
+    A, x = np.concatenate(rows), np.concatenate(values)
+    used = np.abs(A).sum(0) > 0.0
+    place = np.concatenate(times)
+    parts = interleaved(np.column_stack((A[:, used], x))[np.argsort(place, kind='stable')])
+
+    def statistic(kept):
+        table = np.concatenate(kept)
+        return np.linalg.lstsq(table[:, :-1], table[:, -1], rcond=None)[0][:2]
+
+    found = jackknife(('lash', 'compliance'), parts, statistic)
+    value, low, high = found.pop('compliance')
+    if low > 0.0:
+        found['stiffness'] = (1.0 / value, 1.0 / high, 1.0 / low)
+    return found
+
+
+def bias(motion, hold):
+    """Return the estimate `torque` of the bias [Nm]: half the difference of the motors at a small common torque.
+
+    hold: torque demand per motor up to which the bias is full [Nm].
+    """
+    common = np.abs(motion.motor_torque.mean(1))
+    small = np.flatnonzero(common < 0.5 * hold)
+    if small.size < PART_COUNT:
+        return {}
+    half = 0.5 * (motion.motor_torque[:, 0] - motion.motor_torque[:, 1])
+    parts = [half[part] for part in np.array_split(small, PART_COUNT)]
+    return jackknife(('torque',), parts, lambda kept: (np.median(np.concatenate(kept)),))
+
+
+def encoder(motion, pinion_ratio):
+    """Return (estimates, table) of the error of the load encoder against the motors, over a turn.
+
+    The estimates are eccentricity_sin and eccentricity_cos [rad]. The table (m, 2) holds angle [rad] and error [rad]
+    at every 5 deg. This error is the mean of both directions, less the mean over the turn. The error of the pinions,
+    once per turn of them, is removed with pinion_ratio (bull gear to pinion). Without a turn both ways, the result is
+    ({}, empty table).
+    """
+    ways = [_turn(motion, sign) for sign in (1.0, -1.0)]
+    if any(way is None for way in ways):
+        return {}, np.zeros((0, 2))
+    rows = []
+    for sign, part in zip((1.0, -1.0), ways):
+        theta = motion.theta[part]
+        error = theta - motion.motor_angle[part].mean(1)
+        rows.append(np.column_stack((np.sin(theta), np.cos(theta), np.ones_like(theta), np.full_like(theta, sign),
+                                     np.sin(pinion_ratio * theta), np.cos(pinion_ratio * theta), error)))
+    rows = np.concatenate(rows)
+    parts = interleaved(rows)
+
+    def statistic(kept):
+        table = np.concatenate(kept)
+        return np.linalg.lstsq(table[:, :-1], table[:, -1], rcond=None)[0][:2]
+
+    found = jackknife(('eccentricity_sin', 'eccentricity_cos'), parts, statistic)
+    return found, _table(motion, ways)
+
+
+def _turn(motion, sign):
+    """Return the slice of the longest stretch in one direction, of at least MIN_TURN_RAD; None if there is none."""
+    longest = None
+    for first, last in tracking.stretches(sign * motion.v > 1e-2):
+        way = abs(motion.theta[last - 1] - motion.theta[first])
+        if way >= MIN_TURN_RAD and (longest is None or way > longest[0]):
+            longest = way, slice(first, last)
+    return longest and longest[1]
+
+
+def _table(motion, ways):
+    """Return the table of `encoder` from the two slices of the turn."""
+    low = max(motion.theta[part].min() for part in ways)
+    high = min(motion.theta[part].max() for part in ways)
+    step = math.radians(5.0)
+    angles = step * np.arange(math.ceil(low / step), math.floor(high / step) + 1)
+    errors = []
+    for part in ways:
+        order = np.argsort(motion.theta[part])
+        theta = motion.theta[part][order]
+        error = theta - motion.motor_angle[part].mean(1)[order]
+        errors.append([error[np.abs(theta - angle) < math.radians(2.5)].mean() for angle in angles])
+    mean = np.mean(errors, axis=0)
+    return np.column_stack((angles, mean - mean.mean()))

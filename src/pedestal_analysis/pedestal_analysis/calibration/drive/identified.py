@@ -1,0 +1,245 @@
+"""`pedestal calibrate drive`: properties of both axes from safe motions, for the control unit and the simulated plant.
+
+The result is a table with nominal and identified values, rows for --json, a page, and a ROS 2 parameter file with
+acu.AXIS.feedforward.* and adu.AXIS.*. The twin with these values must reproduce the torques of the recording.
+"""
+import dataclasses
+import math
+
+import numpy as np
+
+from adu_drive.params import AduParameters
+from pedestal_analysis.calibration import output_files
+from pedestal_analysis.calibration.drive import estimates, identified_page, motion_data, motions, twin
+from pedestal_analysis.results import intervals
+from pedestal_analysis.results.intervals import estimated, row
+from pedestal_bringup.loop import memory_recording
+from pedestal_bringup.scenario import scenario as scenarios
+from pedestal_common.graph.topics import AXES
+from pedestal_common.parameters import as_dict, build, defaults
+from pedestal_common.text_files import parameter_file
+from pedestal_recording import bag as bags
+
+CASE_NAME, TORQUE_TARGET = 'drive', '< 10'
+"""Case of the rows, and target of the torque error of the twin [%]."""
+VALUE_DIGITS = 6
+"""Significant digits in a parameter file."""
+QUANTITIES = {
+    'inertia': ('kg m2', 'inertia of the load'), 'dish_inertia': ('kg m2', 'part of it that swings on the structure'),
+    'frequency': ('Hz', 'first mode of the structure on a locked base'), 'damping': ('', 'damping ratio of this mode'),
+    'coulomb': ('Nm', 'sliding friction'), 'breakaway': ('Nm', 'static friction'),
+    'stribeck_rate': ('rad/s', 'rate at which the static part has fallen to 1 / e'),
+    'viscous': ('Nms/rad', 'viscous friction'), 'unbalance': ('Nm', 'torque of gravity at angle 0'),
+    'offset': ('Nm', 'torque that does not depend on the motion, such as wind'),
+    'lash': ('rad', 'total lash of one mesh on the load axis'), 'stiffness': ('Nm/rad', 'stiffness of one mesh'),
+    'bias': ('Nm', 'bias torque per motor'), 'eccentricity_sin': ('rad', 'load encoder, sine of the angle'),
+    'eccentricity_cos': ('rad', 'load encoder, cosine of the angle')}
+"""{estimate: (unit, meaning)}, in the order of the table."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Identified:
+    """Result of a calibration of the drive.
+
+    source       names of the recordings
+    recordings   [twin.Recording]
+    found        {axis: {name: (value, low, high)}} in the order of QUANTITIES
+    maps         {axis: (m, 2) error of the load encoder [rad] over the angle [rad]}, empty without a turn
+    changes      {name: value} of the parameters of adu
+    before       {axis: torque error of the nominal twin [-]}; after: that of the identified twin
+    """
+    source: str
+    recordings: list
+    found: dict
+    maps: dict
+    changes: dict
+    before: dict
+    after: dict
+
+
+def calibrate(recordings, source) -> Identified:
+    """Return the Identified of twin.Recordings. Raises ValueError."""
+    found, maps = {}, {}
+    _, corrected = twin.estimated(recordings)
+    for name in AXES:
+        axis = getattr(recordings[0].drive, name)
+        own = dict(corrected[name])
+        of_bias = max((estimates.bias(recording.motions[name], axis.bias.hold) for recording in recordings),
+                      key=lambda found: found['torque'][0] if found else -math.inf)
+        if of_bias:
+            own['bias'] = of_bias['torque']
+        maps[name] = np.zeros((0, 2))
+        for recording in recordings:
+            of_encoder, table = estimates.encoder(recording.motions[name], axis.gear_train.pinion_ratio)
+            if of_encoder:
+                own, maps[name] = {**own, **of_encoder}, table
+                break
+        found[name] = {key: own[key] for key in QUANTITIES if key in own}
+    values = {name: {key: value for key, (value, *_) in own.items()} for name, own in found.items()}
+    changes = {name: _rounded(value) for name, value in twin.parameters(recordings, values).items()}
+    return Identified(source, recordings, found, maps, changes, twin.torque_errors(recordings, {}),
+                      twin.torque_errors(recordings, changes))
+
+
+def _rounded(value):
+    return float(f'{value:.{VALUE_DIGITS}g}')
+
+
+def rows(result):
+    """Return the rows of an Identified for --json."""
+    listed = []
+    for name, found in result.found.items():
+        listed += [estimated(CASE_NAME, f'{name}_{key}', estimate, QUANTITIES[key][0], estimates.PART_COUNT)
+                   for key, estimate in found.items()]
+        listed += [row(CASE_NAME, f'{name}_torque_error_before_percent', 100.0 * result.before[name], '%'),
+                   row(CASE_NAME, f'{name}_torque_error_percent', 100.0 * result.after[name], '%',
+                       target=TORQUE_TARGET)]
+    return listed
+
+
+def passed(result):
+    """Return True if the twin of an Identified reproduces the recorded torques."""
+    return not any(intervals.missed(item) for item in rows(result))
+
+
+def lines(result):
+    """Return the lines of the table of an Identified, with the torque errors and remarks."""
+    drive, listed = as_dict(result.recordings[0].drive), []
+    for name, found in result.found.items():
+        listed += [f'{name:17} {"nominal":>11} {"identified":>11}  {"95 % interval":25} {"unit":8} meaning']
+        for key, (value, low, high) in found.items():
+            parameter = twin.PARAMETER_NAMES.get(key)
+            nominal = f'{drive[f"{name}.{parameter}"]:.5g}' if parameter else ''
+            interval = f'{low:.5g} to {high:.5g}' if math.isfinite(low) else ''
+            listed.append(f'  {key:15} {nominal:>11} {value:11.5g}  {interval:25} {QUANTITIES[key][0]:8} '
+                          f'{QUANTITIES[key][1]}')
+        listed += [f'  torque of the twin is off by {100.0 * result.before[name]:.1f} % rms with nominal values, '
+                   f'{100.0 * result.after[name]:.1f} % with identified values (must be {TORQUE_TARGET} %)',
+                   *(f'  {sentence}' for sentence in remarks(result, name)), '']
+    listed.append('verified: the twin reproduces the recorded torques' if passed(result) else
+                  'NOT VERIFIED: the twin does not reproduce the recorded torques; the drive has a property that its '
+                  'model lacks, or wrong data of the motors, the gear ratio or the control loops')
+    return listed
+
+
+def remarks(result, name):
+    """Return sentences on the properties of an axis that the motions do not show."""
+    found = result.found[name]
+    missing = []
+    if 'lash' not in found:
+        missing.append('lash: not shown, because no motor changes the sign of its torque; add a run with '
+                       f'adu.{name}.bias.schedule=off')
+    if 'frequency' not in found:
+        missing.append('structure: no mode between 2 and 30 Hz shows in the torque')
+    if 'stribeck_rate' not in found:
+        missing.append('static friction: not shown, because it is too small or no motion is slow enough')
+    if 'eccentricity_sin' not in found:
+        missing.append('encoder: not shown, because the axis made no turn of 300 deg both ways')
+    return missing
+
+
+def acu_parameters(result):
+    """Return the parameters {name: value} of acu for an Identified: inertia of load and motors, friction of the load.
+
+    The friction of the motors rises over a wider range of rates than the feed-forward knows. With it, the following
+    error of a slow pass doubled, so the integral of the speed loop takes it.
+    """
+    values = {}
+    for name, found in result.found.items():
+        axis = getattr(result.recordings[0].drive, name)
+        ratio, motors = axis.gear_train.ratio, (axis.motor_1, axis.motor_2)
+        if 'inertia' in found:
+            values[f'{name}.feedforward.inertia'] = _rounded(found['inertia'][0]
+                                                             + ratio**2 * sum(motor.inertia for motor in motors))
+        values[f'{name}.feedforward.friction'] = _rounded(found['coulomb'][0])
+    return values
+
+
+def content(result):
+    """Return the content of the --json file of an Identified."""
+    return {'name': 'calibrate drive', 'rows': rows(result), 'source': result.source, 'verified': passed(result),
+            'remarks': {name: remarks(result, name) for name in result.found},
+            'encoder_map_deg': {name: np.degrees(table).tolist() for name, table in result.maps.items()},
+            'parameters': {'acu': acu_parameters(result), 'adu': result.changes}}
+
+
+def plan_parameters(chosen):
+    """Return (motions.Plan, {node: {parameter: value}}) that let a scenario.Scenario make the motions."""
+    plan = motions.plan(chosen.node_parameters('acu'))
+    start = dict(zip(AXES, plan.start))
+    return plan, {'scenario': {'duration': plan.duration, 'program.source': 'none'},
+                  'acu': {'initial_mode': 'preset', 'commands': plan.commands,
+                          **{f'{name}.preset': angle for name, angle in start.items()}},
+                  'adu': {f'initial_{name}': angle for name, angle in start.items()}}
+
+
+def write_plan(chosen, path):
+    """Write the motions for the antenna of a scenario.Scenario to a new parameter file. Return lines for the user."""
+    plan, sections = plan_parameters(chosen)
+    stated = [f'motions of {plan.duration:g} s for the antenna of {chosen.name}, within', *plan.limits]
+    path.write_text(''.join(f'# {line}\n' for line in stated) + parameter_file.text(sections), encoding='utf-8')
+    return [*stated, f'written: {path}', 'Record the motions twice:',
+            f'    pedestal run {chosen.name} --params-file {path} --bag drive_1',
+            f'    pedestal run {chosen.name} --params-file {path} --param adu.azimuth.bias.schedule=off '
+            '--param adu.elevation.bias.schedule=off --bag drive_2']
+
+
+def in_memory(name, overrides):
+    """Return [twin.Recording] of two runs of a scenario in memory, the second without bias torque.
+
+    name: of the scenario; overrides: changed parameters 'node.key=value', the true values of the simulated drive.
+    The nominal values are those of the scenario itself.
+    """
+    chosen = scenarios.load(name, overrides)
+    nominal = scenarios.load(name).node_parameters('adu')
+    _, plan = plan_parameters(chosen)
+    motion = [scenarios.override(f'{node}.{key}', value) for node, values in plan.items()
+              for key, value in values.items()]
+    without_bias = [f'adu.{axis}.bias.schedule=off' for axis in AXES]
+    found = []
+    for more in ([], without_bias):
+        run = scenarios.load(name, [*overrides, *motion, *more], duration=plan['scenario']['duration'])
+        drive = twin.changed(nominal, {f'{axis}.bias.schedule': 'off' for axis in AXES} if more else {})
+        found.append(twin.read(memory_recording.record(run), drive))
+    return found
+
+
+def of_bags(paths):
+    """Return [twin.Recording] of recordings. Raises ValueError for recordings of different drives."""
+    found, first = [], None
+    for path in paths:
+        bag = bags.read(path, '')
+        given = bag.configuration['parameters'].get('adu', {})
+        known = {key: given[key] for key in defaults(AduParameters) if key in given}
+        if not known:
+            raise ValueError(f'--bag {path}: the recording does not state the parameters of the drive, adu')
+        drive = build(AduParameters, known)
+        axes = {key: value for key, value in as_dict(drive).items() if key.partition('.')[0] in AXES
+                and '.bias.' not in key}
+        first = first or axes
+        changed = [key for key in axes if axes[key] != first[key]]
+        if changed:
+            raise ValueError(f'--bag {path}: adu.{changed[0]} = {axes[changed[0]]} differs from the first recording, '
+                             f'{first[changed[0]]}; only the bias may differ')
+        try:
+            found.append(twin.read(bag, drive))
+        except motion_data.MotionError as error:
+            raise ValueError(f'--bag {path}: {error}') from None
+    return found
+
+
+def main(options, changes):
+    """Calibrate for the options of the verb, write its files, and return (lines, content, verified).
+
+    changes: texts 'node.key=value' of --params-file and --param. Raises ValueError.
+    """
+    source = options.scenario or ', '.join(str(path) for path in options.bag)
+    try:
+        recordings = of_bags(options.bag) if options.bag else in_memory(options.scenario, changes)
+        result = calibrate(recordings, source)
+    except motion_data.MotionError as error:
+        raise ValueError(f'{source}: {error}') from None
+    printed = [f'drive of {source}, {len(recordings)} recordings', '', *lines(result)]
+    printed += output_files.write(options, printed, {'acu': acu_parameters(result), 'adu': result.changes},
+                                  lambda: identified_page.page(result, lines(result), options.command))
+    return printed, content(result), passed(result)

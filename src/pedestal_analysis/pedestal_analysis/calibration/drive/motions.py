@@ -1,0 +1,136 @@
+"""Plan of safe motions that show the properties of a drive: a schedule of `preset` commands for the control unit.
+
+Each axis moves alone, about the middle of its travel, in this order:
+
+    rates        constant rates both ways, from 0.5 mrad/s to half the rate of the shaper: friction
+    reversals    of half the largest rate: inertia, and lash in a run without bias torque
+    pulses       small steps on a constant rate: first mode of the structure. At this rate the friction is constant
+    turn         a turn both ways, if the travel allows a turn: encoder
+
+The motions stay inside the limits of the control unit: MAX_RATE_SHARE of the shaper's rate, the shaper's acceleration,
+and the travel less MARGIN_SHARE at each end.
+"""
+import dataclasses
+import math
+
+from pedestal_common.graph.topics import AXES
+
+MAX_RATE_SHARE, MARGIN_SHARE = 0.5, 0.05
+"""Shares of the shaper's rate and of the travel [-]."""
+SLOW_RATES_RAD_S = (0.5e-3, 1e-3, 2e-3, 4e-3, 8e-3, 0.02, 0.05, 0.15, 0.4)
+"""Rates below the largest one [rad/s]."""
+RATE_TIME_S, SLOWEST_TRAVEL_RAD = 3.0, 4e-3
+"""Time at each rate [s], and smallest angle that it covers [rad], so that the bristles of the friction slide."""
+REVERSAL_COUNT, REVERSAL_TIME_S = 8, 0.8
+"""Number of reversals and time between two of them [s]."""
+PULSE_COUNT, PULSE_INTERVAL_S, PULSE_TIME_S = 31, 0.35, 0.06
+"""Number of pulses, time between two of them, and time of the motion of a pulse [s]."""
+PULSE_LEVELS = (0, 1, 1, 0, 1, 0, 0, 1, 0, 0, 0, 0, 1, 0, 1, 0, 1, 1, 1, 0, 1, 1, 0, 0, 0, 1, 1, 1, 1, 1, 0)
+"""Levels of the pulses: the sequence of a shift register of 5 bits, whose spectrum is flat."""
+PULSES_TIME_S = 1.0 + PULSE_COUNT * PULSE_INTERVAL_S
+"""Time of the constant rate under the pulses, with the part before the first pulse [s]."""
+PULSE_RATES_RAD_S = (0.1, 0.05)
+"""Constant rates of azimuth and elevation under the pulses [rad/s]."""
+TURN_RAD, TURN_RATE_RAD_S = 1.02 * 2.0 * math.pi, 0.5
+"""Angle of a turn with an overlap [rad] and its largest rate [rad/s]."""
+SETTLING_TIME_S = 0.6
+"""Time after a motion before the next [s]."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Plan:
+    """Motions of a calibration of the drive.
+
+    commands   text for the parameter acu.commands
+    start      (azimuth, elevation) at the start [rad]
+    duration   of the run [s]
+    limits     lines that state the limits of the motions
+    """
+    commands: str
+    start: tuple
+    duration: float
+    limits: tuple
+
+
+class _Schedule:
+    """Commands of the mode preset for one axis after another."""
+
+    def __init__(self, acu):
+        self.acu, self.parts, self.t = acu, [], 2.0
+        self.angles = [0.5 * (axis.limits.low + axis.limits.high) for axis in (acu.azimuth, acu.elevation)]
+        self.start = tuple(self.angles)
+
+    def command(self, i, angle, wait, rate=0.0, moves=0.0):
+        """Command axis i to an angle [rad], from which it moves at a rate [rad/s] for `moves` [s]; then `wait` [s]."""
+        self.angles[i] = angle
+        text = f'{self.t:.3f} preset ' + ' '.join(f'{name}={at:.6f}' for name, at in zip(AXES, self.angles))
+        if rate:
+            text += f' {AXES[i]}_rate={rate:.6g} moves={moves:.3f}'
+        self.parts.append(text)
+        self.angles[i] += rate * moves
+        self.t += moves + wait
+
+    def slew(self, i, angle):
+        """Move axis i to an angle [rad] and wait for its arrival."""
+        shaper = (self.acu.azimuth, self.acu.elevation)[i].shaper
+        way, rate = abs(angle - self.angles[i]), MAX_RATE_SHARE * shaper.rate
+        if way > 0.0:
+            time = way / rate
+            self.command(i, self.angles[i], SETTLING_TIME_S + rate / shaper.acceleration,
+                         math.copysign(rate, angle - self.angles[i]), time)
+            self.angles[i] = angle
+
+
+def plan(acu) -> Plan:
+    """Return the Plan for the limits of AcuParameters."""
+    schedule, limits = _Schedule(acu), []
+    for i, (name, axis) in enumerate(zip(AXES, (acu.azimuth, acu.elevation))):
+        travel = axis.limits.high - axis.limits.low
+        low, high = axis.limits.low + MARGIN_SHARE * travel, axis.limits.high - MARGIN_SHARE * travel
+        middle, largest = 0.5 * (low + high), MAX_RATE_SHARE * axis.shaper.rate
+        _rates(schedule, i, middle, 0.6 * (high - low), largest, axis.shaper.acceleration)
+        _reversals(schedule, i, middle, 0.5 * largest)
+        _pulses(schedule, i, middle, min(PULSE_RATES_RAD_S[i], largest, 0.9 * (high - low) / PULSES_TIME_S),
+                axis.shaper.acceleration)
+        if high - low > TURN_RAD:
+            rate = min(TURN_RATE_RAD_S, largest)
+            schedule.slew(i, middle - 0.5 * TURN_RAD)
+            for sign in (1.0, -1.0):
+                schedule.command(i, schedule.angles[i], 1.0, sign * rate, TURN_RAD / rate)
+        schedule.slew(i, middle)
+        limits.append(f'{name}: {math.degrees(low):.1f} to {math.degrees(high):.1f} deg, at most {largest:.3g} rad/s '
+                      f'and {axis.shaper.acceleration:.3g} rad/s2')
+    return Plan('; '.join(schedule.parts), schedule.start, math.ceil(schedule.t + 1.0), tuple(limits))
+
+
+def _rates(schedule, i, middle, travel, largest, acceleration):
+    """Add constant rates both ways about the middle [rad]; travel [rad], largest [rad/s], acceleration [rad/s2]."""
+    for rate in (*(rate for rate in SLOW_RATES_RAD_S if rate < 0.8 * largest), largest):
+        time = min(max(RATE_TIME_S, SLOWEST_TRAVEL_RAD / rate), travel / rate)
+        schedule.slew(i, middle - 0.5 * rate * time)
+        for sign in (1.0, -1.0):
+            schedule.command(i, schedule.angles[i], SETTLING_TIME_S + rate / acceleration, sign * rate, time)
+
+
+def _reversals(schedule, i, middle, rate):
+    """Add reversals of a rate [rad/s] about the middle [rad], without a stop between them."""
+    schedule.slew(i, middle - 0.5 * rate * REVERSAL_TIME_S)
+    for k in range(REVERSAL_COUNT):
+        last = k == REVERSAL_COUNT - 1
+        schedule.command(i, schedule.angles[i], SETTLING_TIME_S if last else 0.0, rate if k % 2 == 0 else -rate,
+                         REVERSAL_TIME_S)
+
+
+def _pulses(schedule, i, middle, rate, acceleration):
+    """Add small steps on a constant rate [rad/s] about the middle [rad]; acceleration [rad/s2]."""
+    # A step of this size keeps the sign of the rate, and takes about PULSE_TIME_S.
+    step = min(acceleration * (0.5 * PULSE_TIME_S)**2, 0.25 * rate * rate / acceleration)
+    begin = middle - 0.5 * rate * PULSES_TIME_S
+    schedule.slew(i, begin)
+    schedule.command(i, begin, 0.0, rate, 1.0)
+    level = 0.0
+    for k in range(PULSE_COUNT):
+        level = step * PULSE_LEVELS[k % len(PULSE_LEVELS)]
+        at = begin + rate * (1.0 + k * PULSE_INTERVAL_S)
+        last = k == PULSE_COUNT - 1
+        schedule.command(i, at + level, SETTLING_TIME_S if last else 0.0, rate, PULSE_INTERVAL_S)

@@ -1,0 +1,193 @@
+"""`pedestal calibrate pointing`: the pointing model of a control unit from measured offsets.
+
+The result is a table of the terms, rows for --json, a page with the residuals, and a ROS 2 parameter file with the
+parameters acu.pointing.*. The file states where the model comes from: source, date and rms.
+"""
+import dataclasses
+
+import numpy as np
+
+from pedestal_analysis.calibration import (
+    collect,
+    distribution,
+    exact,
+    fit,
+    offsets,
+    output_files,
+    pointing_page,
+    terms,
+)
+from pedestal_analysis.results.intervals import estimated, row
+from pedestal_analysis.results.tracking import rms
+from pedestal_common.geometry.pointing_report import residual_text
+from pedestal_recording import bag as bags
+
+CASE_NAME = 'pointing'
+"""Case of the rows."""
+FORMS = {'linear': fit.linear, 'exact': exact.exact}
+"""{form of the model: its fit}."""
+EXACT_GAIN = 0.95
+"""Ratio of the leave-one-out rms of both forms below which the exact form is chosen [-]."""
+MAX_POINTS = 1000
+"""Largest number of points from one recording."""
+TERM_DECIMALS = 9
+"""Decimals of the terms in a parameter file."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Calibration:
+    """Pointing model that was fitted to offsets.
+
+    offsets   offsets.Offsets
+    fit       fit.Fit of the terms that were kept
+    dropped   [(name, value, sigma)] of the terms whose sigma exceeds their value
+    outliers  places of the outliers among the offsets
+    date      date of the measurement, '' if unknown
+    """
+    offsets: offsets.Offsets
+    fit: fit.Fit
+    dropped: list
+    outliers: np.ndarray
+    date: str
+
+
+def calibrate(measured, names, form='', keep_all=False, date='') -> Calibration:
+    """Return the Calibration of offsets.Offsets with the terms `names`. Raises FitError.
+
+    form       one of FORMS; '': linear, unless the exact form has a leave-one-out rms below EXACT_GAIN of it
+    keep_all   keep the terms whose sigma exceeds their value
+    date       replaces the date of the offsets
+    """
+    distribution.check(names, measured.directions)
+
+    def fitted(chosen):
+        found = [one(chosen, measured.directions, measured.values, measured.sigma)
+                 for name, one in FORMS.items() if form in ('', name)]
+        return found[-1] if rms(found[-1].left_out) < EXACT_GAIN * rms(found[0].left_out) else found[0]
+
+    found, dropped = (fitted(names), []) if keep_all else fit.without_doubtful(names, fitted)
+    return Calibration(measured, found, dropped, found.outliers(measured.sigma), date or measured.date)
+
+
+def rows(found):
+    """Return the rows of a Calibration for --json: terms with their intervals, then the residuals."""
+    count, fitted = len(found.offsets.places), found.fit
+    half = fitted.interval * fitted.sigma
+    of_terms = [estimated(CASE_NAME, name, (value, value - width, value + width), terms.TERM_BY_NAME[name].unit, count)
+                for name, value, width in zip(fitted.names, fitted.values, half)]
+    residuals = fitted.residuals
+    measured = {'raw_rms_deg': rms(found.offsets.values), 'residual_rms_deg': rms(residuals),
+                'residual_cross_elevation_rms_deg': rms(residuals[:, 0]), 'residual_elevation_rms_deg':
+                rms(residuals[:, 1]),
+                'leave_one_out_rms_deg': rms(fitted.left_out),
+                'model_error_deg': fit.model_error(fitted.names, fitted.covariance, found.offsets.directions)}
+    return [*of_terms, *(row(CASE_NAME, name, value, 'deg') for name, value in measured.items()),
+            row(CASE_NAME, 'condition', fitted.condition), row(CASE_NAME, 'points', count)]
+
+
+def content(found):
+    """Return the content of the --json file of a Calibration."""
+    fitted = found.fit
+    return {'name': 'calibrate pointing', 'rows': rows(found), 'source': found.offsets.source,
+            'format': found.offsets.format, 'date': found.date, 'form': fitted.form, 'terms': list(fitted.names),
+            'sigma': fitted.sigma.tolist(), 'correlation': fitted.correlation.tolist(),
+            'dropped': [{'term': name, 'value': value, 'sigma': sigma} for name, value, sigma in found.dropped],
+            'indistinct': [[*pair] for pair in fitted.correlated()],
+            'outliers': [found.offsets.places[place] for place in found.outliers]}
+
+
+def term_lines(found):
+    """Return the lines of the table of the terms of a Calibration, with a title."""
+    measured, fitted = found.offsets, found.fit
+    half = fitted.interval * fitted.sigma
+    table = [f'{"term":5} {"value":>10} {"sigma":>9}  {"95 % interval":23} {"unit":4} meaning']
+    for name, value, sigma, width in zip(fitted.names, fitted.values, fitted.sigma, half):
+        term = terms.TERM_BY_NAME[name]
+        interval = f'{value - width:.5f} to {value + width:.5f}'
+        table.append(f'{name:5} {value:10.5f} {sigma:9.5f}  {interval:23} {term.unit:4} {term.meaning} '
+                     f'({term.tpoint} of TPOINT)')
+    return [f'{len(measured.places)} offsets of {measured.source} ({measured.format})'
+            f'{f" of {found.date}" if found.date else ""}, {fitted.form} form', '', *table, '']
+
+
+def residual_lines(found):
+    """Return the lines on the residuals of a Calibration."""
+    known = {item['metric']: item['value'] for item in rows(found)}
+    return [f'rms of the offsets      {known["raw_rms_deg"]:.5f} deg',
+            f'rms of the residuals    {known["residual_rms_deg"]:.5f} deg (cross-elevation '
+            f'{known["residual_cross_elevation_rms_deg"]:.5f}, elevation {known["residual_elevation_rms_deg"]:.5f})',
+            f'leave-one-out rms       {known["leave_one_out_rms_deg"]:.5f} deg, expected of an offset in a new '
+            'direction',
+            f'error of the model      {known["model_error_deg"]:.5f} deg, from the noise of the offsets',
+            f'condition               {known["condition"]:.4g}']
+
+
+def remarks(found):
+    """Return sentences on dropped terms, correlated terms, outliers, and offsets that are few or badly stated."""
+    measured, fitted = found.offsets, found.fit
+    said = [f'{name}: dropped, because its sigma {sigma:.2g} exceeds its value {value:.2g}'
+            for name, value, sigma in found.dropped]
+    said += [f'{first} and {second}: correlation {value:.2f}; the offsets hardly tell these terms apart, so only '
+             'their common effect is certain' for first, second, value in fitted.correlated()]
+    for place in found.outliers:
+        az, el = measured.directions[place]
+        said.append(f'outlier in {measured.places[place]}: azimuth {az:.3f}, elevation {el:.3f} deg is off '
+                    f'the model of the other points by {fitted.left_out[place, 0]:.4f} deg in cross-elevation and '
+                    f'{fitted.left_out[place, 1]:.4f} deg in elevation; check it, and remove it if it is wrong')
+    if len(measured.places) < distribution.GOOD_POINTS:
+        said.append(f'{len(measured.places)} points are few: {distribution.GOOD_POINTS} to 40 points all over the sky '
+                    'are recommended')
+    if measured.has_sigma and not 0.5 < fitted.scale < 2.0:
+        said.append(f'the residuals are {fitted.scale:.2g} times the stated sigmas; the intervals follow the '
+                    'residuals')
+    return said
+
+
+def parameters(found, file, antenna=''):
+    """Return the parameters {name: value} of the control unit for a Calibration.
+
+    file, antenna: names of the parameter file and of the antenna, which the control unit reports with the model
+    """
+    values = dict(zip(found.fit.names, found.fit.values))
+    model = {name.lower(): round(float(values.get(name, 0.0)), TERM_DECIMALS) for name in terms.TERM_BY_NAME}
+    stated = {'antenna': antenna, 'file': file, 'date': found.date,
+              'rms': round(float(rms(found.fit.residuals)), TERM_DECIMALS),
+              'residuals': residual_text(found.offsets.directions, found.fit.residuals)}
+    return {f'pointing.{name}': value for name, value in {**model, **stated}.items()}
+
+
+def collected(paths, count):
+    """Return the offsets.Offsets of recordings; count: points of each, None for the default. Raises ValueError."""
+    parts, dates = [], []
+    if count is not None and not 1 <= count <= MAX_POINTS:
+        raise ValueError(f'--points {count}: must be 1 to {MAX_POINTS}')
+    for path in paths:
+        bag = bags.read(path, '')
+        try:
+            parts.append((path.name, collect.every_point(bag, count or collect.DEFAULT_POINTS)))
+        except collect.CollectError as error:
+            raise ValueError(f'--bag {path}: {error}') from None
+        # In lockstep the time of a recording begins at 0 and states no date.
+        dates += [np.datetime64(int(bag.start), 'ns').astype('datetime64[D]').item().isoformat()] if bag.start else []
+    joined = collect.joined(parts, ', '.join(path.name for path in paths))
+    return joined._replace(date=max(dates, default=''))
+
+
+def main(options):
+    """Calibrate for the options of the verb, write its files and return (lines to print, content for --json). Raises
+    ValueError."""
+    names = terms.chosen(options.terms) if options.terms is not None else terms.DEFAULT_TERMS
+    date = offsets.valid_date(options.date) if options.date else ''
+    measured = collected(options.bag, options.points) if options.bag else offsets.read(options.offsets)
+    if options.collected:
+        options.collected.write_text(offsets.table(measured), encoding='utf-8')
+    try:
+        found = calibrate(measured, names, options.form or '', options.keep_all, date)
+    except fit.FitError as error:
+        raise ValueError(f'{options.offsets or measured.source}: {error}') from None
+    notes, residuals = remarks(found), residual_lines(found)
+    printed = [*term_lines(found), *residuals, *notes]
+    values = parameters(found, options.output.name if options.output else '', options.antenna or '')
+    printed += output_files.write(options, printed, {'acu': values},
+                                  lambda: pointing_page.page(found, residuals, notes, options.command))
+    return printed, content(found)

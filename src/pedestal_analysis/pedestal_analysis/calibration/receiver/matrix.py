@@ -1,0 +1,167 @@
+"""Slopes and cross-talk of the receiver: fit of a 2 x 2 matrix, named faults, and verification on the circle.
+
+The errors of the receiver follow the offsets of the beacon:
+
+    e = C m + n
+
+    e   measured error (cross-elevation, elevation) [beamwidths]
+    m   offset of the beacon from the beam [beamwidths]
+    n   error at m = 0: null of the receiver off the assumed place of the beacon [beamwidths]
+    C   ((C_xx, C_xe), (C_ex, C_ee)): slopes on the diagonal, cross-talk off the diagonal [-]
+
+Least squares give C and n. Each point has the weight 1 / |m|^2, because the relative errors of a curved slope matter
+alike at all offsets. The control unit multiplies the errors with M = C^-1 (acu.tracker.matrix). The published
+errors are real: a phase error phi of a channel multiplies its row of C with cos(phi). Steps: S. M. Sherman and D. K.
+Barton, Monopulse Principles and Techniques, 2nd ed., chapters 7 and 9.
+"""
+import dataclasses
+import math
+
+import numpy as np
+from scipy.special import stdtrit
+
+from pedestal_analysis.results.intervals import CONFIDENCE_LEVEL
+
+SMALLEST_OFFSET_BEAMWIDTHS = 0.05
+"""Offset below which the weight of a point does not grow further [beamwidths]."""
+MIN_SLOPE = 0.2
+"""Least root of the determinant of C [-]. Below it the receiver hardly measures the offsets."""
+WEAK_SLOPE = 0.5
+"""Root of the determinant of C below which a weak slope is named [-]: a phase error of 60 deg."""
+TURNED_AXES_DEG = 10.0
+"""Turn of the axes of the errors above which the turn is named [deg]."""
+
+
+AXIS_NAMES = 'cross-elevation', 'elevation'
+BOTH_NEGATIVE_TEXT = ('180 deg: both slopes are negative; the phase of the sum channel, or of both differences, is '
+                      'off by 180 deg')
+REVERSED_SIGN_TEXT = 'reversed sign: the slope of {} is negative'
+"""Sentences on the faults of both signs and of one sign."""
+
+
+class MatrixError(ValueError):
+    """Error of offsets from which no matrix can be computed. Its text is one line."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Slopes:
+    """Fit of the slopes to n offsets.
+
+    C            (2, 2) slopes and cross-talk [-]
+    null         (2,) error at the offset 0 [beamwidths]
+    half         (2, 2) half of the confidence interval of C, or of its real and imaginary part [-]
+    residuals    (n, 2) measured minus fitted errors, per offset [-]
+
+    All except `half` are complex for complex errors.
+    """
+    C: np.ndarray
+    null: np.ndarray
+    half: np.ndarray
+    residuals: np.ndarray
+
+    @property
+    def matrix(self):
+        """Return M = C^-1 (2, 2) [-], with which the control unit multiplies the errors."""
+        return np.linalg.inv(self.C)
+
+    @property
+    def gain(self):
+        """Return the root of the size of the determinant of C, the mean slope [-]."""
+        return math.sqrt(abs(np.linalg.det(self.C)))
+
+
+def least_squares(offsets, errors) -> Slopes:
+    """Return the Slopes of real or complex errors (n, 2) at offsets (n, 2), both [beamwidths]. Raises MatrixError for
+    offsets on one line."""
+    size = np.maximum(np.hypot(*offsets.T), SMALLEST_OFFSET_BEAMWIDTHS)[:, np.newaxis]
+    A = np.column_stack((offsets, np.ones(len(offsets)))) / size
+    solution, _, rank, _ = np.linalg.lstsq(A, errors / size, rcond=None)
+    if rank < A.shape[1]:
+        raise MatrixError('the offsets are on one line, and cannot tell slope and cross-talk apart')
+    residuals = errors / size - A @ solution
+    # A complex number counts as two real numbers, with the same variance.
+    degrees = max(len(offsets) - A.shape[1], 1) * (2 if np.iscomplexobj(errors) else 1)
+    variance = np.diag(np.linalg.inv(A.T @ A))[:2]
+    quantile = stdtrit(degrees, 0.5 * (1.0 + CONFIDENCE_LEVEL))
+    sigma = np.sqrt((np.abs(residuals)**2).sum(0) / degrees)
+    return Slopes(solution[:2].T, solution[2], quantile * np.outer(sigma, np.sqrt(variance)), residuals)
+
+
+def fit(offsets, errors) -> Slopes:
+    """Return the Slopes of errors (n, 2) at offsets (n, 2), both [beamwidths]. Raises MatrixError."""
+    found = least_squares(offsets, errors)
+    if found.gain < MIN_SLOPE:
+        raise MatrixError(f'the errors hardly follow the offsets: mean slope {found.gain:.3g}, must be at least '
+                          f'{MIN_SLOPE:g}; the phase of both channels may be off by 90 deg, or the receiver follows '
+                          'another signal')
+    return found
+
+
+def unexchanged(C):
+    """Return (C with its rows in the right order, True if the channels are exchanged)."""
+    exchanged = abs(C[0, 1]) + abs(C[1, 0]) > abs(C[0, 0]) + abs(C[1, 1])
+    return (C[::-1], True) if exchanged else (C, False)
+
+
+def turn(C):
+    """Return the angle [rad] by which a matrix C turns the axes of the errors, after signs and channels are right."""
+    C, _ = unexchanged(C)
+    C = np.diag(np.sign(np.diag(C))) @ C
+    return math.atan2(C[1, 0] - C[0, 1], C[0, 0] + C[1, 1])
+
+
+def turned_axes(C):
+    """Return a list with the sentence on the turn of a matrix C, empty up to TURNED_AXES_DEG."""
+    angle = math.degrees(turn(C))
+    if not abs(angle) > TURNED_AXES_DEG:
+        return []
+    return [f'turned axes: the axes of the errors are turned by {angle:.1f} deg']
+
+
+def faults(slopes):
+    """Return sentences that name the faults of Slopes: exchanged channels, signs, turned axes, weak slopes."""
+    C, exchanged = unexchanged(slopes.C)
+    found = []
+    if exchanged:
+        found.append('exchanged channels: an offset in cross-elevation appears as an error in elevation, and the '
+                     'reverse')
+    wrong = [name for name, value in zip(AXIS_NAMES, np.diag(C)) if value < 0.0]
+    if len(wrong) == 2:
+        found.append(BOTH_NEGATIVE_TEXT)
+    elif wrong:
+        found.append(REVERSED_SIGN_TEXT.format(wrong[0]))
+    found += turned_axes(slopes.C)
+    if slopes.gain < WEAK_SLOPE:
+        found.append(f'weak slope: the mean slope is {slopes.gain:.2f}; a phase error of '
+                     f'{math.degrees(math.acos(slopes.gain)):.0f} deg has this effect')
+    return found
+
+
+@dataclasses.dataclass(frozen=True)
+class Verification:
+    """Quality of a matrix on the circle.
+
+    error        largest distance between corrected error and offset, per radius [-]
+    cross_talk   largest cross-talk of the corrected errors, per slope [-]
+    """
+    error: float
+    cross_talk: float
+
+    @property
+    def cross_talk_db(self):
+        """Return the cross-talk [dB], at least -100 dB."""
+        return 20.0 * math.log10(max(self.cross_talk, 1e-5))
+
+
+def verify(matrix, null, offsets, errors) -> Verification:
+    """Return the Verification of a matrix (2, 2) at points (n, 2) of the circle [beamwidths].
+
+    null (2,): error at the offset 0 [beamwidths].
+    """
+    corrected = (errors - null) @ matrix.T
+    radius = float(np.hypot(*offsets.T).mean())
+    A = np.column_stack((offsets, np.ones(len(offsets))))
+    K = np.linalg.lstsq(A, corrected, rcond=None)[0][:2].T
+    slopes = np.maximum(np.abs(np.diag(K)), 1e-9)
+    cross_talk = max(abs(K[0, 1]) / slopes[0], abs(K[1, 0]) / slopes[1])
+    return Verification(float(np.hypot(*(corrected - offsets).T).max()) / radius, cross_talk)

@@ -1,0 +1,165 @@
+"""`pedestal calibrate receiver`: the matrix of the receiver's errors from offsets about a beacon.
+
+The result is a table of the elements, the named faults, the verification on the circle before and after, rows for
+--json, a page, and a ROS 2 parameter file with acu.tracker.matrix.* and acu.tracker.receiver.slope.
+"""
+import dataclasses
+import math
+
+import numpy as np
+
+from acu_tracker.params import AcuParameters
+from pedestal_analysis.calibration import output_files
+from pedestal_analysis.calibration.receiver import matrix, offsets, phasing_page
+from pedestal_analysis.results import intervals, tracking
+from pedestal_analysis.results.intervals import estimated, row
+
+CASE_NAME = 'receiver'
+"""Case of the rows."""
+ERROR_TARGET, CROSS_TALK_TARGET = '< 5', '< -20'
+"""Targets of the error on the circle [%] and of the cross-talk [dB]."""
+SLOPE_RANGE = 0.1, 10.0
+"""Range of acu.tracker.receiver.slope."""
+ELEMENT_DECIMALS = 6
+"""Decimals of the elements in a parameter file."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Phasing:
+    """Calibration of a receiver.
+
+    source          name of the recording or scenario
+    points          offsets.Points
+    slopes          matrix.Slopes
+    in_force        (2, 2) matrix that the control unit used in the recording
+    noise_slope     slope that the control unit used for the noise of the receiver [-]
+    before, after   matrix.Verification with the matrix in force and with the new one
+    """
+    source: str
+    points: offsets.Points
+    slopes: matrix.Slopes
+    in_force: np.ndarray
+    noise_slope: float
+    before: matrix.Verification
+    after: matrix.Verification
+
+
+def calibrate(bag, source) -> Phasing:
+    """Return the Phasing of a bag.Bag of one beam. Raises OffsetError and MatrixError."""
+    points = offsets.read(bag)
+    slopes = matrix.fit(points.offsets[points.fitted], points.errors[points.fitted])
+    known = bag.configuration['parameters'].get('acu', {})
+    in_force = tracking.error_matrix(bag)
+    circle = points.offsets[points.circle], points.errors[points.circle]
+    before, after = (matrix.verify(used, slopes.null, *circle) for used in (in_force, slopes.matrix))
+    slope = known.get('tracker.receiver.slope', AcuParameters().tracker.receiver.slope)
+    return Phasing(source, points, slopes, in_force, slope, before, after)
+
+
+def rows(found):
+    """Return the rows of a Phasing for --json."""
+    slopes, points = found.slopes, found.points
+    count = int(points.fitted.sum())
+    listed = [estimated(CASE_NAME, f'slope_{name}', (value, value - half, value + half), '', count)
+              for names, values, halves in zip(tracking.ERROR_MATRIX_NAMES, slopes.C, slopes.half)
+              for name, value, half in zip(names, values, halves)]
+    listed += [row(CASE_NAME, f'matrix_{name}', value)
+               for names, values in zip(tracking.ERROR_MATRIX_NAMES, slopes.matrix)
+               for name, value in zip(names, values)]
+    turned = math.degrees(matrix.turn(slopes.C))
+    return [*listed, row(CASE_NAME, 'axes_turn_deg', turned, 'deg'),
+            row(CASE_NAME, 'null_cross_elevation', -(slopes.matrix @ slopes.null)[0], 'beamwidths'),
+            row(CASE_NAME, 'null_elevation', -(slopes.matrix @ slopes.null)[1], 'beamwidths'),
+            *verification_rows(found.before, found.after),
+            row(CASE_NAME, 'offsets', count), row(CASE_NAME, 'circle_points', int(points.circle.sum()))]
+
+
+def verification_rows(before, after):
+    """Return the rows of the matrix.Verification before and after, with their targets."""
+    return [row(CASE_NAME, 'circle_error_before_percent', 100.0 * before.error, '%'),
+            row(CASE_NAME, 'circle_error_percent', 100.0 * after.error, '%', target=ERROR_TARGET),
+            row(CASE_NAME, 'cross_talk_before_db', before.cross_talk_db, 'dB'),
+            row(CASE_NAME, 'cross_talk_db', after.cross_talk_db, 'dB', target=CROSS_TALK_TARGET)]
+
+
+def passed(found):
+    """Return True if the new matrix of a calibration with the fields `before` and `after` passes the verification."""
+    return not any(map(intervals.missed, verification_rows(found.before, found.after)))
+
+
+def table(found):
+    """Return the lines of the table of slopes, matrix in force and new matrix."""
+    slopes = found.slopes
+    lines = [f'{"element":8} {"slope C":>9}  {"95 % interval":19} {"in force":>9} {"new matrix":>11}  meaning']
+    meanings = (('slope of cross-elevation', 'elevation offset in the cross-elevation error'),
+                ('cross-elevation offset in the elevation error', 'slope of elevation'))
+    for i, names in enumerate(tracking.ERROR_MATRIX_NAMES):
+        for j, name in enumerate(names):
+            value, half = slopes.C[i, j], slopes.half[i, j]
+            interval = f'{value - half:.4f} to {value + half:.4f}'
+            lines.append(f'{name:8} {value:9.4f}  {interval:19} {found.in_force[i, j]:9.4f} '
+                         f'{slopes.matrix[i, j]:11.4f}  {meanings[i][j]}')
+    return lines
+
+
+def summary(found):
+    """Return the lines on faults and verification of a Phasing."""
+    return summary_of(found, matrix.faults(found.slopes))
+
+
+def summary_of(found, faults):
+    """Return the lines on the faults, sentences, and on the verification of a calibration with the fields `before` and
+    `after`."""
+    lines = [f'FAULT {sentence}' for sentence in faults]
+    unit = f'{offsets.CIRCLE_BEAMWIDTHS:g} beamwidths'
+    lines.append(f'error on the circle of {unit}   {100.0 * found.before.error:.2f} % before, '
+                 f'{100.0 * found.after.error:.2f} % after (must be {ERROR_TARGET} %)')
+    lines.append(f'cross-talk                            {found.before.cross_talk_db:.1f} dB before, '
+                 f'{found.after.cross_talk_db:.1f} dB after (must be {CROSS_TALK_TARGET} dB)')
+    lines.append('verified: the new matrix passes' if passed(found) else 'NOT VERIFIED: the new matrix fails; the '
+                 'errors are not linear, or noise and motion of the beacon are too large')
+    if faults:
+        lines.append('The new matrix corrects these faults. Because another receiver or cable changes them, correct '
+                     'them at their cause if possible, and calibrate again')
+    return lines
+
+
+def parameters(found):
+    """Return the parameters {name: value} of the control unit for a Phasing.
+
+    A slope f times as large makes the noise of the corrected errors f times as small. So the slope of the noise model
+    is multiplied by the mean slope, after the effect of the matrix in force is removed.
+    """
+    elements = {f'tracker.matrix.{name}': round(float(value), ELEMENT_DECIMALS)
+                for names, values in zip(tracking.ERROR_MATRIX_NAMES, found.slopes.matrix)
+                for name, value in zip(names, values)}
+    uncorrected = found.noise_slope * math.sqrt(abs(np.linalg.det(found.in_force)))
+    return {**elements, 'tracker.receiver.slope': noise_slope(uncorrected * found.slopes.gain)}
+
+
+def noise_slope(slope):
+    """Return the value of acu.tracker.receiver.slope for a slope, within SLOPE_RANGE."""
+    return round(min(max(slope, SLOPE_RANGE[0]), SLOPE_RANGE[1]), ELEMENT_DECIMALS)
+
+
+def content(found):
+    """Return the content of the --json file of a Phasing."""
+    return {'name': 'calibrate receiver', 'rows': rows(found), 'source': found.source,
+            'faults': matrix.faults(found.slopes), 'verified': passed(found), 'parameters': parameters(found)}
+
+
+def main(bag, source, options):
+    """Calibrate a bag.Bag, write the files of the options of the verb, and return (lines, content, verified).
+
+    Raises ValueError.
+    """
+    try:
+        found = calibrate(bag, source)
+    except (offsets.OffsetError, matrix.MatrixError) as error:
+        raise ValueError(f'{source}: {error}') from None
+    count, level = int(found.points.fitted.sum()), found.points.level.mean()
+    printed = [f'{count} offsets and {int(found.points.circle.sum())} points of the circle in {source}, '
+               f'C/N0 {level:.1f} dB-Hz', '', *table(found), '', *summary(found)]
+    printed += output_files.write(options, printed, {'acu': parameters(found)},
+                                  lambda: phasing_page.page(found, table(found), summary(found), options.command))
+    return printed, content(found), passed(found)

@@ -1,0 +1,117 @@
+"""Levels at offsets about a source, from a CSV file or from a recording.
+
+A file has the columns cross_elevation_deg, elevation_deg and level_db; or az_deg, el_deg and level_db, of which az_deg
+is an offset in azimuth. Its level is the total power, of source and system noise, in dB.
+
+In a recording the commands `offset` of the control unit move the antenna about the table that it follows. The level of
+the receiver is a C/N0 in dB-Hz: the power of the source alone over the noise power in 1 Hz.
+"""
+import dataclasses
+import itertools
+import math
+
+import numpy as np
+
+from pedestal_analysis.calibration import scan
+from pedestal_analysis.results import tracking
+from pedestal_common.text_files import columns, csv_table
+
+OFFSET_RANGE_DEG, LEVEL_RANGE_DB = (-30.0, 30.0), (-300.0, 300.0)
+"""Ranges of the offsets and of the levels in a file."""
+MAX_FOLLOWING_BEAMWIDTHS = 0.1
+"""Largest following error of an antenna at rest [beamwidths]."""
+_OFFSETS = (columns.Quantity('elevation_deg', {'elevation': '', 'el': ''}, 'deg'),
+            columns.Quantity('cross_elevation_deg', {'cross elevation': '', 'xel': ''}, 'deg'),
+            columns.Quantity('az_deg', {'az': '', 'azimuth': ''}, 'deg'))
+NOISE_KINDS = 'sun', 'moon'
+"""Kinds of simulated targets that are sources of noise."""
+LEVEL_NAMES = 'level_db', 'level_dB'
+"""Names of the column of the level."""
+
+
+class LevelError(ValueError):
+    """Error of levels from which no beam can be computed. Its text is one line."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Levels:
+    """Levels at n offsets.
+
+    offsets   (n, 2) cross-elevation and elevation of the beam from the source [deg]
+    power     (n,) total power, or of a recording the power of the source over the noise power in 1 Hz [Hz]
+    of_source True if the power is that of the source alone
+    errors    (n, 2) errors of the receiver [deg], NaN where there are none
+    bandwidth noise bandwidth of the receiver that the recording states [Hz], NaN if unknown
+    source    name of the file or recording
+    """
+    offsets: np.ndarray
+    power: np.ndarray
+    of_source: bool
+    errors: np.ndarray
+    bandwidth: float
+    source: str
+
+
+def read(path, elevation=None) -> Levels:
+    """Return the Levels of a CSV file. Raises TableError and LevelError.
+
+    elevation: of the source [deg], with which an offset in azimuth becomes one in cross-elevation.
+    """
+    try:
+        table = csv_table.Table(path, csv_table.text(path))
+        up = table.column(_OFFSETS[0])
+        in_azimuth = table.column(_OFFSETS[1], required=False) is None
+        across = table.column(_OFFSETS[2 if in_azimuth else 1])
+        level = next((name for name in LEVEL_NAMES if name in table.fieldnames), None)
+        if level is None:
+            raise table.missing(LEVEL_NAMES[0])
+        rows = [(table.number(across, row[across.name], *OFFSET_RANGE_DEG),
+                 table.number(up, row[up.name], *OFFSET_RANGE_DEG),
+                 csv_table.number(path, table.line_num, level, row[level] or '', *LEVEL_RANGE_DB)) for row in table]
+    except csv_table.csv.Error as error:
+        raise csv_table.TableError(f'{path}: not a CSV text file: {error}') from None
+    if not rows:
+        raise LevelError('0 levels, must be at least 1')
+    x, y, level = np.array(rows).T
+    if in_azimuth:
+        if elevation is None:
+            raise LevelError('the offsets are in azimuth; --elevation must state the elevation of the source')
+        x = x * math.cos(math.radians(elevation))
+    return Levels(np.column_stack((x, y)), 10.0**(0.1 * level), False, np.full((x.size, 2), np.nan), math.nan,
+                  str(path))
+
+
+def of_recording(bag, source) -> Levels:
+    """Return the Levels of a bag.Bag of one beam; source: its name. Raises LevelError."""
+    if 'ship/imu/data' in bag.topics:
+        raise LevelError('the recording is of a ship; its offsets contain the attitude of the deck')
+    missing = [name for name in ('joint_states', 'tracking_receiver/angle_error', 'acu/reference')
+               if name not in bag.topics]
+    if missing:
+        raise LevelError(f'the recording holds no {" and no ".join(missing)}')
+    joints, axes = bag.table('joint_states'), ('azimuth.position', 'elevation.position')
+    t = joints['t']
+    angles = np.column_stack([joints[name] for name in axes])
+    following = tracking.on_grid(bag, t, 'acu/reference', axes) - angles
+    measured = tracking.of_equipment(bag, t, 'tracking_receiver/angle_error', ('x', 'y', 'z'))
+    following[:, 0] *= np.cos(angles[:, 1])     # on the sky, in cross-elevation
+    limit, found = MAX_FOLLOWING_BEAMWIDTHS * tracking.beamwidth(bag), []
+    for dwell in itertools.chain.from_iterable(scan.scans(bag, t, tracking.modes(bag, t))):
+        part = scan.at_rest(dwell)
+        if not (np.abs(following[part]).max() < limit and np.isfinite(measured[part, 2]).any()):
+            continue
+        place = dwell.azimuth * math.cos(np.mean(angles[part, 1])), dwell.elevation
+        off = np.array(place) - following[part].mean(0)
+        known = np.isfinite(measured[part, 0])
+        error = measured[part, :2][known].mean(0) if known.mean() > 0.9 else np.full(2, np.nan)
+        power = np.nanmean(10.0**(0.1 * measured[part, 2]))
+        found.append((*np.degrees(off), power, *np.degrees(error)))
+    if not found:
+        raise LevelError('no command `offset` in a mode that follows a table, with '
+                         f'{scan.MIN_DWELL_S:g} s at rest after it')
+    rows = np.array(found)
+    known = bag.configuration['parameters'].get('tracking_receiver', {})
+    # The level of a carrier has no noise bandwidth.
+    noise = known.get('target.kind') in NOISE_KINDS
+    bandwidth = float(known.get('target.noise_source.bandwidth', math.nan)) if noise else math.nan
+    return Levels(rows[:, :2], rows[:, 2], True, rows[:, 3:], bandwidth, source)

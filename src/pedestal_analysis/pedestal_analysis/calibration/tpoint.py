@@ -1,0 +1,93 @@
+"""Files of TPOINT for an altazimuth mount: observations of four numbers, sky and mount, in degrees (its format 4).
+
+    ! a comment
+    Caption of the file
+    : ALTAZ
+    +31 41 19.6 2021 8 21 13.0 741 2608 0.75     latitude, possibly date, temperature, pressure, height, humidity
+    192.3860283 77.34684 -167.27889 77.34754     azimuth and elevation on the sky, then those of the mount
+    END
+
+Further numbers of an observation, such as the angle of a rotator, are ignored. The azimuth counts from north through
+east. Some observatories count it from south (east is 90 deg), and state it in a comment such as `South = 0`.
+"""
+import datetime
+import math
+import re
+
+from pedestal_common.text_files import csv_table
+from pedestal_common.text_files.csv_table import TableError
+
+AXIS_RANGE_DEG = (-540.0, 720.0)
+"""Accepted azimuths [deg]."""
+MOUNT_ELEVATION_RANGE_DEG = (-10.0, 95.0)
+"""Accepted elevations of the mount [deg]; those on the sky are at most 90."""
+MAX_DIFFERENCE_DEG = 5.0
+"""Largest accepted offset on the sky [deg]."""
+
+_ALTAZ_OPTIONS = ('ALTAZ', 'AZALT')
+_MIN_DATE_NUMBERS = 6
+_ORIGIN_PATTERN = re.compile(r'\b(n|north|s|south)\s*=\s*0\b', re.IGNORECASE)
+_NUMBERS_PATTERN = re.compile(r'[-+]?\.?\d')
+
+
+def is_tpoint(text):
+    """Return True for a text of TPOINT: a line of it begins with : (an option) or with ! (a comment)."""
+    return any(line.lstrip().startswith((':', '!')) or line.strip().upper() in _ALTAZ_OPTIONS
+               for line in text.splitlines())
+
+
+def _records(text):
+    """Return ([(line, words) of the lines of numbers], options) of a text, up to the line END."""
+    numbers, options = [], []
+    for line, content in enumerate(text.splitlines(), start=1):
+        content = content.partition('!')[0].strip()
+        if content.upper() == 'END':
+            break
+        if content.startswith(':') or content.upper() in _ALTAZ_OPTIONS:
+            options += content.lstrip(':').upper().split()
+        elif _NUMBERS_PATTERN.match(content) or (numbers and content):
+            # The caption stands before the options, and may begin with a digit.
+            if options:
+                numbers.append((line, content.split()))
+    return numbers, options
+
+
+def date(text):
+    """Return the date in the run parameters, as in 2021-08-21, '' without one."""
+    numbers, _ = _records(text)
+    words = numbers[0][1] if numbers else []
+    try:
+        return datetime.date(*map(int, words[3:6])).isoformat() if len(words) >= _MIN_DATE_NUMBERS else ''
+    except ValueError:
+        return ''
+
+
+def rows(path, text):
+    """Return [(line, azimuth, elevation, offsets in cross-elevation and elevation, NaN, NaN)] [deg]. Raises
+    TableError."""
+    numbers, options = _records(text)
+    if not set(options) & set(_ALTAZ_OPTIONS):
+        found = f'; options found: {", ".join(options)}' if options else ''
+        raise TableError(f'{path}: a TPOINT file must have the option `: ALTAZ`, for observations of azimuth and '
+                         f'elevation{found}')
+    origin = _ORIGIN_PATTERN.search('\n'.join(re.findall('!.*', text)))
+    from_south = bool(origin) and origin[1].lower().startswith('s')
+    found = []
+    for line, words in numbers[1:]:
+        if len(words) < 4:
+            raise TableError(f'{path}: line {line}: {len(words)} numbers, must be at least 4: azimuth and elevation '
+                             'on the sky, azimuth and elevation of the mount')
+        named = zip(('azimuth', 'elevation', 'azimuth of the mount', 'elevation of the mount'), words,
+                    (AXIS_RANGE_DEG, (-5.0, 90.0), AXIS_RANGE_DEG, MOUNT_ELEVATION_RANGE_DEG))
+        az, el, mount_az, mount_el = (csv_table.number(path, line, name, word, *limits)
+                                      for name, word, limits in named)
+        step = math.remainder(mount_az - az, 360.0)
+        if from_south:
+            az, step = 180.0 - az, -step
+        offset = (step * math.cos(math.radians(el)), mount_el - el)
+        for name, value in zip(('cross-elevation', 'elevation'), offset):
+            if abs(value) > MAX_DIFFERENCE_DEG:
+                raise TableError(f'{path}: line {line}: {name} of the mount minus that on the sky = {value:g} deg: '
+                                 f'must be {-MAX_DIFFERENCE_DEG:g} to {MAX_DIFFERENCE_DEG:g}')
+        found.append((line, math.remainder(az, 360.0), el, *offset, math.nan, math.nan))
+    return found

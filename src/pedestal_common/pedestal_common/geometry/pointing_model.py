@@ -1,0 +1,308 @@
+"""Pointing model of a pedestal: conversion between the direction of the beam on the sky and the encoder angles.
+
+The terms have the numbers and signs of the VLBI Field System and of katpoint. Each term is ADDED to the wanted angles
+to give the angles of the encoders. To first order the sums dA and dE [rad], at the azimuth A and the elevation E, are
+
+    dA = P1 + P3 tan E - P4 / cos E + (P5 sin A - P6 cos A) tan E + P12 A + P13 cos A + P14 sin A
+         + P17 cos 2A + P18 sin 2A
+    dE = P7 + P5 cos A + P6 sin A + P8 cos E + P9 E + P11 sin E + P15 cos 2A + P16 sin 2A + P19 cos 8E + P20 sin 8E
+         + P21 cos A + P22 sin A
+
+P2 and P10 do not exist, because other terms have the same effect. P9 and P12 are factors [-], all other terms are
+angles [rad].
+
+This module computes the terms P1 and P3 to P8 exactly, at any elevation. From the encoders to the sky:
+
+    1. P1 and P7, the zeros, are subtracted from the angles of the encoders; the results are a and e
+    2. the periodic terms and the factors, with a and e for A and E, are subtracted; the sag P8 is among them
+    3. P4 sets the beam off the normal of the elevation axis (collimation)
+    4. the elevation turns the beam
+    5. P3 leans the elevation axis (non-perpendicularity)
+    6. the azimuth turns the elevation axis
+    7. P5 and P6 lean the azimuth axis (tilt): P5 to azimuth 0, P6 to azimuth 90 deg
+
+Steps 2 to 7 are those of the simulated pedestal (adu_drive.plant.mount), which is written on its own, so that a test
+can compare both. The conversion from the sky to the encoders is the exact inverse.
+
+Past the zenith the elevation is above 90 deg, of the encoders as well as of a direction. The axes then point over the
+back: the azimuth A and the elevation E are the direction with the azimuth A + 180 deg and the elevation 180 deg - E.
+Within abs(P3 - P4) of the azimuth axis the beam points nowhere. For a direction in this cone the result is the nearest
+one on its edge.
+
+On the sky means in the frame of the deck: azimuth clockwise from the bow, ashore from north. On a ship the tilt is the
+misalignment between the INS and the pedestal.
+
+m        record of MODEL_DTYPE
+A, E     azimuth and elevation of the encoders [rad]
+a, e     the same without the zeros [rad]
+suffix _dot, _ddot   first and second time derivative
+"""
+import math
+from collections.abc import Mapping
+
+import numpy as np
+
+from pedestal_common.compiled import compiled
+from pedestal_common.geometry.line_of_sight import angles, direction, wrap
+
+TERMS = ('p1', 'p3', 'p4', 'p5', 'p6', 'p7', 'p8', 'p9', 'p11', 'p12', 'p13', 'p14', 'p15', 'p16', 'p17', 'p18', 'p19',
+         'p20', 'p21', 'p22')
+"""Names of the terms."""
+
+FACTORS = ('p9', 'p12')
+"""Terms that are factors [-]; the others are angles [rad]."""
+
+MODEL_DTYPE = np.dtype([('terms', 'f8', (len(TERMS),)), ('exact', 'i8'), ('periodic', 'i8'),
+                        ('p', np.dtype([(name, 'f8') for name in TERMS])),
+                        ('tilt', 'f8', (3, 3)), ('sin_lean', 'f8'), ('cos_lean', 'f8'), ('sin_off', 'f8'),
+                        ('cos_off', 'f8')], align=True)
+"""Pointing model.
+
+terms     the values of TERMS [rad, -]; the other fields follow from these values
+exact     1: all terms are zero, so that encoders and sky have the same angles
+periodic  1: a term of step 2 is not zero
+p         the same values by name
+tilt      rotation (3, 3) from the frame of the azimuth axis to the deck, FLU
+sin_lean, cos_lean, sin_off, cos_off  of P3 and of P4
+"""
+
+MIN_ZENITH_DISTANCE_RAD = 1e-6
+"""Distance from the azimuth axis below which the rates of the azimuth are limited [rad]."""
+
+MAX_CONE_ROUNDING = 1e-12
+"""Excess of a sine over 1 that is rounding, not a direction that the beam cannot reach."""
+
+NEWTON_STEPS = 6
+"""Steps of Newton's method that invert the periodic terms; each step doubles the number of correct digits."""
+
+
+def model(terms: Mapping[str, float]) -> np.ndarray:
+    """Return the record (1,) of a model; terms: {name: value [rad, -]}, 0 for the others of TERMS."""
+    unknown = sorted(set(terms) - set(TERMS))
+    if unknown:
+        raise ValueError(f'term {unknown[0]}: must be one of {", ".join(TERMS)}')
+    m = np.zeros(1, MODEL_DTYPE)
+    put(m[0], np.array([terms.get(name, 0.0) for name in TERMS]))
+    return m
+
+
+@compiled
+def put(m, terms):
+    """Set a model to the values of TERMS (20,) [rad, -]."""
+    p, zero = m.p, True
+    for i in range(len(terms)):
+        m.terms[i] = terms[i]
+        zero &= terms[i] == 0.0
+    (p.p1, p.p3, p.p4, p.p5, p.p6, p.p7, p.p8, p.p9, p.p11, p.p12) = (
+        terms[0], terms[1], terms[2], terms[3], terms[4], terms[5], terms[6], terms[7], terms[8], terms[9])
+    (p.p13, p.p14, p.p15, p.p16, p.p17, p.p18, p.p19, p.p20, p.p21, p.p22) = (
+        terms[10], terms[11], terms[12], terms[13], terms[14], terms[15], terms[16], terms[17], terms[18], terms[19])
+    m.exact, m.periodic = 1 if zero else 0, 0
+    for i in range(6, len(terms)):
+        if terms[i] != 0.0:
+            m.periodic = 1
+    m.sin_lean, m.cos_lean, m.sin_off, m.cos_off = math.sin(p.p3), math.cos(p.p3), math.sin(p.p4), math.cos(p.p4)
+    # The rotation by the tilt is one by the angle tau about the level axis (x, y) = (P6, P5) / tau.
+    tau = math.hypot(p.p5, p.p6)
+    x, y = (p.p6 / tau, p.p5 / tau) if tau > 0.0 else (0.0, 0.0)
+    s, d = math.sin(tau), 1.0 - math.cos(tau)
+    T = m.tilt
+    T[0, 0], T[0, 1], T[0, 2] = 1.0 - d * y * y, d * x * y, s * y
+    T[1, 0], T[1, 1], T[1, 2] = d * x * y, 1.0 - d * x * x, -s * x
+    T[2, 0], T[2, 1], T[2, 2] = -s * y, s * x, 1.0 - d
+
+
+@compiled
+def put_between(m, before, after, x):
+    """Set a model on the way from the terms `before` to the terms `after` (20,).
+
+    x: share of the time, 0 to 1. The terms begin and end without a rate.
+    """
+    share, terms = x * x * (3.0 - 2.0 * x), m.terms
+    for i in range(len(terms)):
+        terms[i] = after[i] if x == 1.0 else before[i] + share * (after[i] - before[i])
+    put(m, terms)
+
+
+@compiled
+def _azimuth_terms(p, a):
+    """Return (the periodic terms of the azimuth at a, their first and second derivative by a)."""
+    s, c, s2, c2 = math.sin(a), math.cos(a), math.sin(2.0 * a), math.cos(2.0 * a)
+    return (p.p12 * a + p.p13 * c + p.p14 * s + p.p17 * c2 + p.p18 * s2,
+            p.p12 - p.p13 * s + p.p14 * c + 2.0 * (p.p18 * c2 - p.p17 * s2),
+            -p.p13 * c - p.p14 * s - 4.0 * (p.p17 * c2 + p.p18 * s2))
+
+
+@compiled
+def _nod(p, a):
+    """Return (the terms of the elevation that depend on a, their first and second derivative by a)."""
+    s, c, s2, c2 = math.sin(a), math.cos(a), math.sin(2.0 * a), math.cos(2.0 * a)
+    return (p.p15 * c2 + p.p16 * s2 + p.p21 * c + p.p22 * s,
+            2.0 * (p.p16 * c2 - p.p15 * s2) + p.p22 * c - p.p21 * s,
+            -4.0 * (p.p15 * c2 + p.p16 * s2) - p.p21 * c - p.p22 * s)
+
+
+@compiled
+def _elevation_terms(p, e):
+    """Return (the terms of the elevation that depend on e, their first and second derivative by e)."""
+    s, c, s8, c8 = math.sin(e), math.cos(e), math.sin(8.0 * e), math.cos(8.0 * e)
+    return (p.p8 * c + p.p9 * e + p.p11 * s + p.p19 * c8 + p.p20 * s8,
+            -p.p8 * s + p.p9 + p.p11 * c + 8.0 * (p.p20 * c8 - p.p19 * s8),
+            -p.p8 * c - p.p11 * s - 64.0 * (p.p19 * c8 + p.p20 * s8))
+
+
+@compiled
+def _leaning(m, x, y, z):
+    """Return a vector (x, y, z) of the elevating part in the frame of the yoke, whose elevation axis leans."""
+    return x, m.cos_lean * y + m.sin_lean * z, m.cos_lean * z - m.sin_lean * y
+
+
+@compiled
+def _to_deck(T, x, y, z):
+    """Return a vector after the rotation T (3, 3)."""
+    return (T[0, 0] * x + T[0, 1] * y + T[0, 2] * z, T[1, 0] * x + T[1, 1] * y + T[1, 2] * z,
+            T[2, 0] * x + T[2, 1] * y + T[2, 2] * z)
+
+
+@compiled
+def _from_deck(T, v):
+    """Return a vector v (x, y, z) after the inverse of the rotation T (3, 3)."""
+    x, y, z = v
+    return (T[0, 0] * x + T[1, 0] * y + T[2, 0] * z, T[0, 1] * x + T[1, 1] * y + T[2, 1] * z,
+            T[0, 2] * x + T[1, 2] * y + T[2, 2] * z)
+
+
+@compiled
+def direction_motion(m, A, E, A_dot, E_dot):
+    """Return ((azimuth, elevation) [rad], their rates [rad/s]) of the beam on the sky.
+
+    A, E, A_dot, E_dot: angles [rad] and rates [rad/s] of the encoders. Among azimuths whole turns apart, the result is
+    nearest to the azimuth of the axis. If the beam is past the zenith, the elevation is above 90 deg.
+    """
+    a, e = A - m.p.p1, E - m.p.p7
+    azimuth, elevation, azimuth_dot, elevation_dot = a, e, A_dot, E_dot
+    if m.periodic:
+        g, g_slope, _ = _azimuth_terms(m.p, a)
+        nod, nod_slope, _ = _nod(m.p, a)
+        f, f_slope, _ = _elevation_terms(m.p, e)
+        azimuth, elevation = a - g, e - f - nod
+        azimuth_dot, elevation_dot = (1.0 - g_slope) * A_dot, (1.0 - f_slope) * E_dot - nod_slope * A_dot
+    cos_E, sin_E = math.cos(elevation), math.sin(elevation)
+    x, y, z = _leaning(m, m.cos_off * cos_E, -m.sin_off, m.cos_off * sin_E)
+    vx, vy, vz = _leaning(m, -m.cos_off * sin_E * elevation_dot, 0.0, m.cos_off * cos_E * elevation_dot)
+    cos_A, sin_A = math.cos(azimuth), math.sin(azimuth)
+    x, y = x * cos_A + y * sin_A, y * cos_A - x * sin_A
+    vx, vy = vx * cos_A + vy * sin_A + azimuth_dot * y, vy * cos_A - vx * sin_A - azimuth_dot * x
+    x, y, z = _to_deck(m.tilt, x, y, z)
+    vx, vy, vz = _to_deck(m.tilt, vx, vy, vz)
+    at, above = angles(x, y, z)
+    level = max(x * x + y * y, MIN_ZENITH_DISTANCE_RAD * MIN_ZENITH_DISTANCE_RAD)
+    at_dot, above_dot = (y * vx - x * vy) / level, vz / math.sqrt(level)
+    if cos_E < 0.0:
+        at, above, above_dot = at + math.pi, math.pi - above, -above_dot
+    return (azimuth + wrap(at - azimuth), above), (at_dot, above_dot)
+
+
+@compiled
+def direction_of(m, A, E):
+    """Return (azimuth, elevation) [rad] of the beam on the sky; A, E: angles of the encoders [rad]."""
+    if m.exact:
+        return A, E
+    on_sky, _ = direction_motion(m, A, E, 0.0, 0.0)
+    return on_sky
+
+
+@compiled
+def _angle_rates(x, y, v, w, level):
+    """Return the first and second time derivative of the azimuth of a vector.
+
+    x, y   components of the vector; level: x^2 + y^2, limited from below
+    v, w   first and second derivative of the vector (x, y, z)
+    """
+    rate = (y * v[0] - x * v[1]) / level
+    return rate, (y * w[0] - x * w[1] - 2.0 * rate * (x * v[0] + y * v[1])) / level
+
+
+@compiled
+def _axis_motion(m, u, v, w, plunged):
+    """Return ((azimuth, rate, acceleration), (the same of the elevation), reachable) after steps 3 to 7 are undone.
+
+    The arguments are those of encoder_motion. The azimuth is in no particular turn.
+    """
+    x, y, z = _from_deck(m.tilt, u)
+    v, w = _from_deck(m.tilt, v), _from_deck(m.tilt, w)
+    # q: sine of the elevation; (x_m, y_m): horizontal part of the beam at azimuth 0; level: its squared length.
+    k = 1.0 / (m.cos_lean * m.cos_off)
+    q, q_dot, q_ddot = k * (z - m.sin_lean * m.sin_off), k * v[2], k * w[2]
+    reachable = abs(q) <= 1.0 + MAX_CONE_ROUNDING
+    q = min(max(q, -1.0), 1.0)
+    level = x * x + y * y
+    y_m = m.sin_lean * m.cos_off * q - m.cos_lean * m.sin_off
+    x_m = math.sqrt(max(level - y_m * y_m, 0.0)) if reachable else 0.0
+    c = x_m / m.cos_off
+    if plunged:
+        x_m, c = -x_m, -c
+    elevation = math.atan2(q, c)
+    # Near the azimuth axis the rates are limited.
+    level = max(level, MIN_ZENITH_DISTANCE_RAD * MIN_ZENITH_DISTANCE_RAD)
+    e_dot = e_ddot = 0.0
+    if reachable:
+        c_limited = math.copysign(max(abs(c), MIN_ZENITH_DISTANCE_RAD), c)
+        e_dot = q_dot / c_limited
+        e_ddot = (q_ddot + q * e_dot * e_dot) / c_limited
+    azimuth = math.atan2(-y, x) - math.atan2(-y_m, x_m)
+    a_dot, a_ddot = _angle_rates(x, y, v, w, level)
+    if y_m != 0.0 or m.sin_lean != 0.0:
+        lean, off = m.sin_lean * m.cos_off, m.cos_off
+        beam_v = (-off * q * e_dot, lean * c * e_dot, 0.0)
+        beam_w = (-off * (q * e_ddot + c * e_dot * e_dot), lean * (c * e_ddot - q * e_dot * e_dot), 0.0)
+        m_dot, m_ddot = _angle_rates(x_m, y_m, beam_v, beam_w, level)
+        a_dot, a_ddot = a_dot - m_dot, a_ddot - m_ddot
+    return (azimuth, a_dot, a_ddot), (elevation, e_dot, e_ddot), reachable
+
+
+@compiled
+def encoder_motion(m, u, v, w, plunged, near):
+    """Return the motion of the encoders that keeps the beam on a moving direction, and whether the beam reaches it.
+
+    u, v, w   unit vector of the direction on the sky (x, y, z), FLU, and its first and second time derivative
+    plunged   True if the axes point to the direction over the zenith
+    near      azimuth near which the azimuth of the axis is chosen [rad]
+
+    The motion is ((azimuth, rate, acceleration), (the same of the elevation)) [rad, rad/s, rad/s2].
+    """
+    (azimuth, a_dot, a_ddot), (elevation, e_dot, e_ddot), reachable = _axis_motion(m, u, v, w, plunged)
+    azimuth = near + wrap(azimuth - near)
+    a, e = azimuth, elevation
+    if m.periodic:
+        for _ in range(NEWTON_STEPS):
+            g, g_slope, _ = _azimuth_terms(m.p, a)
+            a -= (a - g - azimuth) / (1.0 - g_slope)
+        nod, nod_slope, nod_bend = _nod(m.p, a)
+        for _ in range(NEWTON_STEPS):
+            f, f_slope, _ = _elevation_terms(m.p, e)
+            e -= (e - f - nod - elevation) / (1.0 - f_slope)
+        g, g_slope, g_bend = _azimuth_terms(m.p, a)
+        f, f_slope, f_bend = _elevation_terms(m.p, e)
+        a_dot = a_dot / (1.0 - g_slope)
+        a_ddot = (a_ddot + g_bend * a_dot * a_dot) / (1.0 - g_slope)
+        e_dot = (e_dot + nod_slope * a_dot) / (1.0 - f_slope)
+        e_ddot = (e_ddot + nod_slope * a_ddot + nod_bend * a_dot * a_dot + f_bend * e_dot * e_dot) / (1.0 - f_slope)
+    return (a + m.p.p1, a_dot, a_ddot), (e + m.p.p7, e_dot, e_ddot), reachable
+
+
+@compiled
+def encoder_of(m, azimuth, elevation):
+    """Return (A, E, reachable): the angles of the encoders [rad] at which the beam points to a direction on the sky.
+
+    azimuth, elevation   of the direction [rad]; above 90 deg the axes point over the zenith
+    reachable            False if the beam cannot point to the direction; A, E then belong to the nearest one
+
+    The azimuth of the axis is the one nearest to `azimuth`, which counts revolutions.
+    """
+    if m.exact:
+        return azimuth, elevation, True
+    zero = (0.0, 0.0, 0.0)
+    A, E, reachable = encoder_motion(m, direction(azimuth, elevation), zero, zero, math.cos(elevation) < 0.0, azimuth)
+    return A[0], E[0], reachable
+

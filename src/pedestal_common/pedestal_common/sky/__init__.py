@@ -1,0 +1,1 @@
+"""Places of the sun and the moon, for predictions and for simulated targets."""

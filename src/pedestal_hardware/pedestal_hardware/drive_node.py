@@ -1,0 +1,185 @@
+"""ROS node of an antenna with four CiA 402 servo drives: owns the time, and takes the place of `adu_node`.
+
+The node runs the unit `pedestal_hardware.unit.ServoDrives`, whose law is in `servo_drives`. A thread of the node
+commissions drives that have not been used yet or that return to the bus. `entry` is imported first, so that a signal
+during the other imports ends the process without a message.
+"""
+import pedestal_common.entry  # noqa: F401
+
+# isort: split
+import sys
+import threading
+import time
+
+from adu_drive.adu_node import AduNode
+from pedestal_common.node import shell
+from pedestal_hardware import commissioning, errors
+from pedestal_hardware.bus import BusError
+from pedestal_hardware.params import START_KEY, time_0_after
+from pedestal_hardware.unit import DRIVE_LABELS
+
+RETRY_PERIOD_S = 0.5
+"""Time between two tries to commission drives that report nothing [s]."""
+
+
+ENABLE_LEAD_S = 2.0
+"""Time before time 0 in which the drives are enabled [s]."""
+
+LEAVE_TIME_S = 2.0
+"""Longest wait for the end of the commissioning thread, after the node has left the bus [s]."""
+
+ANSWER_POLL_S = 0.02
+"""Time between two checks whether all drives answer [s]."""
+
+
+class DriveNode(AduNode):
+    """Node of four servo drives. recommission: drives that the thread commissions again, because of a reset."""
+
+    def __init__(self):
+        self.recommission, self.changed, self.ending = set(), threading.Event(), False
+        self.bus = self.commissioning = self.start_time = None
+        self.shown_errors, self.shown_problems = [], []
+        super().__init__('pedestal_hardware.drive_node')
+
+    def begin(self):
+        """Prepare the bus and the steps. The first step waits until all drives answer."""
+        # The bus is imported here, because python-can is an extra of this package.
+        try:
+            from pedestal_hardware.canopen_bus import CanopenBus
+        except ImportError as error:
+            raise BusError(f"{error}: pip install 'pedestal_hardware[can]'") from None
+        p = self.parameters
+        self.bus = CanopenBus(p.bus, p.drives.nodes, DRIVE_LABELS, p.period)
+        self.answer_limit = time.monotonic() + p.bus.connect_time
+        self.commissioning = threading.Thread(target=self.commission_lost_drives, daemon=True)
+        self.commissioning.start()
+        super().begin()
+
+    @property
+    def FIRST_STEP(self):  # noqa: N802  a constant of the base class
+        """Number of the first step: the drives are enabled before time 0."""
+        return -round(ENABLE_LEAD_S / self.parameters.period)
+
+    @property
+    def awaits(self):
+        """Condition for the first step: the drives answer, then the start time."""
+        drives = self.parameters.drives
+        answer = f'the drives {", ".join(map(str, drives.nodes))}'
+        return answer if drives.start_after else f'{answer}, then {super().awaits}'
+
+    def make_due_step(self):
+        """Make the due step as soon as all drives have answered. Raises BusError if a drive does not answer in time.
+        """
+        unit = self.unit
+        if unit.bus is None:
+            missing = [i for i in range(len(DRIVE_LABELS)) if not unit.parts['drives']['ready'][i]]
+            tried = [i for i in missing if unit.problems[i]]
+            if tried and time.monotonic() > self.answer_limit:
+                raise BusError(f'{self.label(tried[0])}: {unit.problems[tried[0]]}')
+            if missing:
+                self.wait = ANSWER_POLL_S
+                return
+            self._use_bus()
+        super().make_due_step()
+
+    def _use_bus(self):
+        """Begin to exchange data with the drives, which all answer."""
+        drives = range(len(DRIVE_LABELS))
+        found = [self.bus.read(drive, 0x603F, 0, 'H') for drive in drives]
+        # The drives have an error of the bus because this node or the bus was absent. This start clears it.
+        if any(found) and all(errors.is_of_the_bus(code) for code in found if code):
+            self.unit.reset_drives(list(drives))
+        self.unit.bus = self.bus
+        self._choose_start()
+        self.get_logger().info(f'drives {", ".join(map(str, self.parameters.drives.nodes))} answer')
+
+    def _choose_start(self):
+        """Let time 0 follow the answer of the drives, by whole seconds from graph.start, and publish it."""
+        lead = self.parameters.drives.start_after
+        if lead:
+            _, utc = self.clock()
+            self.start_time = self._epoch = time_0_after(self.epoch(utc), utc, lead)
+            self.diagnose_now()
+
+    def diagnosed(self):
+        """Return the Diagnosis of the drives, with time 0 if it follows their answer."""
+        diagnosis = super().diagnosed()
+        if self.start_time is None:
+            return diagnosis
+        return diagnosis._replace(values=[*diagnosis.values, (START_KEY, str(self.start_time))])
+
+    def label(self, drive):
+        """Return the name of a drive for texts, with its node."""
+        return f'{DRIVE_LABELS[drive]} (node {self.parameters.drives.nodes[drive]})'
+
+    def commission(self, drive):
+        """Start a drive and verify its settings. Return True if it can be used; otherwise keep the reason."""
+        try:
+            self.bus.start(drive, self.parameters.torque_mode(drive))
+            self.unit.use_drive(drive, commissioning.commission(self.bus, drive, self.parameters))
+        except BusError as error:
+            self.unit.problems[drive] = str(error)
+            return False
+        return True
+
+    def commission_lost_drives(self):
+        """Commission drives that have returned to the bus or whose faults are reset, until the node ends."""
+        while not self.ending:
+            again = self.recommission.copy()
+            self.recommission.difference_update(again)      # a request in the meantime stays
+            for drive in sorted({*self.unit.lost, *again}):
+                self.unit.parts['drives']['ready'][drive] = 0
+                if not self.ending and self.commission(drive) and self.unit.bus is not None:
+                    self.get_logger().info(f'{self.label(drive)} is on the bus again')
+            self.changed.wait(RETRY_PERIOD_S)
+            self.changed.clear()
+
+    def _service(self, name):
+        """Return the callback of a service. A reset also commissions the faulty drives again, because some drives
+        accept the reset only then."""
+        serve = super()._service(name)
+
+        def call(request, response):
+            faulty = self.unit.faulty
+            answer = serve(request, response)
+            if name == 'adu/reset_faults' and answer.success and faulty:
+                self.recommission.update(faulty)
+                self.changed.set()
+            return answer
+        return call
+
+    def after_step(self):
+        """Log new errors of the drives, and what the bus has rejected."""
+        super().after_step()
+        shown = self.unit.parts['drives']['error'].tolist()
+        if shown != self.shown_errors:
+            for drive, (before, now) in enumerate(zip(self.shown_errors or [0] * len(shown), shown)):
+                if now and now != before:
+                    self.get_logger().warning(f'{self.label(drive)}: error {errors.name(now)}')
+            self.shown_errors = shown
+        if self.unit.problems != self.shown_problems:
+            for drive, problem in enumerate(self.unit.problems):
+                if problem and problem not in self.shown_problems:
+                    self.get_logger().warning(f'{self.label(drive)}: {problem}')
+            self.shown_problems = list(self.unit.problems)
+        while self.bus.notes:
+            self.get_logger().warning(self.bus.notes.pop(0))
+
+    def close(self):
+        """Leave the bus and end."""
+        self.ending = True
+        self.changed.set()
+        if self.bus is not None:
+            self.bus.stop()
+        if self.commissioning is not None:
+            self.commissioning.join(LEAVE_TIME_S)
+        super().close()
+
+
+def main(args=None):
+    """Run the node to its end. Return the exit code."""
+    return shell.main(DriveNode, args)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,170 @@
+"""Comparison of the attitude of an INS with its rates, which finds a wrong frame.
+
+Both give the rotation of the deck during a block of BLOCK_TIME_S: a from the attitudes at its begin and end, r from
+the rates. Sums over the last blocks, which fade with MEMORY_TIME_S, give for each axis
+
+    slope          sum a_i r_i / sum r_i^2                        1 in equal frames with equal units
+    correlation    sum a_i r_i / sqrt(sum a_i^2 sum r_i^2)        1 in equal frames
+
+The slope decides for gyros, because noise of the attitude does not change its mean. The rate of turn of a compass is
+smoothed by an unknown filter; for it only the sign of the correlation decides.
+
+A body frame that differs between attitude and rates exchanges axes or signs. A frame that both share with each other,
+but not with the parameters, leaves a and r equal; the direction of the specific force, which points upwards, then
+finds it.
+"""
+import math
+
+import numpy as np
+
+from pedestal_common.compiled import compiled
+from pedestal_hardware.ins.frames import rotation_vector
+
+BLOCK_TIME_S = 0.2
+"""Length of a block [s]; noise of the attitude matters little over this time."""
+
+MEMORY_TIME_S = 5.0
+"""Time constant with which old blocks fade [s]."""
+
+MIN_CHECK_TIME_S = 3.0
+"""Time with motion after which a verdict is given [s]."""
+
+MIN_RATE_RAD_S = math.radians(0.5)
+"""Rms of the rates of an axis from which it is compared [rad/s]."""
+
+MIN_ATTITUDE_RATE_RAD_S = math.radians(2.0)
+"""Rms rate of change of the attitude from which an axis is compared although its rates are small [rad/s]."""
+
+SLOPE_RANGE = 0.3, 3.0
+"""Slopes of an axis that agrees."""
+
+MIN_TURN_CORRELATION = -0.5
+"""Smallest correlation of a heading that agrees with a rate of turn."""
+
+JUMP_RAD = math.radians(0.5)
+"""Rotation [rad] of the attitude in a block that is a jump of the attitude if the rates explain less than a fifth of
+it. A correction of the heading is no wrong frame."""
+
+JUMP_REST_BLOCKS = 10
+"""Number of blocks after a jump in which no other one is a jump. Rates that are always too small are no jumps."""
+
+GRAVITY_M_S2 = 5.0
+"""Mean specific force [m/s2] from which its direction is compared; less means that gravity was removed."""
+
+ALL_AXES, TURN_AXIS = 0b111, 0b100
+"""Bit masks of the axes whose rates are known."""
+
+MAX_FORCE_M_S2 = 1000.0
+"""Specific force [m/s2] that no ship has; more is not used."""
+
+FRAME_UNKNOWN, FRAME_RIGHT, FRAME_WRONG = range(3)
+"""Verdicts: not enough motion so far, all axes with motion agree, an axis disagrees."""
+
+CHECK_DTYPE = np.dtype([('runs', 'i8'), ('begin', 'i8'), ('last', 'i8'), ('q', 'f8', (4,)), ('w', 'f8', (3,)),
+                        ('integral', 'f8', (3,)), ('cross', 'f8', (3, 3)), ('attitude', 'f8', (3,)),
+                        ('rates', 'f8', (3,)), ('weight', 'f8'), ('force', 'f8', (3,)), ('force_weight', 'f8'),
+                        ('moved', 'f8', (3,)), ('jumps', 'i8'), ('rest', 'i8'), ('verdict', 'i8'), ('down', 'i8')],
+                       align=True)
+"""State of the check.
+
+runs, begin, last      1 after the first sample; stamps of the begin of the block and of the last sample [ns]
+q, w, integral         quaternion at the begin of the block; rate of the last sample; integral of the rate [rad]
+cross                  faded sums r_i a_j [rad2]; attitude, rates: of a_i^2 and r_i^2; weight: of the blocks
+force, force_weight    faded sum of the specific force [m/s2], and of the samples
+moved                  time during which an axis was compared [s]
+jumps, rest            number of jumps of the attitude; blocks until the next jump may be
+verdict, down          of FRAME_*; 1 if the specific force points downwards
+"""
+
+
+@compiled
+def restart(s):
+    """Begin a new block; the sums stay."""
+    s.runs = 0
+
+
+@compiled
+def slope(s, i):
+    """Return the slope of an axis; infinite without rates."""
+    return s.cross[i, i] / s.rates[i]
+
+
+@compiled
+def is_compared(s, i):
+    """Return True if an axis moves enough to be compared."""
+    blocks = BLOCK_TIME_S**2 * s.weight
+    return s.rates[i] > MIN_RATE_RAD_S**2 * blocks or s.attitude[i] > MIN_ATTITUDE_RATE_RAD_S**2 * blocks
+
+
+@compiled
+def agrees(s, i, axes):
+    """Return True if attitude and rates of an axis agree; axes: as of `take`."""
+    if axes == ALL_AXES:
+        return SLOPE_RANGE[0] <= slope(s, i) <= SLOPE_RANGE[1]
+    return s.cross[i, i] >= MIN_TURN_CORRELATION * math.sqrt(s.attitude[i] * s.rates[i])
+
+
+@compiled
+def _close_block(s, q, axes):
+    """Add a block that ends with the quaternion q to the sums, and set the verdict."""
+    a = rotation_vector(s.q, q)
+    size_a, size_r = math.sqrt(a[0]**2 + a[1]**2 + a[2]**2), 0.0
+    for i in range(3):
+        size_r += s.integral[i]**2
+    s.rest = max(s.rest - 1, 0)
+    if axes == ALL_AXES and size_a > JUMP_RAD and size_a > 5.0 * math.sqrt(size_r) and s.rest == 0:
+        s.jumps += 1
+        s.rest = JUMP_REST_BLOCKS
+        return
+    fade = math.exp(-BLOCK_TIME_S / MEMORY_TIME_S)
+    s.weight = fade * s.weight + 1.0
+    for i in range(3):
+        for j in range(3):
+            s.cross[i, j] = fade * s.cross[i, j] + s.integral[i] * a[j]
+        s.attitude[i] = fade * s.attitude[i] + a[i]**2
+        s.rates[i] = fade * s.rates[i] + s.integral[i]**2
+    wrong, right = False, False
+    for i in range(3):
+        if axes & (1 << i) == 0:
+            continue
+        if is_compared(s, i):
+            s.moved[i] += BLOCK_TIME_S
+            if s.moved[i] >= MIN_CHECK_TIME_S:
+                good = agrees(s, i, axes)
+                right, wrong = right or good, wrong or not good
+        else:
+            s.moved[i] = 0.0
+    if wrong or right:
+        s.verdict = FRAME_WRONG if wrong else FRAME_RIGHT
+
+
+@compiled
+def take(s, stamp, q, w, force, axes):
+    """Take a sample in the frames that the parameters declare.
+
+    stamp     of the sample [ns], newer than the last
+    q, w      quaternion (4,) deck -> earth, and rates (3,) [rad/s]
+    force     specific force (3,) [m/s2], NaN for none
+    axes      ALL_AXES of gyros, TURN_AXIS of a rate of turn
+    """
+    if abs(force[0]) + abs(force[1]) + abs(force[2]) < MAX_FORCE_M_S2:      # also excludes NaN
+        k = math.exp(-(stamp - s.last) * 1e-9 / MEMORY_TIME_S) if s.runs else 1.0
+        s.force_weight = k * s.force_weight + 1.0
+        for i in range(3):
+            s.force[i] = k * s.force[i] + force[i]
+        s.down = 1 if s.force[2] < -GRAVITY_M_S2 * s.force_weight else 0
+    if s.runs:
+        T = (stamp - s.last) * 1e-9
+        for i in range(3):
+            s.integral[i] += 0.5 * T * (s.w[i] + w[i])
+    if s.runs and (stamp - s.begin) * 1e-9 > 0.999 * BLOCK_TIME_S:
+        _close_block(s, q, axes)
+    if s.runs == 0 or (stamp - s.begin) * 1e-9 > 0.999 * BLOCK_TIME_S:
+        s.runs, s.begin = 1, stamp
+        for i in range(4):
+            s.q[i] = q[i]
+        for i in range(3):
+            s.integral[i] = 0.0
+    s.last = stamp
+    for i in range(3):
+        s.w[i] = w[i]

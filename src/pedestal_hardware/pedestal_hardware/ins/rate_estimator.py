@@ -1,0 +1,58 @@
+"""Deck rate from a sequence of attitudes, for a device without rates: a fading-memory filter of third order.
+
+The filter predicts the attitude by rate and acceleration, and corrects all three by the difference e to the measured
+attitude. The gains depend on the pole p = exp(-bandwidth T) of a step T:
+
+    angle 1 - p^3        rate 1.5 (1 - p)^2 (1 + p) / T        acceleration (1 - p)^3 / T^2
+
+A constant acceleration causes no error. Source: Morrison, Introduction to Sequential Smoothing and Prediction, 1969.
+"""
+import math
+
+import numpy as np
+
+from pedestal_common.compiled import compiled
+from pedestal_hardware.ins.frames import rotation_vector, turned
+
+ESTIMATOR_DTYPE = np.dtype([('q', 'f8', (4,)), ('w', 'f8', (3,)), ('dw', 'f8', (3,)), ('since', 'i8'),
+                            ('last', 'i8'), ('runs', 'i8')], align=True)
+"""State: estimated quaternion, rate [rad/s] and acceleration [rad/s2]; stamps of the first and the last sample [ns];
+runs: 1 after the first sample."""
+
+SETTLING_TIME_CONSTANTS = 3.0
+"""Time after the first sample, in 1 / bandwidth, from which the rate is used."""
+
+
+@compiled
+def restart(s):
+    """Discard all samples."""
+    s.runs = 0
+
+
+@compiled
+def take(s, stamp, q, bandwidth):
+    """Take a quaternion q (4,) at a stamp [ns] that is newer than the last; bandwidth: of the filter [rad/s].
+
+    Return (True if the rate is settled, its components [rad/s]).
+    """
+    if s.runs == 0:
+        s.runs, s.since = 1, stamp
+        for i in range(4):
+            s.q[i] = q[i]
+        for i in range(3):
+            s.w[i] = s.dw[i] = 0.0
+    else:
+        T = (stamp - s.last) * 1e-9
+        p = math.exp(-bandwidth * T)
+        predicted = turned(s.q, T * (s.w[0] + 0.5 * T * s.dw[0]), T * (s.w[1] + 0.5 * T * s.dw[1]),
+                           T * (s.w[2] + 0.5 * T * s.dw[2]))
+        e = rotation_vector(predicted, q)
+        g = 1.0 - p**3
+        corrected = turned(predicted, g * e[0], g * e[1], g * e[2])
+        for i in range(4):
+            s.q[i] = corrected[i]
+        for i in range(3):
+            s.w[i] += T * s.dw[i] + 1.5 * (1.0 - p)**2 * (1.0 + p) / T * e[i]
+            s.dw[i] += (1.0 - p)**3 / (T * T) * e[i]
+    s.last = stamp
+    return (stamp - s.since) * 1e-9 * bandwidth >= SETTLING_TIME_CONSTANTS, (s.w[0], s.w[1], s.w[2])

@@ -1,0 +1,226 @@
+"""From the sentences or the messages of an INS to attitudes of the graph. No ROS and no clock here: the caller gives
+the time of arrival."""
+import collections
+import math
+import typing
+
+import numpy as np
+
+from pedestal_common.node.unit import LEVEL_ERROR, LEVEL_OK, LEVEL_WARN, Diagnosis
+from pedestal_common.wire import messages
+from pedestal_hardware.ins import conventions, frame_check, frames, input_law, sentences
+from pedestal_hardware.ins.input_law import Outcome
+
+REPORT_NS = 2_000_000_000
+"""Time for which the diagnosis reports a dropped sample [ns]."""
+
+TURN_AGE_NS = 1_000_000_000
+"""Age from which a rate of turn is not compared any more [ns]."""
+
+DROP_KINDS = ('bad_checksum', 'unreadable', 'out_of_range', 'no_heading', 'no_time', 'no_orientation', 'stale',
+              'future', *input_law.OUTCOMES[1:])
+"""Reasons to drop a sample."""
+
+OUTCOME_TEXTS = {Outcome.NO_ATTITUDE: 'the orientation must have the length 1, and the rates must be finite',
+                 Outcome.NOT_NEWER: 'the stamp is not later than the last one',
+                 Outcome.TOO_FAST: f'the deck would turn faster than {math.degrees(input_law.MAX_RATE_RAD_S):.0f} '
+                                     'deg/s',
+                 Outcome.SETTLING: 'the rates settle'}
+"""{code of an outcome: reason}, without the outcomes of a wrong frame."""
+
+AXIS_NAMES = ('roll', 'pitch', 'yaw')
+
+VERDICT_TEXTS = ('not enough motion so far', 'agrees', 'wrong')
+"""Texts of the verdicts of frame_check."""
+
+
+class Sample(typing.NamedTuple):
+    """Attitude of the deck in the frames of the graph.
+
+    stamp      time of the measurement [ns, UTC]
+    q, w       quaternion deck -> earth; rate [rad/s]
+    force      specific force [m/s2], NaN for none
+    variances  of roll, pitch, heading [rad2], 0 for unknown
+    """
+    stamp: int
+    q: np.ndarray
+    w: np.ndarray
+    force: np.ndarray
+    variances: tuple[float, float, float]
+
+
+class Memory(typing.NamedTuple):
+    """Memory of the law: a record (1,) of input_law.RECORD_DTYPE."""
+    record: np.ndarray
+
+
+class InsInputUnit:
+    """Attitudes of an InsInputParameters.
+
+    counts    {kind: number} of the published samples, of the dropped ones, and of sentences that are not used
+    state     text of ins/state
+    """
+
+    def __init__(self, parameters):
+        p = self.parameters = parameters
+        frame = (p.imu.earth, p.imu.body, p.imu.rate_body) if p.source == 'imu' else ('enu', 'flu', 'flu')
+        self._declared, self._case = frame, frames.mounting_matrix(*p.mounting.radians)
+        self.memory = Memory(np.zeros(1, input_law.RECORD_DTYPE))
+        self.record = self.memory.record
+        constants = self.record['constants'][0]
+        constants['frame'] = frames.constants(*frame, p.mounting.radians, math.radians(p.heading_zero))[0]
+        constants['bandwidth'], constants['max_gap_ns'] = p.rate_bandwidth, round(p.max_gap * 1e9)
+        constants['checked'] = p.frame_check
+        self.counts = collections.Counter(dict.fromkeys(('published', *DROP_KINDS, 'other_sentences'), 0))
+        self.state, self._dropped, self._dropped_at, self._blocking = 'aligning', '', 0, ''
+        self._heading, self._turn, self._age_ns = (math.nan, 0), (0.0, 0), 0
+
+    def prepare(self):
+        """Compile the law, without a change of the unit."""
+        before = self.record.copy()
+        input_law.step(self.record)
+        self.record['inputs']['q'], self.record['inputs']['axes'] = (0.0, 0.0, 0.0, 1.0), frame_check.ALL_AXES
+        input_law.step(self.record)
+        self.record[...] = before
+
+    def take_line(self, line, arrival):
+        """Return the Sample of a line, bytes; None without one. arrival: of the line [ns, UTC]."""
+        p = self.parameters
+        try:
+            found = sentences.parse(line)
+        except sentences.SentenceError as error:
+            return self._drop(error.kind, str(error), arrival)
+        if isinstance(found, sentences.Turn):
+            self._turn = -math.radians(found.rate) / 60.0, arrival
+            return None
+        if found is not None and found.kind == 'hdt':
+            self._heading = found.heading, arrival
+        if found is None or found.kind != p.nmea.sentence:
+            self.counts['other_sentences'] += 1
+            return None
+        heading = found.heading
+        if math.isnan(heading):
+            heading, at = self._heading
+            if math.isnan(heading) or arrival - at > round(p.oldest * 1e9):
+                return self._drop('no_heading', f'{found.kind} without heading, and no HDT in the last {p.oldest:g} s',
+                                  arrival)
+        device = None if found.time_of_day is None else sentences.stamp_at(found.time_of_day, arrival)
+        u = self.record['inputs'][0]
+        u['q'] = frames.of_angles(math.radians(heading), *self._level_angles(found))
+        rate, at = self._turn
+        turns = at and arrival - at <= TURN_AGE_NS
+        u['w'], u['axes'] = (0.0, 0.0, rate), frame_check.TURN_AXIS if turns else 0
+        u['force'] = math.nan
+        aligned = not found.sigmas[2] > p.aligned_sigma and (
+            not p.nmea.aligned_status or found.status is None or found.status >= p.nmea.aligned_status)
+        variances = tuple(0.0 if math.isnan(sigma) else math.radians(sigma)**2 for sigma in found.sigmas)
+        return self._sample(device, arrival, variances, aligned)
+
+    def _level_angles(self, found):
+        """Return (pitch, roll) [rad] of a sentence with the bow up and the starboard side down."""
+        p = self.parameters.nmea
+        pitch = math.radians(found.pitch) * (1.0 if p.pitch_positive == 'bow_up' else -1.0)
+        roll = math.radians(found.roll) * (1.0 if p.roll_positive == 'starboard_down' else -1.0)
+        if p.roll_angle == 'tss':
+            roll = math.asin(min(max(math.sin(roll) / max(math.cos(pitch), 1e-9), -1.0), 1.0))
+        return pitch, roll
+
+    def take_imu(self, message, arrival):
+        """Return the Sample of a sensor_msgs/Imu; None without one. arrival: of the message [ns, UTC]."""
+        p, u = self.parameters, self.record['inputs'][0]
+        if message.orientation_covariance[0] < 0.0:
+            return self._drop('no_orientation', f'{p.imu.topic}: orientation_covariance[0] < 0 declares no '
+                              'orientation (REP 145)', arrival)
+        q, w, f = message.orientation, message.angular_velocity, message.linear_acceleration
+        has_rates = message.angular_velocity_covariance[0] >= 0.0 or p.imu.undeclared_rates
+        u['q'], u['w'], u['force'] = (q.x, q.y, q.z, q.w), (w.x, w.y, w.z), (f.x, f.y, f.z)
+        u['axes'] = frame_check.ALL_AXES if has_rates else 0
+        if message.linear_acceleration_covariance[0] < 0.0 or not np.isfinite(u['force']).all():
+            u['force'] = math.nan
+        variances = tuple(float(message.orientation_covariance[i]) for i in (0, 4, 8))
+        variances = tuple(variance if 0.0 < variance < math.inf else 0.0 for variance in variances)
+        aligned = not math.sqrt(variances[2]) > math.radians(p.aligned_sigma)
+        return self._sample(messages.nanoseconds(message.header.stamp), arrival, variances, aligned)
+
+    def _sample(self, device, arrival, variances, aligned):
+        """Return the Sample of the inputs of the law; None for a dropped one. device: stamp of the device [ns, UTC],
+        None for none."""
+        p, u = self.parameters, self.record['inputs'][0]
+        stamp = arrival if p.stamp == 'arrival' else device
+        if stamp is None:
+            return self._drop('no_time', 'a sentence without time', arrival)
+        self._age_ns = arrival - stamp
+        if self._age_ns > round(p.oldest * 1e9):
+            return self._drop('stale', f'the stamp is {self._age_ns * 1e-9:.3f} s old', arrival)
+        if -self._age_ns > round(p.future * 1e9):
+            return self._drop('future', f'the stamp is {-self._age_ns * 1e-9:.3f} s in the future', arrival)
+        u['stamp'] = stamp - round(p.latency * 1e9)
+        outcome = input_law.step(self.record)
+        blocked = outcome in (Outcome.TILTED, Outcome.WRONG_FRAME)
+        self._blocking = self._wrong_frame(outcome) if blocked else ''
+        if outcome != Outcome.PUBLISHED:
+            self.state = 'aligning' if outcome == Outcome.WRONG_FRAME else self.state
+            return self._drop(input_law.OUTCOMES[outcome], self._blocking or OUTCOME_TEXTS[outcome], arrival)
+        self.counts['published'] += 1
+        self.state = 'aligned' if aligned else 'aligning'
+        outputs = self.record['outputs'][0]
+        return Sample(int(u['stamp']), outputs['q'], outputs['w'], outputs['force'], variances)
+
+    def _wrong_frame(self, outcome):
+        """Return the text of a frame that cannot be right, with the frames that would fit."""
+        check, u, o = (self.record[name][0] for name in ('state', 'inputs', 'outputs'))
+        check = check['check']
+        if outcome == Outcome.TILTED:
+            x, y = o['q'][:2]
+            tilt = math.degrees(math.acos(max(1.0 - 2.0 * (x * x + y * y), -1.0)))
+            reason = f'the deck would be tilted by {tilt:.0f} deg'
+        elif check['verdict'] != frame_check.FRAME_WRONG:
+            reason = 'linear_acceleration would point downwards'
+        else:
+            axes = u['axes']
+            reason = 'the attitude does not turn with its rates: ' + ', '.join(
+                f'{name} {frame_check.slope(check, i):.2g} times its rate' for i, name in enumerate(AXIS_NAMES)
+                if axes & (1 << i) and check['moved'][i] > 0.0 and not frame_check.agrees(check, i, axes))
+        if self.parameters.source == 'nmea':
+            return f'wrong frame: {reason}; compare the signs of heading, rate of turn, roll and pitch'
+        fitting = conventions.fitting(check, self._declared, self._case, u['q'])
+        return f'wrong frame: {reason}; {conventions.text(fitting)}'
+
+    def _drop(self, kind, reason, arrival):
+        self.counts[kind] += 1
+        if kind != 'settling':
+            self._dropped, self._dropped_at = f'dropped a sample: {reason}', arrival
+
+    @property
+    def verdict(self):
+        """Text of the verdict of the check of the frames."""
+        return VERDICT_TEXTS[self.record['state'][0]['check']['verdict']]
+
+    def diagnose(self, now):
+        """Return the Diagnosis at a time [ns, UTC]: ERROR for a wrong frame, WARN for REPORT_NS after a dropped
+        sample."""
+        state, o = self.record['state'][0], self.record['outputs'][0]
+        values = [*((f'{name}_deg', f'{angle:.2f}') for name, angle in self._angles(o['q'])),
+                  *((f'{name}_rate_deg_s', f'{math.degrees(rate):.2f}') for name, rate in zip(AXIS_NAMES, o['w'])),
+                  ('frame_check', self.verdict),
+                  *((f'{name}_slope', f'{frame_check.slope(state["check"], i):.2f}')
+                    for i, name in enumerate(AXIS_NAMES) if state['check']['moved'][i] > 0.0),
+                  ('age_s', f'{self._age_ns * 1e-9:.3f}'), ('gaps', str(state['gaps'])),
+                  ('jumps', str(state['check']['jumps'])),
+                  *((name, str(count)) for name, count in self.counts.items())]
+        if self._blocking:
+            return Diagnosis(LEVEL_ERROR, self._blocking, values)
+        if self._dropped and now - self._dropped_at < REPORT_NS:
+            return Diagnosis(LEVEL_WARN, self._dropped, values)
+        if self.state == 'aligning':
+            return Diagnosis(LEVEL_WARN, 'the INS aligns', values)
+        return Diagnosis(LEVEL_OK, 'receives attitudes', values)
+
+    def _angles(self, q):
+        """Return (name, angle [deg]) of heading, pitch (bow up) and roll (starboard down) of a quaternion."""
+        x, y, z, w = q
+        yaw = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+        pitch = -math.asin(min(max(2.0 * (w * y - x * z), -1.0), 1.0))
+        roll = math.atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
+        return (('heading', (90.0 - math.degrees(yaw)) % 360.0), ('pitch', math.degrees(pitch)),
+                ('roll', math.degrees(roll)))

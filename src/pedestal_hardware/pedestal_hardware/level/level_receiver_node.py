@@ -1,0 +1,56 @@
+"""ROS node of a receiver with a level only: publishes each level on tracking_receiver/angle_error, with errors NaN.
+
+The unit `unit.LevelUnit` reads the lines. `entry` is imported first, so that a signal during the other imports ends
+the process without a message.
+"""
+import pedestal_common.entry  # noqa: F401
+
+# isort: split
+import math
+import sys
+
+from pedestal_common.node import shell
+from pedestal_common.wire import messages
+from pedestal_hardware.level.unit import LevelUnit
+from pedestal_hardware.lines.line_node import LineNode
+
+ERROR_TOPIC = 'tracking_receiver/angle_error'
+
+
+class LevelReceiverNode(LineNode):
+    """Node of a LevelUnit. An error of 0 would state that the target is on the axis, so the errors are NaN."""
+
+    def __init__(self):
+        super().__init__('pedestal_hardware.level.level_receiver_node')
+        self.unit, self.message = LevelUnit(self.parameters), messages.template(ERROR_TOPIC)
+        self.message.vector.x = self.message.vector.y = math.nan
+        self.publish = self.writer(ERROR_TOPIC)
+        self.read_lines(self.parameters.url, self.parameters.baud_rate)
+
+    @property
+    def awaits(self):
+        """Text that names the device for which the node waits."""
+        return f'lines from {self.parameters.url}'
+
+    def take_line(self, line):
+        """Publish the level of a line."""
+        level = self.unit.take(line, self.clock()[1])
+        if level is None:
+            return
+        self.published(level.stamp)
+        messages.put_stamp(self.message.header.stamp, level.stamp)
+        self.message.vector.z = level.level
+        self.publish(messages.serialize(self.message))
+
+    def diagnosed(self):
+        """Return the Diagnosis of the unit."""
+        return self.unit.diagnose(self.clock()[1])
+
+
+def main(args=None):
+    """Run the node to its end. Return the exit code."""
+    return shell.main(LevelReceiverNode, args)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,225 @@
+"""Blocks of samples, and their times.
+
+A source delivers chunks of any length. Each chunk has the number of its first sample, by which gaps show, and the time
+of this sample. `Blocks` makes blocks of equal length of the chunks. `TimeBase` gives the time of each sample: by the
+sample counter, from one measured time. The time of arrival of a chunk alone never is the time of its samples.
+"""
+import collections
+import contextlib
+import typing
+
+import numpy as np
+
+from pedestal_common.graph.steps import NS_PER_SECOND
+
+TIME_TOLERANCE_NS = 20_000
+"""Largest deviation of a source's time from the sample counter before the counter is set again [ns]."""
+
+ARRIVAL_WINDOW_S = 10.0
+"""Time in which the earliest arrival is searched that sets the counter of a source without times [s]."""
+
+CLOCK_TOLERANCE_S, CLOCK_TIME_S = 0.1, 0.5
+"""Largest deviation of the time of the samples from the clock [s], and the time after which a larger one is a fault
+[s]: a stall of the machine makes some blocks late."""
+
+LATE_INTERVAL_S, MIN_LATE_ARRIVALS = 0.25, 5
+"""Shortest time [s] and smallest number of arrivals of an interval, of which the earliest arrival counts."""
+
+LATE_TOLERANCE_S = 0.004
+"""Largest delay of the earliest arrivals of two intervals before samples count as lost [s]. A clock that drifts by
+200 ppm makes the arrivals as late in twice ARRIVAL_WINDOW_S."""
+
+RATE_WINDOW_S = 2.0
+"""Time over which the sample rate of a source without times is measured [s]."""
+
+CAUSE_TOLERANCE = 0.05
+"""Largest relative deviation of a wrong sample rate from that of a possible cause."""
+
+RATE_TOLERANCE, STALL_TIME_S = 0.01, 0.1
+"""Largest relative deviation of the measured sample rate, and the delay of one arrival that is no deviation [s]."""
+
+
+class StreamError(ValueError):
+    """Error of a stream of samples, one line that names the value and what it must be."""
+
+
+class Chunk(typing.NamedTuple):
+    """Samples (n, channels) complex64 that follow each other, the number of the first sample, and its UTC [ns]."""
+    samples: np.ndarray
+    first: int
+    utc: int
+
+
+class Block(typing.NamedTuple):
+    """Samples (n, channels) of a step, the UTC of their middle [ns], number of samples missing before them."""
+    samples: np.ndarray
+    middle: int
+    missing: int
+
+
+def saturated_share(samples, full_scale) -> float:
+    """Return the share of samples (n, channels) whose first channel is at full scale, 0 without a full scale."""
+    if full_scale is None:
+        return 0.0
+    first = samples[:, 0]
+    return float(((np.abs(first.real) >= full_scale) | (np.abs(first.imag) >= full_scale)).mean())
+
+
+class TimeBase:
+    """Time of the samples: `index` is the number of a sample, `utc` its time [ns]."""
+
+    def __init__(self, rate):
+        self.rate, self.index, self.utc = rate, 0, None
+
+    def at(self, index) -> int:
+        """Return the UTC of a sample [ns]."""
+        return self.utc + round((index - self.index) * NS_PER_SECOND / self.rate)
+
+    def note(self, index, utc) -> bool:
+        """Take the measured time of a sample. Return True if the times of the samples have changed."""
+        if self.utc is not None and abs(utc - self.at(index)) <= TIME_TOLERANCE_NS:
+            return False
+        self.index, self.utc = index, utc
+        return True
+
+
+class Blocks:
+    """Blocks of a size, made of chunks.
+
+    lost: number of samples that were missing; gaps: number of gaps; recorder: sigmf.Recorder to which the samples are
+    written, or None; recorder_fault: text of the error that ended the recorder, '' without one.
+    """
+
+    def __init__(self, rate, size, recorder=None):
+        self.size, self.base, self.recorder = size, TimeBase(rate), recorder
+        self.kept, self.begin, self.next = None, 0, None      # kept: samples of an incomplete block
+        self.lost = self.gaps = self.missing = 0
+        self.recorder_fault = ''
+
+    def put(self, chunk) -> 'list[Block]':
+        """Take a Chunk and return the complete blocks. A gap discards the samples of an incomplete block."""
+        gap = self.next is not None and chunk.first != self.next
+        if gap:
+            lost = max(chunk.first - self.next, 1)
+            self.lost, self.gaps, self.missing = self.lost + lost, self.gaps + 1, self.missing + lost
+        if gap or self.next is None:
+            self.kept, self.begin = chunk.samples[:0], chunk.first
+        moved = self.base.note(chunk.first, chunk.utc)
+        if self.recorder is not None:
+            self._record(chunk, moved or gap or self.next is None)
+        self.next = chunk.first + len(chunk.samples)
+        self.kept = np.concatenate((self.kept, chunk.samples)) if len(self.kept) else chunk.samples
+        made = []
+        for k in range(len(self.kept) // self.size):
+            middle = self.base.at(self.begin) + round(0.5 * self.size * NS_PER_SECOND / self.base.rate)
+            made.append(Block(self.kept[k * self.size:(k + 1) * self.size], middle, self.missing))
+            self.begin, self.missing = self.begin + self.size, 0
+        self.kept = self.kept[len(made) * self.size:]
+        return made
+
+    def _record(self, chunk, begins):
+        """Write a Chunk to the recorder. An error ends the recorder, not the blocks."""
+        try:
+            self.recorder.write(chunk, begins)
+        except StreamError as error:
+            recorder, self.recorder, self.recorder_fault = self.recorder, None, str(error)
+            with contextlib.suppress(StreamError):      # a full disk takes the rest of the samples neither
+                recorder.close()
+
+
+class ClockComparison:
+    """Comparison of the times of the blocks with the clock. fault: text of their deviation, '' without one."""
+
+    def __init__(self):
+        self.fault, self.since, self.shown = '', None, 0
+
+    def note(self, middle, now):
+        """Take the middle of a block and the UTC at which it was complete [ns]."""
+        deviation = middle - now
+        if abs(deviation) <= CLOCK_TOLERANCE_S * NS_PER_SECOND:
+            self.fault, self.since = '', None
+            return
+        self.since = now if self.since is None else self.since
+        # The text stays while the deviation is about the same, so that the log does not repeat it.
+        if now - self.since >= CLOCK_TIME_S * NS_PER_SECOND and not (
+                self.fault and abs(deviation - self.shown) <= CLOCK_TOLERANCE_S * NS_PER_SECOND):
+            self.shown = deviation
+            self.fault = (f'time of the samples is {abs(deviation) / NS_PER_SECOND:.1f} s '
+                          f'{"ahead of" if deviation > 0 else "behind"} the clock')
+
+
+class ArrivalClock:
+    """Times of the samples of a source without times, from the times at which they arrive.
+
+    A sample arrives after its time by the delay of its way, which varies upwards. The earliest arrival of a window
+    therefore sets the times, with the shortest delay known. For each message call `lost`, then `utc`.
+
+    causes: {ratio of a wrong sample rate and the right one: text on its possible cause}.
+    """
+
+    def __init__(self, rate, delay, causes=None):
+        self.rate, self.delay_ns, self.causes = rate, round(delay * NS_PER_SECOND), causes or {}
+        self.window_ns = round(ARRIVAL_WINDOW_S * NS_PER_SECOND)
+        self.interval_ns = round(LATE_INTERVAL_S * NS_PER_SECOND)
+        self.tolerance_ns = round(LATE_TOLERANCE_S * NS_PER_SECOND)
+        # What becomes later by more between two intervals has a wrong rate, which check_rate names.
+        self.spread_ns = round((RATE_TOLERANCE + STALL_TIME_S / RATE_WINDOW_S) * self.interval_ns)
+        self.clear()
+
+    def clear(self):
+        """Begin again, after a gap."""
+        self.offset = self.present = self.until = None
+        self.arrivals = collections.deque()
+        self.began = self.earliest = self.before = None
+        self.count = 0
+
+    def lost(self, next_sample, arrived) -> int:
+        """Return the number of samples that were lost without a sign, 0 for none: for about 0.5 s, no arrival was as
+        early as the times of the samples demand. The caller adds them to the numbers of the samples.
+
+        next_sample: number of the sample after the last one; arrived: UTC [ns].
+        """
+        offset = arrived - round(next_sample * NS_PER_SECOND / self.rate)
+        if self.began is None:
+            self.began, self.earliest = arrived, offset
+        if arrived - self.began < self.interval_ns or self.count < MIN_LATE_ARRIVALS:
+            self.earliest, self.count = min(self.earliest, offset), self.count + 1
+            return 0
+        before, earliest = self.before, self.earliest
+        self.before, self.began, self.earliest, self.count = earliest, arrived, offset, 1
+        if before is None or abs(earliest - before) > self.spread_ns:
+            return 0
+        late = min(before, earliest) - self.offset
+        if late <= self.tolerance_ns:
+            return 0
+        # The numbers that grow take the delay away, so the offset stays the shortest one that is known.
+        self.arrivals.clear()
+        self.began = self.before = None
+        self.count = 0
+        return round(late * self.rate / NS_PER_SECOND)
+
+    def utc(self, first, count, arrived) -> int:
+        """Return the UTC [ns] of sample number `first` of `count` samples that arrived at a UTC [ns]."""
+        offset = arrived - round((first + count) * NS_PER_SECOND / self.rate)
+        if self.until is None or arrived > self.until:
+            # The clocks of source and machine drift, so each window begins with its own earliest arrival.
+            self.offset = offset if self.until is None else self.present
+            self.present, self.until = offset, arrived + self.window_ns
+        self.present, self.offset = min(self.present, offset), min(self.offset, offset)
+        return self.offset + round(first * NS_PER_SECOND / self.rate) - self.delay_ns
+
+    def check_rate(self, next_sample, arrived):
+        """Raise StreamError if the samples of the last RATE_WINDOW_S arrived at a wrong rate. next_sample: number of
+        the sample after the last one; arrived: UTC [ns]."""
+        window = self.arrivals
+        window.append((next_sample, arrived))
+        while arrived - window[1][1] > RATE_WINDOW_S * NS_PER_SECOND if len(window) > 1 else False:
+            window.popleft()
+        elapsed = arrived - window[0][1]
+        if elapsed >= RATE_WINDOW_S * NS_PER_SECOND:
+            rate = (next_sample - window[0][0]) * NS_PER_SECOND / elapsed
+            # A stall of the machine delays one arrival, so short windows deviate more.
+            if abs(rate / self.rate - 1.0) > RATE_TOLERANCE + STALL_TIME_S * NS_PER_SECOND / elapsed:
+                cause = next((f'; {text}' for ratio, text in self.causes.items()
+                              if abs(rate / (ratio * self.rate) - 1.0) < CAUSE_TOLERANCE), '')
+                raise StreamError(f'sample rate {rate:.0f} S/s: must be {self.rate:.0f} S/s (source.rate){cause}')

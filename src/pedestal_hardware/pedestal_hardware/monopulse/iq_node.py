@@ -1,0 +1,84 @@
+"""ROS node of the simulated I/Q: sends the samples of all channels for each direction of the beam.
+
+The unit is iq_unit.SimulatedIq. Before the first step the node sends noise, as a front end without a signal does.
+`entry` is imported first, so that a signal during the other imports ends the process without a message.
+"""
+import pedestal_common.entry  # noqa: F401
+
+# isort: split
+import sys
+
+from pedestal_common.graph.nodes import MONOPULSE_RECEIVER
+from pedestal_common.node import shell, unit_node
+from pedestal_hardware.monopulse import sinks
+from pedestal_hardware.monopulse.blocks import NS_PER_SECOND
+from pedestal_hardware.params import START_KEY
+
+NOISE_PERIOD_S = 0.02
+"""Time between two transmissions of noise before the first step [s]."""
+
+MAX_SPAN_S = 0.2
+"""Longest time for which samples are made at once [s]. After a longer one the samples have a gap."""
+
+
+class IqNode(unit_node.UnitNode):
+    """Node of the simulated I/Q. sent: UTC of the end of the samples that were sent [ns]; number: of the next one."""
+
+    def __init__(self):
+        self.sink, self.sent, self.number = None, None, 0
+        super().__init__('pedestal_hardware.monopulse.iq_node')
+
+    def begin(self):
+        """Open the sink, and begin to follow the trigger."""
+        self.sink = sinks.opened(self.parameters)
+        self.get_logger().info(f'samples to {self.parameters.source.url} ({self.parameters.source.kind})')
+        self.noise = self.every(NOISE_PERIOD_S, self._send_noise)
+        if self.parameters.source.start_after:
+            self.message_reader('diagnostics', self._take_start)
+        super().begin()
+
+    def _take_start(self, array):
+        """Take time 0 from the diagnostics of the receiver, which chooses it at the first samples."""
+        for status in array.status:
+            for value in status.values if status.name == MONOPULSE_RECEIVER.name else ():
+                if value.key == START_KEY:
+                    self._epoch = int(value.value)
+
+    def _send_noise(self):
+        """Send noise up to now."""
+        self._send(self.clock()[1])
+
+    def _send(self, until):
+        """Send the samples from the last ones to a UTC [ns]."""
+        rate = self.parameters.source.rate
+        if self.sent is None:
+            self.sent = until
+        elif until - self.sent > MAX_SPAN_S * NS_PER_SECOND:
+            begin = until - self.ports[0].unit.parameters.block * NS_PER_SECOND / rate
+            self.number += round((begin - self.sent) * rate / NS_PER_SECOND)
+            self.sent = round(begin)
+        count = round((until - self.sent) * rate / NS_PER_SECOND)
+        if count > 0:
+            self.sink.send(self.unit.samples(count), self.number, self.sent)
+            self.number, self.sent = self.number + count, self.sent + round(count * NS_PER_SECOND / rate)
+
+    def answer(self, stamp, values):
+        """Answer a step, then send its samples."""
+        self.noise.cancel()
+        super().answer(stamp, values)
+        self._send(stamp)
+
+    def close(self):
+        """Close the sink and end."""
+        if self.sink is not None:
+            self.sink.close()
+        super().close()
+
+
+def main(args=None):
+    """Run the node to its end. Return the exit code."""
+    return shell.main(IqNode, args)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

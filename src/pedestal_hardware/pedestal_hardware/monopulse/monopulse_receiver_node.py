@@ -1,0 +1,160 @@
+"""ROS node of a monopulse receiver of I/Q samples: takes the place of `tracking_receiver_node`.
+
+A thread receives the samples. Each block of them is a step of the unit `unit.MonopulseReceiver`, whose law is in
+`front_end`. `entry` is imported first, so that a signal during the other imports ends the process without a message.
+"""
+import pedestal_common.entry  # noqa: F401
+
+# isort: split
+import sys
+import threading
+import time
+
+from pedestal_common.node import shell, unit_node
+from pedestal_hardware.monopulse import blocks, sigmf, sources
+from pedestal_hardware.params import START_KEY, time_0_after
+
+READ_TIMEOUT_S = 0.1
+"""Longest wait for samples before the node looks whether it ends [s]."""
+
+MAX_SATURATED_SHARE = 0.01
+"""Largest share of the samples of a block at full scale [-]."""
+
+FAULT_TIME_S = 2.0
+"""Time for which a fault of the stream is reported after its last occurrence [s]."""
+
+
+class MonopulseReceiverNode(unit_node.UnitNode):
+    """Node of a receiver of I/Q samples. heard: time of the monotonic clock of the last samples [s]; fault: (time,
+    text) of the last fault."""
+
+    def __init__(self):
+        self.source = self.receiving = self.blocks = None
+        self.ending, self.heard, self.fault, self.start = False, None, (-FAULT_TIME_S, ''), None
+        super().__init__('pedestal_hardware.monopulse.monopulse_receiver_node')
+
+    def begin(self):
+        """Open the source and receive."""
+        p, recorder = self.parameters, None
+        self.source = sources.opened(p, lambda: self.clock()[1])
+        if p.source.record:
+            # A node that is started again during a run must not fail at its own recording.
+            path = sigmf.free_path(p.source.record)
+            recorder = sigmf.Recorder(path, p.source.rate, p.feed.channels, 'received')
+            self.get_logger().info(f'samples are recorded to {path}')
+        self.blocks = blocks.Blocks(p.source.rate, p.block, recorder)
+        self.comparison, self.begun = blocks.ClockComparison(), time.monotonic()
+        if not p.source.start_after:
+            self.start = self.graph.start
+        self.receiving = threading.Thread(target=self._guarded(self._receive), daemon=True)
+        self.receiving.start()
+
+    @property
+    def awaits(self):
+        """Text that names the inputs for which the node waits."""
+        source = self.parameters.source
+        return f'samples of {source.url} ({source.kind})'
+
+    def _receive(self):
+        """Receive samples and make the steps until the node ends."""
+        while not self.ending:
+            try:
+                chunk = self.source.read(READ_TIMEOUT_S)
+            except blocks.StreamError as error:
+                self._note_fault(str(error))
+                continue
+            if chunk is not None:
+                before = self.heard
+                self.heard = time.monotonic()
+                if before is not None and self.heard - before > self.parameters.source.silence:
+                    self.get_logger().info(f'samples again, after {self.heard - before:.1f} s')
+                recorded = self.blocks.recorder_fault
+                made = self.blocks.put(chunk)
+                if self.blocks.recorder_fault != recorded:
+                    self._note_fault(f'the recording ends: {self.blocks.recorder_fault}')
+                for block in made:
+                    self._make(block)
+            if chunk is None or made:
+                self._look_for_faults()
+
+    def _note_fault(self, text):
+        """Note a fault of the stream, and log a new one."""
+        at, last = self.fault
+        now = time.monotonic()
+        if text != last or now - at > FAULT_TIME_S:
+            self.get_logger().warning(text)
+        self.fault = now, text
+        self._look_for_faults()
+
+    def _look_for_faults(self):
+        """Give the unit the present fault and the counts of the stream, and publish a change at once."""
+        now, (at, text) = time.monotonic(), self.fault
+        silent = now - (self.begun if self.heard is None else self.heard)
+        if now - at > FAULT_TIME_S:
+            text = ''
+        if silent > self.parameters.source.silence:
+            text = text or (f'no samples for {silent:.0f} s' if self.heard is not None else 'no samples so far')
+        unit = self.unit
+        unit.source_fault = text
+        unit.counts = {'lost_samples': self.blocks.lost, 'gaps': self.blocks.gaps, **self.source.counts}
+        if [unit.urgent] != self._urgent and self.diagnose_now():
+            self._urgent = [unit.urgent]
+
+    def _make(self, block):
+        """Make the step of a block, and publish its error."""
+        [port] = self.ports
+        if block.missing:
+            self._note_fault(f'{block.missing} samples are missing')
+        share = blocks.saturated_share(block.samples, self.source.full_scale)
+        if share > MAX_SATURATED_SHARE:
+            self._note_fault('samples are at full scale: the signal is too strong for the front end, lower its gain')
+        self.comparison.note(block.middle, self.clock()[1])
+        if self.comparison.fault:
+            self._note_fault(self.comparison.fault)
+        self.unit.take(block)
+        port.step(block.middle, {})
+        if self.start is None:
+            self._choose_start()
+        if block.middle - self.unit.age_ns < self.start:   # before time 0 of a run the graph publishes no measurements
+            return
+        self.begin_step(block.middle)
+        port.publish()
+        self.after_step()
+
+    def _choose_start(self):
+        """Let time 0 follow the first samples, by whole seconds from graph.start, and publish it."""
+        self.start = time_0_after(self.graph.start, self.clock()[1], self.parameters.source.start_after)
+        self.diagnose_now()
+
+    def diagnosed(self):
+        """Return the Diagnosis of the receiver, with the error that ended the recording, and with time 0 if it follows
+        the first samples."""
+        diagnosis, values = super().diagnosed(), []
+        if self.blocks is not None and self.blocks.recorder_fault:
+            values.append(('recording_fault', self.blocks.recorder_fault))
+        if self.parameters.source.start_after and self.start is not None:
+            values.append((START_KEY, str(self.start)))
+        return diagnosis._replace(values=[*diagnosis.values, *values])
+
+    def close(self):
+        """Close the source and the recording, and end."""
+        self.ending = True
+        if self.receiving is not None:
+            self.receiving.join(1.0)
+        if self.source is not None:
+            self.source.close()
+        if self.blocks is not None and self.blocks.recorder is not None:
+            try:
+                self.blocks.recorder.close()
+            except blocks.StreamError as error:
+                self.get_logger().warning(f'the recording is cut: {error}')
+        super().close()
+
+
+def main(args=None):
+    """Run the node to its end. Return the exit code."""
+    return shell.main(MonopulseReceiverNode, args)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,208 @@
+"""Unit of a receiver of I/Q samples: blocks of samples in, angle errors out, without stream and without ROS."""
+import cmath
+import math
+import typing
+
+import numpy as np
+
+from pedestal_common.compiled import compiled
+from pedestal_common.graph import nodes
+from pedestal_common.node.unit import LEVEL_ERROR, LEVEL_OK, LEVEL_WARN, Diagnosis, Unit, joined
+from pedestal_common.wire.records import NO_STAMP
+from pedestal_hardware.monopulse import feed, front_end, scan
+from tracking_receiver_sim import receiver
+
+ANGLE_ERROR_TOPIC = 'tracking_receiver/angle_error'
+
+AXIS_NAMES = 'cross_elevation', 'elevation'
+
+MAX_PASSED_GAP_S = 0.2
+"""Longest gap after which the loop continues at its frequency [s]. At 3 kHz/s the carrier moves by 600 Hz in it."""
+
+_FIELDS = [('state', front_end.STATE_DTYPE), ('constants', front_end.CONSTANTS_DTYPE),
+           ('outputs', front_end.OUTPUTS_DTYPE)]
+RECORD_DTYPE = np.dtype(_FIELDS, align=True)
+SCANNED_RECORD_DTYPE = np.dtype([*_FIELDS, ('window', scan.WINDOW_DTYPE)], align=True)
+
+
+class Memory(typing.NamedTuple):
+    """Memory of the unit for three channels. record: (1,) of RECORD_DTYPE; samples: (n, 3) of a block; dumps: (parts,
+    3) integrals."""
+    record: np.ndarray
+    samples: np.ndarray
+    dumps: np.ndarray
+
+
+class ScannedMemory(typing.NamedTuple):
+    """Memory of the unit for a scanned feed. record: (1,) of SCANNED_RECORD_DTYPE; samples: (n, 2) of a block; dumps:
+    (parts, 2) integrals and means."""
+    record: np.ndarray
+    samples: np.ndarray
+    dumps: np.ndarray
+
+
+@compiled
+def publish(error, stamp, o):
+    """Write the outputs of the receiver to the message of a stamp [ns]."""
+    error.stamp = stamp
+    error.vector[0], error.vector[1], error.vector[2] = o.cross_elevation, o.elevation, o.cn0_dbhz
+
+
+@compiled
+def law(memory, stamp, inputs, outputs):
+    """Execute the step of a block. stamp: middle of the block [ns]."""
+    m = memory.record[0]
+    front_end.step(m.state, m.constants, memory.samples, memory.dumps, m.outputs)
+    publish(outputs[ANGLE_ERROR_TOPIC], stamp, m.outputs)
+
+
+@compiled
+def laws(memory, stamps, inputs, outputs):
+    """Execute `law` for each element of arrays."""
+    for k in range(len(stamps)):
+        law(memory, stamps[k], inputs[k], outputs[k])
+
+
+@compiled
+def scanned_law(memory, stamp, inputs, outputs):
+    """Execute the step of a block of a scanned feed. stamp: middle of the block [ns]. The stamp of an error is the
+    middle of its window."""
+    m = memory.record[0]
+    if scan.step(m.state, m.constants, m.window, memory.samples, memory.dumps, m.outputs):
+        publish(outputs[ANGLE_ERROR_TOPIC], stamp - m.window.age_ns, m.outputs)
+    else:
+        outputs[ANGLE_ERROR_TOPIC].stamp = NO_STAMP
+
+
+@compiled
+def scanned_laws(memory, stamps, inputs, outputs):
+    """Execute `scanned_law` for each element of arrays."""
+    for k in range(len(stamps)):
+        scanned_law(memory, stamps[k], inputs[k], outputs[k])
+
+
+class MonopulseReceiver(Unit):
+    """A receiver of the samples of three channels or of a scanned feed, of MonopulseParameters.
+
+    Before each step `take` takes the block of the step.
+
+    integration     effective time of an error [s], see feed.effective_integration
+    age_ns          time from the stamp of an error to the middle of the block that completes it [ns]
+    source_fault    fault of the stream of samples, '' without one
+    counts          {name: number} of the events of the stream
+    """
+    NODE, LAWS = nodes.MONOPULSE_RECEIVER, {Memory: (law, laws), ScannedMemory: (scanned_law, scanned_laws)}
+
+    def __init__(self, parameters, reads):
+        super().__init__(parameters, reads)
+        p = parameters
+        parts, channels = p.receiver.samples_per_step, len(p.feed.channels)
+        if p.feed.scanned:
+            memory, record = ScannedMemory, joined(SCANNED_RECORD_DTYPE, state=front_end.initial_state(p),
+                                                   constants=scan.constants(p), window=scan.initial_window(p))
+        else:
+            memory, record = Memory, joined(RECORD_DTYPE, state=front_end.initial_state(p),
+                                            constants=front_end.constants(p))
+        record['outputs']['status'] = front_end.Status.WAIT
+        self.memory = memory(record, np.zeros((p.block, channels), np.complex64),
+                             np.zeros((parts, channels), np.complex128))
+        self.integration = feed.effective_integration(p)
+        self.age_ns = int(self.parts['window']['age_ns']) if p.feed.scanned else 0
+        self.search = front_end.Search(p)
+        self.source_fault, self.counts = '', {}
+
+    def take(self, block):
+        """Take a blocks.Block for the next step. After a long gap the carrier is searched again."""
+        self.memory.samples[...] = block.samples
+        state = self.parts['state']
+        if block.missing:
+            front_end.pass_gap(state, block.missing > MAX_PASSED_GAP_S * self.parameters.source.rate)
+            self.search.clear()
+            if self.parameters.feed.scanned:
+                scan.begin_again(self.parts['window'])
+        if state['carrier'] == 0 and np.isfinite(block.samples[:, 0]).all():
+            turn = self.search.put(block.samples[:, 0])
+            if turn is not None:
+                front_end.use_carrier(state, turn)
+        else:
+            self.search.clear()
+
+    def prepare(self):
+        """Compile all functions that the node calls, without a change of the unit."""
+        super().prepare()
+        record = self.memory.record.copy()
+        front_end.use_carrier(self.parts['state'], 0.0)
+        front_end.pass_gap(self.parts['state'], True)
+        if self.parameters.feed.scanned:
+            scan.begin_again(self.parts['window'])
+        self.memory.record[...] = record
+
+    @property
+    def urgent(self):
+        """Values whose change is published at once: lock and fault of the stream."""
+        return int(self.parts['outputs']['locked']), bool(self.source_fault)
+
+    def diagnose(self):
+        """Return the Diagnosis: carrier, C/N0, the ratios of difference and sum or the scan, events of the stream.
+
+        The level is ERROR for a fault of the stream or of its samples, or of the scan, WARN without lock.
+        """
+        p, state, outputs = self.parameters, self.parts['state'], self.parts['outputs']
+        hertz = p.source.rate / (2.0 * math.pi)
+        sigma = receiver.angle_noise(p, float(outputs['cn0_dbhz']), p.period) * math.sqrt(p.period / self.integration)
+        values = [('cn0_dbhz', f'{outputs["cn0_dbhz"]:.2f}'), ('locked', str(int(outputs['locked']))),
+                  ('carrier_hz', f'{state["turn"] * hertz:.1f}'), ('residual_hz', f'{state["error"] * hertz:.2f}'),
+                  ('search_level_db', f'{self.search.level:.1f}'),
+                  ('noise_power_db', f'{10.0 * math.log10(max(state["noise"], front_end.SMALLEST_POWER)):.2f}'),
+                  ('angle_noise_deg', f'{math.degrees(sigma):.4g}'),
+                  ('effective_integration_s', f'{self.integration:.4g}')]
+        values += self._of_scan() if p.feed.scanned else self._of_ratios()
+        values += [('bad_blocks', str(int(state['bad']))), *((name, str(count)) for name, count in
+                                                            self.counts.items())]
+        if self.source_fault:
+            return Diagnosis(LEVEL_ERROR, self.source_fault, values)
+        status = int(outputs['status'])
+        text = front_end.STATUS_TEXT_BY_CODE[status]
+        if status == front_end.Status.WRONG_SCAN:
+            text += self._wrong_scan
+        if status in (front_end.Status.NOT_FINITE, front_end.Status.NO_SCAN, front_end.Status.WRONG_SCAN):
+            return Diagnosis(LEVEL_ERROR, text, values)
+        return Diagnosis(LEVEL_OK if status == front_end.Status.LOCKED else LEVEL_WARN, text, values)
+
+    def _of_ratios(self):
+        """Return the values of the Diagnosis on the differences of three channels."""
+        state, values = self.parts['state'], []
+        for name, real, imag, skew in zip(AXIS_NAMES, state['ratio_real'], state['ratio_imag'], state['skew']):
+            ratio = complex(real, imag)
+            values += [(f'{name}_ratio', f'{abs(ratio):.5f}'), (f'{name}_phase_deg',
+                                                               f'{math.degrees(cmath.phase(ratio)):.2f}'),
+                       (f'{name}_skew', f'{skew:.5f}')]
+        return values
+
+    def _of_scan(self):
+        """Return the values of the Diagnosis on a scanned feed: its rate and its modulation."""
+        window = self.parts['window']
+        return [('scan_hz', f'{self._scan_hz:.2f}'), ('scan_mean', f'{abs(window["mean"]):.3f}'),
+                ('scan_reversals', f'{window["reversals"]:.2f}'),
+                *((f'{name}_modulation', f'{value:.5f}') for name, value in zip(AXIS_NAMES, window['slope']))]
+
+    @property
+    def _scan_hz(self):
+        """Measured rate of the scan [Hz], negative for the wrong direction."""
+        p = self.parameters
+        return float(self.parts['window']['advance']) / (2.0 * math.pi) * p.receiver.samples_per_step / p.period
+
+    @property
+    def _wrong_scan(self):
+        """Text that names the value of a wrong scan reference, and what it must be."""
+        window, rate = self.parts['window'], self.parameters.feed.scan_rate
+        if window['reversals'] > scan.MAX_REVERSALS:
+            return f': it turns by more than 110 deg {window["reversals"]:.1f} times in a scan, must be 0'
+        if abs(self._scan_hz - rate) > scan.MAX_RATE_SHARE * rate:
+            return f': {self._scan_hz:.1f} Hz, must be {rate:g} Hz'
+        return f': its mean is {abs(window["mean"]):.2f} of its amplitude, must be 0'
+
+    @staticmethod
+    def idle(numbers):
+        """Return a reason if no error is finite: such a recording does not exercise the receiver."""
+        return '' if np.isfinite(numbers[ANGLE_ERROR_TOPIC][:, 0]).any() else 'the receiver never locked'

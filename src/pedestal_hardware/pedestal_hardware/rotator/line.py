@@ -1,0 +1,154 @@
+"""Connection to a rotator, by TCP or a serial line, in a thread of its own.
+
+The thread asks for the position once in `poll_period`, and sends the newest set-point between two polls. Because a
+rotator needs up to 0.6 s for an answer, no step of the node may wait for one. After an error the thread opens the
+connection again, once in RETRY_PERIOD_S.
+"""
+import threading
+import time
+import typing
+
+import serial
+
+from pedestal_hardware.rotator.protocols import Accepted, Position, Refusal
+
+RETRY_PERIOD_S = 1.0
+"""Time between two attempts to open the connection [s]."""
+
+READ_TIMEOUT_S = 0.02
+"""Longest wait for the next byte [s]."""
+
+MAX_READ_BYTES = 4096
+"""Number of bytes that are read at once."""
+
+
+class Measurement(typing.NamedTuple):
+    """Angles of the device [deg], and the time of the monotonic clock at which they arrived [s]."""
+    azimuth: float
+    elevation: float
+    at: float
+
+
+class Line:
+    """Connection to one rotator.
+
+    url         `socket://host:port` for TCP, or the path of a serial device, as pyserial takes it
+    protocol    class of rotators' protocols
+    baud_rate   of a serial device; 0: that of the protocol
+    timeout     longest wait for an answer [s]
+
+    newest      the newest Measurement, None before the first
+    silence     reason why no position arrives, '' while positions arrive
+    refusal     reason of the device for the refusal of the last set-point or stop, '' after an accepted one
+    counts      numbers of positions, set-points, refusals and missing answers
+    """
+
+    def __init__(self, url, protocol, poll_period, timeout, baud_rate=0):
+        self.url, self.protocol, self.poll_period, self.timeout = url, protocol, poll_period, timeout
+        self.baud_rate = baud_rate or protocol.BAUD_RATE
+        self.newest, self.silence, self.refusal = None, f'{url}: not connected so far', ''
+        self.counts = {'positions': 0, 'set_points': 0, 'refusals': 0, 'missing_answers': 0}
+        self._request, self._lock = b'', threading.Lock()
+        self._ended, self._wake = threading.Event(), threading.Event()
+        self._thread = threading.Thread(target=self._run, name='rotator', daemon=True)
+        self._reader = protocol()
+
+    @property
+    def fault(self):
+        """Reason why the device does not follow, '' if it does."""
+        return self.silence or self.refusal
+
+    def start(self):
+        """Start the thread."""
+        self._thread.start()
+
+    def send_set_point(self, azimuth, elevation):
+        """Send a set-point [deg] at the next opportunity, in place of an earlier one that was not sent."""
+        with self._lock:
+            self._request = self._reader.set_point(azimuth, elevation)
+        self._wake.set()
+
+    def send_stop(self):
+        """Send a stop at the next opportunity, in place of a set-point that was not sent."""
+        with self._lock:
+            self._request = self.protocol.STOP
+        self._wake.set()
+
+    def close(self):
+        """Stop the device and end the thread."""
+        self.send_stop()
+        self._ended.set()
+        self._wake.set()
+        if self._thread.is_alive():
+            self._thread.join(2.0 * self.timeout + RETRY_PERIOD_S)
+
+    def _run(self):
+        while not self._ended.is_set():
+            try:
+                with serial.serial_for_url(self.url, baudrate=self.baud_rate, timeout=READ_TIMEOUT_S,
+                                           write_timeout=self.timeout) as device:
+                    self._serve(device)
+            except (OSError, ValueError) as error:     # SerialException is an OSError
+                self.silence = f'{self.url}: {error}'
+                self._ended.wait(RETRY_PERIOD_S)
+
+    def _serve(self, device):
+        """Exchange requests and answers until the thread ends; raises OSError when the device vanishes."""
+        self._reader = self.protocol()
+        while True:
+            begun, ending = time.monotonic(), self._ended.is_set()
+            self._wake.clear()
+            self._send_request(device)
+            if ending:
+                return
+            device.write(self.protocol.ASK)
+            self._await(device, Position)
+            self._wake.wait(max(self.poll_period - (time.monotonic() - begun), 0.0))
+
+    def _send_request(self, device):
+        """Send the newest set-point or stop, if there is one, and await its answer where the protocol has one."""
+        request = self._request
+        if not request:
+            return
+        device.write(request)
+        self.counts['set_points'] += request != self.protocol.STOP
+        if self.protocol.ANSWERS_SETS:
+            self._await(device, Accepted)
+        with self._lock:
+            # An error before this line leaves the request to the next connection, a refused stop to the next poll.
+            if self._request is request and not (self.refusal and request == self.protocol.STOP):
+                self._request = b''
+
+    def _refused(self, reason, awaited):
+        """Keep the reason of a refusal: of a request until the next one is accepted, of other bytes until the next
+        position."""
+        if awaited is Accepted:
+            self.refusal = f'{self.url}: request refused: {reason}'
+        else:
+            self.silence = f'{self.url}: {reason}'
+
+    def _await(self, device, awaited):
+        """Read until an answer of the awaited type arrives, or a refusal of a set-point.
+
+        Raise OSError after a time-out. The connection is then opened again, because a late answer would be taken for
+        the answer to the next request.
+        """
+        end = time.monotonic() + self.timeout
+        while time.monotonic() < end:
+            received = device.read(max(1, min(device.in_waiting, MAX_READ_BYTES)))
+            ended = False
+            for answer in self._reader.answers(received):
+                if isinstance(answer, Position):
+                    self.newest = Measurement(*answer, time.monotonic())
+                    self.counts['positions'] += 1
+                    self.silence = ''
+                elif isinstance(answer, Refusal):
+                    self.counts['refusals'] += 1
+                    self._refused(answer.reason, awaited)
+                else:
+                    self.refusal = ''
+                ended |= isinstance(answer, awaited) or isinstance(answer, Refusal) and awaited is Accepted
+            if ended:
+                return
+        self.counts['missing_answers'] += 1
+        raise OSError(f'no {"position" if awaited is Position else "answer"} for {self.timeout:g} s')

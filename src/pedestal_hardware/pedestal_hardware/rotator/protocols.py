@@ -1,0 +1,205 @@
+"""Protocols of rotators: the bytes of a request, and the answers in the bytes of the device.
+
+Sources: Hamlib 4.6 (rotators/gs232a, gs232b, easycomm, spid, and tests/rotctl_parse.c), the EasyComm standard, and the
+manual of the SPID Rot2Prog. All angles are in degrees. A protocol object keeps what a device has sent of an unfinished
+answer, so each connection needs its own object.
+"""
+import re
+import typing
+
+MAX_ANSWER_BYTES = 512
+"""Number of bytes without a complete answer after which the bytes are refused."""
+
+MAX_ANGLE_DEG = 1000.0
+"""Largest angle that a device may report [deg]."""
+
+
+class Position(typing.NamedTuple):
+    """Answer of a device: azimuth and elevation [deg]."""
+    azimuth: float
+    elevation: float
+
+
+class Refusal(typing.NamedTuple):
+    """Answer of a device that refuses a request, or bytes that are no answer; reason: one line."""
+    reason: str
+
+
+class Accepted(typing.NamedTuple):
+    """Answer of a device that accepts a set-point or a stop."""
+
+
+class RotatorProtocol:
+    """Base of the protocols.
+
+    ASK           request of the position
+    STOP          request to stop both axes
+    ANSWERS_SETS  True if the device answers a set-point
+    BAUD_RATE     usual speed of the serial line
+    RESOLUTION    smallest step of a set-point [deg]
+    """
+    ASK = b''
+    STOP = b''
+    ANSWERS_SETS = False
+    BAUD_RATE = 9600
+    RESOLUTION = 0.01
+
+    def __init__(self):
+        self.buffer = b''
+
+    def set_point(self, azimuth, elevation) -> bytes:
+        """Return the request to move to angles [deg]."""
+        raise NotImplementedError
+
+    def answers(self, received: bytes) -> list:
+        """Return the complete answers in the received bytes: Position, Accepted or Refusal."""
+        self.buffer += received
+        found = list(self._complete())
+        if len(self.buffer) > MAX_ANSWER_BYTES:
+            found.append(Refusal(f'{len(self.buffer)} bytes without an answer: {self.buffer[:20]!r} ...'))
+            self.buffer = b''
+        return found
+
+    def _complete(self):
+        """Yield the complete answers, and remove their bytes from the buffer."""
+        raise NotImplementedError
+
+
+class LineProtocol(RotatorProtocol):
+    """Base of the protocols of text lines."""
+
+    def _complete(self):
+        *lines, self.buffer = re.split(rb'[\r\n]+', self.buffer)
+        for line in lines:
+            if line.strip():
+                yield from self.answers_of(line.strip())
+
+    def answers_of(self, line):
+        """Yield the answers in one line."""
+        raise NotImplementedError
+
+
+def checked(azimuth, elevation):
+    """Return the Position of two numbers or texts, or the Refusal of angles that no device has."""
+    try:
+        position = Position(float(azimuth), float(elevation))
+    except ValueError:
+        return Refusal(f'position {azimuth[:20]!r}, {elevation[:20]!r}: must be two numbers')
+    if not all(abs(angle) <= MAX_ANGLE_DEG for angle in position):
+        return Refusal(f'position {position.azimuth:g}, {position.elevation:g} deg: must be within '
+                       f'+-{MAX_ANGLE_DEG:g} deg')
+    return position
+
+
+class Rotctld(LineProtocol):
+    """Client of Hamlib's rotctld, by which every rotator that Hamlib supports is reached."""
+    ASK, STOP, ANSWERS_SETS, RESOLUTION = b'p\n', b'S\n', True, 0.01
+
+    def __init__(self):
+        super().__init__()
+        self._azimuth = None
+
+    def set_point(self, azimuth, elevation):
+        """Return the request to move to angles [deg]."""
+        return b'P %.2f %.2f\n' % (azimuth, elevation)
+
+    def answers_of(self, line):
+        """Yield the answer that a line completes: a position has two lines."""
+        if line.startswith(b'RPRT'):
+            self._azimuth = None
+            code = line[4:].strip()
+            yield Accepted() if code == b'0' else Refusal(f'rotctld error {code.decode(errors="replace")}')
+        elif isinstance(checked(line, line), Refusal):
+            self._azimuth = None
+            yield checked(line, line)
+        elif self._azimuth is None:
+            self._azimuth = line
+        else:
+            azimuth, self._azimuth = self._azimuth, None
+            yield checked(azimuth, line)
+
+
+class Gs232(LineProtocol):
+    """Yaesu GS-232A and GS-232B, whole degrees."""
+    ASK, STOP, RESOLUTION = b'C2\r', b'S\r', 1.0
+    _POSITION = re.compile(rb'AZ=(\d{3})\s+EL=(\d{3})|\+0(\d{3})\s*\+0(\d{3})')
+
+    def set_point(self, azimuth, elevation):
+        """Return the request to move to angles [deg]."""
+        return b'W%03d %03d\r' % (round(azimuth), round(elevation))
+
+    def answers_of(self, line):
+        """Yield the answer of a line."""
+        match = self._POSITION.fullmatch(line)
+        if match:
+            yield checked(*filter(None, match.groups()))
+        else:
+            yield Refusal(f'answer {line.decode(errors="replace")!r}: must be AZ=aaa EL=eee, or +0aaa+0eee')
+
+
+class Easycomm(LineProtocol):
+    """EasyComm II and III. The device answers the two angles in one line or in two."""
+    ASK, STOP, RESOLUTION = b'AZ EL \n', b'SA SE \n', 0.1
+    _WORD = re.compile(rb'(AZ|EL)([-+]?[\d.]+)')
+
+    def __init__(self):
+        super().__init__()
+        self._angles = {}
+
+    def set_point(self, azimuth, elevation):
+        """Return the request to move to angles [deg]."""
+        return b'AZ%.1f EL%.1f\n' % (azimuth, elevation)
+
+    def answers_of(self, line):
+        """Yield the position once both angles have arrived; other words, such as alarms, are refused."""
+        for word in line.split():
+            match = self._WORD.fullmatch(word)
+            if not match:
+                yield Refusal(f'answer {word.decode(errors="replace")!r}: must be AZaaa.a or ELeee.e')
+                continue
+            self._angles[match[1]] = match[2]
+            if len(self._angles) == 2:
+                yield checked(self._angles.pop(b'AZ'), self._angles.pop(b'EL'))
+
+
+class Rot2prog(RotatorProtocol):
+    """SPID Rot2Prog, frames of 13 bytes to the device and 12 bytes from it.
+
+    An angle is sent as pulses, PH (360 + angle), PH pulses for each degree, and received as digits of 0.1 deg. MD-01
+    also answers a set-point, with the same frame, and may send text between the frames.
+    """
+    ASK, STOP = (b'W' + 10 * b'\0' + bytes([command]) + b' ' for command in (0x1F, 0x0F))
+    BAUD_RATE, RESOLUTION = 600, 0.1
+    PULSES_PER_DEG = 10
+    FRAME_BYTES = 12
+
+    def set_point(self, azimuth, elevation):
+        """Return the request to move to angles [deg]."""
+        pulses = self.PULSES_PER_DEG
+        return b'W%04d%c%04d%c\x2f ' % (round(pulses * (360.0 + azimuth)), pulses,
+                                        round(pulses * (360.0 + elevation)), pulses)
+
+    def _complete(self):
+        while True:
+            begin = self.buffer.find(b'W')
+            self.buffer = self.buffer[begin:] if begin >= 0 else b''
+            if len(self.buffer) < self.FRAME_BYTES:
+                return
+            frame = self.buffer[:self.FRAME_BYTES]
+            digits = frame[1:5] + frame[6:10]
+            if frame[-1:] != b' ' or max(digits) > 9:     # the W of a text, or a damaged frame
+                self.buffer = self.buffer[1:]
+                yield Refusal(f'frame {frame.hex(" ")}: must be W, eight digits with their pulses, and a space')
+                continue
+            self.buffer = self.buffer[self.FRAME_BYTES:]
+            angles = (100 * d[0] + 10 * d[1] + d[2] + 0.1 * d[3] - 360 for d in (digits[:4], digits[4:]))
+            yield checked(*angles)
+
+
+PROTOCOLS: dict[str, type[RotatorProtocol]] = {
+    'rotctld': Rotctld,
+    'gs232': Gs232,
+    'easycomm': Easycomm,
+    'rot2prog': Rot2prog,
+}
+"""Protocols by name."""

@@ -1,0 +1,170 @@
+"""Unit of a rotator: reference in; measured angles, state and set-points out.
+
+The node gives the newest measurement of the device to the unit before each step, and sends what the step decides.
+"""
+import math
+import typing
+
+import numpy as np
+
+from adu_drive.angle_drive import DRIVE_STATE_TOPIC, EMERGENCY_STOP_TEXT, ENABLED_TEXT, REFERENCE_TOPIC, AngleDrive
+from pedestal_common.compiled import compiled
+from pedestal_common.graph import nodes, topics
+from pedestal_common.graph.modes import MODES
+from pedestal_common.node.unit import LEVEL_ERROR, LEVEL_OK, LEVEL_WARN, Diagnosis, joined
+from pedestal_common.wire.records import NO_STAMP
+from pedestal_hardware.rotator import set_point
+
+MODE_TOPIC, JOINT_STATES_TOPIC, CLOCK_TOPIC = 'acu/mode', 'joint_states', 'clock'
+
+MODE_COUNT = len(MODES)
+"""Number of the modes of the control unit; as a code an unknown mode."""
+
+FAULT_TEXT = 'fault: rotator silent'
+STATE_TEXTS = ENABLED_TEXT, 'disabled', EMERGENCY_STOP_TEXT, FAULT_TEXT
+"""Texts of adu/state of a rotator."""
+STATE_CODE_ENABLED, STATE_CODE_DISABLED, STATE_CODE_EMERGENCY_STOP, STATE_CODE_FAULT = range(len(STATE_TEXTS))
+
+MODE_CODE_STANDBY, MODE_CODE_STOP, MODE_CODE_RATE = (MODES.index(mode) for mode in ('standby', 'stop', 'rate'))
+"""Codes of modes of the control unit. In standby and stop the rotator stands still."""
+
+DEVICE_DTYPE = np.dtype([('angle', 'f8', (2,)), ('rate', 'f8', (2,)), ('came', 'i8'), ('silent', 'i8')],
+                        align=True)
+"""State of the device.
+
+angle, rate   newest measured angles [rad], and the rate between the last two measurements [rad/s]
+came          1 if a measurement has arrived since the last step
+silent        1 while the newest measurement is too old
+"""
+
+SWITCHES_DTYPE = np.dtype([('wanted', 'i8'), ('emergency', 'i8')], align=True)
+"""Switches of the drive: 1 after a request to enable; 1 while an emergency stop is latched."""
+
+RECORD_DTYPE = np.dtype([('state', set_point.STATE_DTYPE), ('constants', set_point.CONSTANTS_DTYPE),
+                         ('inputs', set_point.INPUTS_DTYPE), ('outputs', set_point.OUTPUTS_DTYPE),
+                         ('switches', SWITCHES_DTYPE), ('device', DEVICE_DTYPE)], align=True)
+
+
+class Memory(typing.NamedTuple):
+    """Memory of a rotator; record: (1,) of RECORD_DTYPE."""
+    record: np.ndarray
+
+
+@compiled
+def condition(switches, device):
+    """Return the code of STATE_TEXTS; records of SWITCHES_DTYPE and DEVICE_DTYPE."""
+    if switches.emergency:
+        return STATE_CODE_EMERGENCY_STOP
+    if device.silent:
+        return STATE_CODE_FAULT
+    return STATE_CODE_ENABLED if switches.wanted else STATE_CODE_DISABLED
+
+
+@compiled
+def law(memory, stamp, inputs, outputs):
+    """Make the step of a stamp [ns]. A step without a new measurement publishes no angles."""
+    record = memory.record[0]
+    u, device, reference = record.inputs, record.device, inputs[REFERENCE_TOPIC]
+    u.stamp_ns, u.reference_stamp_ns = stamp, reference.stamp
+    mode = inputs[MODE_TOPIC]
+    moves = 0 <= mode < MODE_COUNT and mode != MODE_CODE_STANDBY and mode != MODE_CODE_STOP
+    u.enabled = 1 if condition(record.switches, device) == STATE_CODE_ENABLED and moves else 0
+    u.by_hand = 1 if mode == MODE_CODE_RATE else 0
+    for i in range(2):
+        u.angle[i], u.rate[i], u.measured[i] = reference.position[i], reference.velocity[i], device.angle[i]
+    set_point.step(record.state, record.constants, u, record.outputs)
+    joints = outputs[JOINT_STATES_TOPIC]
+    joints.stamp = stamp if device.came else NO_STAMP
+    outputs[CLOCK_TOPIC].stamp = stamp
+    for i in range(2):
+        joints.position[i], joints.velocity[i], joints.effort[i] = device.angle[i], device.rate[i], 0.0
+    device.came = 0
+    outputs[DRIVE_STATE_TOPIC] = condition(record.switches, device)
+
+
+@compiled
+def laws(memory, stamps, inputs, outputs):
+    """Apply `law` to each element of arrays."""
+    for k in range(len(stamps)):
+        law(memory, stamps[k], inputs[k], outputs[k])
+
+
+class Rotator(AngleDrive):
+    """A rotator of a RotatorParameters."""
+    NODE, LAWS, STATE_TEXTS = nodes.ROTATOR_DRIVE, {Memory: (law, laws)}, STATE_TEXTS
+
+    def __init__(self, parameters, reads):
+        super().__init__(parameters, reads)
+        p = parameters
+        constants = np.zeros(1, set_point.CONSTANTS_DTYPE)
+        constants['timeout_ns'] = p.timeout_ns
+        constants['dead_band'], constants['resolution'] = math.radians(p.dead_band), math.radians(p.step_deg)
+        constants['low'][0], constants['high'][0] = zip(*p.travel_rad)
+        switches, device = np.zeros(1, SWITCHES_DTYPE), np.zeros(1, DEVICE_DTYPE)
+        switches['wanted'] = device['silent'] = 1
+        self.memory = Memory(joined(RECORD_DTYPE, constants=constants, switches=switches, device=device,
+                                    state=set_point.initial_state()))
+        self.measured_at, self.counts, self.fault = None, {}, ''
+
+    def measure(self, measurement, now):
+        """Take the newest Measurement of the line, or None. now: time of the monotonic clock [s]."""
+        device = self.parts['device']
+        if measurement is not None and measurement.at != self.measured_at:
+            angles = np.radians((measurement.azimuth, measurement.elevation))
+            if self.measured_at is not None and not device['silent']:
+                device['rate'] = (angles - device['angle']) / (measurement.at - self.measured_at)
+            device['angle'], device['came'], self.measured_at = angles, 1, measurement.at
+        device['silent'] = self.measured_at is None or now - self.measured_at > self.parameters.silence
+        if device['silent']:
+            device['rate'] = 0.0
+
+    @property
+    def decision(self):
+        """The set-point (azimuth, elevation) [deg] to send after the last step, 'stop', or None."""
+        outputs = self.parts['outputs']
+        if outputs['send']:
+            return tuple(np.degrees(outputs['set_point']))
+        return 'stop' if outputs['stop'] else None
+
+    def take_text(self, topic, text):
+        """Take the mode of the control unit; an unknown mode does not move the rotator."""
+        self.inputs[topic] = MODES.index(text) if text in MODES else MODE_COUNT
+
+    @property
+    def condition_code(self):
+        """Present code of STATE_TEXTS, also between two steps."""
+        return condition(self.parts['switches'], self.parts['device'])
+
+    def diagnose(self):
+        """Return the Diagnosis: what the rotator can follow, and ERROR for a device that does not answer."""
+        p, outputs, device, u = self.parameters, self.parts['outputs'], self.parts['device'], self.parts['inputs']
+        switches = self.parts['switches']
+        rate = math.degrees(max(abs(u['rate']))) if u['reference_stamp_ns'] != NO_STAMP else 0.0
+        values = [*((f'{axis}_deg', f'{math.degrees(angle):.2f}')
+                    for axis, angle in zip(topics.AXES, device['angle'])),
+                  ('state', self.condition), ('accuracy_deg', f'{p.accuracy_deg:g}'),
+                  ('rate_limit_deg_s', f'{p.rate:g}'), ('target_rate_deg_s', f'{rate:.3f}'),
+                  *((name, str(count)) for name, count in self.counts.items())]
+        if self.condition == FAULT_TEXT or self.fault:
+            return Diagnosis(LEVEL_ERROR if device['silent'] else LEVEL_WARN, self.fault or self.condition, values)
+        if self.condition != ENABLED_TEXT:
+            return Diagnosis(LEVEL_ERROR if switches['emergency'] else LEVEL_WARN, self.condition, values)
+        if outputs['invalid']:
+            return Diagnosis(LEVEL_ERROR, f'{REFERENCE_TOPIC} holds NaN or infinity, is not within '
+                             f'+-{set_point.MAX_REFERENCE_RAD:g} rad, or is not newer than the previous one: ignored',
+                             values)
+        if outputs['far']:
+            return Diagnosis(LEVEL_WARN, 'mode rate would begin far from the measured angles: the rotator waits; '
+                             'command a preset first', values)
+        if self.inputs[MODE_TOPIC][0] in (MODE_CODE_STANDBY, MODE_CODE_STOP):
+            return Diagnosis(LEVEL_OK, 'stands still', values)
+        if outputs['stale']:
+            return Diagnosis(LEVEL_ERROR, f'no new {REFERENCE_TOPIC} for {p.timeout_ns * 1e-9:g} s: the rotator is '
+                             'stopped', values)
+        if outputs['outside']:
+            return Diagnosis(LEVEL_WARN, 'the target is outside the travel of the rotator: the axis waits at its end',
+                             values)
+        if rate > p.rate:
+            return Diagnosis(LEVEL_WARN, f'the target moves at {rate:.2f} deg/s, the rotator at {p.rate:g} deg/s',
+                             values)
+        return Diagnosis(LEVEL_OK, f'follows within {p.accuracy_deg:g} deg, at most {p.rate:g} deg/s', values)

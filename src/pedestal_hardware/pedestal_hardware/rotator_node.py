@@ -1,0 +1,58 @@
+"""ROS node of a rotator: a drive that takes set-points, by rotctld, GS-232, EasyComm or Rot2Prog.
+
+The node owns the time of its graph, which is a graph in realtime with the angles of an array (`graph.beams` 1). It
+runs the unit `rotator.unit.Rotator`; change the law in `rotator.set_point`. `entry` is imported first, so that a
+signal during the other imports ends the process without a message.
+"""
+import pedestal_common.entry  # noqa: F401
+
+# isort: split
+import sys
+import time
+
+from adu_drive.timekeeper_node import Timekeeper
+from pedestal_common.node import shell
+from pedestal_hardware.rotator.line import Line
+from pedestal_hardware.rotator.protocols import PROTOCOLS
+
+
+class RotatorNode(Timekeeper):
+    """A drive whose steps exchange angles with the Line of a rotator."""
+
+    def __init__(self):
+        self.line = None
+        super().__init__('pedestal_hardware.rotator_node')
+
+    def begin(self):
+        """Connect to the device and begin the steps."""
+        p = self.parameters
+        self.line = Line(p.url, PROTOCOLS[p.protocol], p.period, p.answer_timeout, p.baud_rate)
+        self.line.start()
+        super().begin()
+
+    def _make(self, stamp, values):
+        """Make a step with the newest measurement, and send its set-point."""
+        unit = self.unit
+        unit.measure(self.line.newest, time.monotonic())
+        unit.counts, unit.fault = dict(self.line.counts), self.line.fault
+        super()._make(stamp, values)
+        decision = unit.decision
+        if decision == 'stop':
+            self.line.send_stop()
+        elif decision is not None:
+            self.line.send_set_point(*decision)
+
+    def close(self):
+        """Stop the device and end."""
+        if self.line is not None:
+            self.line.close()
+        super().close()
+
+
+def main(args=None):
+    """Run the node to its end. Return the exit code."""
+    return shell.main(RotatorNode, args)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,127 @@
+"""ROS node of four simulated CiA 402 drives, with a bus of their own: a socketcand server on this machine.
+
+A thread serves the bus. It advances drives and plant with the time, and publishes adu/truth at each SYNC. `entry` is
+imported first, so that a signal during the other imports ends the process without a message.
+"""
+import pedestal_common.entry  # noqa: F401
+
+# isort: split
+import sys
+import threading
+
+from pedestal_common.graph.nodes import DRIVE_NODE
+from pedestal_common.node import shell, unit_node
+from pedestal_common.wire.records import NO_STAMP
+from pedestal_hardware.bus import BusError
+from pedestal_hardware.params import START_KEY
+from pedestal_hardware.simulated import law
+from pedestal_hardware.unit import DRIVE_LABELS
+
+POLL_S = 0.002
+"""Longest time between two steps of the plant [s]."""
+
+
+class DrivesNode(unit_node.UnitNode):
+    """Node of the simulated drives. lock: held while the unit steps or takes a command."""
+
+    PRECEDENCE = 2
+    """Priority above that of the drive node, which waits for the reports of the drives in each step."""
+
+    def __init__(self):
+        self.lock, self.ending, self.newest, self.served = threading.Lock(), False, {}, None
+        super().__init__('pedestal_hardware.simulated.drives_node')
+
+    def begin(self):
+        """Serve the bus."""
+        try:
+            from pedestal_hardware.simulated.can_drive import CanDrives
+            from pedestal_hardware.simulated.socketcand_server import SocketcandServer
+        except ImportError as error:
+            raise BusError(f"{error}: pip install 'pedestal_hardware[can]'") from None
+        p = self.parameters
+        try:
+            bus = SocketcandServer(p.bus.port)
+        except OSError as error:
+            raise BusError(f'bus.port = {p.bus.port}: {error.strerror}') from None
+        [port] = self.ports
+        for name, decoder in port.decoders.items():
+            if name != self.unit.trigger:
+                self.reader(name, unit_node.decoding(decoder), self._newest_receiver(name))
+        if p.drives.start_after:
+            self.message_reader('diagnostics', self._take_start)
+        self.drives = CanDrives(bus, self.unit, self._on_sync)
+        self.get_logger().info(f'{len(DRIVE_LABELS)} drives, nodes {", ".join(map(str, p.drives.nodes))}, on '
+                               f'socketcand {p.bus.channel} at 127.0.0.1:{p.bus.port}')
+        self.served = threading.Thread(target=self._guarded(self._serve), daemon=True)
+        self.served.start()
+
+    @property
+    def awaits(self):
+        """Text that names the inputs for which the node waits."""
+        return f'the SYNC of a master on port {self.parameters.bus.port}'
+
+    def _take_start(self, array):
+        """Take time 0 from the diagnostics of the node of the drives, which chooses it when all drives answer."""
+        for status in array.status:
+            for value in status.values if status.name == DRIVE_NODE else ():
+                if value.key == START_KEY and int(value.value) != self._epoch:
+                    with self.lock:
+                        earlier, self._epoch = self._epoch - int(value.value), int(value.value)
+                        if self.unit.parts['tick'] != NO_STAMP:
+                            self.unit.parts['tick'] += earlier // law.TICK_NS
+
+    def _newest_receiver(self, name):
+        def take(message, _):
+            self.newest[name] = message
+        return take
+
+    def _command_taker(self, port):
+        take = super()._command_taker(port)
+
+        def locked(message):
+            with self.lock:
+                take(message)
+        return locked
+
+    def _serve(self):
+        """Serve the bus and advance the plant until the node ends."""
+        while not self.ending:
+            self.drives.poll(POLL_S)
+            with self.lock:
+                _, utc = self.clock()
+                law.advance(self.unit.memory.record, utc - self.epoch(utc))
+            if (self.unit.urgent,) != tuple(self._urgent) and self.diagnose_now():
+                self._urgent = [self.unit.urgent]
+            for drive in self.drives.drives:
+                while drive.notes:
+                    self.get_logger().warning(f'{DRIVE_LABELS[drive.number]}: {drive.notes.pop(0)}')
+
+    def _on_sync(self):
+        """Advance the unit to now, and publish the truth of the step."""
+        [port] = self.ports
+        with self.lock:
+            _, utc = self.clock()
+            values, self.newest = self.newest, {}
+            port.step(utc, values)
+            truth = self.unit.outputs[0]['adu/truth']
+            if truth['stamp'] < 0:
+                truth['stamp'] = NO_STAMP
+                return
+            self.begin_step(utc)
+            port.publish()
+
+    def close(self):
+        """Close the bus and end."""
+        self.ending = True
+        if self.served is not None:
+            self.served.join(1.0)
+        super().close()
+
+
+def main(args=None):
+    """Run the node to its end. Return the exit code."""
+    return shell.main(DrivesNode, args)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,97 @@
+"""Unit of the simulated drives: plant, injected faults and adu/truth, without bus and without ROS."""
+import dataclasses
+import typing
+
+import numpy as np
+
+from adu_drive import drive_unit, injected
+from adu_drive import unit as adu_unit
+from pedestal_common.graph import nodes, topics
+from pedestal_common.injection import schedule, table
+from pedestal_common.injection.simulated import Simulated
+from pedestal_common.node.unit import LEVEL_OK, LEVEL_WARN, Diagnosis, joined
+from pedestal_common.wire.records import NO_STAMP
+from pedestal_hardware import cia402, commissioning, errors, pdo
+from pedestal_hardware.simulated import law
+from pedestal_hardware.unit import DRIVE_LABELS
+
+PLANT_FAULTS = ('motor_loss', 'encoder_jump', 'encoder_stuck', 'brake_stuck', 'lost_tooth', 'gust')
+"""Injected faults of the drive unit that simulated drives can have."""
+
+ALIGNED_REPORT_DTYPE = np.dtype([(name, 'i8') for name in pdo.REPORT_FIELDS])
+"""Report of a drive for compiled laws, in numbers of eight bytes."""
+
+
+class Memory(typing.NamedTuple):
+    """Memory of the simulated drives; record: (1,) of law.RECORD_DTYPE."""
+    record: np.ndarray
+
+
+class SimulatedDrives(Simulated):
+    """Unit of the simulated drives, from ServoDriveParameters."""
+    NODE, LAWS = nodes.SIMULATED_DRIVES, {Memory: (law.law, law.laws)}
+    VERBS, FAULTS_OF = table.INJECT_COMMANDS[nodes.DRIVE_NODE], nodes.DRIVE_NODE
+
+    def __init__(self, parameters, reads):
+        super().__init__(parameters, reads)
+        link = np.zeros(1, adu_unit.LINK_DTYPE)
+        link['truth_stamp'] = NO_STAMP
+        at_rest = dataclasses.replace(parameters, initially_enabled=False)
+        self.memory = Memory(joined(
+            law.RECORD_DTYPE, state=drive_unit.initial_state(at_rest), constants=drive_unit.constants(parameters),
+            link=link, schedule=schedule.empty(), injected=np.zeros(1, injected.DRIVE_INJECTED_DTYPE)))
+        self.parts['tick'], self.parts['period'] = NO_STAMP, round(parameters.period * 1e9)
+        self.reports = np.zeros(pdo.DRIVE_COUNT, ALIGNED_REPORT_DTYPE)
+        for drive in range(pdo.DRIVE_COUNT):
+            self.power_up(drive)
+
+    def axis_of(self, drive):
+        """Return the AxisParameters of a drive."""
+        return getattr(self.parameters, topics.AXES[drive // 2])
+
+    def power_up(self, drive):
+        """Bring a drive into its state after the supply came on."""
+        d, motor = self.parts['drive'][drive], (self.axis_of(drive).motor_1, self.axis_of(drive).motor_2)[drive % 2]
+        brake = d['brake_open'], d['brake_ticks']
+        self.parts['drive'][drive:drive + 1] = np.zeros(1, law.DRIVE_DTYPE)
+        d['state'], d['leaving'] = cia402.State.SWITCH_ON_DISABLED, law.STAY
+        # The brakes that were open close in their own time.
+        d['brake_ticks'] = 0 if brake[0] else max(brake[1], law.MAX_CATCH_UP_TICKS)
+        d['velocity_unit'] = commissioning.RAD_S_PER_RPM
+        d['torque_unit'] = commissioning.PERMILLE * self.axis_of(drive).thermal.rated_torque
+        d['torque_limit'] = motor.torque_limit
+
+    def measure(self):
+        """Update `reports` (4,), the reports of the drives at their last time."""
+        law.report(self.memory.record, self.reports)
+        return self.reports
+
+    def execute(self, command, arguments):
+        """Inject a fault; see Simulated. Raises ValueError for a fault of messages, which a bus does not have."""
+        if command.verb not in (*PLANT_FAULTS, table.CLEAR_COMMAND.name):
+            raise ValueError(f'{command.verb}: simulated drives have the faults {", ".join(PLANT_FAULTS)}')
+        return super().execute(command, arguments)
+
+    def diagnose(self):
+        """Return the Diagnosis with state and error of each drive."""
+        values, faulty = [], []
+        for label, d in zip(DRIVE_LABELS, self.parts['drive']):
+            values.append((f'{label} drive', cia402.STATE_NAMES[d['state']]))
+            if d['error']:
+                faulty.append(f'{label}: {errors.name(int(d["error"]))}')
+        return Diagnosis(LEVEL_WARN if faulty else LEVEL_OK, '; '.join(faulty) or 'drives run', values)
+
+    @property
+    def urgent(self):
+        """Values whose change is published at once: the errors of the drives."""
+        return tuple(self.parts['drive']['error'].tolist())
+
+    def prepare(self):
+        """Compile all functions that the node calls, without a change of the unit."""
+        super().prepare()
+        record = self.memory.record.copy()
+        self.measure()
+        law.advance(self.memory.record, np.int64(NO_STAMP))
+        law.obey(self.parts['drive'][0], 0)
+        law.raise_fault(self.parts['drive'][0], errors.ERROR_HEARTBEAT_LOST)
+        self.memory.record[...] = record

@@ -1,0 +1,176 @@
+"""The control unit with rotators in place of the drive: Hamlib's rotctld, and simulated ones on pseudo terminals."""
+import math
+import pathlib
+import shutil
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+from shared import PEDESTAL, free_port
+
+from pedestal_common.wire import commands, messages
+
+PARAMETERS = pathlib.Path(__file__).parents[1] / 'docs' / 'how-to' / 'rotator.yaml'
+BEAMWIDTH_DEG = 10.0
+STEP_TRACK = (f'tracker.receiver.beamwidth:={math.radians(BEAMWIDTH_DEG)}', 'steptrack.cycle:=8.0',
+              'steptrack.dwell:=0.8', 'steptrack.step:=0.1')
+ROTCTLD = shutil.which('rotctld')
+
+
+class Device:
+    """A rotator: its process, and how the node reaches it."""
+
+    def __init__(self, process, url):
+        self.process, self.url = process, url
+
+
+@pytest.fixture
+def device(request):
+    """A rotator of a protocol."""
+    if request.param == 'rotctld':
+        if ROTCTLD is None:
+            pytest.skip('rotctld is not installed (libhamlib-utils)')
+        port = free_port()
+        process = subprocess.Popen([ROTCTLD, '-m', '1', '-T', '127.0.0.1', '-t', str(port)])
+        yield request.param, Device(process, f'socket://127.0.0.1:{port}')
+    else:
+        process = subprocess.Popen([*PEDESTAL, 'simulate', 'rotator', '--protocol', request.param],
+                                   stdout=subprocess.PIPE, text=True)
+        yield request.param, Device(process, process.stdout.readline().strip())
+    process.send_signal(signal.SIGCONT)
+    process.terminate()
+    process.wait(10.0)
+
+
+@pytest.fixture
+def station(device, start_process, connect, reserve_domain):
+    """(Client, Device, smallest step [deg]) of a graph of control unit and rotator."""
+    domain, (protocol, rotator) = reserve_domain(), device
+    def start(module, changes):
+        start_process([sys.executable, '-m', module, '--ros-args', '--params-file', PARAMETERS,
+                       *(part for change in changes for part in ('-p', change))], ROS_DOMAIN_ID=str(domain))
+
+    # The control unit is there first, and reports a silent drive until the rotator is there.
+    start('acu_tracker.acu_node', STEP_TRACK)
+    client = connect(domain, f'client_{domain}')
+    for name in ('acu/mode', 'acu/command_result', 'diagnostics'):
+        client.read(name)
+    client.diagnosed('no joint_states', 60.0)
+    start('pedestal_hardware.rotator_node', (f'protocol:={protocol}', f'url:={rotator.url}'))
+    for name in ('adu/state', 'joint_states'):
+        client.read(name)
+    client.write('acu/command', 'acu/program_track')
+    client.until(lambda: client.heard['adu/state'] and client.heard['adu/state'][-1].data == 'enabled'
+                 and client.heard['joint_states'] and client.heard['acu/mode'])
+    client.diagnosed('standby (', 60.0)      # the control unit has made a step, so it has the angles
+    return client, rotator, {'gs232': 1.0}.get(protocol, 0.1)
+
+
+def ask(client, verb, **arguments):
+    """Command the control unit, and wait until it grants the command."""
+    number = str(len(client.heard['acu/command_result']) + 1)
+    client.publish('acu/command', commands.message(commands.Command(verb, 'client', number, arguments)))
+    reply = client.until(lambda: client.heard['acu/command_result'][int(number) - 1:])[-1]
+    assert commands.of_reply(reply)[1].granted, reply
+
+
+def distance(client, azimuth, elevation):
+    """Return the larger distance of an axis from an angle [deg]."""
+    return float(np.max(np.abs(np.degrees(client.heard['joint_states'][-1].position) - (azimuth, elevation))))
+
+
+@pytest.mark.parametrize('device', ('rotctld', 'gs232', 'easycomm', 'rot2prog'), indirect=True)
+def test_a_rotator_goes_where_a_preset_says(station):
+    """The mode stays, and no alarm takes the motion of a rotator for uncommanded motion."""
+    client, _, step = station
+    ask(client, 'preset', azimuth=math.radians(20.0), elevation=math.radians(12.0))
+    client.until(lambda: distance(client, 20.0, 12.0) <= step, told=lambda: str(client.heard['joint_states'][-1]))
+    client.diagnosed('follows within')
+    assert client.heard['acu/mode'][-1].data == 'preset'
+    assert client.heard['adu/state'][-1].data == 'enabled'
+
+
+@pytest.mark.parametrize('device', ('easycomm',), indirect=True)
+def test_a_program_track_within_what_the_rotator_can_do(station):
+    """1 deg/s in azimuth: the axis stays within the stated accuracy and one period of motion."""
+    client, _, _ = station
+    begin = messages.nanoseconds(client.heard['joint_states'][-1].header.stamp) + 10_000_000_000
+    points = [(begin + round(k * 1e9), math.radians(30.0 + k), math.radians(30.0)) for k in range(-20, 60)]
+    client.publish('acu/program_track', program_track(points))
+    ask(client, 'program')
+    client.until(lambda: messages.nanoseconds(client.heard['joint_states'][-1].header.stamp) > begin + 5_000_000_000)
+    first = len(client.heard['joint_states'])
+    client.spin(8.0)
+    errors = []
+    for joints in client.heard['joint_states'][first:]:
+        t = (messages.nanoseconds(joints.header.stamp) - begin) * 1e-9
+        errors.append(math.degrees(joints.position[0]) - (30.0 + t))
+    assert len(errors) > 20 and max(map(abs, errors)) < 0.5, errors
+    assert client.heard['acu/mode'][-1].data == 'program'
+
+
+@pytest.mark.parametrize('device', ('easycomm',), indirect=True)
+def test_step_track_finds_the_peak_of_a_level(station):
+    """With a beam of 10 deg, whose steps of 1 deg are ten steps of the rotator. The noise is learnt off target."""
+    client, _, _ = station
+    target, noise = np.array((24.0, 20.0)), np.random.default_rng(1)
+    client.write('tracking_receiver/angle_error')
+
+    def off():
+        angles = np.degrees(client.heard['joint_states'][-1].position)
+        return (angles - target) * (math.cos(math.radians(target[1])), 1.0) / BEAMWIDTH_DEG
+
+    def send(joints):
+        error = messages.template('tracking_receiver/angle_error')
+        error.header.stamp, error.vector.x, error.vector.y = joints.header.stamp, math.nan, math.nan
+        error.vector.z = max(50.0 - 12.0 * float(off() @ off()), 20.0) + 0.02 * noise.standard_normal()
+        client.publish('tracking_receiver/angle_error', error)
+
+    ask(client, 'preset', azimuth=math.radians(60.0), elevation=math.radians(20.0))
+    client.until(lambda: distance(client, 60.0, 20.0) < 0.1)
+    client.read('joint_states', send)
+    client.spin(4.0)
+    ask(client, 'preset', azimuth=math.radians(21.0), elevation=math.radians(20.0))
+    client.until(lambda: distance(client, 21.0, 20.0) < 0.1)
+    client.spin(2.0)
+    ask(client, 'steptrack')
+    client.until(lambda: np.hypot(*off()) < 0.06, told=lambda: f'{off()} beamwidths off')
+    assert client.heard['acu/mode'][-1].data == 'steptrack'
+
+
+def program_track(points):
+    """Return a program track of points (stamp [ns], azimuth, elevation [rad])."""
+    rows = []
+    for stamp, *angles in points:
+        row = messages.trajectory_point(2)
+        row.positions[:] = angles
+        row.time_from_start = messages.Duration(*divmod(stamp - points[0][0], 1_000_000_000))
+        rows.append(row)
+    track = messages.program_track(rows)
+    messages.put_stamp(track.header.stamp, points[0][0])
+    return track
+
+
+@pytest.mark.parametrize('device', ('rotctld',), indirect=True)
+def test_a_rotator_that_vanishes_is_named_and_returns(station):
+    """A silent device publishes no angles. The control unit holds its mode for the time of a short silence."""
+    client, rotator, step = station
+    ask(client, 'preset', azimuth=math.radians(20.0), elevation=math.radians(12.0))
+    rotator.process.send_signal(signal.SIGSTOP)
+    client.diagnosed('no position for 1 s')
+    client.until(lambda: client.heard['adu/state'][-1].data == 'fault: rotator silent')
+    count = len(client.heard['joint_states'])
+    client.spin(1.0)
+    assert len(client.heard['joint_states']) == count
+    rotator.process.send_signal(signal.SIGCONT)
+    client.until(lambda: client.heard['adu/state'][-1].data == 'enabled')
+    since = time.monotonic()
+    client.until(lambda: client.heard['acu/mode'][-1].data == 'preset' or time.monotonic() - since > 5.0)
+    if client.heard['acu/mode'][-1].data != 'preset':
+        ask(client, 'preset', azimuth=math.radians(20.0), elevation=math.radians(12.0))
+    client.until(lambda: distance(client, 20.0, 12.0) <= step)
+    rotator.process.kill()
+    client.until(lambda: client.heard['adu/state'][-1].data == 'fault: rotator silent')

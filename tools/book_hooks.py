@@ -1,0 +1,12 @@
+"""Hooks of mkdocs (mkdocs.yml): changes of the HTML of a page of the book."""
+import re
+
+
+def on_page_content(html, **_context):
+    """Return the HTML of a page whose long names in tables may break after a dot, a slash or an underscore."""
+    return re.sub(r'(?s)<td.*?</td>', lambda cell: re.sub(r'<code>.*?</code>', _breakable, cell[0]), html)
+
+
+def _breakable(code):
+    """Return the code of a match with the places where a line may break."""
+    return re.sub(r'(?<=\w)([./_])(?=\w)', r'\1<wbr>', code[0].removesuffix('</code>')) + '</code>'
