@@ -13,7 +13,6 @@ import importlib.metadata
 import os
 import re
 import shlex
-import signal
 import sys
 import types
 from collections.abc import Sequence
@@ -53,7 +52,7 @@ def main(args: Sequence[str] | None = None) -> int:
         parser.error(f"no verb '{given[0]}':{did_you_mean(given[0], VERBS)} pedestal --help lists the verbs")
     options = parser.parse_args(given)
     options.command = shlex.join(('pedestal', *given))
-    stop.on_stop(signal.default_int_handler)     # from here on a signal raises KeyboardInterrupt
+    stop.interrupt_on_stop()
     json_on_stdout = getattr(options, 'json', None) == STDOUT_PATH
     try:
         with contextlib.redirect_stdout(sys.stderr) if json_on_stdout else contextlib.nullcontext():

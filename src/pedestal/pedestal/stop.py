@@ -21,6 +21,14 @@ def on_stop(handler: Callable[[int, types.FrameType | None], object]) -> None:
             signal.signal(number, handler)
 
 
+def interrupt_on_stop() -> None:
+    """Let the three signals raise KeyboardInterrupt, again after 20 ms if Python had to ignore it."""
+    from pedestal_common import ignored_stop
+    on_stop(signal.default_int_handler)
+    signal.signal(signal.SIGALRM, signal.default_int_handler)
+    ignored_stop.retry(KeyboardInterrupt)
+
+
 def _end_at_once(_number: int, _frame: types.FrameType | None) -> None:
     """End the process with the usual message, without Python's buffers and exit functions."""
     os.write(2, f'{STOP_MESSAGE}\n'.encode())

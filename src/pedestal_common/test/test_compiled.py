@@ -287,8 +287,7 @@ class Unit:
         while True:
             law(2.0)
 
-for number in shell.STOP_SIGNALS:
-    signal.signal(number, shell._on_signal)
+shell.stop_on_signals()
 try:
     shell.Shell.prepare(None, Unit())
 except shell.Stopped:
@@ -301,3 +300,48 @@ def test_a_signal_while_machine_code_is_made_stops_the_node_and_loses_nothing(tm
     done = subprocess.run([sys.executable, '-m', 'stopped'], capture_output=True, text=True, timeout=120.0,
                           env=environment(tmp_path, tmp_path / 'cache'))
     assert (done.stdout, done.stderr, done.returncode) == ('stopped 3.0\n', '', 0)
+
+
+IGNORED = """
+import os
+import signal
+import time
+import typing
+import weakref
+
+from pedestal_common.node import shell
+
+class Memory(typing.NamedTuple):
+    pass
+
+class Module:
+    def __del__(self):
+        if not callbacks:
+            os.kill(os.getpid(), signal.SIGINT)
+
+def callback(_reference):
+    os.kill(os.getpid(), signal.SIGINT)
+
+class Unit:
+    memory = Memory()
+
+    def prepare(self):
+        module = Module()
+        reference = weakref.ref(module, callback) if callbacks else None
+        del module
+        time.sleep(20.0)
+        print('went on')
+
+shell.stop_on_signals()
+for callbacks in False, True:
+    shell._stop.clear()
+    try:
+        shell.Shell.prepare(None, Unit())
+    except shell.Stopped:
+        print('stopped')
+"""
+
+
+def test_a_signal_in_a_destructor_or_in_a_weak_callback_stops_the_node():
+    done = subprocess.run([sys.executable, '-c', IGNORED], capture_output=True, text=True, timeout=120.0)
+    assert (done.stdout, done.stderr, done.returncode) == ('stopped\nstopped\n', '', 0)

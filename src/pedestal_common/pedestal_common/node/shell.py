@@ -26,7 +26,7 @@ from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValu
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from pedestal_common import parameters
+from pedestal_common import ignored_stop, parameters
 from pedestal_common.graph import nodes
 from pedestal_common.graph.graph_parameters import GraphParameters
 from pedestal_common.graph.steps import NS_PER_SECOND, SECONDS_PER_DAY, GraphError
@@ -67,10 +67,7 @@ _compiling: list[bool] = []
 """Not empty while the process compiles, which a signal may interrupt."""
 
 STOP_SIGNALS = signal.SIGINT, signal.SIGTERM, signal.SIGALRM
-"""Signals that stop a node; the last is sent only by the node itself, see _on_signal."""
-
-STOP_RETRY_S = 0.02
-"""Time after which a node that could not stop at once tries to stop again [s]."""
+"""Signals that stop a node; the last is sent only by the node itself, see ignored_stop."""
 
 _HOOKS = '_raw_object_cache_getbuffer', '_raw_object_cache_notify'
 """Functions of llvmlite that LLVM calls before and after it makes machine code; it ignores exceptions from them."""
@@ -84,11 +81,18 @@ def _on_signal(_number, frame):
     while frame is not None:
         if frame.f_code.co_name in _HOOKS:
             # While machine code is made, Python runs its signal handlers only in these functions. An exception there
-            # would become a message on stderr, and the code would be lost. The later signal of a timer avoids both.
-            signal.setitimer(signal.ITIMER_REAL, STOP_RETRY_S)
+            # would be ignored, and the code would be lost.
+            ignored_stop.stop_later()
             return
         frame = frame.f_back
     raise Stopped
+
+
+def stop_on_signals():
+    """Let the STOP_SIGNALS stop the node of this process."""
+    for number in STOP_SIGNALS:
+        signal.signal(number, _on_signal)
+    ignored_stop.retry(Stopped)
 
 
 def readings():
@@ -452,8 +456,7 @@ def main(make_node, args=None):
     The exit code is 0, or 1 after an error, which is one line on stderr. The node's `result`, if any, is printed on
     stdout as a JSON object; an error adds {'error': the line, 'silent': the silent nodes}.
     """
-    for number in STOP_SIGNALS:
-        signal.signal(number, _on_signal)
+    stop_on_signals()
     node, code = None, 0
     name = os.path.basename(sys.argv[0])
     try:
