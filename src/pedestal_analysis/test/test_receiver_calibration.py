@@ -109,6 +109,28 @@ def test_faults_of_the_simulated_receiver_are_named(capfd, change, word):
     assert code == 0 and any(word in sentence for sentence in content['faults'])
 
 
+def offsets_by_command():
+    """Return the parameters of a run in the mode program with the offsets of CROSS and CIRCLE about the beacon."""
+    steps = (f'{4 + 3 * k} offset azimuth={x * 0.0175 / math.cos(0.5):.6f} elevation={e * 0.0175:.6f}'
+             for k, (x, e) in enumerate((*CROSS, *CIRCLE)))
+    return ['scenario.program.source=target', 'acu.initial_mode=program', f'acu.commands={"; ".join(steps)}']
+
+
+def test_offsets_of_the_mode_program_give_the_matrix_of_the_mode_preset(capfd):
+    given = ['tracking_receiver.antenna.cross_coupling=0.3', *offsets_by_command(), 'acu.tracker.handover=false']
+    code, content = calibrated(capfd, *(part for change in given for part in ('--param', change)))
+    found = values(content)
+    C = np.array([[found[f'slope_{name}'] for name in names] for names in tracking.ERROR_MATRIX_NAMES])
+    np.testing.assert_allclose(C, 1.02 * turned(0.3), atol=0.02)
+    assert code == 0 and found['circle_error_percent'] < 5.0 and found['cross_talk_db'] < -20.0
+
+
+def test_a_program_that_hands_over_to_autotrack_is_refused(capfd):
+    given = [part for change in offsets_by_command() for part in ('--param', change)]
+    assert cli.main(['calibrate', 'receiver', '--scenario', 'receiver_phasing', *given]) == 1
+    assert 'unless acu.tracker.handover = false' in capfd.readouterr().err
+
+
 @pytest.mark.parametrize('changes, message', [
     (('tracking_receiver.receiver.cn0_dbhz=30',), 'receiver not locked at'),
     (('acu.commands=4 preset azimuth=0.002 elevation=0.5',), 'offsets outside the circle, must be at least 6'),

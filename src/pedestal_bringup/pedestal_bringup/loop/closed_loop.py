@@ -107,13 +107,15 @@ class Run:
     units      {node: Unit} after the run
     forecasts  [(stamp [ns], announcement.numbers)] at every whole second: the keyhole forecasts of the control unit
     replies    {topic of replies: [(stamp [ns], Command, Reply)]} to the scheduled commands
+    tracks     {topic: JointTrajectory} of the program track, which the operator sends before the first step
     """
     steps: np.ndarray
     truth: np.ndarray
     stamps: np.ndarray
     units: dict
     forecasts: list
-    replies: dict = dataclasses.field(default_factory=dict)
+    replies: dict
+    tracks: dict
 
     @property
     def t(self):
@@ -168,9 +170,10 @@ class Loop:
             full = prefix + name if nodes.row(name).of_beam else name
             if full in scenario.nodes:
                 self.units[name] = scenario.unit(full, dict(changed).get(name))
-        for topic, message in Plan(scenario).tracks.items():
-            if topic.startswith(prefix):
-                self.units['acu'].decode(nodes.plain(topic), message)
+        self.tracks = {nodes.plain(topic): message for topic, message in Plan(scenario).tracks.items()
+                       if topic.startswith(prefix)}
+        for topic, message in self.tracks.items():
+            self.units['acu'].decode(topic, message)
         self.replies = {}
         period = self.units[nodes.DRIVE_NODE].parameters.period
         self.period_ns = round(period * NS_PER_SECOND)
@@ -217,4 +220,4 @@ class Loop:
             loop(memories, first, self.period_ns, before, injected[part], steps[part], truth[part])
             first = last
         return Run(steps, truth, np.arange(self.steps) * self.period_ns, self.units, forecasts,
-                   self.replies)
+                   self.replies, self.tracks)

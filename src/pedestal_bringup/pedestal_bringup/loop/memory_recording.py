@@ -45,7 +45,8 @@ class MemoryRecording:
         """{name: type} of the topics in this recording."""
         of_diagnostics = {DIAGNOSTICS_TOPIC: messages.DiagnosticArray.__msgtype__} if self._forecasts else {}
         of_replies = dict.fromkeys(self._run.replies, messages.DiagnosticStatus.__msgtype__)
-        return {**self._run.topics, **of_replies, **of_diagnostics}
+        of_tracks = {topic: message.__msgtype__ for topic, message in self._run.tracks.items()}
+        return {**self._run.topics, **of_tracks, **of_replies, **of_diagnostics}
 
     def table(self, topic):
         """Return {column: array (n,)} of a topic with a row per message, like columns.table of a bag."""
@@ -67,8 +68,10 @@ class MemoryRecording:
         return dict(self._run.units[node].diagnose().values)
 
     def messages(self, topic):
-        """Yield (topic, log time [ns], publish time [ns], message) of the topic `diagnostics` or of a topic of
-        replies."""
+        """Yield (topic, log time [ns], publish time [ns], message) of `diagnostics`, of a topic of replies or of the
+        program track."""
+        if topic in self._run.tracks:
+            yield topic, 0, 0, self._run.tracks[topic]
         for stamp, command, reply in self._run.replies.get(topic, ()):
             yield topic, stamp, stamp, commands.reply_message(command, reply)
         if topic != DIAGNOSTICS_TOPIC:

@@ -183,5 +183,6 @@ def runs(loops, names, kept=None):
               ControlUnits(acu_record, Tables(*tables), np.array(ends)), first, last, period_ns, steps, keeps)
         first = last
     lanes.from_lanes(moving, drive_record)
-    return [Run(steps, np.zeros(0, TRUTH_DTYPE), np.arange(count) * period_ns, loop.units, forecast, loop.replies)
+    return [Run(steps, np.zeros(0, TRUTH_DTYPE), np.arange(count) * period_ns, loop.units, forecast, loop.replies,
+                loop.tracks)
             for loop, steps, forecast in zip(loops, kept, forecasts)]

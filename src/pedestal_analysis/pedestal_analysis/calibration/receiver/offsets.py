@@ -85,7 +85,8 @@ def read(bag) -> Points:
     found = [_point(t[first:last], offsets[first:last] / beamwidth, errors[first:last], beamwidth)
              for first, last in _still(t, offsets, beamwidth)]
     if not found:
-        raise OffsetError(f'no part in the modes preset or program with a still beam of {MIN_POINT_S:g} s')
+        raise OffsetError(f'no part in the modes preset or program with a still beam of {MIN_POINT_S:g} s; program '
+                          'hands over to autotrack unless acu.tracker.handover = false')
     spans, means, errors, sigma, level = map(np.array, zip(*found))
     if plain:
         # The middle of the points is the beacon: most points of a cross have the offset 0 on one of the axes.
