@@ -250,6 +250,14 @@ def test_lockstep_has_no_drives():
     assert 'graph.pacing = lockstep: must be realtime for servo drives' in done.stderr
 
 
+@pytest.mark.parametrize('change, message', [
+    ('bus.interface=socketcan', 'bus.interface = socketcan: must be socketcand'),
+    ('bus.host=192.168.1.9', 'bus.host = 192.168.1.9: must be 127.0.0.1')])
+def test_simulated_drives_have_a_bus_of_this_machine(change, message):
+    with pytest.raises(scenario.ScenarioError, match=f'{message} with drives = simulated'):
+        scenario.load('leo_pass', ['scenario.drives=simulated', f'adu.{change}'], pacing='realtime')
+
+
 def test_pedestal_simulate_drives_serves_a_bus(start_process):
     port = free_port()
     process = start_process([*PEDESTAL, 'simulate', 'drives', '--port', port])

@@ -318,6 +318,7 @@ def test_a_foreign_bag_without_parameters_says_so(foreign, pedestal):
     code, said, _ = pedestal(foreign)
     assert code == 1
     assert 'acu: 1001 steps, 0 to 5 s, realtime; DEFAULT parameters' in said
+    assert 'acu: the recording is realtime' in said
     assert 'adu:' not in said
 
 

@@ -86,6 +86,9 @@ def _node_report(recording, node, given, changes, options):
         report = _against_recorded(recording, done.outputs, done, tolerance)
     report.lines[:0] = [_title(recording, done, options.params_file), *_substitutes(recording, done),
                          *_input_problems(done), *_requests(done)]
+    if not (changes or options.live or recording.lockstep or report.well):
+        report.lines.append(f'{node}: the recording is realtime: a step differs if one of its messages was in '
+                            'transit, and so do the steps after it; `pedestal verify` states the lost steps')
     part = steps_before(recording.bag) > 0
     if part:
         report.lines.append(f'{node}: the recording begins during its run; the recomputation begins with the initial '

@@ -166,6 +166,9 @@ MEASUREMENT_FLAGS = tuple((node.name, topic.measured, topic.flag) for node in no
 SCANS_BEFORE_COAST = 2.5
 """Number of errors of a feed with one output that must be missing before autotrack coasts."""
 
+SIMULATED_BUS = {'bus.interface': 'socketcand', 'bus.host': '127.0.0.1'}
+"""{parameter of drive_node: its only value with simulated drives}, because their bus is a server on this machine."""
+
 IQ_LATENCY_STEPS = 2
 """Latency of a receiver of I/Q samples for the control unit, in steps of the drive."""
 
@@ -612,6 +615,10 @@ def _share_parameters(name: str, sections: Sections, header: ScenarioParameters,
         if receiver.feed.scanned:
             _share_scan(name, receiver, latency, sections['acu'])
     if header.servo:
+        for key, value in SIMULATED_BUS.items():
+            if sections['adu'].get(key, value) != value:
+                raise ScenarioError(f'scenario {name}, adu: {key} = {sections["adu"][key]}: must be {value} with '
+                                    f'drives = {header.drives}')
         # A command acts with the synchronisation after the one that its joint states belong to.
         sections['acu'].setdefault('command_delay', value_of('adu', 'period'))
     for owner, key, node, known_as in SHARED_PARAMETERS:
