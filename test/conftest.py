@@ -31,15 +31,16 @@ START = 180.0
 
 @pytest.fixture(scope='session')
 def reserve_domain():
-    """reserve() -> a ROS_DOMAIN_ID that no other test session of this machine holds. Those of Linux whose ports lie
-    outside of the ephemeral ones are 1 to 101 and 215 to 229; when this session has MOST_DOMAINS of them, or all are
-    taken, the one that it was given first is given again: Fast DDS remembers a killed process for 20 s."""
+    """reserve(lasting=False) -> a ROS_DOMAIN_ID that no other test session of this machine holds. Those of Linux whose
+    ports lie outside of the ephemeral ones are 1 to 101 and 215 to 229; when this session has MOST_DOMAINS of them, or
+    all are taken, the one that it was given first is given again, except lasting ones, whose graph lives as long as
+    the session: Fast DDS remembers a killed process for 20 s."""
     usable = [*range(1, 102), *range(215, 230)]
     candidates = iter(random.sample(usable, len(usable)))
     reservations = []
     given = collections.deque()
 
-    def reserve():
+    def reserve(lasting=False):
         for candidate in candidates if len(given) < MOST_DOMAINS else ():
             reservation = socket.socket()
             try:
@@ -48,7 +49,8 @@ def reserve_domain():
                 reservation.close()
                 continue
             reservations.append(reservation)
-            given.append(candidate)
+            if not lasting:
+                given.append(candidate)
             return candidate
         if not given:
             pytest.fail('every ROS_DOMAIN_ID is taken')
@@ -62,7 +64,7 @@ def reserve_domain():
 
 @pytest.fixture(scope='session')
 def domain_id(reserve_domain):
-    return reserve_domain()
+    return reserve_domain(lasting=True)
 
 
 def _environment(domain_id, folder):
@@ -457,7 +459,7 @@ def station(reserve_domain, tmp_path_factory, patient):
     run = _run('uav_flyby', ('--duration', '900', '--pacing', 'realtime', '--frames', *patient,
                              *(word for server, port in ports.items() for word in (f'--{server}', port)),
                              *(word for change in changes for word in ('--param', change))),
-               reserve_domain(), tmp_path_factory.mktemp('station'))
+               reserve_domain(lasting=True), tmp_path_factory.mktemp('station'))
     try:
         with _clients() as connect:
             said = begins_with(run.process, 6)
