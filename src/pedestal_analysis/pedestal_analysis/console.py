@@ -21,6 +21,9 @@ EXIT_CODES = {
     EXIT_STOPPED: 'the run was stopped, for example by Ctrl-C'}
 """{exit code of `pedestal run`: its meaning}. The codes 1, 3 and 130 take precedence over 4."""
 
+MAX_JSON_MARK_BYTES = 100
+"""Number of first bytes by which a file of JSON is recognised."""
+
 STDOUT_PATH = pathlib.Path('/dev/stdout')
 """Path of the option --json without a file name, or with the file name -."""
 
@@ -103,9 +106,14 @@ def add_json(parser):
 
 
 def check_json(path):
-    """Raise ValueError if the file of --json cannot be written."""
+    """Raise ValueError if the file of --json cannot be written, or if it exists and holds anything but JSON."""
     if path and (path.is_dir() or not path.parent.is_dir()):
         raise ValueError(f'--json {path}: must be a file in a directory that exists')
+    if path and path != STDOUT_PATH and path.is_file():
+        with path.open('rb') as file:
+            begin = file.read(MAX_JSON_MARK_BYTES).lstrip()
+        if begin and not begin.startswith((b'{', b'[')):
+            raise ValueError(f'--json {path}: exists already and holds no JSON; the file is not overwritten')
 
 
 def write_json(path, content):

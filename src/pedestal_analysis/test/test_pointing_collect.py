@@ -1,6 +1,6 @@
 """Offsets from the pass of a station with raw errors: those of its true errors, and errors of unusable recordings."""
 import copy
-import functools
+import dataclasses
 import pathlib
 
 import numpy as np
@@ -77,16 +77,15 @@ def test_a_recording_without_autotrack_gives_no_offset(station):
     with pytest.raises(collect.CollectError, match='no autotrack of 8 s with a predicted direction'):
         collect.points(record, [late])
     # Without a program track, a recording must hold the elements of the mode tle.
+    bare = copy.copy(record)
+    bare._run = dataclasses.replace(record._run, tracks={})
+    vars(bare).pop('topics', None)
     with pytest.raises(collect.CollectError, match='no autotrack of 8 s with a predicted direction; no scan of 5'):
-        collect.every_point(record)
+        collect.every_point(bare)
 
 
 class WithProgram(memory_recording.MemoryRecording):
-    """Recording that also holds the program track of its run, as a file does. program: message; start: UTC [ns]."""
-
-    @functools.cached_property
-    def topics(self):
-        return {**super().topics, predicted.PROGRAM_TOPIC: self.program.__msgtype__}
+    """Recording whose program track has the stamp of a run in realtime. program: message; start: UTC [ns]."""
 
     def messages(self, topic):
         if topic != predicted.PROGRAM_TOPIC:
@@ -107,6 +106,8 @@ def test_refraction_that_the_control_unit_adds_is_no_offset(direction, refractiv
     monkeypatch.setattr(pointing.bags, 'read', lambda path, beam: record)
     found = pointing.collected([pathlib.Path('pass_1')], 5)
     assert len(found.places) == 5
+    with pytest.raises(ValueError, match='--bag copy: has the same offsets as pass_1; each recording must be given'):
+        pointing.collected([pathlib.Path('pass_1'), pathlib.Path('copy')], 5)
     np.testing.assert_allclose(found.values, exact.offsets(tuple(true), list(true.values()), found.directions),
                                atol=0.02)
     [followed] = predicted.programs(record)

@@ -168,6 +168,19 @@ def test_an_outlier_is_named_and_nothing_else():
     assert sum(line.startswith('outlier in line 19: azimuth') for line in pointing.remarks(found)) == 1
 
 
+def test_the_linear_form_remains_where_the_exact_form_has_no_result():
+    """An offset of 5 deg near the zenith: the exact law does not converge, and the outlier is named all the same."""
+    directions, rng = sky(4)
+    values = terms.design(NAMES, directions) @ VALUES + SIGMA_DEG * rng.normal(size=(40, 2))
+    directions[17], values[17] = (20.0, 88.0), (5.0, 0.0)
+    with pytest.raises(fit.FitError, match='the exact fit has not converged'):
+        pointing.calibrate(measured_with(values, directions), NAMES, 'exact')
+    found = pointing.calibrate(measured_with(values, directions), NAMES)
+    said = pointing.remarks(found)
+    assert found.fit.form == 'linear' and found.outliers[0] == 17
+    assert any(line.startswith('the linear form is taken: the exact fit has not converged') for line in said)
+
+
 def spread(az=(0.0, 360.0), el=(10.0, 80.0), count=40):
     rng = np.random.default_rng(9)
     return np.column_stack((rng.uniform(*az, count), rng.uniform(*el, count)))

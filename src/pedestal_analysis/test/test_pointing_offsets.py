@@ -30,6 +30,8 @@ def read(tmp_path, content):
     table(), table(separator=';'), table(separator='\t'), '\ufeff' + table(), table().replace('\n', '\r\n'),
     table(separator=';').replace('.', ','), '# measured 2026-11-26\n' + table(), table().encode('utf-16'),
     table(separator=' '), table([(*row, 'a') for row in ROWS], (*NAMES, 'note')),
+    table(names=('az', 'el', 'd_xel', 'd_el', 'sigma'), separator=' '),
+    table(names=('az_deg', 'el_deg', 'Cross-Elevation [deg]', 'elevation_deg', 'sigma_deg')),
     table([tuple(np.radians(row)) for row in ROWS], [name.replace('deg', 'rad') for name in NAMES])])
 def test_each_dialect_gives_the_same_offsets(tmp_path, content):
     found = read(tmp_path, content)
@@ -65,7 +67,7 @@ def changed(column, value, line=3):
     (table().replace('0.003\n', '0.003,7\n'), 'line 3: 6 cells, must be 5'),
     (table([row[:3] for row in ROWS], NAMES[:3]), "line 1: column 'elevation_deg' is missing; columns found: "
                                                   "'az_deg'"),
-    (table(names=('az', *NAMES[1:])), "line 1: column 'az': must end with a known unit to be taken as az_deg: deg, "),
+    (table(names=('azimuth', *NAMES[1:])), "line 1: column 'azimuth': must end with a known unit to be taken as "),
     (table(names=('az_arcsec', *NAMES[1:])), "column 'az_arcsec': must end with a known unit"),
     (table(names=(*NAMES[:4], 'az_rad')), "columns 'az_deg' and 'az_rad': only one of them may be the az_deg"),
     (table([*ROWS, ROWS[1]]), 'line 5: az_deg = 12.5, el_deg = 70, offsets -0.01 and 0.03 deg: repeats line 3'),
@@ -132,11 +134,39 @@ def test_a_file_of_tpoint_holds_sky_and_mount(tmp_path):
 
 def test_a_file_of_tpoint_may_count_the_azimuth_from_south(tmp_path):
     found = read(tmp_path, '! South = 0, East = 90\n' + TPOINT)
-    np.testing.assert_allclose(found.directions[:, 0], [150.0, -170.0])
+    np.testing.assert_allclose(found.directions[:, 0], [150.0, 190.0])
     np.testing.assert_allclose(found.values[:, 0], np.cos(np.radians([60.0, 25.0])) * [-0.06, -0.05])
 
 
+@pytest.mark.parametrize('comment, begin', [
+    ('rms residual s = 0.4 arcsec', 'north, because no comment'), ('wind from s=0 m/s', 'north, because no comment'),
+    ('n = 0 rejected', 'north, because no comment'), ('seen south = 0.5 mm of rain', 'north, because no comment'),
+    ('azimuth is measured from south', 'south, as line 1'), ('Az: N=0, E=90', 'north, as line 1'),
+    ('converted (South = 0, East=90)', 'south, as line 1'), ('S = 0, W = 90', 'south, as line 1'),
+    ('North = 0 deg', 'north, as line 1')])
+def test_only_a_comment_on_the_azimuth_states_where_it_begins(tmp_path, comment, begin):
+    found = read(tmp_path, f'! {comment}\n' + TPOINT)
+    assert found.directions[0, 0] == pytest.approx(150.0 if begin.startswith('south') else 30.0)
+    assert found.notes[0].startswith(f'TPOINT: the azimuth counts from {begin}')
+
+
+def test_the_mount_of_a_file_of_tpoint_states_the_turn_of_the_wrap(tmp_path):
+    found = read(tmp_path, TPOINT.replace('30.0 60.0 30.06', '30.0 60.0 390.06'))
+    assert found.directions[0, 0] == pytest.approx(390.0)
+
+
+def test_a_date_in_the_future_is_no_date_of_the_measurement(tmp_path):
+    path = tmp_path / 'offsets.csv'
+    path.write_text('# measured 2026-11-20\n# next service 2030-05-01\n' + table())
+    assert offsets.read(path, '2026-11-26').date == '2026-11-20'
+    with pytest.raises(ValueError, match='must not be later than today, 2026-11-26'):
+        offsets.valid_date('2026-11-27', '2026-11-26')
+
+
 @pytest.mark.parametrize('content, message', [
+    ('! South = 0\n! azimuth is measured from north\n' + TPOINT, 'from north by line 2 and from south by line 1'),
+    (TPOINT.replace('47 21 36.0 2026 11 26\n', ''), 'line 5: begins with 30.0 60.0 30.06: the first line of numbers '
+                                                    'must be the run parameters'),
     (TPOINT.replace('ALTAZ', 'EQUAT'), 'must have the option `: ALTAZ`, .*; options found: EQUAT'),
     (TPOINT.replace('30.0 60.0 30.06 59.99 12.0', '30.0 60.0 30.06'), 'line 6: 3 numbers, must be at least 4'),
     (TPOINT.replace('59.99', '71.0'), 'line 6: elevation of the mount minus that on the sky = 11 deg: must be -5 to'),
@@ -200,6 +230,28 @@ def test_a_wrong_option_is_refused(tmp_path, capsys, given, message):
     file.write_text(table(station()))
     assert cli.main(['calibrate', 'pointing', '--offsets', str(file), *given]) == 1
     assert message in capsys.readouterr().err
+
+
+def test_no_output_replaces_measurements_or_another_output(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    file = tmp_path / 'offsets.csv'
+    file.write_text(table(station()))
+    for given, message in ((('--json', './offsets.csv'), '--json offsets.csv: exists already and holds no JSON'),
+                           (('--output', 'x', '--report', './x'), '--output x: is also the file of --report'),
+                           (('--output', 'x', '--json', tmp_path / 'x'), '--output x: is also the file of --json'),
+                           (('--output', '-'), '--output -: must be the name of a file')):
+        assert cli.main(['calibrate', 'pointing', '--offsets', str(file), *map(str, given)]) == 1
+        assert message in capsys.readouterr().err
+    assert file.read_text() == table(station()) and list(tmp_path.iterdir()) == [file]
+    assert cli.main(['calibrate', 'pointing', '--offsets', str(file), '--json', 'x']) == 0
+    assert cli.main(['calibrate', 'pointing', '--offsets', str(file), '--json', 'x']) == 0      # it holds JSON
+
+
+def test_the_encoder_of_p12_counts_the_turns(tmp_path, capsys):
+    file = tmp_path / 'offsets.csv'
+    file.write_text(table(station()))
+    assert cli.main(['calibrate', 'pointing', '--offsets', str(file), '--terms', '1,4,5,6,7,12', '--keep-all']) == 0
+    assert 'P12: the azimuths must state the turn of the wrap' in capsys.readouterr().out
 
 
 def test_too_few_offsets_are_refused_with_the_file(tmp_path, capsys):

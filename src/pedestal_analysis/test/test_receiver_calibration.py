@@ -71,7 +71,16 @@ def test_each_fault_has_its_name(name, word, angle_deg):
     assert any('turned axes' in sentence for sentence in said) == (angle_deg != 0.0)
 
 
-def test_weak_slopes_and_offsets_on_one_line_are_named():
+@pytest.mark.parametrize('angle_deg', [-60.0, -45.8, 45.8, 60.0])
+def test_axes_that_are_turned_far_are_one_fault(angle_deg):
+    """Not exchanged channels with a reversed sign, which would have the same effect."""
+    found = matrix.fit(CROSS, CROSS @ turned(math.radians(angle_deg)).T)
+    assert matrix.faults(found) == [f'turned axes: the axes of the errors are turned by {angle_deg:.1f} deg']
+
+
+def test_weak_and_steep_slopes_and_offsets_on_one_line_are_named():
+    assert any('steep slope: the mean slope is 5.00' in sentence
+               for sentence in matrix.faults(matrix.fit(CROSS, 5.0 * CROSS)))
     assert any('weak slope' in sentence and '66 deg' in sentence
                for sentence in matrix.faults(matrix.fit(CROSS, 0.4 * CROSS)))
     with pytest.raises(matrix.MatrixError, match='mean slope 0.1, must be at least 0.2'):
@@ -139,6 +148,25 @@ def test_unusable_runs_are_refused(capfd, changes, message):
     given = [part for change in changes for part in ('--param', change)]
     assert cli.main(['calibrate', 'receiver', '--scenario', 'receiver_phasing', *given]) == 1
     assert message in capfd.readouterr().err
+
+
+def test_a_result_that_is_not_verified_gets_no_parameter_file(capfd, tmp_path):
+    output = tmp_path / 'matrix.yaml'
+    code = cli.main(['calibrate', 'receiver', '--scenario', 'receiver_phasing', '--param',
+                     'tracking_receiver.antenna.slope_factor=5', '--output', str(output)])
+    said = capfd.readouterr().out
+    assert code == 4 and not output.exists()
+    assert 'NOT VERIFIED' in said and f'not written: {output}' in said and 'steep slope' in said
+
+
+def test_the_null_of_the_errors_is_stated(capfd):
+    """The errors are 0 where the receiver's axis is on the beacon."""
+    _, content = calibrated(capfd, '--param', 'tracking_receiver.antenna.boresight_cross_elevation=0.0015')
+    found = values(content)
+    assert found['null_cross_elevation'] == pytest.approx(0.0015 / 0.0175, abs=0.005)
+    assert found['null_elevation'] == pytest.approx(0.0, abs=0.005)
+    assert cli.main(['calibrate', 'receiver', '--scenario', 'receiver_phasing']) == 0
+    assert 'null of the errors                    cross-elevation 0.000' in capfd.readouterr().out
 
 
 def test_nan_in_a_locked_receiver_is_refused():

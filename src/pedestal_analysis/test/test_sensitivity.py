@@ -118,12 +118,35 @@ def test_offsets_in_azimuth_shrink_with_the_elevation(tmp_path, capfd):
     (lambda rows: rows * (1.0, 1.0, 0.0), [], 'Y factor 0 dB'),
     (lambda rows: rows, ['--flux', '300'], 'G/T needs both'),
     (lambda rows: rows, ['--flux', '-3', '--frequency', '8'], '--flux -3: must be 1 to 1e'),
-    (lambda rows: rows, ['--flux', 'nan', '--frequency', '8'], '--flux nan: must be 1 to 1e')])
+    (lambda rows: rows, ['--flux', 'nan', '--frequency', '8'], '--flux nan: must be 1 to 1e'),
+    (lambda rows: rows, ['--attenuation', '0.3'], '--attenuation: has no effect without --flux'),
+    (lambda rows: rows, ['--bandwidth', '1e6'], '--bandwidth: has no effect without --bag'),
+    (lambda rows: rows, ['--elevation', '40'], '--elevation: has no effect, because the offsets are in cross-elevation'
+     )])
 def test_bad_input_is_refused(tmp_path, capfd, change, given, message):
     file = write(tmp_path / 'bad.csv', change(measured(0.0)))
-    assert cli.main(['calibrate', 'sensitivity', '--levels', file, *given]) == 1
+    assert cli.main(['calibrate', 'sensitivity', '--levels', file, '--diameter', '0.53', *given]) == 1
     error = capfd.readouterr().err
     assert message in error
+
+
+def test_a_source_of_unknown_size_is_refused(tmp_path, capfd):
+    """As a point the sun would make the beam half as wide again."""
+    file = write(tmp_path / 'sun.csv', measured(0.0))
+    assert cli.main(['calibrate', 'sensitivity', '--levels', file]) == 1
+    assert '--diameter: is needed without --flux' in capfd.readouterr().err
+
+
+@pytest.mark.parametrize('names, separator, point', [
+    (('Cross-Elevation [deg]', 'Elevation [deg]', 'Level [dB]'), ';', ','),
+    (('xel_deg', 'el_deg', 'Level_dB'), '\t', '.')])
+def test_levels_are_read_in_each_dialect(tmp_path, names, separator, point):
+    rows, file = measured(0.0), tmp_path / 'levels.csv'
+    lines = [separator.join(names), *(separator.join(f'{value:.6f}' for value in row).replace('.', point)
+                                      for row in rows)]
+    file.write_text('\n'.join(lines))
+    found = levels.read(file)
+    np.testing.assert_allclose(np.column_stack((found.offsets, 10.0 * np.log10(found.power))), rows, atol=1e-5)
 
 
 def test_the_beam_of_the_simulated_receiver():

@@ -1,5 +1,6 @@
 """Arguments that several verbs of the command line share: their definition, and the check of their values."""
 import argparse
+import itertools
 import os
 import pathlib
 import types
@@ -183,15 +184,24 @@ def add_result_files(parser: argparse.ArgumentParser, output: str, report: str) 
 
 
 def check_result_files(options: argparse.Namespace, *more: str) -> None:
-    """Check --output and --report, and the options `more` that name new files. Raises ValueError."""
-    for name in ('output', 'report', *more):
+    """Check --output and --report, and the options `more` that name new files. Raises ValueError, also for two options
+    of which one would overwrite the file of the other."""
+    new = ('output', 'report', *more)
+    for name in new:
         check_new_file(f'--{name.replace("_", "-")}', getattr(options, name))
+    paths = [(name, path) for name, given in vars(options).items()
+             for path in (given if isinstance(given, list) else [given]) if isinstance(path, pathlib.Path)]
+    for (name, path), (other, same) in itertools.combinations(paths, 2):
+        if {name, other} & {*new, 'json'} and path.resolve() == same.resolve():
+            raise ValueError(f'--{name.replace("_", "-")} {path}: is also the file of --{other.replace("_", "-")}')
 
 
 def check_new_file(option: str, path: pathlib.Path | None) -> None:
     """Raise ValueError if the file of an option exists already, or if its directory is missing."""
     if path is None:
         return
+    if str(path) == '-':
+        raise ValueError(f'{option} -: must be the name of a file; only --json writes to standard output')
     if path.exists():
         raise ValueError(f'{option} {path}: exists already; the file is not overwritten')
     if not path.parent.is_dir():

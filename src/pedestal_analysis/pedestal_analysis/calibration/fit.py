@@ -130,7 +130,9 @@ def fitted(form, names, x, solved, residuals, sigma):
     blocks = U.reshape(n, 2, p)
     kept = np.eye(2) - blocks @ blocks.transpose(0, 2, 1)
     if np.linalg.det(kept).min() < SMALLEST_SINGULAR_VALUE:
-        raise FitError('a point determines a term alone, because no other point is near it; add points')
+        place = int(np.argmin(np.linalg.det(kept)))
+        raise FitError(f'the offset number {place + 1} determines a term alone; add points near it, or correct its '
+                       'sigma if it is far below that of the other offsets')
     left_out = np.linalg.solve(kept, r[:, :, None])[:, :, 0] * sigma
     half = float(stdtrit(degrees, 0.5 * (1.0 + CONFIDENCE_LEVEL)))
     return Fit(form, tuple(names), x, scale**2 * C, np.zeros(p), half, float(s[0] / s[-1]), residuals, left_out, scale)

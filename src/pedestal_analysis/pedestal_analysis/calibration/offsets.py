@@ -4,7 +4,8 @@ The content of a file shows its format:
 
     CSV       columns az_deg, el_deg, cross_elevation_deg, elevation_deg and possibly sigma_deg; other units of
               angle and other separators are accepted, see csv_table. The first two are the direction wanted on the
-              sky; the next two are the offset that had to be added to the command
+              sky; the next two are the offset that had to be added to the command. The names az, el, d_xel, d_el and
+              sigma without a unit are degrees
     katpoint  columns azimuth, elevation, delta_azimuth, delta_elevation and possibly delta_azimuth_std and
               delta_elevation_std, in degrees; the azimuth offset is one of the axis
     TPOINT    see tpoint.py
@@ -30,10 +31,11 @@ MIN_COSINE = 1e-3
 MIN_RADIAN_POINTS = 5
 """Number of points from which values that all look like radians are refused."""
 
-_SKY = (columns.Quantity('az_deg', {'az': '', 'azimuth': ''}, 'deg'), columns.Quantity('el_deg', {'el': ''}, 'deg'))
-_OFFSET = (columns.Quantity('cross_elevation_deg', {'cross elevation': '', 'xel': '', 'd xel': ''}, 'deg'),
-           columns.Quantity('elevation_deg', {'elevation': '', 'd el': ''}, 'deg'))
-_SIGMA = columns.Quantity('sigma_deg', {'sigma': ''}, 'deg')
+_SKY = (columns.Quantity('az_deg', {'az': 'deg', 'azimuth': ''}, 'deg'),
+        columns.Quantity('el_deg', {'el': 'deg'}, 'deg'))
+_OFFSET = (columns.Quantity('cross_elevation_deg', {'cross elevation': '', 'xel': '', 'd xel': 'deg'}, 'deg'),
+           columns.Quantity('elevation_deg', {'elevation': '', 'd el': 'deg'}, 'deg'))
+_SIGMA = columns.Quantity('sigma_deg', {'sigma': 'deg'}, 'deg')
 _KATPOINT_NAMES = ('azimuth', 'elevation', 'delta_azimuth', 'delta_elevation')
 _KATPOINT_SIGMA_NAMES = ('delta_azimuth_std', 'delta_elevation_std')
 _DATE_PATTERN = re.compile(r'\b(\d{4}-\d{2}-\d{2})(?!\d)')
@@ -50,6 +52,7 @@ class Offsets(typing.NamedTuple):
     source       name of the file, or of the recordings
     format       CSV, katpoint, TPOINT or recordings
     date         date of the measurement, as in 2026-11-26, '' if the file states none
+    notes        sentences on the meaning of the file
     """
     directions: np.ndarray
     values: np.ndarray
@@ -59,18 +62,27 @@ class Offsets(typing.NamedTuple):
     source: str
     format: str
     date: str
+    notes: tuple = ()
 
 
-def read(path) -> Offsets:
-    """Return the Offsets of a file. Raises TableError, which names file, line, field, value and allowed range."""
+def read(path, latest='') -> Offsets:
+    """Return the Offsets of a file. Raises TableError, which names file, line, field, value and allowed range.
+
+    latest: date, as in 2026-11-26, after which no date is that of the measurement; '': every date may be.
+    """
+    notes: tuple = ()
     text = csv_table.text(path)
     if not text.strip():
         raise TableError(f'{path}: the file is empty; it must have a line with the names of the columns and a line '
                          'for each offset')
     if tpoint.is_tpoint(text):
-        rows, date, kind = tpoint.rows(path, text), tpoint.date(text), 'TPOINT'
+        rows, dates, kind = tpoint.rows(path, text), [tpoint.date(text)], 'TPOINT'
+        begin, line = tpoint.origin(path, text)
+        why = f'as line {line} states' if line else 'because no comment states another origin'
+        notes = f'TPOINT: the azimuth counts from {begin}, {why}',
     else:
-        rows, date, kind = _table(path, text)
+        rows, dates, kind = _table(path, text)
+    date = max((one for one in dates if not latest or one <= latest), default='')
     if not rows:
         raise TableError(f'{path}: 0 offsets, must be at least 1')
     lines, *numbers = zip(*rows)
@@ -80,7 +92,7 @@ def read(path) -> Offsets:
     has_sigma = bool(np.isfinite(sigma).all())
     return Offsets(table[:, :2], table[:, 2:4], sigma if has_sigma else np.ones_like(sigma), has_sigma,
                    [f'line {line}' for line in lines],
-                   pathlib.Path(path).name, kind, date)
+                   pathlib.Path(path).name, kind, date, notes)
 
 
 def table(measured):
@@ -91,23 +103,26 @@ def table(measured):
     return '\n'.join([*head, ','.join(names), *(','.join(f'{value:.7f}' for value in row) for row in numbers)]) + '\n'
 
 
-def valid_date(text):
-    """Return a date such as 2026-11-26 as it is. Raises ValueError."""
+def valid_date(text, latest):
+    """Return a date such as 2026-11-26 as it is. Raises ValueError, also for a date later than `latest`."""
     try:
-        return datetime.date.fromisoformat(text).isoformat()
+        date = datetime.date.fromisoformat(text).isoformat()
     except ValueError:
         raise ValueError(f'--date {text:.40}: must be a date such as 2026-11-26') from None
+    if date > latest:
+        raise ValueError(f'--date {date}: must not be later than today, {latest}')
+    return date
 
 
 def _table(path, text):
-    """Return (rows, date, format) of a CSV file. A row is (line, az, el, xel, el offset, sigma xel, sigma el)."""
+    """Return (rows, dates, format) of a CSV file. A row is (line, az, el, xel, el offset, sigma xel, sigma el)."""
     try:
         table = csv_table.Table(path, text)
         katpoint = set(_KATPOINT_NAMES) <= set(table.fieldnames)
         rows = list((_katpoint if katpoint else _plain)(table))
     except csv_table.csv.Error as error:
         raise TableError(f'{path}: not a CSV text file: {error}') from None
-    return rows, _date(text), 'katpoint' if katpoint else 'CSV'
+    return rows, _dates(text), 'katpoint' if katpoint else 'CSV'
 
 
 def _plain(table):
@@ -141,15 +156,15 @@ def _katpoint(table):
                                                       else (np.nan, np.nan)))
 
 
-def _date(text):
-    """Return the last date in a CSV file, '' without one. Dates stand in comments and in columns of times."""
+def _dates(text):
+    """Return the dates in a CSV file. Dates stand in comments and in columns of times."""
     found = []
     for word in _DATE_PATTERN.findall(text):
         try:
             found.append(datetime.date.fromisoformat(word).isoformat())
         except ValueError:
             continue
-    return max(found, default='')
+    return found
 
 
 def _check(path, lines, table):

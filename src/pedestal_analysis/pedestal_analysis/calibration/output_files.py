@@ -4,15 +4,17 @@ from pedestal_common.parameters import check_each
 from pedestal_common.text_files import parameter_file
 
 
-def write(options, printed, sections, page, iq=False) -> list[str]:
+def write(options, printed, sections, page, iq=False, verified=True) -> list[str]:
     """Write the files that the options `output` and `report` of a step name. Return a line for each of them.
 
     printed: lines that the step prints, for the head of the parameter file; sections: {node: {parameter: value}};
-    page(): HTML text of the page; iq: True for the parameters of a receiver of I/Q samples. Raises ParameterError for
-    a value out of its range.
+    page(): HTML text of the page; iq: True for the parameters of a receiver of I/Q samples. A result that is not
+    `verified` gets no parameter file, because it must not be used. Raises ParameterError for a value out of its range.
     """
     said = []
-    if options.output:
+    if options.output and not verified:
+        said.append(f'not written: {options.output}, because the result is not verified')
+    elif options.output:
         for node, values in sections.items():
             check_each(nodes.row(node, iq=iq).parameters_type(), values)
         head = ''.join(f'# {line}'.rstrip() + '\n' for line in (f'made by: {" ".join(options.command.split())}',

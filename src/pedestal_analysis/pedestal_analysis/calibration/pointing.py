@@ -4,6 +4,7 @@ The result is a table of the terms, rows for --json, a page with the residuals, 
 parameters acu.pointing.*. The file states where the model comes from: source, date and rms.
 """
 import dataclasses
+import datetime
 
 import numpy as np
 
@@ -41,32 +42,46 @@ class Calibration:
     offsets   offsets.Offsets
     fit       fit.Fit of the terms that were kept
     dropped   [(name, value, sigma)] of the terms whose sigma exceeds their value
-    outliers  places of the outliers among the offsets
+    outliers  places of the outliers among the offsets, the largest first
     date      date of the measurement, '' if unknown
+    notes     sentences on the choice of the form
     """
     offsets: offsets.Offsets
     fit: fit.Fit
     dropped: list
     outliers: np.ndarray
     date: str
+    notes: tuple
 
 
 def calibrate(measured, names, form='', keep_all=False, date='') -> Calibration:
     """Return the Calibration of offsets.Offsets with the terms `names`. Raises FitError.
 
-    form       one of FORMS; '': linear, unless the exact form has a leave-one-out rms below EXACT_GAIN of it
+    form       one of FORMS; '': linear, unless the exact form converges and has a leave-one-out rms below EXACT_GAIN
+               of that of the linear form
     keep_all   keep the terms whose sigma exceeds their value
     date       replaces the date of the offsets
     """
     distribution.check(names, measured.directions)
+    offsets_of = measured.directions, measured.values, measured.sigma
+    notes: set[str] = set()
 
     def fitted(chosen):
-        found = [one(chosen, measured.directions, measured.values, measured.sigma)
-                 for name, one in FORMS.items() if form in ('', name)]
-        return found[-1] if rms(found[-1].left_out) < EXACT_GAIN * rms(found[0].left_out) else found[0]
+        if form:
+            return FORMS[form](chosen, *offsets_of)
+        found = fit.linear(chosen, *offsets_of)
+        try:
+            also = exact.exact(chosen, *offsets_of)
+        except fit.FitError as error:
+            notes.add(f'the linear form is taken: {error}')
+            return found
+        return also if rms(also.left_out) < EXACT_GAIN * rms(found.left_out) else found
 
     found, dropped = (fitted(names), []) if keep_all else fit.without_doubtful(names, fitted)
-    return Calibration(measured, found, dropped, found.outliers(measured.sigma), date or measured.date)
+    outliers = found.outliers(measured.sigma)
+    size = np.hypot(*(found.left_out[outliers] / measured.sigma[outliers]).T)
+    return Calibration(measured, found, dropped, outliers[np.argsort(-size)], date or measured.date,
+                       tuple(sorted(notes)))
 
 
 def rows(found):
@@ -125,7 +140,11 @@ def residual_lines(found):
 def remarks(found):
     """Return sentences on dropped terms, correlated terms, outliers, and offsets that are few or badly stated."""
     measured, fitted = found.offsets, found.fit
-    said = [f'{name}: dropped, because its sigma {sigma:.2g} exceeds its value {value:.2g}'
+    said = [*measured.notes, *found.notes]
+    if 'P12' in fitted.names:
+        said.append('P12: the azimuths must state the turn of the wrap; 10 and 370 deg are different angles of '
+                    'the encoder')
+    said += [f'{name}: dropped, because its sigma {sigma:.2g} exceeds its value {value:.2g}'
             for name, value, sigma in found.dropped]
     said += [f'{first} and {second}: correlation {value:.2f}; the offsets hardly tell these terms apart, so only '
              'their common effect is certain' for first, second, value in fitted.correlated()]
@@ -134,6 +153,9 @@ def remarks(found):
         said.append(f'outlier in {measured.places[place]}: azimuth {az:.3f}, elevation {el:.3f} deg is off '
                     f'the model of the other points by {fitted.left_out[place, 0]:.4f} deg in cross-elevation and '
                     f'{fitted.left_out[place, 1]:.4f} deg in elevation; check it, and remove it if it is wrong')
+    if len(found.outliers) > 1:
+        said.append('the largest outlier stands first; remove only this outlier and fit again, because it may make '
+                    'good points look like outliers')
     if len(measured.places) < distribution.GOOD_POINTS:
         said.append(f'{len(measured.places)} points are few: {distribution.GOOD_POINTS} to 40 points all over the sky '
                     'are recommended')
@@ -161,12 +183,17 @@ def collected(paths, count):
     parts, dates = [], []
     if count is not None and not 1 <= count <= MAX_POINTS:
         raise ValueError(f'--points {count}: must be 1 to {MAX_POINTS}')
+    origins = {}
     for path in paths:
         bag = bags.read(path, '')
         try:
-            parts.append((path.name, collect.every_point(bag, count or collect.DEFAULT_POINTS)))
+            points = collect.every_point(bag, count or collect.DEFAULT_POINTS)
         except collect.CollectError as error:
             raise ValueError(f'--bag {path}: {error}') from None
+        first = origins.setdefault((*points[0][2], *points[0][3]), path)
+        if first is not path:
+            raise ValueError(f'--bag {path}: has the same offsets as {first}; each recording must be given once')
+        parts.append((path.name, points))
         # In lockstep the time of a recording begins at 0 and states no date.
         dates += [np.datetime64(int(bag.start), 'ns').astype('datetime64[D]').item().isoformat()] if bag.start else []
     joined = collect.joined(parts, ', '.join(path.name for path in paths))
@@ -177,8 +204,9 @@ def main(options):
     """Calibrate for the options of the verb, write its files and return (lines to print, content for --json). Raises
     ValueError."""
     names = terms.chosen(options.terms) if options.terms is not None else terms.DEFAULT_TERMS
-    date = offsets.valid_date(options.date) if options.date else ''
-    measured = collected(options.bag, options.points) if options.bag else offsets.read(options.offsets)
+    today = datetime.datetime.now(datetime.timezone.utc).date().isoformat()
+    date = offsets.valid_date(options.date, today) if options.date else ''
+    measured = collected(options.bag, options.points) if options.bag else offsets.read(options.offsets, today)
     if options.collected:
         options.collected.write_text(offsets.table(measured), encoding='utf-8')
     try:

@@ -8,7 +8,8 @@
     END
 
 Further numbers of an observation, such as the angle of a rotator, are ignored. The azimuth counts from north through
-east. Some observatories count it from south (east is 90 deg), and state it in a comment such as `South = 0`.
+east. Some observatories count it from south (east is 90 deg), and state it in a comment such as `South = 0`. Because
+both conventions fit equally well, the convention of a file is always stated with the result.
 """
 import datetime
 import math
@@ -26,7 +27,11 @@ MAX_DIFFERENCE_DEG = 5.0
 
 _ALTAZ_OPTIONS = ('ALTAZ', 'AZALT')
 _MIN_DATE_NUMBERS = 6
-_ORIGIN_PATTERN = re.compile(r'\b(n|north|s|south)\s*=\s*0\b', re.IGNORECASE)
+_ORIGIN_PATTERN = re.compile(r'\b(?:(north|south)\s*=\s*0(?:\.0+)?\s*(?:deg\w*)?(?=\s*(?:[,;)]|\.?$))'
+                             r'|az\w*\b.*\bfrom\s+(?:the\s+)?(north|south)\b'
+                             r'|([ns])\s*=\s*0\s*,\s*(?:e|east|w|west)\s*=\s*(?:90|270)\b)', re.IGNORECASE)
+"""Comments that state where the azimuth begins; a letter alone counts only with a second direction, as N=0, E=90."""
+_LATITUDE_PATTERN = re.compile(r'[-+]?\d{1,2}$')
 _NUMBERS_PATTERN = re.compile(r'[-+]?\.?\d')
 
 
@@ -62,16 +67,37 @@ def date(text):
         return ''
 
 
+def origin(path, text):
+    """Return (`north` or `south`, line of the comment that states it, 0 without one). Raises TableError for comments
+    that contradict each other."""
+    stated = {}
+    for line, content in enumerate(text.splitlines(), start=1):
+        match = _ORIGIN_PATTERN.search(content.partition('!')[2])
+        if match:
+            letter = next(filter(None, match.groups()))[0].lower()
+            stated.setdefault({'n': 'north', 's': 'south'}[letter], line)
+    if len(stated) == 2:
+        raise TableError(f'{path}: the azimuth counts from north by line {stated["north"]} and from south by line '
+                         f'{stated["south"]}; only one of them may be stated')
+    return next(iter(stated.items()), ('north', 0))
+
+
 def rows(path, text):
     """Return [(line, azimuth, elevation, offsets in cross-elevation and elevation, NaN, NaN)] [deg]. Raises
-    TableError."""
+    TableError.
+
+    The azimuth is in the turn of the wrap in which the mount was.
+    """
     numbers, options = _records(text)
     if not set(options) & set(_ALTAZ_OPTIONS):
         found = f'; options found: {", ".join(options)}' if options else ''
         raise TableError(f'{path}: a TPOINT file must have the option `: ALTAZ`, for observations of azimuth and '
                          f'elevation{found}')
-    origin = _ORIGIN_PATTERN.search('\n'.join(re.findall('!.*', text)))
-    from_south = bool(origin) and origin[1].lower().startswith('s')
+    from_south = origin(path, text)[0] == 'south'
+    if numbers and not all(map(_LATITUDE_PATTERN.match, numbers[0][1][:2])):
+        line, words = numbers[0]
+        raise TableError(f'{path}: line {line}: begins with {" ".join(words[:3]):.40}: the first line of numbers must '
+                         'be the run parameters, with the latitude in degrees, minutes and seconds')
     found = []
     for line, words in numbers[1:]:
         if len(words) < 4:
@@ -82,6 +108,7 @@ def rows(path, text):
         az, el, mount_az, mount_el = (csv_table.number(path, line, name, word, *limits)
                                       for name, word, limits in named)
         step = math.remainder(mount_az - az, 360.0)
+        az = mount_az - step
         if from_south:
             az, step = 180.0 - az, -step
         offset = (step * math.cos(math.radians(el)), mount_el - el)
@@ -89,5 +116,5 @@ def rows(path, text):
             if abs(value) > MAX_DIFFERENCE_DEG:
                 raise TableError(f'{path}: line {line}: {name} of the mount minus that on the sky = {value:g} deg: '
                                  f'must be {-MAX_DIFFERENCE_DEG:g} to {MAX_DIFFERENCE_DEG:g}')
-        found.append((line, math.remainder(az, 360.0), el, *offset, math.nan, math.nan))
+        found.append((line, az, el, *offset, math.nan, math.nan))
     return found

@@ -31,15 +31,16 @@ _UNIT_NAMES = {
     'm': {'m': ('m', 'meter', 'meters', 'metre', 'metres'), 'km': ('km', 'kilometer', 'kilometers', 'kilometre',
                                                                    'kilometres'),
           'cm': ('cm',), 'mm': ('mm',), 'ft': ('ft', 'foot', 'feet')},
+    'db': {'db': ('db', 'decibel', 'decibels')},
     'hz': {'hz': ('hz',), 'rad/s': ('rad/s', 'radpers')},
     'm2_per_hz': {'m2/Hz': ('m2/hz', 'm^2/hz', 'm2perhz', 'm²/hz', 'm**2/hz'),
                   'm2 s/rad': ('m2s/rad', 'm^2s/rad', 'm²s/rad', 'm2/rad/s', 'm^2/rad/s', 'm²/rad/s')}}
 _UNIT_SIZES = {'s': 1.0, 'ms': 1e-3, 'us': 1e-6, 'ns': 1e-9, 'min': 60.0, 'h': 3600.0, 'd': SECONDS_PER_DAY,
                'deg': 1.0, 'rad': math.degrees(1.0), 'mrad': math.degrees(1e-3),
                'm': 1.0, 'km': 1000.0, 'cm': 0.01, 'mm': 1e-3, 'ft': METRES_PER_FOOT,
-               'hz': 1.0, 'rad/s': 0.5 / math.pi, 'm2/Hz': 1.0, 'm2 s/rad': 2.0 * math.pi,
+               'db': 1.0, 'hz': 1.0, 'rad/s': 0.5 / math.pi, 'm2/Hz': 1.0, 'm2 s/rad': 2.0 * math.pi,
                UTC: 1.0, JULIAN_DATE: SECONDS_PER_DAY, MODIFIED_JULIAN_DATE: SECONDS_PER_DAY}
-"""Size of each unit, in the first unit of its row in _UNIT_NAMES: s, deg, m, Hz or m2/Hz."""
+"""Size of each unit, in the first unit of its row in _UNIT_NAMES: s, deg, m, dB, Hz or m2/Hz."""
 _UTC_PATTERN = re.compile(r'(ut|utc|utcg|gmt|z|zulu|utciso8601|iso8601|iso)?(hrmn(ss|sc)?(fff)?)?')
 """Words behind the name of a time in UTC; HR:MN:SS.fff is of JPL Horizons, UTCG of STK."""
 _APPARENT_NAMES = ('aapp', 'aappr', 'rapp')
@@ -136,7 +137,7 @@ def _known(name, wanted):
     """Return (name of the quantity, rest without blanks and brackets) of a column's name; None if the name does not
     begin with the quantity."""
     for spaced in (name, _CAMEL_CASE_PATTERN.sub(' ', name)):
-        text = ' '.join(spaced.lower().replace('_', ' ').split())
+        text = ' '.join(spaced.lower().replace('_', ' ').replace('-', ' ').split())
         for known in sorted(wanted.names, key=len, reverse=True):
             if text.startswith(known) and not text[len(known):len(known) + 1].isalnum():
                 return known, _BETWEEN_PATTERN.sub('', text[len(known):]).removeprefix('/')

@@ -57,6 +57,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(options: argparse.Namespace) -> int:
     """Recompute and print the comparison. Return the exit code, 1 for a failed comparison."""
+    console.check_json(options.json)
     if options.iq is not None:
         for name in ('node', 'param', 'params_file', 'pacing', 'absolute', 'relative', 'ignore', 'allow_idle', 'live',
                      'explain', 'output'):

@@ -55,6 +55,11 @@ class IqPhasing:
         """Return the sentences that name the faults of the receiver with the matrix in force."""
         return complex_matrix.faults(self.slopes, self.in_force)
 
+    @property
+    def null(self):
+        """Return the offset (2,) at which the errors are 0 [beamwidths]."""
+        return -(self.slopes.matrix @ self.slopes.null).real
+
     def multiplied(self, used):
         """Return the ratios (n, 2) over k_m less their null, multiplied with a matrix (2, 2)."""
         return (self.ratios - self.slopes.null) @ used.T
@@ -115,10 +120,7 @@ def rows(found):
                    estimated(case, f'{name}_phase', (phase, phase - phase_half, phase + phase_half), 'rad', count)]
     before, after = (100.0 * complex_matrix.skew(found.multiplied(used)[points.circle], points.offsets[points.circle])
                      for used in (found.in_force, found.slopes.matrix))
-    null = -(found.slopes.matrix @ found.slopes.null).real
-    return [*listed, row(case, 'slope', found.k_m * found.slopes.gain),
-            row(case, 'null_cross_elevation', null[0], 'beamwidths'),
-            row(case, 'null_elevation', null[1], 'beamwidths'),
+    return [*listed, row(case, 'slope', found.k_m * found.slopes.gain), *phasing.null_rows(found.null),
             *phasing.verification_rows(found.before, found.after), row(case, 'skew_before_percent', before, '%'),
             row(case, 'skew_percent', after, '%'), row(case, 'offsets', count),
             row(case, 'circle_points', int(points.circle.sum()))]
@@ -205,5 +207,5 @@ def main(options, changes):
         printed.append(samples.file.cut)
     printed += output_files.write(options, printed, parameters(found),
                                   lambda: iq_phasing_page.page(found, table(found), summary(found), options.command),
-                                  iq=True)
+                                  iq=True, verified=phasing.passed(found))
     return printed, content(found), phasing.passed(found)

@@ -15,6 +15,7 @@ errors are real: a phase error phi of a channel multiplies its row of C with cos
 Barton, Monopulse Principles and Techniques, 2nd ed., chapters 7 and 9.
 """
 import dataclasses
+import itertools
 import math
 
 import numpy as np
@@ -28,6 +29,11 @@ MIN_SLOPE = 0.2
 """Least root of the determinant of C [-]. Below it the receiver hardly measures the offsets."""
 WEAK_SLOPE = 0.5
 """Root of the determinant of C below which a weak slope is named [-]: a phase error of 60 deg."""
+STEEP_SLOPE = 2.0
+"""Root of the determinant of C above which a steep slope is named [-]."""
+TURN_OF_A_FAULT_RAD = math.radians(40.0)
+"""Turn of the axes that is as likely as one fault of signs or channels [rad]. From 85 to 95 deg, exchanged channels
+with a reversed sign are therefore likelier than turned axes."""
 TURNED_AXES_DEG = 10.0
 """Turn of the axes of the errors above which the turn is named [deg]."""
 
@@ -103,11 +109,28 @@ def unexchanged(C):
     return (C[::-1], True) if exchanged else (C, False)
 
 
+def explained(C):
+    """Return (exchanged, signs (2,), angle [rad]): the likeliest faults of channels, signs and axes of a real C.
+
+    Several faults have the same effect: axes turned by 90 deg, and exchanged channels with one reversed sign. The
+    explanation with the fewest faults is taken; a turn counts by TURN_OF_A_FAULT_RAD.
+    """
+    def cost(case):
+        exchanged, signs, angle = case
+        return exchanged + (min(signs) < 0) + abs(angle) / TURN_OF_A_FAULT_RAD
+
+    cases = []
+    for exchanged, *signs in itertools.product((True, False), (1, -1), (1, -1)):
+        right = np.diag(signs) @ (C[::-1] if exchanged else C)
+        if np.linalg.det(right) > 0.0:
+            angle = math.atan2(right[1, 0] - right[0, 1], right[0, 0] + right[1, 1])
+            cases.append((exchanged, signs, angle))
+    return min(cases, key=cost)
+
+
 def turn(C):
     """Return the angle [rad] by which a matrix C turns the axes of the errors, after signs and channels are right."""
-    C, _ = unexchanged(C)
-    C = np.diag(np.sign(np.diag(C))) @ C
-    return math.atan2(C[1, 0] - C[0, 1], C[0, 0] + C[1, 1])
+    return explained(C)[2]
 
 
 def turned_axes(C):
@@ -120,12 +143,12 @@ def turned_axes(C):
 
 def faults(slopes):
     """Return sentences that name the faults of Slopes: exchanged channels, signs, turned axes, weak slopes."""
-    C, exchanged = unexchanged(slopes.C)
+    exchanged, signs, _ = explained(slopes.C)
     found = []
     if exchanged:
         found.append('exchanged channels: an offset in cross-elevation appears as an error in elevation, and the '
                      'reverse')
-    wrong = [name for name, value in zip(AXIS_NAMES, np.diag(C)) if value < 0.0]
+    wrong = [name for name, sign in zip(AXIS_NAMES, signs) if sign < 0]
     if len(wrong) == 2:
         found.append(BOTH_NEGATIVE_TEXT)
     elif wrong:
@@ -134,6 +157,9 @@ def faults(slopes):
     if slopes.gain < WEAK_SLOPE:
         found.append(f'weak slope: the mean slope is {slopes.gain:.2f}; a phase error of '
                      f'{math.degrees(math.acos(slopes.gain)):.0f} deg has this effect')
+    if slopes.gain > STEEP_SLOPE:
+        found.append(f'steep slope: the mean slope is {slopes.gain:.2f}; the gain of the difference channels is too '
+                     'high, or the beamwidth of the receiver is too small')
     return found
 
 

@@ -43,6 +43,11 @@ class Phasing:
     before: matrix.Verification
     after: matrix.Verification
 
+    @property
+    def null(self):
+        """Return the offset (2,) at which the errors are 0 [beamwidths]."""
+        return -self.slopes.matrix @ self.slopes.null
+
 
 def calibrate(bag, source) -> Phasing:
     """Return the Phasing of a bag.Bag of one beam. Raises OffsetError and MatrixError."""
@@ -68,10 +73,15 @@ def rows(found):
                for name, value in zip(names, values)]
     turned = math.degrees(matrix.turn(slopes.C))
     return [*listed, row(CASE_NAME, 'axes_turn_deg', turned, 'deg'),
-            row(CASE_NAME, 'null_cross_elevation', -(slopes.matrix @ slopes.null)[0], 'beamwidths'),
-            row(CASE_NAME, 'null_elevation', -(slopes.matrix @ slopes.null)[1], 'beamwidths'),
+            *null_rows(found.null),
             *verification_rows(found.before, found.after),
             row(CASE_NAME, 'offsets', count), row(CASE_NAME, 'circle_points', int(points.circle.sum()))]
+
+
+def null_rows(null):
+    """Return the rows of the null of the errors (2,), the offset at which they are 0 [beamwidths]."""
+    return [row(CASE_NAME, f'null_{axis}', value, 'beamwidths')
+            for axis, value in zip(('cross_elevation', 'elevation'), null)]
 
 
 def verification_rows(before, after):
@@ -108,9 +118,11 @@ def summary(found):
 
 
 def summary_of(found, faults):
-    """Return the lines on the faults, sentences, and on the verification of a calibration with the fields `before` and
-    `after`."""
+    """Return the lines on the faults, sentences, on the null of the errors and on the verification of a calibration
+    with the fields `null`, `before` and `after`."""
     lines = [f'FAULT {sentence}' for sentence in faults]
+    lines.append(f'null of the errors                    cross-elevation {found.null[0]:.3f}, elevation '
+                 f'{found.null[1]:.3f} beamwidths from the assumed beacon')
     unit = f'{offsets.CIRCLE_BEAMWIDTHS:g} beamwidths'
     lines.append(f'error on the circle of {unit}   {100.0 * found.before.error:.2f} % before, '
                  f'{100.0 * found.after.error:.2f} % after (must be {ERROR_TARGET} %)')
@@ -161,5 +173,6 @@ def main(bag, source, options):
     printed = [f'{count} offsets and {int(found.points.circle.sum())} points of the circle in {source}, '
                f'C/N0 {level:.1f} dB-Hz', '', *table(found), '', *summary(found)]
     printed += output_files.write(options, printed, {'acu': parameters(found)},
-                                  lambda: phasing_page.page(found, table(found), summary(found), options.command))
+                                  lambda: phasing_page.page(found, table(found), summary(found), options.command),
+                                  verified=passed(found))
     return printed, content(found), passed(found)

@@ -23,10 +23,9 @@ MAX_FOLLOWING_BEAMWIDTHS = 0.1
 _OFFSETS = (columns.Quantity('elevation_deg', {'elevation': '', 'el': ''}, 'deg'),
             columns.Quantity('cross_elevation_deg', {'cross elevation': '', 'xel': ''}, 'deg'),
             columns.Quantity('az_deg', {'az': '', 'azimuth': ''}, 'deg'))
+_LEVEL = columns.Quantity('level_db', {'level': ''}, 'db')
 NOISE_KINDS = 'sun', 'moon'
 """Kinds of simulated targets that are sources of noise."""
-LEVEL_NAMES = 'level_db', 'level_dB'
-"""Names of the column of the level."""
 
 
 class LevelError(ValueError):
@@ -42,6 +41,7 @@ class Levels:
     of_source True if the power is that of the source alone
     errors    (n, 2) errors of the receiver [deg], NaN where there are none
     bandwidth noise bandwidth of the receiver that the recording states [Hz], NaN if unknown
+    diameter  diameter of the source that the recording states [deg], NaN if unknown
     source    name of the file or recording
     """
     offsets: np.ndarray
@@ -49,6 +49,7 @@ class Levels:
     of_source: bool
     errors: np.ndarray
     bandwidth: float
+    diameter: float
     source: str
 
 
@@ -62,12 +63,10 @@ def read(path, elevation=None) -> Levels:
         up = table.column(_OFFSETS[0])
         in_azimuth = table.column(_OFFSETS[1], required=False) is None
         across = table.column(_OFFSETS[2 if in_azimuth else 1])
-        level = next((name for name in LEVEL_NAMES if name in table.fieldnames), None)
-        if level is None:
-            raise table.missing(LEVEL_NAMES[0])
+        level = table.column(_LEVEL)
         rows = [(table.number(across, row[across.name], *OFFSET_RANGE_DEG),
                  table.number(up, row[up.name], *OFFSET_RANGE_DEG),
-                 csv_table.number(path, table.line_num, level, row[level] or '', *LEVEL_RANGE_DB)) for row in table]
+                 table.number(level, row[level.name], *LEVEL_RANGE_DB)) for row in table]
     except csv_table.csv.Error as error:
         raise csv_table.TableError(f'{path}: not a CSV text file: {error}') from None
     if not rows:
@@ -77,8 +76,10 @@ def read(path, elevation=None) -> Levels:
         if elevation is None:
             raise LevelError('the offsets are in azimuth; --elevation must state the elevation of the source')
         x = x * math.cos(math.radians(elevation))
+    elif elevation is not None:
+        raise LevelError('--elevation: has no effect, because the offsets are in cross-elevation')
     return Levels(np.column_stack((x, y)), 10.0**(0.1 * level), False, np.full((x.size, 2), np.nan), math.nan,
-                  str(path))
+                  math.nan, str(path))
 
 
 def of_recording(bag, source) -> Levels:
@@ -114,4 +115,6 @@ def of_recording(bag, source) -> Levels:
     # The level of a carrier has no noise bandwidth.
     noise = known.get('target.kind') in NOISE_KINDS
     bandwidth = float(known.get('target.noise_source.bandwidth', math.nan)) if noise else math.nan
-    return Levels(rows[:, :2], rows[:, 2], True, rows[:, 3:], bandwidth, source)
+    disk = math.degrees(known.get('target.noise_source.diameter', math.nan)) if noise else 0.0
+    return Levels(rows[:, :2], rows[:, 2], True, rows[:, 3:], bandwidth,
+                  disk if 'target.kind' in known else math.nan, source)

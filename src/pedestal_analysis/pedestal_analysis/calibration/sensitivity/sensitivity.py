@@ -37,9 +37,22 @@ class Sensitivity:
     g_over_t: float
 
 
+def diameter_of_source(measured, options):
+    """Return the diameter [deg] of the source of levels.Levels: that of the options, of the sun with a flux, or that
+    which the recording states. Raises ValueError without any of them."""
+    if options.diameter is not None:
+        return options.diameter
+    if options.flux:
+        return SUN_DIAMETER_DEG
+    if math.isnan(measured.diameter):
+        raise ValueError('--diameter: is needed without --flux: 0 deg for a beacon or a star, '
+                         f'{SUN_DIAMETER_DEG:g} deg for the sun or the moon')
+    return measured.diameter
+
+
 def calibrate(measured, options) -> Sensitivity:
     """Return the Sensitivity of levels.Levels for the options of the verb. Raises LevelError and ValueError."""
-    diameter = options.diameter if options.diameter is not None else SUN_DIAMETER_DEG if options.flux else 0.0
+    diameter = diameter_of_source(measured, options)
     found = beam.fit(measured, diameter)
     scale = found.floor
     if measured.of_source:
@@ -112,13 +125,17 @@ def parameters(found):
 
 
 def check_options(options):
-    """Raise ValueError for an option out of its range, and for a flux without a frequency."""
+    """Raise ValueError for an option out of its range, for a flux without a frequency, and for an option without
+    effect."""
     for name, (low, high, unit) in OPTION_RANGES.items():
         value = getattr(options, name)
         if value is not None and not low <= value <= high:
             raise ValueError(f'--{name} {value:g}: must be {low:g} to {high:g} {unit}')
     if (options.flux is None) != (options.frequency is None):
         raise ValueError('--flux and --frequency: G/T needs both')
+    for name, other in (('attenuation', 'flux'), ('bandwidth', 'bag'), ('elevation', 'levels')):
+        if getattr(options, name) is not None and getattr(options, other) is None:
+            raise ValueError(f'--{name}: has no effect without --{other}')
 
 
 def main(options):
