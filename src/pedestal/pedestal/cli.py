@@ -70,6 +70,8 @@ def main(args: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         print(stop.STOP_MESSAGE, file=sys.stderr)
         return stop.STOP_EXIT_CODE
+    finally:
+        stop.ignore_at_exit()
 
 
 class Parser(argparse.ArgumentParser):

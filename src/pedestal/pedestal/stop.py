@@ -4,6 +4,7 @@ The command line imports this module first, because the import of the rest takes
 import ends the process at once, with the usual message. Another program that imports this module keeps its own
 handlers of the signals.
 """
+import atexit
 import os
 import signal
 import sys
@@ -14,7 +15,7 @@ STOP_MESSAGE, STOP_EXIT_CODE = 'pedestal: stopped', 130
 """Message on stderr and exit code of a stopped process; 130 is 128 + number of SIGINT, the convention of shells."""
 
 
-def on_stop(handler: Callable[[int, types.FrameType | None], object]) -> None:
+def on_stop(handler: Callable[[int, types.FrameType | None], object] | signal.Handlers) -> None:
     """Set the handler of the three signals. A signal that the parent process ignores remains ignored."""
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         if signal.getsignal(number) is not signal.SIG_IGN:
@@ -22,11 +23,26 @@ def on_stop(handler: Callable[[int, types.FrameType | None], object]) -> None:
 
 
 def interrupt_on_stop() -> None:
-    """Let the three signals raise KeyboardInterrupt, again after 20 ms if Python had to ignore it."""
+    """Let the three signals raise KeyboardInterrupt, after 20 ms if Python would ignore it now."""
     from pedestal_common import ignored_stop
-    on_stop(signal.default_int_handler)
-    signal.signal(signal.SIGALRM, signal.default_int_handler)
+
+    def interrupt(_number: int, frame: types.FrameType | None) -> None:
+        ignored_stop.raise_stop(KeyboardInterrupt, frame)
+    on_stop(interrupt)
+    signal.signal(signal.SIGALRM, interrupt)
     ignored_stop.retry(KeyboardInterrupt)
+
+
+def ignore_at_exit() -> None:
+    """Let signals have no effect from the first exit function of Python on. At its end Python restores their default
+    action, which would kill a process that has done its work."""
+    atexit.unregister(_ignore)
+    atexit.register(_ignore)
+
+
+def _ignore() -> None:
+    signal.setitimer(signal.ITIMER_REAL, 0.0)
+    on_stop(signal.SIG_IGN)
 
 
 def _end_at_once(_number: int, _frame: types.FrameType | None) -> None:

@@ -43,6 +43,15 @@ def test_a_track_that_rises_and_sets_within_the_run_says_so(tmp_path):
     assert rises.startswith('the target rises after 5.') and sets.startswith('the target sets after 15.0')
 
 
+def test_a_run_that_is_longer_than_a_track_states_its_end(tmp_path):
+    path = tmp_path / 'a.csv'
+    path.write_text('t,az,el\n' + ''.join(f'{k},{120 + k},{20 + k}\n' for k in range(21)))
+    changes = [f'tracking_receiver.target.track_file.path={path}']
+    *_, ends = Plan(scenario.load('track_file', changes, duration=30.0)).announced()
+    assert ends == 'the track of the target ends after 20.0 s: nothing can be tracked after'
+    assert not any('ends' in line for line in Plan(scenario.load('track_file', changes)).announced())
+
+
 @pytest.mark.parametrize(('given', 'held', 'line'), (
     (('acu.azimuth.limits.high=6.2832',), {'azimuth.limits.high': 1.5 * math.pi},
      'acu.azimuth.limits.high = 6.2832 rad is wider than the travel of the drive: adu.azimuth.limits.upper = 4.71239 '

@@ -1,29 +1,47 @@
-"""Second attempt of a signal to stop a process after Python had to ignore the exception of the first.
+"""Stop of a process by an exception in the handler of a signal, also where Python would ignore the exception.
 
-The handler of a signal raises an exception that ends the work of the process. Python ignores every exception in a
-destructor, and in a callback of a weak reference or of a C library. The work would go on, with a traceback on stderr.
-Numba runs many such destructors while it compiles.
+Python ignores every exception in a destructor, and in a callback of a weak reference or of a C library. The work would
+go on, with a traceback on stderr. Numba runs many such destructors and callbacks while it compiles. Therefore a timer
+sends SIGALRM a little later, and the handler of SIGALRM raises the exception again.
 """
 import signal
 import sys
+import types
 
 STOP_RETRY_S = 0.02
 """Time after which SIGALRM tries again to stop the process [s]."""
 
+_HOOKS = '_raw_object_cache_getbuffer', '_raw_object_cache_notify'
+"""Functions of llvmlite that LLVM calls before and after it makes machine code. An exception in these functions would
+be ignored and would lose the code, so that the law could not be loaded."""
 
-def stop_later() -> None:
-    """Start a timer that sends SIGALRM to this process."""
-    signal.setitimer(signal.ITIMER_REAL, STOP_RETRY_S)
+
+def raise_stop(stop: type[BaseException], frame: types.FrameType | None) -> None:
+    """Raise the exception `stop`, or raise it a little later if LLVM makes machine code now.
+
+    frame: second argument of the handler of a signal.
+    """
+    while frame is not None:
+        if frame.f_code.co_name in _HOOKS:
+            _stop_later()
+            return
+        frame = frame.f_back
+    raise stop
 
 
 def retry(stop: type[BaseException]) -> None:
-    """Call `stop_later` whenever Python ignores the exception `stop`. The handler of SIGALRM must raise it again.
+    """Let SIGALRM follow whenever Python ignores the exception `stop`. The handler of SIGALRM must raise it again.
 
     Any other ignored exception is reported as Python does.
     """
     def on_unraisable(unraisable: 'sys.UnraisableHookArgs') -> None:
         if issubclass(unraisable.exc_type, stop):
-            stop_later()
+            _stop_later()
         else:
             sys.__unraisablehook__(unraisable)
     sys.unraisablehook = on_unraisable
+
+
+def _stop_later() -> None:
+    """Start a timer that sends SIGALRM to this process."""
+    signal.setitimer(signal.ITIMER_REAL, STOP_RETRY_S)

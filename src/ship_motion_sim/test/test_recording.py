@@ -134,6 +134,13 @@ def test_repeated_rows_are_passed_over_and_counted(path, tmp_path):
                     'before')
 
 
+def test_a_run_that_is_longer_than_the_record_states_its_end(path):
+    ship = ShipParameters(motion='recorded', recorded=RecordedParameters(path=str(path), start=10.0))
+    _, line = motion.summary(ship, 60.0)
+    assert line == 'the recorded motion of the ship ends after 50 s of the run; the deck is at rest after it'
+    assert len(motion.summary(ship, 50.0)) == 1
+
+
 HEAD = 'time_s,roll_deg,pitch_deg,heading_deg\n'
 
 

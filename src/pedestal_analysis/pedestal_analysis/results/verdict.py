@@ -1,8 +1,8 @@
 """Verdict on a run: one sentence on what happened, from the recording alone.
 
 A run has failed in three cases: its drive tripped, a command of the scenario was refused, or a commanded mode should
-have tracked the target and never did. A run has not failed if no commanded mode tracks, or if the run ended on the way
-to the target, before the receiver could lock.
+have tracked the target and never did. Autotrack on a side lobe never tracked the target. A run has not failed if no
+commanded mode tracks, or if the run ended on the way to the target, before the receiver could lock.
 """
 import math
 import typing
@@ -41,6 +41,12 @@ control unit must enter autotrack within `lock_count` steps plus this time.
 APPROACH_WINDOW_S, MIN_APPROACH = 0.5, 0.1
 """A beam is on the way to the target if its distance shrank by more than MIN_APPROACH beamwidths in the last
 APPROACH_WINDOW_S seconds."""
+MIN_SWING_RAD = math.radians(1.0)
+"""Least decrease and increase of the distance by which a beam has come near the target and gone away again [rad]."""
+
+MIN_OFF_TARGET_S, MIN_REASON_SHARE = 0.5, 0.1
+"""Time more than a beamwidth off the target [s], and share of the run outside autotrack after its end, that a verdict
+on a tracked run states."""
 
 
 class Verdict(typing.NamedTuple):
@@ -120,10 +126,10 @@ def _tracking(bag, run) -> tuple[str, str]:
     shares = {mode: 100.0 * float(np.mean(run.mode == mode)) for mode in modes.MODES if (run.mode == mode).any()}
     distance = np.hypot(run.cross_elevation, run.elevation_error)
     near = distance < 0.5 * run.beamwidth
+    off = distance > run.beamwidth
     by_level = run.mode == 'steptrack'
     if 'autotrack' in shares:
-        since = '' if math.isnan(run.lock_time) else f', first lock at {run.lock_time:.4g} s'
-        return TRACKED, f'tracked {run.tracked_percent:.3g} % of {run.t[-1] - run.t[0]:.4g} s{since}'
+        return _autotracked(bag, run, near, off, distance)
     if by_level.any() and (near[by_level].any() or not math.isfinite(run.beamwidth)):
         return TRACKED, f'tracked by its level for {shares["steptrack"]:.3g} % of {run.t[-1] - run.t[0]:.4g} s'
     if not any(_leads_to_tracking(mode, acu.get('tracker.handover', True)) for mode in wanted):
@@ -131,6 +137,29 @@ def _tracking(bag, run) -> tuple[str, str]:
     if not any(modes.MODE_ROWS[modes.MODES.index(mode)].follows for mode in shares):
         return _never_began(bag, acu.get('initial_mode', 'standby'))
     return _never_tracked(bag, run, distance, near, acu)
+
+
+def _autotracked(bag, run, near, off, distance):
+    """Return (word, sentence) on a run with autotrack.
+
+    near, off (n,): True with the target within half a beamwidth, beyond a beamwidth; distance (n,): angle from beam
+    to target [rad].
+    """
+    auto = run.mode == 'autotrack'
+    off_s, wide = np.sum(auto & off) * run.period, np.max(distance[auto & off], initial=0.0) * DEG_PER_RAD
+    if off_s > MIN_OFF_TARGET_S and not near[auto].any():
+        return NOT_TRACKED, (f'tracked 0 %: autotrack for {np.sum(auto) * run.period:.3g} s, always off the target, by '
+                             f'up to {wide:.3g} deg: a side lobe, or another signal')
+    text = f'tracked {run.tracked_percent:.3g} % of {run.t[-1] - run.t[0]:.4g} s'
+    if not math.isnan(run.lock_time):
+        text += f', first lock at {run.lock_time:.4g} s'
+    if off_s > MIN_OFF_TARGET_S:
+        text += f'; {off_s:.3g} s of it more than a beamwidth off the target, by up to {wide:.3g} deg'
+    ended = run.t[auto][-1]
+    reason = bag.last_values(f'{bag.beam}acu').get('refused autotrack', '')
+    if reason and run.t[-1] - ended > MIN_REASON_SHARE * (run.t[-1] - run.t[0]):
+        text += f'; no autotrack from {ended:.4g} s on: {reason}'
+    return TRACKED, text
 
 
 def _without_target(shares, acu):
@@ -196,7 +225,15 @@ def _next_command(acu, end):
 
 
 def _approaches(run, distance):
-    """Return True if the beam approaches the target at the end; distance (n,) [rad]."""
+    """Return True if the beam approaches the target at the end, and has not come near and gone away again before.
+
+    distance (n,): angle from beam to target [rad].
+    """
     window = round(APPROACH_WINDOW_S / run.period)
-    return (distance.size > window and run.mode[-1] not in ('', 'standby')
-            and distance[-1 - window] - distance[-1] > MIN_APPROACH * run.beamwidth)
+    if not (distance.size > window and run.mode[-1] not in ('', 'standby')
+            and distance[-1 - window] - distance[-1] > MIN_APPROACH * run.beamwidth):
+        return False
+    known = distance[np.isfinite(distance) & (run.mode != 'standby')]
+    swing = max(MIN_SWING_RAD, run.beamwidth)
+    before, after = np.maximum.accumulate(known), np.maximum.accumulate(known[::-1])[::-1]
+    return not ((before - known > swing) & (after - known > swing)).any()

@@ -84,7 +84,7 @@ class Plan:
         """Lines on the file of a recorded ship motion (motion.summary); () without such a file or without a ship."""
         if 'ship_motion' not in self.scenario.nodes:
             return ()
-        return motion.summary(self.scenario.node_parameters('ship_motion').ship)
+        return motion.summary(self.scenario.node_parameters('ship_motion').ship, self.scenario.header.duration)
 
     def announced(self):
         """Return the lines that a user reads before the run: the notes of the scenario, the file of the ship motion,
@@ -109,8 +109,8 @@ class Plan:
 
 
 def _sky(built, kind, duration):
-    """Return lines on a Target `built`: its rise and set if they are within the run, and its highest place if it has a
-    date and no summary. (The summary of a recorded flight already states the highest place.)
+    """Return lines on a Target `built`: its rise and its set or end if they are within the run, and its highest place
+    if it has a date and no summary. (The summary of a recorded flight already states the highest place.)
 
     kind: name of its kind, as in target.kind; duration: length of the run [s].
     """
@@ -130,7 +130,9 @@ def _sky(built, kind, duration):
                f'{when(top)}',) if begin and not built.summary else ()
     rises = (f'the {name} rises {when(up[0])}: nothing can be tracked before',) if up[0] > known[0] else ()
     sets = (f'the {name} sets {when(up[-1])}: nothing can be tracked after',) if up[-1] < known[-1] else ()
-    return (*highest, *rises, *sets)
+    ends = (f'the track of the {name} ends {when(known[-1])}: nothing can be tracked after',
+            ) if not sets and known[-1] < times.size - 1 else ()
+    return (*highest, *rises, *sets, *ends)
 
 
 def program_message(times, angles):

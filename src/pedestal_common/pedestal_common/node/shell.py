@@ -69,23 +69,12 @@ _compiling: list[bool] = []
 STOP_SIGNALS = signal.SIGINT, signal.SIGTERM, signal.SIGALRM
 """Signals that stop a node; the last is sent only by the node itself, see ignored_stop."""
 
-_HOOKS = '_raw_object_cache_getbuffer', '_raw_object_cache_notify'
-"""Functions of llvmlite that LLVM calls before and after it makes machine code; it ignores exceptions from them."""
-
 
 def _on_signal(_number, frame):
     """Note the signal, so that `main` stops the node. Raise Stopped if the process compiles laws."""
     _stop.append(True)
-    if not _compiling:
-        return
-    while frame is not None:
-        if frame.f_code.co_name in _HOOKS:
-            # While machine code is made, Python runs its signal handlers only in these functions. An exception there
-            # would be ignored, and the code would be lost.
-            ignored_stop.stop_later()
-            return
-        frame = frame.f_back
-    raise Stopped
+    if _compiling:
+        ignored_stop.raise_stop(Stopped, frame)
 
 
 def stop_on_signals():

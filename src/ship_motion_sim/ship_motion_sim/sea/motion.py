@@ -63,13 +63,17 @@ def constants(params: ShipParameters) -> np.ndarray:
     return record
 
 
-def summary(params: ShipParameters) -> tuple[str, ...]:
+def summary(params: ShipParameters, duration: float = math.inf) -> tuple[str, ...]:
     """Return a line on the file of the motion, with the columns that were taken; () without a file.
 
-    Raises csv_table.TableError for a file that cannot be used.
+    duration: of the run [s]; a second line states that a recorded motion ends before. Raises csv_table.TableError for
+    a file that cannot be used.
     """
     if params.motion == 'recorded':
-        return (recording.read(params.recorded).description,)
+        times, _, description = recording.read(params.recorded)
+        ends = (f'the recorded motion of the ship ends after {times[-1]:.4g} s of the run; the deck is at rest after '
+                f'it',) if times[-1] < duration < math.inf else ()
+        return (description, *ends)
     return (waves.measured(params).description,) if params.spectrum == 'file' else ()
 
 
