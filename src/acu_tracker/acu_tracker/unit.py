@@ -396,7 +396,9 @@ class Acu(Unit):
         changing = pointing.report(state['before'], begins, begins + duration)
         self.pointing_reports = [*self.pointing_reports[:int(state['report'])], changing, pointing.report()]
         self.pointing, self.refused_model = pointing, ''
-        return Reply(True, f'pointing model {changing.title}; it is in force in {duration:.1f} s')
+        unchecked = pointing.unchecked(self.parameters.antenna)
+        return Reply(True, f'pointing model {changing.title}; it is in force in {duration:.1f} s'
+                     + (f'; {unchecked}' if unchecked else ''))
 
     def take_text(self, topic, text):
         """Take the text of a text topic; the text of adu/state is also kept for the diagnosis."""
@@ -441,6 +443,8 @@ class Acu(Unit):
             self.update_tables()
             return Reply(True, 'program track shifted by {:g} s, {:g} and {:g} rad'.format(*self.offset))
         if verb == 'pointing':
+            if not command.arguments:
+                raise ValueError('pointing: no term is given; p1=0 requests a model whose terms are all 0')
             return self.take_model(arguments)
         if verb == 'elements':
             self.take_elements(*arguments.values())

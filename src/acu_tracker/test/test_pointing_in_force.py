@@ -243,6 +243,15 @@ def test_the_unit_reports_the_model_in_force():
         done.terms)
 
 
+def test_an_antenna_without_a_name_does_not_check_the_model():
+    unit = Acu(AcuParameters(), ())
+    stepped(unit)
+    granted, text = unit.command(model_command(p1=0.1, antenna='south'))
+    assert granted and text.endswith("antenna 'south' of the pointing model is not checked, because the parameter "
+                                     'antenna is empty')
+    assert 'checked' not in unit.command(model_command(p1=0.2))[1]
+
+
 def test_a_model_is_replaced_while_it_changes():
     unit = Acu(AcuParameters(), ())
     assert stepped(unit) == [None] and 'pointing_model' not in dict(unit.diagnose().values)
@@ -250,7 +259,9 @@ def test_a_model_is_replaced_while_it_changes():
     stepped(unit, 200)
     now = unit.parts['state']['tracking']['pointing']['model']['terms'].copy()
     assert 0.0 < now[0] < math.radians(1.0)
-    assert unit.command(model_command())[0]
+    granted, text = unit.command(model_command())
+    assert not granted and 'no term is given; p1=0 requests a model whose terms are all 0' in text
+    assert unit.command(model_command(p1=0.0))[0]
     begun, done = map(pointing_report.read, stepped(unit, 1000))
     assert begun.before == pytest.approx(pointing_report.in_degrees(now)) and begun.terms == done.terms == {}
     assert unit.parts['state']['tracking']['pointing']['model']['exact'] == 1

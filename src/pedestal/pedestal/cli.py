@@ -92,6 +92,19 @@ class Parser(argparse.ArgumentParser):
         return super().parse_known_args(joined, namespace)
 
 
+    def parse_args(self, args=None, namespace=None):  # type: ignore[no-untyped-def,override]
+        """Return the namespace. Arguments NAME=VALUE of a command may also stand behind its options, where the parser
+        of argparse does not accept them."""
+        namespace, unknown = self.parse_known_args(args, namespace)
+        more = [word for word in unknown if '=' in word and not word.startswith('-')]
+        if more and hasattr(namespace, 'given'):
+            namespace.given = [*namespace.given, *more]
+            unknown = [word for word in unknown if word not in more]
+        if unknown:
+            self.error(f'unrecognized arguments: {" ".join(unknown)}')
+        return namespace
+
+
 def _parser(named: str = '') -> argparse.ArgumentParser:
     """Return the parser of the command line with all verbs. named: the only verb that gets its arguments, because the
     arguments of `run` import the code of a graph; '' for all."""

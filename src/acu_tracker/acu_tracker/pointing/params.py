@@ -80,6 +80,13 @@ class PointingParameters(Parameters):
             raise ParameterError(f'pointing.antenna = {self.antenna!r}: must be the parameter antenna, {antenna!r}: '
                                  'the model belongs to another antenna')
 
+    def unchecked(self, antenna):
+        """Return a text that the antenna of the model has not been checked, because this antenna has no name; ''
+        otherwise. antenna: name of this antenna."""
+        if not self.antenna or antenna:
+            return ''
+        return f'antenna {self.antenna!r} of the pointing model is not checked, because the parameter antenna is empty'
+
     def check_date(self, now):
         """Raise ParameterError for a model of a later date than `now`, a datetime (UTC); None: unknown."""
         if now is not None and self.made is not None and self.made > now:

@@ -148,7 +148,7 @@ def _autotracked(bag, run, near, off, distance):
     auto = run.mode == 'autotrack'
     off_s, wide = np.sum(auto & off) * run.period, np.max(distance[auto & off], initial=0.0) * DEG_PER_RAD
     if off_s > MIN_OFF_TARGET_S and not near[auto].any():
-        return NOT_TRACKED, (f'tracked 0 %: autotrack for {np.sum(auto) * run.period:.3g} s, always off the target, by '
+        return NOT_TRACKED, (f'tracked 0 %: autotrack for {np.sum(auto) * run.period:.3g} s, always off the target by '
                              f'up to {wide:.3g} deg: a side lobe, or another signal')
     text = f'tracked {run.tracked_percent:.3g} % of {run.t[-1] - run.t[0]:.4g} s'
     if not math.isnan(run.lock_time):

@@ -70,7 +70,10 @@ def main(options: argparse.Namespace) -> int:
         return 0
     now = datetime.datetime.now(datetime.timezone.utc).replace(tzinfo=None)
     for prefix in chosen.prefixes:
-        chosen.node_parameters(f'{prefix}acu').pointing.check_date(now)
+        acu = chosen.node_parameters(f'{prefix}acu')
+        acu.pointing.check_date(now)
+        if unchecked := acu.pointing.unchecked(acu.antenna):
+            print(unchecked)
     bag = graph.new_bag(options.bag, chosen.name)
     console.check_json(options.json)
     servers = operator_servers.selected(options, chosen.header)

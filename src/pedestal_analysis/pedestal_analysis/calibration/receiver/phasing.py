@@ -121,8 +121,9 @@ def summary_of(found, faults):
     """Return the lines on the faults, sentences, on the null of the errors and on the verification of a calibration
     with the fields `null`, `before` and `after`."""
     lines = [f'FAULT {sentence}' for sentence in faults]
-    lines.append(f'null of the errors                    cross-elevation {found.null[0]:.3f}, elevation '
-                 f'{found.null[1]:.3f} beamwidths from the assumed beacon')
+    x, y = np.round(found.null, 3) + 0.0    # without the sign of a zero
+    lines.append(f'null of the errors                    cross-elevation {x:.3f}, elevation {y:.3f} beamwidths from '
+                 'the assumed beacon')
     unit = f'{offsets.CIRCLE_BEAMWIDTHS:g} beamwidths'
     lines.append(f'error on the circle of {unit}   {100.0 * found.before.error:.2f} % before, '
                  f'{100.0 * found.after.error:.2f} % after (must be {ERROR_TARGET} %)')
