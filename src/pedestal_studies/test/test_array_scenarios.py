@@ -46,8 +46,8 @@ def test_a_beam_that_only_leads_is_seen_at_the_beginning_of_its_intervals():
     nothing, on = np.zeros_like(t), np.ones_like(t, bool)
     mode, noise = np.full(t.size, 'autotrack'), 1e-4 * (-1.0)**np.arange(600).reshape(300, 2)
     unknown = np.full_like(beam, np.nan)
-    for_all = (t, *beam.T, unknown, nothing, nothing, unknown, 0.5 * begun + noise, nothing, noise, beam, beam,
-               nothing, mode, on, on, math.radians(1.0))
+    for_all = (t, *beam.T, unknown, nothing, nothing, unknown, 0.5 * begun + noise, nothing, noise, *4 * [beam],
+               nothing, mode, on, on, math.radians(1.0), np.zeros(2))
     values = results.measured(results.of_tracking(tracking.Tracking(*for_all, begun=begun)))
     assert values['pointing_max_deg'][0] == pytest.approx(math.degrees(0.005 * math.cos(0.7)), rel=1e-4)
     assert values['cross_elevation_rms_deg'][0] == pytest.approx(values['cross_elevation_max_deg'][0], rel=1e-6)

@@ -150,9 +150,7 @@ def angle(data, zoomed=False):
                              _continuous(run.target_earth[:, 1])))
     window = _slowest(run, truth) if zoomed else None
     for i, axes in enumerate(panels[:, 0]):
-        beam = _continuous(run.beam_earth[:, i], truth[:, i])
-        scale = np.cos(run.beam_earth[:, 1] + run.filtered[:, 1]) if i == 0 else 1.0
-        filtered = beam + np.degrees(run.filtered[:, i] / scale)
+        filtered = _continuous(run.estimate_earth[:, i], truth[:, i])
         measured = _continuous(data.raw_angles[:, i], truth[:, i])
         draw_line(axes, run.t, measured, window, color=RAW_COLOUR, linewidth=0.8 if zoomed else 2.5,
                   label='measured, before the filter')
@@ -403,8 +401,8 @@ FIGURES = (
     Spec('pointing', 'True pointing error', 'True angle from the beam axis to the target on both axes, and its size '
          'over the whole run. The background shows the mode of the ACU.', ('truth',), pointing, timed=True),
     Spec('error', 'Error before and after the filter', 'The receiver error (grey) changes '
-         'from sample to sample. The position loop follows the filtered line of sight, here seen from the true beam '
-         '(blue). The loop itself uses the encoders and, on a ship, the attitude of the INS.',
+         'from sample to sample. The position loop follows the filtered line of sight (blue): the true pointing '
+         'error plus the error of the filter. Slow errors of encoders and INS are no error of the filter.',
          ('truth', 'lock'), error, timed=True, paper=7),
     Spec('error_zoom', 'Error, zoomed',
          f'The middle {ZOOM_SPAN_S:g} s of the evaluated part. The position loop holds the filtered error (blue) near '

@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from pedestal_analysis.results import results, tracking
+from pedestal_analysis.results import results, sensor_frame, tracking
 from pedestal_analysis.results.results import Result
 from pedestal_analysis.results.tracking import DEG_PER_RAD, known_rms, largest
 from pedestal_common.graph.topics import AXES
@@ -106,19 +106,20 @@ class TruthComparison:
 
     @functools.cached_property
     def error(self):
-        """Estimate minus truth (k, 2) [rad]: cross-elevation, elevation."""
-        return self.run.filtered[self.evaluated] - self.true
+        """Estimate minus its truth (k, 2) [rad]: cross-elevation, elevation."""
+        return self.run.estimate_error[self.evaluated]
 
     @property
     def noise(self):
-        """Rms difference between receiver error and true pointing error [rad]."""
-        return known_rms(self.run.measured[self.evaluated] - self.true)
+        """Rms difference between receiver error and true pointing error minus boresight offset [rad]."""
+        return known_rms(self.run.measured[self.evaluated] - (self.true - self.run.boresight))
 
     @functools.cached_property
     def motion(self):
         """(lag [s] of the estimate behind the true direction, rms error of its rate [rad/s]), in earth angles.
 
         The lag is the least-squares fit of the error e of the angle to the true rate w: lag = - sum(e w) / sum(w w).
+        The error e is against the truth in the frame of the sensors.
         """
         if self.evaluated.sum() < 3:
             return math.nan, math.nan
@@ -130,7 +131,7 @@ class TruthComparison:
         truth = np.column_stack((np.unwrap(self.run.target_earth[:, 0]), self.run.target_earth[:, 1]))
         scale = np.column_stack((np.cos(truth[:, 1]), np.ones(t.size)))
         true_rate = np.gradient(truth, t, axis=0) * scale
-        error = ((angle - truth + math.pi) % (2.0 * math.pi) - math.pi) * scale
+        error = ((angle - self.run.sensor_truth + math.pi) % (2.0 * math.pi) - math.pi) * scale
         known = self.evaluated & np.isfinite(error).all(axis=1) & np.isfinite(true_rate).all(axis=1)
         e, w = error[known], true_rate[known]
         moving = np.sum(w * w)
@@ -147,19 +148,21 @@ COMPARISON_RESULTS = (
     Result('recorded_pointing_rms_deg', 'deg', 'truth', lambda acu: known_rms(acu.true) * DEG_PER_RAD,
            'Rms of the true pointing error of the recorded antenna, both axes together.'),
     Result('estimate_error_rms_deg', 'deg', 'truth', lambda acu: known_rms(acu.error) * DEG_PER_RAD,
-           'Rms of estimate minus truth, both axes together.'),
+           f'Rms of estimate minus truth, both axes together. {sensor_frame.DEFINITION}'),
     Result('estimate_error_cross_elevation_rms_deg', 'deg', 'truth',
-           lambda acu: known_rms(acu.error[:, 0]) * DEG_PER_RAD, 'Rms of estimate minus truth in cross-elevation.'),
+           lambda acu: known_rms(acu.error[:, 0]) * DEG_PER_RAD,
+           f'Rms of estimate minus truth in cross-elevation. {sensor_frame.DEFINITION}'),
     Result('estimate_error_elevation_rms_deg', 'deg', 'truth', lambda acu: known_rms(acu.error[:, 1]) * DEG_PER_RAD,
-           'Rms of estimate minus truth in elevation.'),
+           f'Rms of estimate minus truth in elevation. {sensor_frame.DEFINITION}'),
     Result('estimate_error_max_deg', 'deg', 'truth', lambda acu: largest(acu.error) * DEG_PER_RAD,
-           'Largest absolute value of estimate minus truth on either axis.'),
+           f'Largest absolute value of estimate minus truth on either axis. {sensor_frame.DEFINITION}'),
     Result('single_sample_noise_deg', 'deg', 'truth', lambda acu: acu.noise * DEG_PER_RAD,
-           'Rms of the difference between receiver error and true pointing error, both axes together.'),
+           'Rms of the difference between receiver error and true pointing error minus boresight offset, both axes '
+           'together.'),
     Result('noise_reduction', '-', 'truth', lambda acu: acu.noise / known_rms(acu.error),
-           'Noise of one receiver sample, divided by the error of the estimate.'),
+           'Ratio of single_sample_noise_deg to estimate_error_rms_deg.'),
     Result('estimate_lag_s', 's', 'truth', lambda acu: acu.motion[0],
-           'Lag of the estimate behind the true direction.'),
+           f'Lag of the estimate behind the true direction. {sensor_frame.DEFINITION}'),
     Result('estimate_rate_error_rms_deg_s', 'deg/s', 'truth', lambda acu: acu.motion[1] * DEG_PER_RAD,
            'Rms of estimated rate minus true rate, both axes together.'),
     Result('estimate_rate_noise_deg_s', 'deg/s', 'acu', lambda acu: acu.ripple(acu.estimate) * DEG_PER_RAD,

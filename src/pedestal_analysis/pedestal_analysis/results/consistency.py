@@ -7,10 +7,8 @@ degree of freedom for each measured number. The NEES of angle and rate has two d
 that the stated covariance is too small (the filter is too sure). Smaller values mean that it is too large (the filter
 is too careful).
 
-The filter estimates the target in the frame of its sensors. The slow errors of INS, encoders and boresight turn this
-frame, and the measurements cannot show these errors. Because the antenna points in the same frame, the slow errors are
-no error of the filter. The truth for the NEES is therefore the direction that sensors with these slow errors, and
-without noise, would measure.
+The filter estimates the target in the frame of its sensors, so the truth for the NEES is that of the module
+sensor_frame.
 """
 import dataclasses
 import functools
@@ -37,12 +35,6 @@ NOTABLE_DEVIATION = 0.1
 
 The mean must also lie outside its band. Because the band of a run of minutes is narrower than the accuracy of any
 model, the band alone would mark every filter.
-"""
-
-SLOW_ERROR_TIME_S = 1.0
-"""Time over which the errors of INS and encoders are averaged to find their slow part [s].
-
-The filter follows the slow errors. The faster errors are noise, which the filter must expect.
 """
 
 FILTER_NUMBERS = ('innovation', 'rate_innovation', 'nis', 'sigma', 'rate_sigma', 'correlation')
@@ -106,62 +98,21 @@ def _rates(relative, velocity, attitude, ship_velocity, rates):
 
 
 @compiled
-def _offsets_of_sensors(deck, error, known_attitude, target, offsets):
-    """Fill offsets (n, 2) (cross-elevation, elevation) [rad]: the direction that the sensors measure without noise,
-    seen from the true direction.
+def _turn_rates(angles, turned, rates):
+    """Turn the rates (n, 2) [rad/s] of earth angles (n, 2) [rad] in place, to those at the `turned` angles (n, 2).
 
-    deck (n, 2): angles of the encoders [rad]; error (n, 2): true pointing error (cross-elevation, elevation) [rad];
-    known_attitude (n, 4): attitude of the INS; target (n, 2): true earth angles of the target [rad].
-    """
-    mat = np.empty((3, 3))
-    for k in range(len(deck)):
-        azimuth, elevation = line_of_sight.displaced(deck[k, 0], deck[k, 1], error[k, 0], error[k, 1])
-        x, y, z = line_of_sight.direction(azimuth, elevation)
-        q = known_attitude[k]
-        line_of_sight.rotation(q[0], q[1], q[2], q[3], mat)
-        east, north, up = line_of_sight.to_earth(mat, x, y, z)
-        # Earth angles turn clockwise like deck angles, so north, west, up take the place of FLU.
-        offsets[k, 0], offsets[k, 1] = line_of_sight.offsets(target[k, 0], target[k, 1], north, -east, up)
-
-
-@compiled
-def _turn_rows(angles, rates, offsets):
-    """Turn earth angles (n, 2) [rad] and their rates (n, 2) [rad/s] in place by offsets (n, 2) [rad].
-
-    An offset is (cross-elevation, elevation). Each row is turned as if its offset stood still. Because the filter
-    takes the changes of a slow error for a random walk of the angle, they are no rate.
+    Each row is turned as if its offset stood still. Because the filter takes the changes of a slow error for a random
+    walk of the angle, they are no rate.
     """
     for k in range(len(angles)):
-        azimuth, elevation = line_of_sight.displaced(angles[k, 0], angles[k, 1], offsets[k, 0], offsets[k, 1])
         sight = line_of_sight_of(Motion(AxisMotion(angles[k, 0], rates[k, 0], 0.0),
                                         AxisMotion(angles[k, 1], rates[k, 1], 0.0)))
-        u = Vector(*line_of_sight.earth_direction(azimuth, elevation))
+        u = Vector(*line_of_sight.earth_direction(turned[k, 0], turned[k, 1]))
         # The small turn has the rotation vector r = u_before x u_after, and adds r x du to the derivative du.
         more = cross(cross(sight.u, u), sight.du)
         du = Vector(sight.du.x + more.x, sight.du.y + more.y, sight.du.z + more.z)
         motion = earth_angles(LineOfSight(u, du, Vector(0.0, 0.0, 0.0)))
-        angles[k, 0], angles[k, 1] = azimuth, elevation
         rates[k, 0], rates[k, 1] = motion.azimuth.rate, motion.elevation.rate
-
-
-def _slow(values, period):
-    """Return values (n, 2) averaged over SLOW_ERROR_TIME_S about each row, without NaN; period of the rows [s]."""
-    window = np.ones(2 * round(0.5 * SLOW_ERROR_TIME_S / period) + 1)
-    known = np.isfinite(values)
-    with np.errstate(invalid='ignore'):
-        return np.column_stack([
-            np.convolve(np.where(there, column, 0.0), window, 'same') / np.convolve(there, window, 'same')
-            for column, there in zip(values.T, known.T)])
-
-
-def _boresight(bag):
-    """Return the boresight offset (2,) (cross-elevation, elevation) [rad] of the receiver, from the parameters of a
-    bag.
-
-    It is the direction in which the receiver measures no error, seen from the beam.
-    """
-    of_receiver = bag.configuration['parameters'].get('tracking_receiver', {})
-    return np.array([of_receiver.get(f'antenna.boresight_{axis}', 0.0) for axis in ('cross_elevation', 'elevation')])
 
 
 def read(bag, run):
@@ -178,21 +129,16 @@ def read(bag, run):
                                         for axis in topics.AXES])
     place, twist = ('position.x', 'position.y', 'position.z'), ('twist.linear.x', 'twist.linear.y', 'twist.linear.z')
     relative, velocity = at_steps('target/truth', place), at_steps('target/truth', twist)
-    attitude = known_attitude = np.tile(line_of_sight.ASHORE_ATTITUDE, (t.size, 1))
+    attitude = np.tile(line_of_sight.ASHORE_ATTITUDE, (t.size, 1))
     ship_velocity = np.zeros((t.size, 3))
     if 'ship/truth' in bag.topics:
         relative = relative - at_steps('ship/truth', place)
-        quaternion = [f'orientation.{letter}' for letter in 'xyzw']
-        attitude, known_attitude = at_steps('ship/truth', quaternion), at_steps('ship/imu/data', quaternion)
+        attitude = at_steps('ship/truth', [f'orientation.{letter}' for letter in 'xyzw'])
         ship_velocity = at_steps('ship/truth', twist)
     true_rate = np.empty((t.size, 2))
     _rates(relative, velocity, attitude, ship_velocity, true_rate)
-    offsets, seen = np.empty((t.size, 2)), run.target_earth.copy()
-    _offsets_of_sensors(np.column_stack((run.azimuth, run.elevation)),
-                        np.column_stack((run.cross_elevation, run.elevation_error)) - _boresight(bag), known_attitude,
-                        run.target_earth, offsets)
-    _turn_rows(seen, true_rate, _slow(offsets, run.period))
-    error = (estimate[:, :2] - seen + math.pi) % (2.0 * math.pi) - math.pi
+    _turn_rates(run.target_earth, run.sensor_truth, true_rate)
+    error = (estimate[:, :2] - run.sensor_truth + math.pi) % (2.0 * math.pi) - math.pi
     rate_error = estimate[:, 2:] - true_rate
     with np.errstate(all='ignore'):  # a filter without a stated covariance has no NEES
         a, b, correlation = error / numbers['sigma'], rate_error / numbers['rate_sigma'], numbers['correlation']

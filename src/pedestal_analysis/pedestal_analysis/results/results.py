@@ -19,7 +19,15 @@ import itertools
 import math
 import typing
 
-from pedestal_analysis.results import consistency, isolation, known_attitude, mode_pointing, pointing_loss, tracking
+from pedestal_analysis.results import (
+    consistency,
+    isolation,
+    known_attitude,
+    mode_pointing,
+    pointing_loss,
+    sensor_frame,
+    tracking,
+)
 from pedestal_analysis.results.tracking import DEG_PER_RAD, known_rms, largest
 
 
@@ -52,6 +60,9 @@ BRIEF_COUNT = 8
 MARK_MEANINGS = {'too sure': 'the errors are larger than it states',
                  'too careful': 'the errors are smaller than it states'}
 """{note of consistency.mark: its meaning for the filter}."""
+
+ENCODER_DEFINITION = 'This result includes all errors between dish and encoders, such as the bend.'
+"""Sentence in the definitions of the results by the encoders."""
 
 
 def _of_mode(mode):
@@ -93,30 +104,39 @@ RESULTS = (
     Result('elevation_max_deg', 'deg', 'tracking', lambda run: run.pointing(largest, 1),
            'Largest true pointing error in elevation, in settled autotrack.'),
     Result('encoder_pointing_rms_deg', 'deg', 'encoders', lambda run: known_rms(run.by_encoders),
-           'Rms of the pointing error computed from the encoders, both axes together, in settled autotrack.'),
+           'Rms of the pointing error computed from the encoders (true target minus encoders), both axes together, '
+           f'in settled autotrack. {ENCODER_DEFINITION}'),
     Result('encoder_pointing_max_deg', 'deg', 'encoders', lambda run: largest(run.by_encoders),
-           'Largest pointing error of either axis computed from the encoders, in settled autotrack.'),
+           'Largest pointing error of either axis computed from the encoders, in settled autotrack. '
+           f'{ENCODER_DEFINITION}'),
     Result('encoder_cross_elevation_rms_deg', 'deg', 'encoders', lambda run: known_rms(run.by_encoders[:, 0]),
-           'Rms of the pointing error in cross-elevation computed from the encoders, in settled autotrack.'),
+           'Rms of the pointing error in cross-elevation computed from the encoders, in settled autotrack. '
+           f'{ENCODER_DEFINITION}'),
     Result('encoder_elevation_rms_deg', 'deg', 'encoders', lambda run: known_rms(run.by_encoders[:, 1]),
-           'Rms of the pointing error in elevation computed from the encoders, in settled autotrack.'),
+           'Rms of the pointing error in elevation computed from the encoders, in settled autotrack. '
+           f'{ENCODER_DEFINITION}'),
     Result('encoder_cross_elevation_max_deg', 'deg', 'encoders', lambda run: largest(run.by_encoders[:, 0]),
-           'Largest pointing error in cross-elevation computed from the encoders, in settled autotrack.'),
+           'Largest pointing error in cross-elevation computed from the encoders, in settled autotrack. '
+           f'{ENCODER_DEFINITION}'),
     Result('encoder_elevation_max_deg', 'deg', 'encoders', lambda run: largest(run.by_encoders[:, 1]),
-           'Largest pointing error in elevation computed from the encoders, in settled autotrack.'),
+           'Largest pointing error in elevation computed from the encoders, in settled autotrack. '
+           f'{ENCODER_DEFINITION}'),
     Result('single_sample_noise_deg', 'deg', 'tracking', lambda run: known_rms(run.noise),
-           'Rms of the difference between receiver error and true pointing error, both axes together, in settled '
-           'autotrack.', "receiver's single-sample noise"),
+           'Rms of the difference between receiver error and true pointing error minus boresight offset, both axes '
+           'together, in settled autotrack.', "receiver's single-sample noise"),
     Result('pointing_to_noise', '-', 'tracking', lambda run: run.pointing(known_rms) / known_rms(run.noise),
            'Ratio of pointing_rms_deg to single_sample_noise_deg.', target='<= 0.4'),
     Result('noise_reduction_cross_elevation', '-', 'tracking',
            lambda run: known_rms(run.noise[:, 0]) / known_rms(run.filter_error[:, 0]),
-           'Noise of one receiver sample, divided by the error of the filtered line of sight, in cross-elevation.'),
+           'Noise of one receiver sample, divided by the error of the filtered line of sight, in cross-elevation. '
+           f'{sensor_frame.DEFINITION}'),
     Result('noise_reduction_elevation', '-', 'tracking',
            lambda run: known_rms(run.noise[:, 1]) / known_rms(run.filter_error[:, 1]),
-           'Noise of one receiver sample, divided by the error of the filtered line of sight, in elevation.'),
+           'Noise of one receiver sample, divided by the error of the filtered line of sight, in elevation. '
+           f'{sensor_frame.DEFINITION}'),
     Result('noise_reduction', '-', 'tracking', lambda run: known_rms(run.noise) / known_rms(run.filter_error),
-           'Noise of one receiver sample, divided by the error of the filtered line of sight, both axes together.'),
+           'Noise of one receiver sample, divided by the error of the filtered line of sight, both axes together. '
+           f'{sensor_frame.DEFINITION}'),
     Result('lock_time_s', 's', 'tracking', lambda run: run.lock_time,
            'Time of the first lock of the receiver.', 'first lock', brief=True),
     Result('autotrack_time_s', 's', 'tracking', lambda run: run.autotrack_time,

@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from pedestal_analysis.results import beam_direction
+from pedestal_analysis.results import beam_direction, sensor_frame
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry import line_of_sight
 from pedestal_common.graph.steps import NS_PER_SECOND
@@ -51,27 +51,46 @@ def _true_error(direction, relative, attitude, error):
 
 
 @compiled
-def _view_from_beam(beam, attitude, known_attitude, estimate, filtered, beam_earth):
-    """Fill filtered (n, 2): direction of the estimate minus the beam; and beam_earth (n, 2): earth angles of the beam.
+def _deck_direction(mat_ed, azimuth, elevation):
+    """Return the unit vector FLU of earth angles [rad] on a deck; mat_ed: rotation deck -> earth."""
+    east, north, up = line_of_sight.earth_direction(azimuth, elevation)
+    return line_of_sight.to_deck(mat_ed, east, north, up)
 
-    filtered                (cross-elevation, elevation) [rad]
+
+@compiled
+def _earth_angles(mat_ed, x, y, z):
+    """Return the earth angles [rad] of a vector FLU; mat_ed: rotation deck -> earth."""
+    east, north, up = line_of_sight.to_earth(mat_ed, x, y, z)
+    return line_of_sight.earth_angles(east, north, up)
+
+
+@compiled
+def _view_from_beam(beam, attitude, known_attitude, estimate, truth, error, beam_earth, estimate_earth):
+    """Fill error, beam_earth and estimate_earth (n, 2) [rad].
+
+    error                   estimate minus its truth (cross-elevation, elevation), seen from the beam
+    beam_earth              earth angles of the beam
+    estimate_earth          true earth angles of the estimate's direction on the deck
     beam (n, 2)             deck angles [rad]
     attitude (n, 4)         true attitude
     known_attitude (n, 4)   attitude that the INS reports
     estimate (n, 2)         earth angles [rad], computed with the attitude that the INS reports
+    truth (n, 2)            earth angles [rad] of the target in the frame of the sensors
     """
     mat_ed, known = np.empty((3, 3)), np.empty((3, 3))
     for k in range(len(beam)):
         azimuth, elevation = beam[k, 0], beam[k, 1]
         line_of_sight.rotation(attitude[k, 0], attitude[k, 1], attitude[k, 2], attitude[k, 3], mat_ed)
-        x, y, z = line_of_sight.direction(azimuth, elevation)
-        east, north, height = line_of_sight.to_earth(mat_ed, x, y, z)
-        beam_earth[k, 0], beam_earth[k, 1] = line_of_sight.earth_angles(east, north, height)
         line_of_sight.rotation(known_attitude[k, 0], known_attitude[k, 1], known_attitude[k, 2], known_attitude[k, 3],
                                known)
-        east, north, height = line_of_sight.earth_direction(estimate[k, 0], estimate[k, 1])
-        x, y, z = line_of_sight.to_deck(known, east, north, height)
-        filtered[k, 0], filtered[k, 1] = line_of_sight.offsets(azimuth, elevation, x, y, z)
+        x, y, z = line_of_sight.direction(azimuth, elevation)
+        beam_earth[k, 0], beam_earth[k, 1] = _earth_angles(mat_ed, x, y, z)
+        x, y, z = _deck_direction(known, truth[k, 0], truth[k, 1])
+        true_cross_elevation, true_elevation = line_of_sight.offsets(azimuth, elevation, x, y, z)
+        x, y, z = _deck_direction(known, estimate[k, 0], estimate[k, 1])
+        cross_elevation, up = line_of_sight.offsets(azimuth, elevation, x, y, z)
+        error[k, 0], error[k, 1] = cross_elevation - true_cross_elevation, up - true_elevation
+        estimate_earth[k, 0], estimate_earth[k, 1] = _earth_angles(mat_ed, x, y, z)
 
 
 @compiled
@@ -113,16 +132,19 @@ class Tracking:
     reference                       (n, 2) the same of the ACU's reference; NaN in standby or for an electronic beam
     cross_elevation,
     elevation_error                 (n,) true pointing error at the stamps: target minus direction of the beam
-    encoder_error                   (n, 2) target minus `azimuth`, `elevation`; NaN for an electronic beam, and for
-                                    a bag without adu/truth
+    encoder_error                   (n, 2) true target minus `azimuth`, `elevation`, with all errors of the encoders;
+                                    NaN for an electronic beam, and for a bag without adu/truth
     measured, cn0                   (n, 2) receiver error; (n,) C/N0 [dB-Hz]
-    filtered                        (n, 2) direction of the filter's estimate minus direction of the beam
+    estimate_error                  (n, 2) the filter's estimate minus `sensor_truth`, in the axes of the beam
     beam_earth, target_earth        (n, 2) earth angles of the beam and of the target
+    estimate_earth                  (n, 2) true earth angles of the direction on the deck that the filter states
+    sensor_truth                    (n, 2) earth angles of the target in the frame of the sensors, see sensor_frame
     range                           (n,) distance to the target [m]
     mode                            (n,) mode of the ACU as a text, '' if unknown
     tracking                        (n,) bool: the evaluated part of the run, which is settled autotrack
     since                           (n,) bool: all steps from the first evaluated step on, in any mode
     beamwidth                       half-power beamwidth, NaN if the bag does not state it
+    boresight                       (2,) boresight offset of the receiver (cross-elevation, elevation)
     begun                           (n, 2) true pointing error of an electronic beam at the beginning of the interval
                                     that ends at the stamp, else NaN
     """
@@ -135,14 +157,17 @@ class Tracking:
     encoder_error: np.ndarray
     measured: np.ndarray
     cn0: np.ndarray
-    filtered: np.ndarray
+    estimate_error: np.ndarray
     beam_earth: np.ndarray
     target_earth: np.ndarray
+    estimate_earth: np.ndarray
+    sensor_truth: np.ndarray
     range: np.ndarray
     mode: np.ndarray
     tracking: np.ndarray
     since: np.ndarray
     beamwidth: float
+    boresight: np.ndarray
     begun: np.ndarray
 
     @property
@@ -177,18 +202,24 @@ class Tracking:
 
     @functools.cached_property
     def noise(self):
-        """Receiver error minus true error (k, 2) [deg] over the evaluated part.
+        """Receiver error minus the error without noise (k, 2) [deg] over the evaluated part.
 
-        The receiver of an electronic beam measures the error in the middle of the interval between two steps. The true
-        error there is the mean of those at the beginning and at the end.
+        The error without noise is the true error minus the boresight offset. The receiver of an electronic beam
+        measures the error in the middle of the interval between two steps. The true error there is the mean of those
+        at the beginning and at the end.
         """
         true = 0.5 * (self.true + self.begun[self.tracking]) if self.electronic else self.true
-        return (self.measured[self.tracking] - true) * DEG_PER_RAD
+        return (self.measured[self.tracking] - (true - self.boresight)) * DEG_PER_RAD
+
+    @functools.cached_property
+    def filtered(self):
+        """Pointing error by the filter (n, 2) [rad]: true pointing error plus error of the estimate."""
+        return np.column_stack((self.cross_elevation, self.elevation_error)) + self.estimate_error
 
     @functools.cached_property
     def filter_error(self):
-        """Error of the filter, estimate minus true target (k, 2) [deg], over the evaluated part."""
-        return (self.filtered[self.tracking] - self.true) * DEG_PER_RAD
+        """Error of the filter, estimate minus its truth (k, 2) [deg], over the evaluated part."""
+        return self.estimate_error[self.tracking] * DEG_PER_RAD
 
     def pointing(self, measure, axis=slice(None)):
         """Return a statistic of the true pointing error over the evaluated part [deg].
@@ -346,29 +377,35 @@ def read(bag) -> Tracking:
         ship = at_steps('ship/truth', ('position.x', 'position.y', 'position.z'))
         attitude = at_steps('ship/truth', quaternion)
         known_attitude = of_equipment(bag, t, 'ship/imu/data', quaternion)
+        stamped = at_steps('ship/imu/data', quaternion)
         ship = ship + _lever_arm(bag, attitude)
     else:
         ship = np.zeros((t.size, 3))
-        attitude = known_attitude = np.tile(line_of_sight.ASHORE_ATTITUDE, (t.size, 1))
+        attitude = known_attitude = stamped = np.tile(line_of_sight.ASHORE_ATTITUDE, (t.size, 1))
     measured = of_equipment(bag, t, 'tracking_receiver/angle_error', ('x', 'y', 'z'))
     estimate = at_steps('acu/estimate', ('azimuth.position', 'elevation.position'))
-    error, encoder_error, filtered, beam_earth = np.full((4, t.size, 2), np.nan)
+    error, encoder_error, estimate_error, beam_earth, estimate_earth = np.full((5, t.size, 2), np.nan)
     velocity = at_steps('target/truth', ('twist.linear.x', 'twist.linear.y', 'twist.linear.z'))
     relative = _arriving(bag, target - ship, velocity)
     _true_error(beam, relative, attitude, error)
     if beam is not encoders and not bag.beams:
         _true_error(encoders, relative, attitude, encoder_error)
-    _view_from_beam(beam, attitude, known_attitude, estimate, filtered, beam_earth)
     target_earth = np.column_stack((np.arctan2(relative[:, 0], relative[:, 1]),
                                     np.arctan2(relative[:, 2], np.hypot(relative[:, 0], relative[:, 1]))))
+    # An attitude of the step itself has no age. An INS with stamps of its own has none of these.
+    boresight = sensor_frame.boresight(bag)
+    sensor_truth = sensor_frame.truth(t, encoders, error - boresight,
+                                      stamped if np.isfinite(stamped).any() else known_attitude, target_earth)
+    _view_from_beam(beam, attitude, known_attitude, estimate, sensor_truth, estimate_error, beam_earth, estimate_earth)
     mode = modes(bag, t)
     automatic = mode == 'autotrack'
     start = t[automatic][0] + HANDOVER_SETTLING_S if automatic.any() else math.inf
     reference = beam_direction.on_sky(bag, t, at_steps('acu/reference', ('azimuth.position', 'elevation.position')))
     reference[(mode == 'standby') | (mode == '') | (bag.beams > 0)] = np.nan
     return Tracking(t, encoders[:, 0], encoders[:, 1], reference, error[:, 0], error[:, 1], encoder_error,
-                    measured[:, :2], measured[:, 2], filtered, beam_earth, target_earth,
-                    np.linalg.norm(relative, axis=1), mode, automatic & (t >= start), t >= start, beamwidth(bag),
+                    measured[:, :2], measured[:, 2], estimate_error, beam_earth, target_earth, estimate_earth,
+                    sensor_truth, np.linalg.norm(relative, axis=1), mode, automatic & (t >= start), t >= start,
+                    beamwidth(bag), boresight,
                     interval_start_error(beam, error) if bag.beams else np.full_like(error, np.nan))
 
 
