@@ -29,7 +29,7 @@ CASES = {
     'a swing': ('ship_uav', 39.8, ('ship_motion.ship.motion=plain', 'ship_motion.ship.plain.roll_amplitude_deg=30',
                                    'ship_motion.ship.plain.roll_period=0.5'), 'never locked', 'the beam came within'),
     'a side lobe': ('sidelobe', 20.0, ('acu.acquisition.expected_dbhz=0',), 'never tracked',
-                    'always off the target, by up to 1.7 deg: a side lobe'),
+                    'always off the target by up to 1.7 deg: a side lobe'),
     'a reason': ('uav_flyby', 8.0, ('acu.commands=3 standby',), 'tracked', 'first lock at 0.19 s'),
     'too short': ('leo_pass', 0.5, (LOW_LEVEL,), 'ended on the way', 'before the receiver could lock'),
     'aligning': ('ship_align_and_track', 1.0, (), 'ended on the way', 'before mode program was entered: INS aligning'),
