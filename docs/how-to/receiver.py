@@ -40,8 +40,12 @@ class Receiver(Node):
             while True:
                 text = self.socket.recv(100)
         except BlockingIOError:
-            numbers = [float(part) for part in text.split()]
-            return numbers if len(numbers) == 3 else (math.nan, math.nan, 0.0)
+            pass
+        try:
+            cross_elevation, elevation, cn0 = map(float, text.split())
+        except ValueError:          # another datagram
+            return math.nan, math.nan, 0.0
+        return cross_elevation, elevation, cn0
 
 
 middleware.initialise()

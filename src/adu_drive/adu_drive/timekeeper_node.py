@@ -199,21 +199,25 @@ class Timekeeper(unit_node.UnitNode):
         The wall-clock time begins with the answers to step 0. Before these answers the nodes still discover each
         other.
         """
-        self.result = self._outcome(self.k - 1)
+        self.result = self._outcome(self.k - 1, self.k)
         self.await_acknowledged()
         self.finished = True
 
     def close(self):
         """End the node; in realtime, first keep the result of the run, see `_outcome`."""
         if not self.graph.lockstep:
-            self.result = self._outcome(self.made)
+            # Without graph.start the number of a step counts from midnight.
+            self.result = self._outcome(self.made, self.made + int(self.missed_steps))
         super().close()
 
-    def _outcome(self, made):
-        """Return the result of the run: {name: value}. made: number of steps made in the wall-clock time, from which
-        the realtime factor follows."""
+    def _outcome(self, made, steps):
+        """Return the result of the run: {name: value}.
+
+        made: number of steps made in the wall-clock time, from which the realtime factor follows; steps: number of the
+        steps of the run.
+        """
         wall = max(time.monotonic_ns() - self.begun, 1) * 1e-9
-        return {'steps': self.k, 'wall_s': wall, 'realtime_factor': made * self.parameters.period / wall,
+        return {'steps': steps, 'wall_s': wall, 'realtime_factor': made * self.parameters.period / wall,
                 'lost_steps': int(self.lost_steps), 'missed_steps': int(self.missed_steps),
                 'late_ticks': int(self.late_ticks)}
 

@@ -4,6 +4,7 @@ import math
 
 from adu_drive.params import RunParameters
 from pedestal_common.parameters import ParameterError, Parameters, choice, group, parameter, text
+from pedestal_hardware.lines import sources
 from pedestal_hardware.rotator.protocols import PROTOCOLS
 
 
@@ -48,6 +49,9 @@ class RotatorParameters(RunParameters):
     def check(self):
         """Raise ParameterError for a resolution that the protocol cannot send, or a silence before its time-out."""
         super().check()
+        if sources.place(self.url)[0] == 'udp':
+            raise ParameterError(f"url = '{self.url}': must be socket://HOST:PORT, or the path of a serial device "
+                                 'that begins with /')
         finest = PROTOCOLS[self.protocol].RESOLUTION
         if self.resolution and self.resolution < finest:
             raise ParameterError(f'resolution = {self.resolution:g} deg: must be 0, or at least {finest:g} deg, the '

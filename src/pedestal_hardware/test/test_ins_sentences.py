@@ -38,6 +38,8 @@ def test_other_sentences():
 @pytest.mark.parametrize('sent, kind, reason', [
     (b'$HEHDT,12.3,T*00\r\n', 'bad_checksum', 'checksum does not match'),
     (b'$HEHDT,12.3,T\r\n', 'bad_checksum', 'checksum missing'), (b'\xff\xfe', 'unreadable', 'no NMEA'),
+    (line('HEHDT,123.4,M'), 'unreadable', 'heading 123.4,M: must be a number and T'),
+    (line('HEHDT,123,4,T'), 'unreadable', 'heading 123,4,T: must be a number and T'),
     (b'hello', 'unreadable', 'no NMEA'), (line('HEHDT,,T'), 'unreadable', "heading '': must be a number"),
     (line('HEHDT,nan,T'), 'out_of_range', 'heading nan: must be'), (line('HEHDT,400.0,T'), 'out_of_range', '400'),
     (line('PASHR,120000.1,1.0,T,95.0,0.0,0,0,0,0,1'), 'out_of_range', 'PASHR: roll 95: must be -90 to 90'),

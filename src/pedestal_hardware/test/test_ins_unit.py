@@ -82,6 +82,42 @@ def test_a_bad_sentence_is_dropped_and_named(line, kind, reason):
     assert fed(unit, 3, first=6) is not None and unit.diagnose(NOON + 99 * STEP).level == 0
 
 
+@pytest.mark.parametrize('heading', [0.0, 48.0])
+def test_a_single_wrong_attitude_disturbs_no_rate(heading):
+    """A restart of the device (heading 0), and an outlier of 8 deg, in a stream of 10 Hz of a still deck."""
+    unit = unit_of()
+    still = fed(unit, 50, lambda k: pashr(k, heading=40.0))
+    assert np.abs(still.w).max() < 1e-6
+    assert unit.take_line(pashr(50, heading=heading), NOON + 50 * STEP) is None and unit.counts['too_fast'] == 1
+    for k in range(51, 80):
+        found = unit.take_line(pashr(k, heading=40.0), NOON + k * STEP)
+        assert found is not None and np.abs(found.w).max() < 1e-6
+
+
+def test_an_attitude_that_stays_elsewhere_is_taken():
+    unit = unit_of()
+    fed(unit, 50, lambda k: pashr(k, heading=40.0))
+    found = fed(unit, 50, lambda k: pashr(k, heading=90.0), first=50)
+    assert found is not None and np.abs(found.w).max() < 1e-6 and unit.counts['too_fast'] == 3
+
+
+def test_a_status_that_is_missing_is_not_aligned():
+    unit = unit_of(nmea__aligned_status=1)
+    fed(unit, 50, lambda k: pashr(k, tail='0.1,0.02,0.03,0.05,1'))
+    assert unit.state == 'aligning'
+    fed(unit, 50, first=50)
+    assert unit.state == 'aligned'
+    with pytest.raises(ParameterError, match='nmea.aligned_status = 1: must be 0 with nmea.sentence = hdt'):
+        unit_of(nmea__aligned_status=1, nmea__sentence='hdt')
+
+
+def test_a_device_without_attitudes_does_not_align():
+    unit = unit_of()
+    assert unit.diagnose(NOON).message == 'no attitude so far'
+    unit.take_line(pashr(0), NOON)
+    assert 'the rates settle: two samples must be at most max_gap = 0.5 s apart' in unit.diagnose(NOON).message
+
+
 def test_after_a_gap_the_rates_begin_again():
     unit = unit_of(max_gap=0.5)
     fed(unit, 10)

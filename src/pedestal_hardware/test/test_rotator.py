@@ -218,6 +218,43 @@ def test_a_silent_device_is_a_fault_without_angles_and_returns():
     assert np.degrees(joints['position'][0]) == pytest.approx((3.0, 4.0))
 
 
+def test_a_rotator_that_does_not_move_is_reported():
+    device = Device()
+    for _ in range(40):
+        device.step(50.0, measured=(3.0, 4.0))
+    diagnosis = device.unit.diagnose()
+    assert diagnosis.level == 1 and 'the rotator has not moved for' in diagnosis.message
+    assert '47.0 deg away from its set-point' in diagnosis.message
+    for k in range(40):
+        device.step(50.0, measured=(4.0 + k, 4.0))
+        assert device.unit.diagnose().level == 0
+
+
+def test_a_refusal_without_an_answer_belongs_to_the_set_point():
+    """A GS-232 does not answer W, and `?>` to a W that it refuses."""
+    server, lines = socket.create_server(('127.0.0.1', 0)), []
+
+    def serve():
+        connection, _ = server.accept()
+        with connection, connection.makefile('rwb', buffering=0) as stream, contextlib.suppress(OSError):
+            for part in iter(lambda: stream.read(1), b''):
+                lines.append(part)
+                if part == b'\r':
+                    word = b''.join(lines)
+                    lines.clear()
+                    stream.write(b'?>\r\n' if word.startswith(b'W') else b'+0010+0045\r\n')
+    threading.Thread(target=serve, daemon=True).start()
+    connection = Line(f'socket://127.0.0.1:{server.getsockname()[1]}', protocols.PROTOCOLS['gs232'], 0.02, 0.5)
+    connection.start()
+    wait_until(lambda: connection.newest is not None)
+    connection.send_set_point(120.0, 30.0)
+    wait_until(lambda: connection.counts['refusals'] == 1)
+    positions = connection.counts['positions']
+    wait_until(lambda: connection.counts['positions'] > positions + 3)
+    assert 'request refused' in connection.fault
+    connection.close()
+
+
 def test_a_target_that_is_too_fast_is_reported():
     device = Device(rate=1.0)
     device.step(10.0, rate=2.0)
@@ -230,6 +267,8 @@ def test_a_target_that_is_too_fast_is_reported():
     ({'silence': 0.5}, 'silence = 0.5 s: must be above answer_timeout = 1 s'),
     ({'protocol': 'gs232', 'azimuth.low': -180.0}, 'must be at least 0 deg'),
     ({'protocol': 'spid'}, 'must be one of'),
+    ({'url': 'ttyUSB0'}, "url = 'ttyUSB0': must be"), ({'url': 'tcp://127.0.0.1:4533'}, 'tcp: must be'),
+    ({'url': 'udp://127.0.0.1:4533'}, 'must be socket://HOST:PORT, or the path of a serial device'),
 ])
 def test_parameters_that_do_not_go_together(given, message):
     with pytest.raises(ParameterError, match=message):

@@ -70,14 +70,16 @@ def step(record):
         o.w[i], o.force[i] = w[i], force[i]
     if u.axes:
         frame_check.take(s.check, u.stamp, o.q, o.w, o.force, u.axes)
-    settled = True
-    if u.axes != frame_check.ALL_AXES:
-        settled, w = rate_estimator.take(s.estimator, u.stamp, o.q, c.bandwidth)
-        for i in range(3):
-            o.w[i] = w[i]
     # The cosine of the tilt is the third diagonal element of the matrix of q.
     if 1.0 - 2.0 * (o.q[0]**2 + o.q[1]**2) < 0.5:
         return Outcome.TILTED
+    settled = True
+    if u.axes != frame_check.ALL_AXES:
+        settled, w, jumped = rate_estimator.take(s.estimator, u.stamp, o.q, c.bandwidth)
+        if jumped:
+            return Outcome.TOO_FAST
+        for i in range(3):
+            o.w[i] = w[i]
     if settled and o.w[0]**2 + o.w[1]**2 + o.w[2]**2 > MAX_RATE_RAD_S**2:
         return Outcome.TOO_FAST
     if c.checked and (s.check.verdict == frame_check.FRAME_WRONG or s.check.down):

@@ -75,6 +75,9 @@ class InsInputParameters(Parameters):
         """Raise ParameterError for a connection that cannot be used, or a time that the sentence does not have."""
         if self.source == 'nmea':
             sources.place(self.nmea.url, 'nmea.url')
+            if self.nmea.aligned_status and self.nmea.sentence != 'pashr':
+                raise ParameterError(f'nmea.aligned_status = {self.nmea.aligned_status}: must be 0 with nmea.sentence '
+                                     f'= {self.nmea.sentence}, which states no status')
             if self.stamp == 'device' and self.nmea.sentence != 'pashr':
                 raise ParameterError(f'stamp = device: must be arrival with nmea.sentence = {self.nmea.sentence}, '
                                      'which has no time')

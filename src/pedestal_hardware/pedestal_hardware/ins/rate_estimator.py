@@ -15,9 +15,13 @@ from pedestal_common.compiled import compiled
 from pedestal_hardware.ins.frames import rotation_vector, turned
 
 ESTIMATOR_DTYPE = np.dtype([('q', 'f8', (4,)), ('w', 'f8', (3,)), ('dw', 'f8', (3,)), ('since', 'i8'),
-                            ('last', 'i8'), ('runs', 'i8')], align=True)
+                            ('last', 'i8'), ('runs', 'i8'), ('jumps', 'i8')], align=True)
 """State: estimated quaternion, rate [rad/s] and acceleration [rad/s2]; stamps of the first and the last sample [ns];
-runs: 1 after the first sample."""
+runs: 1 after the first sample; jumps: number of consecutive samples that were not used."""
+
+MAX_JUMP_RAD_S, MAX_JUMPS = 1.0, 3
+"""Largest deviation of a sample from its prediction, per time since the last sample [rad/s], and number of consecutive
+samples beyond it from which the attitude is a new one. A single wrong sample would disturb the rates for a second."""
 
 SETTLING_TIME_CONSTANTS = 3.0
 """Time after the first sample, in 1 / bandwidth, from which the rate is used."""
@@ -26,15 +30,17 @@ SETTLING_TIME_CONSTANTS = 3.0
 @compiled
 def restart(s):
     """Discard all samples."""
-    s.runs = 0
+    s.runs = s.jumps = 0
 
 
 @compiled
 def take(s, stamp, q, bandwidth):
     """Take a quaternion q (4,) at a stamp [ns] that is newer than the last; bandwidth: of the filter [rad/s].
 
-    Return (True if the rate is settled, its components [rad/s]).
+    Return (True if the rate is settled, its components [rad/s], True for a sample that jumps and is not used).
     """
+    if s.jumps == MAX_JUMPS:
+        restart(s)
     if s.runs == 0:
         s.runs, s.since = 1, stamp
         for i in range(4):
@@ -47,6 +53,10 @@ def take(s, stamp, q, bandwidth):
         predicted = turned(s.q, T * (s.w[0] + 0.5 * T * s.dw[0]), T * (s.w[1] + 0.5 * T * s.dw[1]),
                            T * (s.w[2] + 0.5 * T * s.dw[2]))
         e = rotation_vector(predicted, q)
+        if math.sqrt(e[0]**2 + e[1]**2 + e[2]**2) > MAX_JUMP_RAD_S * T:
+            s.jumps += 1
+            return False, (0.0, 0.0, 0.0), True
+        s.jumps = 0
         g = 1.0 - p**3
         corrected = turned(predicted, g * e[0], g * e[1], g * e[2])
         for i in range(4):
@@ -55,4 +65,4 @@ def take(s, stamp, q, bandwidth):
             s.w[i] += T * s.dw[i] + 1.5 * (1.0 - p)**2 * (1.0 + p) / T * e[i]
             s.dw[i] += (1.0 - p)**3 / (T * T) * e[i]
     s.last = stamp
-    return (stamp - s.since) * 1e-9 * bandwidth >= SETTLING_TIME_CONSTANTS, (s.w[0], s.w[1], s.w[2])
+    return (stamp - s.since) * 1e-9 * bandwidth >= SETTLING_TIME_CONSTANTS, (s.w[0], s.w[1], s.w[2]), False

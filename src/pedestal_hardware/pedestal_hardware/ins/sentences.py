@@ -101,7 +101,9 @@ def _prdid(data):
 
 
 def _hdt(data):
-    """Return the Attitude of HDT."""
+    """Return the Attitude of HDT. Raises SentenceError for a magnetic heading, and for a decimal comma."""
+    if len(data) < 2 or data[1] != 'T':
+        raise SentenceError('unreadable', f'heading {",".join(data):.20}: must be a number and T, true')
     return Attitude('hdt', _number('heading', data, 0, -360.0, 360.0))
 
 

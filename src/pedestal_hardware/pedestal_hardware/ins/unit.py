@@ -112,7 +112,7 @@ class InsInputUnit:
         u['w'], u['axes'] = (0.0, 0.0, rate), frame_check.TURN_AXIS if turns else 0
         u['force'] = math.nan
         aligned = not found.sigmas[2] > p.aligned_sigma and (
-            not p.nmea.aligned_status or found.status is None or found.status >= p.nmea.aligned_status)
+            not p.nmea.aligned_status or (found.status or 0) >= p.nmea.aligned_status)
         variances = tuple(0.0 if math.isnan(sigma) else math.radians(sigma)**2 for sigma in found.sigmas)
         return self._sample(device, arrival, variances, aligned)
 
@@ -212,6 +212,11 @@ class InsInputUnit:
             return Diagnosis(LEVEL_ERROR, self._blocking, values)
         if self._dropped and now - self._dropped_at < REPORT_NS:
             return Diagnosis(LEVEL_WARN, self._dropped, values)
+        if not self.counts['published']:
+            if not self.counts['settling']:
+                return Diagnosis(LEVEL_OK, 'no attitude so far', values)
+            return Diagnosis(LEVEL_WARN, 'the rates settle: two samples must be at most max_gap = '
+                             f'{self.parameters.max_gap:g} s apart', values)
         if self.state == 'aligning':
             return Diagnosis(LEVEL_WARN, 'the INS aligns', values)
         return Diagnosis(LEVEL_OK, 'receives attitudes', values)

@@ -138,6 +138,8 @@ class Recording:
         if self.type is None:
             raise StreamError(f'{meta}: core:datatype = {head["core:datatype"]!r:.40}: must be one of '
                               f'{", ".join(FORMATS)}')
+        if 'core:dataset' in head and head['core:dataset'] != data_path(meta).name:
+            raise StreamError(f'{meta}: core:dataset = {head["core:dataset"]!r:.60}: must be {data_path(meta).name}')
         count = self._value(head, 'core:num_channels', int, 1)
         if count != self.channels:
             raise StreamError(f'{meta}: core:num_channels = {count}: must be {self.channels}: {", ".join(channels)}')
@@ -182,6 +184,10 @@ class Recording:
         for capture in captures:
             if not isinstance(capture, dict):
                 raise StreamError(f'{self.meta}: captures: each must be an object')
+            for name in ('core:header_bytes', 'core:trailing_bytes'):
+                if capture.get(name, 0) != 0:
+                    raise StreamError(f'{self.meta}: {name} = {capture[name]!r:.40}: must be 0; remove these bytes '
+                                      'from the file of the samples')
             start = self._value(capture, 'core:sample_start', int)
             text = self._value(capture, 'core:datetime', str, text_of(0) if not found else None)
             try:

@@ -49,6 +49,8 @@ class Line:
         self.newest, self.silence, self.refusal = None, f'{url}: not connected so far', ''
         self.counts = {'positions': 0, 'set_points': 0, 'refusals': 0, 'missing_answers': 0}
         self._request, self._lock = b'', threading.Lock()
+        # True from a request that the protocol does not answer until the next position: a refusal belongs to it.
+        self._unanswered = False
         self._ended, self._wake = threading.Event(), threading.Event()
         self._thread = threading.Thread(target=self._run, name='rotator', daemon=True)
         self._reader = protocol()
@@ -111,6 +113,8 @@ class Line:
         if not request:
             return
         device.write(request)
+        if not self.protocol.ANSWERS_SETS:
+            self.refusal, self._unanswered = '', True
         self.counts['set_points'] += request != self.protocol.STOP
         if self.protocol.ANSWERS_SETS:
             self._await(device, Accepted)
@@ -120,9 +124,9 @@ class Line:
                 self._request = b''
 
     def _refused(self, reason, awaited):
-        """Keep the reason of a refusal: of a request until the next one is accepted, of other bytes until the next
-        position."""
-        if awaited is Accepted:
+        """Keep the reason of a refusal: of a request until the next request is sent or accepted, of other bytes until
+        the next position."""
+        if awaited is Accepted or self._unanswered:
             self.refusal = f'{self.url}: request refused: {reason}'
         else:
             self.silence = f'{self.url}: {reason}'
@@ -141,7 +145,7 @@ class Line:
                 if isinstance(answer, Position):
                     self.newest = Measurement(*answer, time.monotonic())
                     self.counts['positions'] += 1
-                    self.silence = ''
+                    self.silence, self._unanswered = '', False
                 elif isinstance(answer, Refusal):
                     self.counts['refusals'] += 1
                     self._refused(answer.reason, awaited)

@@ -28,6 +28,9 @@ STATE_CODE_ENABLED, STATE_CODE_DISABLED, STATE_CODE_EMERGENCY_STOP, STATE_CODE_F
 MODE_CODE_STANDBY, MODE_CODE_STOP, MODE_CODE_RATE = (MODES.index(mode) for mode in ('standby', 'stop', 'rate'))
 """Codes of modes of the control unit. In standby and stop the rotator stands still."""
 
+STUCK_TIME_S = 5.0
+"""Time without motion, away from the set-point, after which the rotator is reported as stuck [s]."""
+
 DEVICE_DTYPE = np.dtype([('angle', 'f8', (2,)), ('rate', 'f8', (2,)), ('came', 'i8'), ('silent', 'i8')],
                         align=True)
 """State of the device.
@@ -105,6 +108,8 @@ class Rotator(AngleDrive):
         self.memory = Memory(joined(RECORD_DTYPE, constants=constants, switches=switches, device=device,
                                     state=set_point.initial_state()))
         self.measured_at, self.counts, self.fault = None, {}, ''
+        # Times of the monotonic clock [s]: of the last motion, and since when the rotator is away from the set-point.
+        self._moved_at, self._away_since, self._stuck_s = 0.0, None, 0.0
 
     def measure(self, measurement, now):
         """Take the newest Measurement of the line, or None. now: time of the monotonic clock [s]."""
@@ -113,10 +118,21 @@ class Rotator(AngleDrive):
             angles = np.radians((measurement.azimuth, measurement.elevation))
             if self.measured_at is not None and not device['silent']:
                 device['rate'] = (angles - device['angle']) / (measurement.at - self.measured_at)
+            if np.abs(angles - device['angle']).max() > 0.25 * math.radians(self.parameters.step_deg):
+                self._moved_at = now
             device['angle'], device['came'], self.measured_at = angles, 1, measurement.at
         device['silent'] = self.measured_at is None or now - self.measured_at > self.parameters.silence
         if device['silent']:
             device['rate'] = 0.0
+        away = self.parts['inputs']['enabled'] and self._distance_deg > self.parameters.accuracy_deg + \
+            self.parameters.step_deg
+        self._away_since = (now if self._away_since is None else self._away_since) if away else None
+        self._stuck_s = now - max(self._moved_at, self._away_since) if away else 0.0
+
+    @property
+    def _distance_deg(self):
+        """Distance of the rotator from its last set-point, of the farther axis [deg]; NaN before the first."""
+        return math.degrees(np.abs(self.parts['state']['set_point'] - self.parts['device']['angle']).max())
 
     @property
     def decision(self):
@@ -164,6 +180,9 @@ class Rotator(AngleDrive):
         if outputs['outside']:
             return Diagnosis(LEVEL_WARN, 'the target is outside the travel of the rotator: the axis waits at its end',
                              values)
+        if self._stuck_s > STUCK_TIME_S:
+            return Diagnosis(LEVEL_WARN, f'the rotator has not moved for {self._stuck_s:.0f} s, '
+                             f'{self._distance_deg:.1f} deg away from its set-point', values)
         if rate > p.rate:
             return Diagnosis(LEVEL_WARN, f'the target moves at {rate:.2f} deg/s, the rotator at {p.rate:g} deg/s',
                              values)
