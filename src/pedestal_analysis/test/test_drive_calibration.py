@@ -13,6 +13,7 @@ from pedestal_analysis.calibration.drive import estimates, identified, motion_da
 from pedestal_bringup.loop import memory_recording
 from pedestal_bringup.scenario import scenario
 from pedestal_common.parameters import as_dict
+from pedestal_common.text_files import parameter_file
 from pedestal_common.wire import commands
 
 TRUE = {'azimuth.load.inertia': 273.0, 'azimuth.friction.coulomb': 90.0, 'azimuth.friction.breakaway': 120.0,
@@ -65,6 +66,54 @@ def test_the_twin_predicts_the_torques(result):
         assert before > 20.0 and after < 3.0
 
 
+def calibrated(folder, *given):
+    """Return (exit code, content of --json, {metric: row}) of the verb, with --output in a folder."""
+    code = cli.main(['calibrate', 'drive', *given, '--json', str(folder / 'rows.json'), '--output',
+                     str(folder / 'drive.yaml')])
+    content = json.loads((folder / 'rows.json').read_text())
+    return code, content, {row['metric']: row for row in content['rows']}
+
+
+def test_nominal_values_that_fit_better_are_kept(tmp_path):
+    """An antenna whose dish swings for seconds: identified values are near the true nominal ones, which are kept."""
+    antenna = tmp_path / 'my.yaml'
+    assert cli.main(['new', str(antenna), *('--mirror 5.5 --frequency 8.2 --inertia-azimuth 2500 --inertia-elevation '
+                     '1800 --ratio-azimuth 300 --ratio-elevation 320 --mode 4 --lash 0.8').split()]) == 0
+    code, content, rows = calibrated(tmp_path, '--scenario', str(antenna))
+    true = as_dict(scenario.load(str(antenna)).node_parameters('adu'))
+    assert code == 0 and 'azimuth.friction.coulomb' in content['kept']['azimuth']
+    assert content['parameters']['adu'] == {name: true[name] for name in content['parameters']['adu']}
+    for name in ('azimuth', 'elevation'):
+        assert content['remarks'][name][0].startswith('nominal values kept')
+        assert not any('lash: not shown' in text for text in content['remarks'][name])
+        assert rows[f'{name}_lash']['value'] == pytest.approx(8e-4, rel=0.01)
+        assert rows[f'{name}_torque_error_percent']['value'] < 0.01
+        assert rows[f'{name}_torque_error_identified_percent']['value'] < 2.0
+    assert rows['elevation_unbalance']['value'] == pytest.approx(209.7, abs=5.0)
+    assert rows['elevation_viscous']['value'] == pytest.approx(180.0, abs=10.0)
+
+
+def test_a_mode_that_a_rigid_twin_shows_too_is_not_claimed(tmp_path):
+    """The teeth of this station rattle without bias torque; its structure is rigid."""
+    code, content, rows = calibrated(tmp_path, '--scenario', 'leo_station_7m')
+    true = as_dict(scenario.load('leo_station_7m').node_parameters('adu'))
+    assert code == 0 and not any('frequency' in metric for metric in rows)
+    for name in ('azimuth', 'elevation'):
+        assert content['parameters']['adu'][f'{name}.structure.inertia_share'] == 0.0
+        assert rows[f'{name}_torque_error_identified_percent']['value'] < 2.0
+        for key in ('inertia', 'coulomb', 'viscous', 'lash', 'stiffness'):
+            row = rows[f'{name}_{key}']
+            assert row['ci_low'] < true[f'{name}.{twin.PARAMETER_NAMES[key]}'] < row['ci_high'], row['metric']
+
+
+def test_a_result_that_is_not_verified_is_not_written(tmp_path, capfd):
+    """The speed loop of the drive differs from its data."""
+    code, content, _ = calibrated(tmp_path, '--scenario', 'leo_pass', '--param',
+                                  'adu.azimuth.speed_loop.proportional=14')
+    assert code == 4 and not content['verified'] and not (tmp_path / 'drive.yaml').exists()
+    assert f'not written: {tmp_path / "drive.yaml"}, because the result is not verified' in capfd.readouterr().out
+
+
 def test_the_file_is_for_control_unit_and_plant(result):
     """The feed-forward has the inertia of load and motors, and the friction of the load."""
     _, content, file, page = result
@@ -94,6 +143,13 @@ def test_the_plan_stays_inside_the_stated_limits(tmp_path, capfd):
         assert 0.95 * motions.MAX_RATE_SHARE < np.abs(rate).max() / axis.shaper.rate < 1.8 * motions.MAX_RATE_SHARE
     states = run.table('adu/state')['data']
     assert set(states) == {'enabled'}
+
+
+def test_the_plan_prints_a_command_for_the_given_scenario(tmp_path, capfd):
+    antenna = tmp_path / 'my antenna.yaml'
+    antenna.write_text(parameter_file.text({'scenario': {'title': 'mine'}}))
+    assert cli.main(['calibrate', 'drive', '--scenario', str(antenna), '--plan', str(tmp_path / 'plan.yaml')]) == 0
+    assert f"pedestal run '{antenna}' --params-file {tmp_path / 'plan.yaml'} --bag" in capfd.readouterr().out
 
 
 def test_the_plan_of_a_short_travel_stays_inside():
@@ -127,18 +183,31 @@ def test_lash_needs_both_flanks():
     rng = np.random.default_rng(2)
     n, ratio, lash, k = 2000, 64.0, 1e-3, 5e6
     torque = np.column_stack((rng.uniform(5.0, 40.0, n), -rng.uniform(5.0, 40.0, n)))
-    motion = motion_data.Motion(*(np.zeros(n),) * 4, *(np.zeros((n, 2)),) * 4)
+    motion = motion_data.Motion(5e-3 * np.arange(n), *(np.zeros(n),) * 3, *(np.zeros((n, 2)),) * 4)
 
     def found(torque):
         angle = 0.5 * lash * np.sign(torque) + ratio * torque / k + (0.1, -0.2)
         moved = motion_data.Motion(**{**motion.__dict__, 'motor_angle': angle})
-        return estimates.lash(moved, torque, ratio)
+        return estimates.lash([(moved, torque)], ratio)
 
     assert found(torque) == {}
-    torque[::2] *= -1.0
+    torque[n // 2:] *= -1.0
     value, low, high = found(torque)['lash']
     assert value == pytest.approx(lash, rel=1e-9) and low <= value <= high
     assert found(torque)['stiffness'][0] == pytest.approx(k, rel=1e-9)
+
+
+def test_lash_shows_in_a_run_with_small_torques():
+    """A run with a bias torque above all others does not hide the lash of a run without it."""
+    n, ratio, lash = 2000, 300.0, 8e-4
+    one_way = np.column_stack((np.full(n, 20.0), np.full(n, -20.0)))
+    both_ways = np.repeat((1.0, -1.0), n // 2)[:, np.newaxis] * np.linspace(1.0, 2.0, n)[:, np.newaxis] * (1.0, 1.0)
+    parts = []
+    for torque in (one_way, both_ways):
+        angle = 0.5 * lash * np.sign(torque) + ratio * torque / 6e7
+        parts.append((motion_data.Motion(5e-3 * np.arange(n), *(np.zeros(n),) * 3, angle, *(np.zeros((n, 2)),) * 3),
+                      torque))
+    assert estimates.lash(parts, ratio)['lash'][0] == pytest.approx(lash, rel=1e-9)
 
 
 @pytest.mark.parametrize('given, message', [

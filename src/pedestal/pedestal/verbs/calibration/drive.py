@@ -7,7 +7,8 @@ recordings by --bag. With --scenario alone the verb makes both runs in memory.
 The estimates are corrected by a twin: the simulated drive with these values, which receives the recorded commands. The
 torque of the twin must agree with the recording within 10 %. Exit code 0: verified; 4: not verified.
 
---output writes a parameter file for the control unit and for the simulated drive.
+--output writes a parameter file for the control unit and for the simulated drive, if the result is verified. An axis
+keeps its nominal values if the twin fits the recording at least as well with them.
 """
 import argparse
 import pathlib
@@ -48,7 +49,8 @@ def main(options: argparse.Namespace) -> int:
     changes = arguments.changes(options)
     if options.plan:
         from pedestal_bringup.scenario import scenario
-        print('\n'.join(identified.write_plan(scenario.load(options.scenario, changes), options.plan)))
+        chosen = scenario.load(options.scenario, changes)
+        print('\n'.join(identified.write_plan(chosen, options.scenario, options.plan)))
         return 0
     printed, content, verified = identified.main(options, changes)
     print('\n'.join(printed))

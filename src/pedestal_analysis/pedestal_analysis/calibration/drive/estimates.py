@@ -6,6 +6,7 @@ returns {name: (value, low, high)}, and {} for a property that the motions do no
 import math
 
 import numpy as np
+from scipy.ndimage import binary_erosion
 from scipy.optimize import least_squares
 
 from pedestal_analysis.results import tracking
@@ -23,8 +24,9 @@ SLOW_RATE_RAD_S = 6e-3
 """Rate below which the static part of the friction shows [rad/s]."""
 MIN_LASH_ROWS = 40
 """Smallest number of steps with each sign of the torque of a motor."""
-STRONG_TORQUE_SHARE = 0.25
-"""Share of the largest torque of a motor from which its teeth are in firm contact [-]."""
+STRONG_TORQUE_SHARE, CONTACT_TIME_S = 0.15, 0.02
+"""Share of the largest torque of a motor [-], and time before and after a step [s]. With this torque during this time
+the teeth are in firm contact. This avoids steps at which a motor still crosses the lash."""
 MIN_TURN_RAD = math.radians(300.0)
 """Smallest angle over which the error of the encoder is fitted [rad]."""
 
@@ -113,38 +115,42 @@ def friction(pieces, gravity):
     return found
 
 
-def lash(motion, torque, ratio):
+def lash(parts, ratio):
     """Return the estimates `lash` [rad] and `stiffness` [Nm/rad] of a mesh on the load axis.
 
         theta_i / N - theta = z_i + lash / 2 sign(T_i) + N T_i / k
 
-    theta_i, T_i: angle and torque of motor i on the gear, (n, 2) of `torque` [Nm]; z_i: zero of its encoder; k:
-    stiffness. A motor shows the lash only if its torque changes the sign: in a run without bias torque, or at an
-    acceleration above it. Then the teeth touch with both flanks.
+    parts: [(Motion, T)] of the recordings, with the torques T (n, 2) of the motors on the gear [Nm]; ratio: N.
+    theta_i: angle of motor i; z_i: zero of its encoder; k: stiffness. A motor shows the lash only in a recording in
+    which its torque changes the sign: without bias torque, or at an acceleration above it. Then the teeth touch with
+    both flanks.
     """
-    rows, values, times = [], [], []
-    for i in range(2):
-        T = torque[:, i]
-        strong = np.abs(T) > STRONG_TORQUE_SHARE * np.percentile(np.abs(T), 99.5)
-        if min((T[strong] > 0.0).sum(), (T[strong] < 0.0).sum()) < MIN_LASH_ROWS:
-            continue
-        zeros = np.zeros((strong.sum(), 2))
-        zeros[:, i] = 1.0
-        rows.append(np.column_stack((0.5 * np.sign(T[strong]), ratio * T[strong], zeros)))
-        values.append((motion.motor_angle[:, i] - motion.theta)[strong])
-        times.append(np.flatnonzero(strong))
+    rows, times, before = [], [], 0
+    for motion, torque in parts:
+        contact = np.ones(2 * round(CONTACT_TIME_S / float(np.median(np.diff(motion.t)))) + 1)
+        for i in range(2):
+            T = torque[:, i]
+            least = STRONG_TORQUE_SHARE * np.percentile(np.abs(T), 99.5)
+            flanks = [binary_erosion(sign * T > least, contact) for sign in (1.0, -1.0)]
+            if min(flank.sum() for flank in flanks) < MIN_LASH_ROWS:
+                continue
+            strong = flanks[0] | flanks[1]
+            zeros = np.zeros((strong.sum(), 2))
+            zeros[:, i] = 1.0
+            rows.append(np.column_stack((0.5 * np.sign(T[strong]), ratio * T[strong], zeros,
+                                         (motion.motor_angle[:, i] - motion.theta)[strong])))
+            times.append(before + np.flatnonzero(strong))
+        before += len(torque)
     if not rows:
         return {}
-    A, x = np.concatenate(rows), np.concatenate(values)
-    used = np.abs(A).sum(0) > 0.0
-    place = np.concatenate(times)
-    parts = interleaved(np.column_stack((A[:, used], x))[np.argsort(place, kind='stable')])
+    A = np.concatenate(rows)
+    shares = interleaved(A[np.argsort(np.concatenate(times), kind='stable')][:, np.abs(A).sum(0) > 0.0])
 
     def statistic(kept):
         table = np.concatenate(kept)
         return np.linalg.lstsq(table[:, :-1], table[:, -1], rcond=None)[0][:2]
 
-    found = jackknife(('lash', 'compliance'), parts, statistic)
+    found = jackknife(('lash', 'compliance'), shares, statistic)
     value, low, high = found.pop('compliance')
     if low > 0.0:
         found['stiffness'] = (1.0 / value, 1.0 / high, 1.0 / low)

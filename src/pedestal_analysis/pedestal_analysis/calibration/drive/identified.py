@@ -3,8 +3,10 @@
 The result is a table with nominal and identified values, rows for --json, a page, and a ROS 2 parameter file with
 acu.AXIS.feedforward.* and adu.AXIS.*. The twin with these values must reproduce the torques of the recording.
 """
+import argparse
 import dataclasses
 import math
+import shlex
 
 import numpy as np
 
@@ -22,8 +24,10 @@ from pedestal_recording import bag as bags
 
 CASE_NAME, TORQUE_TARGET = 'drive', '< 10'
 """Case of the rows, and target of the torque error of the twin [%]."""
-VALUE_DIGITS = 6
-"""Significant digits in a parameter file."""
+VALUE_DIGITS, ERROR_DIGITS = 6, 3
+"""Significant digits in a parameter file, and decimal digits of torque errors that are compared."""
+DIRECT_NAMES = 'bias', 'eccentricity_sin', 'eccentricity_cos'
+"""Estimates that the sum of the torques does not show."""
 QUANTITIES = {
     'inertia': ('kg m2', 'inertia of the load'), 'dish_inertia': ('kg m2', 'part of it that swings on the structure'),
     'frequency': ('Hz', 'first mode of the structure on a locked base'), 'damping': ('', 'damping ratio of this mode'),
@@ -45,15 +49,20 @@ class Identified:
     recordings   [twin.Recording]
     found        {axis: {name: (value, low, high)}} in the order of QUANTITIES
     maps         {axis: (m, 2) error of the load encoder [rad] over the angle [rad]}, empty without a turn
-    changes      {name: value} of the parameters of adu
-    before       {axis: torque error of the nominal twin [-]}; after: that of the identified twin
+    changes      {name: value} of the parameters of adu: identified values, or nominal values of the names in `kept`
+    kept         {axis: parameters that keep their nominal values}
+    before       {axis: torque error of the nominal twin [-]}
+    identified   {axis: torque error of the twin with all identified values [-]}
+    after        {axis: torque error of the twin with `changes` [-]}
     """
     source: str
     recordings: list
     found: dict
     maps: dict
     changes: dict
+    kept: dict
     before: dict
+    identified: dict
     after: dict
 
 
@@ -76,9 +85,31 @@ def calibrate(recordings, source) -> Identified:
                 break
         found[name] = {key: own[key] for key in QUANTITIES if key in own}
     values = {name: {key: value for key, (value, *_) in own.items()} for name, own in found.items()}
-    changes = {name: _rounded(value) for name, value in twin.parameters(recordings, values).items()}
-    return Identified(source, recordings, found, maps, changes, twin.torque_errors(recordings, {}),
+    identified = {name: _rounded(value) for name, value in twin.parameters(recordings, values).items()}
+    changes, kept, before, error = _chosen(recordings, found, identified)
+    return Identified(source, recordings, found, maps, changes, kept, before, error,
                       twin.torque_errors(recordings, changes))
+
+
+def _chosen(recordings, found, identified):
+    """Return (changes, kept, before, identified) of an Identified; identified: {parameter: value} of adu.
+
+    An axis keeps its nominal values if the twin fits the recording at least as well with them. The torque does not
+    show bias and encoder, so such an axis keeps them only if their intervals hold the nominal values.
+    """
+    nominal, names = as_dict(recordings[0].drive), {}
+    for axis, own in found.items():
+        direct = {f'{axis}.{twin.PARAMETER_NAMES[key]}': own[key] for key in DIRECT_NAMES if key in own}
+        shown = {name for name, (_, low, high) in direct.items() if not low <= nominal[name] <= high}
+        names[axis] = {name for name in identified if name.startswith(f'{axis}.')} - shown
+
+    def values(kept):
+        return {name: nominal[name] if name in kept else value for name, value in identified.items()}
+
+    before, after = (twin.torque_errors(recordings, values(kept)) for kept in (set().union(*names.values()), ()))
+    kept = {axis: own if round(before[axis], ERROR_DIGITS) <= round(after[axis], ERROR_DIGITS) else set()
+            for axis, own in names.items()}
+    return values(set().union(*kept.values())), kept, before, after
 
 
 def _rounded(value):
@@ -92,6 +123,7 @@ def rows(result):
         listed += [estimated(CASE_NAME, f'{name}_{key}', estimate, QUANTITIES[key][0], estimates.PART_COUNT)
                    for key, estimate in found.items()]
         listed += [row(CASE_NAME, f'{name}_torque_error_before_percent', 100.0 * result.before[name], '%'),
+                   row(CASE_NAME, f'{name}_torque_error_identified_percent', 100.0 * result.identified[name], '%'),
                    row(CASE_NAME, f'{name}_torque_error_percent', 100.0 * result.after[name], '%',
                        target=TORQUE_TARGET)]
     return listed
@@ -113,8 +145,10 @@ def lines(result):
             interval = f'{low:.5g} to {high:.5g}' if math.isfinite(low) else ''
             listed.append(f'  {key:15} {nominal:>11} {value:11.5g}  {interval:25} {QUANTITIES[key][0]:8} '
                           f'{QUANTITIES[key][1]}')
+        chosen = f', {100.0 * result.after[name]:.1f} % with the chosen values' if result.kept[name] else ''
         listed += [f'  torque of the twin is off by {100.0 * result.before[name]:.1f} % rms with nominal values, '
-                   f'{100.0 * result.after[name]:.1f} % with identified values (must be {TORQUE_TARGET} %)',
+                   f'{100.0 * result.identified[name]:.1f} % with identified values{chosen} '
+                   f'(must be {TORQUE_TARGET} %)',
                    *(f'  {sentence}' for sentence in remarks(result, name)), '']
     listed.append('verified: the twin reproduces the recorded torques' if passed(result) else
                   'NOT VERIFIED: the twin does not reproduce the recorded torques; the drive has a property that its '
@@ -123,14 +157,17 @@ def lines(result):
 
 
 def remarks(result, name):
-    """Return sentences on the properties of an axis that the motions do not show."""
-    found = result.found[name]
+    """Return sentences on the kept values of an axis, and on its properties that the motions do not show."""
+    found, kept = result.found[name], result.kept[name]
     missing = []
+    if kept:
+        missing.append('nominal values kept: the twin fits the recording at least as well with them')
     if 'lash' not in found:
-        missing.append('lash: not shown, because no motor changes the sign of its torque; add a run with '
-                       f'adu.{name}.bias.schedule=off')
+        off = any(getattr(recording.drive, name).bias.schedule == 'off' for recording in result.recordings)
+        missing.append('lash: not shown, because no motor changes the sign of a firm torque'
+                       + ('' if off else f'; add a run with adu.{name}.bias.schedule=off'))
     if 'frequency' not in found:
-        missing.append('structure: no mode between 2 and 30 Hz shows in the torque')
+        missing.append('structure: no mode between 2 and 30 Hz shows in the torque, or a rigid twin shows it too')
     if 'stribeck_rate' not in found:
         missing.append('static friction: not shown, because it is too small or no motion is slow enough')
     if 'eccentricity_sin' not in found:
@@ -144,14 +181,14 @@ def acu_parameters(result):
     The friction of the motors rises over a wider range of rates than the feed-forward knows. With it, the following
     error of a slow pass doubled, so the integral of the speed loop takes it.
     """
-    values = {}
-    for name, found in result.found.items():
+    values, extra = {}, twin.extra_inertia(result.recordings)
+    for name in result.found:
         axis = getattr(result.recordings[0].drive, name)
         ratio, motors = axis.gear_train.ratio, (axis.motor_1, axis.motor_2)
-        if 'inertia' in found:
-            values[f'{name}.feedforward.inertia'] = _rounded(found['inertia'][0]
+        if f'{name}.load.inertia' in result.changes:
+            values[f'{name}.feedforward.inertia'] = _rounded(result.changes[f'{name}.load.inertia'] + extra[name]
                                                              + ratio**2 * sum(motor.inertia for motor in motors))
-        values[f'{name}.feedforward.friction'] = _rounded(found['coulomb'][0])
+        values[f'{name}.feedforward.friction'] = result.changes[f'{name}.friction.coulomb']
     return values
 
 
@@ -160,6 +197,7 @@ def content(result):
     return {'name': 'calibrate drive', 'rows': rows(result), 'source': result.source, 'verified': passed(result),
             'remarks': {name: remarks(result, name) for name in result.found},
             'encoder_map_deg': {name: np.degrees(table).tolist() for name, table in result.maps.items()},
+            'kept': {name: sorted(kept) for name, kept in result.kept.items()},
             'parameters': {'acu': acu_parameters(result), 'adu': result.changes}}
 
 
@@ -173,15 +211,18 @@ def plan_parameters(chosen):
                   'adu': {f'initial_{name}': angle for name, angle in start.items()}}
 
 
-def write_plan(chosen, path):
-    """Write the motions for the antenna of a scenario.Scenario to a new parameter file. Return lines for the user."""
+def write_plan(chosen, given, path):
+    """Write the motions for the antenna of a scenario.Scenario to a new parameter file. Return lines for the user.
+
+    given: name or path of the scenario, as the user gave it.
+    """
+    run = shlex.join(('pedestal', 'run', given, '--params-file', str(path)))
     plan, sections = plan_parameters(chosen)
     stated = [f'motions of {plan.duration:g} s for the antenna of {chosen.name}, within', *plan.limits]
     path.write_text(''.join(f'# {line}\n' for line in stated) + parameter_file.text(sections), encoding='utf-8')
     return [*stated, f'written: {path}', 'Record the motions twice:',
-            f'    pedestal run {chosen.name} --params-file {path} --bag drive_1',
-            f'    pedestal run {chosen.name} --params-file {path} --param adu.azimuth.bias.schedule=off '
-            '--param adu.elevation.bias.schedule=off --bag drive_2']
+            f'    {run} --bag drive_1',
+            f'    {run} --param adu.azimuth.bias.schedule=off --param adu.elevation.bias.schedule=off --bag drive_2']
 
 
 def in_memory(name, overrides):
@@ -240,6 +281,9 @@ def main(options, changes):
     except motion_data.MotionError as error:
         raise ValueError(f'{source}: {error}') from None
     printed = [f'drive of {source}, {len(recordings)} recordings', '', *lines(result)]
+    if options.output and not passed(result):
+        printed.append(f'not written: {options.output}, because the result is not verified')
+        options = argparse.Namespace(**{**vars(options), 'output': None})
     printed += output_files.write(options, printed, {'acu': acu_parameters(result), 'adu': result.changes},
                                   lambda: identified_page.page(result, lines(result), options.command))
     return printed, content(result), passed(result)

@@ -39,18 +39,21 @@ ROW_STEP, MIN_ROWS = 2, 200
 """Step from one used row to the next, which the smoothing allows, and smallest number of rows."""
 
 
-def identify(parts, friction, gravity):
+def identify(parts, friction, gravity, flexible=True):
     """Return the estimates `inertia` [kg m2], and with a mode `dish_inertia` [kg m2], `frequency` [Hz] and `damping`.
 
     parts      [(Motion, torque on the load (n,) [Nm])] of the recordings
     friction   estimates.friction, whose torque at constant rate is subtracted
     gravity    True if the torque of gravity depends on the angle
+    flexible   False for a structure without a mode
     """
     known = {name: found[0] for name, found in friction.items()}
     data = [_rows(motion, torque, known, gravity) for motion, torque in parts]
     rows = np.concatenate([chosen for *_, chosen in data])
     if len(rows) < MIN_ROWS:
         return {}
+    if not flexible:
+        return _rigid(rows)
 
     def dish(w, zeta):
         return np.concatenate([_swing(period, a, used, w, zeta) for period, a, used, _ in data])
@@ -67,7 +70,21 @@ def identify(parts, friction, gravity):
         w, zeta = math.exp(found.x[0]), min(math.exp(found.x[1]), MAX_DAMPING)
         if _solved(rows, dish(w, zeta))[-1] > MIN_SHARE * abs(_solved(rows)[0]):
             return _flexible(rows, dish, w, zeta)
+    return _rigid(rows)
+
+
+def _rigid(rows):
+    """Return the estimate `inertia` of a rigid structure."""
     return jackknife(('inertia',), interleaved(rows), lambda kept: _solved(np.concatenate(kept))[:1])
+
+
+def inertia_torque(motion, found):
+    """Return the torque (n,) [Nm] that accelerates base and dish of a Motion; found: estimates of `identify`."""
+    if 'frequency' not in found:
+        return found['inertia'][0] * motion.a if 'inertia' in found else np.zeros_like(motion.a)
+    J, J_d, f, zeta = (found[name][0] for name in ('inertia', 'dish_inertia', 'frequency', 'damping'))
+    period = float(np.median(np.diff(motion.t)))
+    return (J - J_d) * motion.a + J_d * _swing(period, motion.a, slice(None), 2.0 * math.pi * f, zeta)
 
 
 def _flexible(rows, dish, w, zeta):

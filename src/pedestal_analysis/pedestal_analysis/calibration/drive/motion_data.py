@@ -93,9 +93,3 @@ def smoothed(t, theta, motors, ratio) -> Motion:
     rate[1:-1], acceleration[1:-1] = 0.5 * (later - before) / period, (later - 2.0 * now + before) / period**2
     return Motion(t, smooth[:, 0], rate[:, 0], acceleration[:, 0], smooth[:, 1:3] / ratio, rate[:, 1:],
                   acceleration[:, 1:], smooth[:, 3:])
-
-
-def joined(parts) -> Motion:
-    """Return the Motion of several recordings, one after another."""
-    return Motion(*(np.concatenate([getattr(part, field.name) for part in parts])
-                    for field in dataclasses.fields(Motion)))

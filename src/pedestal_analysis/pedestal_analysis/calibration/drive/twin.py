@@ -26,10 +26,16 @@ PARAMETER_NAMES = {
 SCALED_NAMES = ('viscous', 'coulomb', 'breakaway', 'stribeck_rate', 'lash', 'stiffness', 'frequency', 'damping')
 ADDED_NAMES = ('inertia', 'dish_inertia', 'unbalance')
 """Estimates that the twin corrects by a ratio, and by a difference."""
-ROUND_COUNT, MAX_RATIO = 3, 1.6
+MESH_NAMES = 'lash', 'stiffness'
+"""Estimates of a mesh."""
+ROUND_COUNT, MAX_RATIO = 4, 1.6
 """Number of corrections, and largest ratio of a correction [-]."""
+PASS_COUNT = 2
+"""Number of passes of the estimates of friction and inertia."""
 MAX_SHARE = 0.85
 """Largest share of the dish in the inertia of the load [-]."""
+RIGID = {f'{name}.structure.inertia_share': 0.0 for name in AXES}
+"""Parameters of adu of a drive without a flexible structure."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -92,35 +98,53 @@ def load_inertia_change(drive, elevation):
     return float(about @ bodies['I'] @ about + bodies['J_yoke'] - drive.azimuth.load.inertia)
 
 
-def estimate(recordings, motions, name) -> dict:
+def estimate(recordings, motions, name, flexible=True) -> dict:
     """Return the estimates {name: (value, low, high)} of an axis. Raises ValueError, which names too few motions.
 
-    recordings: Recordings, of which the parameters are used; motions: [Motion] in their place, recorded or replayed.
+    recordings: Recordings, of which the parameters are used; motions: [Motion] in their place, recorded or replayed;
+    flexible: False for a rigid structure.
     """
     axes = [getattr(recording.drive, name) for recording in recordings]
     gravity = name == 'elevation'
     loads = [motion.load_torque(axis) for motion, axis in zip(motions, axes)]
-    pieces = np.concatenate([estimates.plateaus(motion, load) for motion, load in zip(motions, loads)])
-    found = dict(estimates.friction(pieces, gravity))
-    found |= mode.identify(list(zip(motions, loads)), found, gravity)
-    mesh = np.concatenate([motion.mesh_torque(axis) for motion, axis in zip(motions, axes)])
-    found |= estimates.lash(motion_data.joined(motions), mesh, axes[0].gear_train.ratio)
+    found: dict = {}
+    for _ in range(PASS_COUNT):
+        # At a constant rate a dish may swing for seconds, so the friction needs the inertias and the inertias need it.
+        rests = [load - mode.inertia_torque(motion, found) for motion, load in zip(motions, loads)]
+        pieces = np.concatenate([estimates.plateaus(motion, rest) for motion, rest in zip(motions, rests)])
+        found = dict(estimates.friction(pieces, gravity))
+        found |= mode.identify(list(zip(motions, loads)), found, gravity, flexible)
+    found |= estimates.lash([(motion, motion.mesh_torque(axis)) for motion, axis in zip(motions, axes)],
+                            axes[0].gear_train.ratio)
     return found
 
 
 def estimated(recordings):
     """Return (first estimates, corrected estimates), each {axis: {name: (value, low, high)}}. Raises ValueError."""
-    first = {name: estimate(recordings, [recording.motions[name] for recording in recordings], name) for name in AXES}
-    extra = _extra(recordings)
+    true = {name: [recording.motions[name] for recording in recordings] for name in AXES}
+    first = {name: estimate(recordings, true[name], name) for name in AXES}
+    extra = extra_inertia(recordings)
+    flexible = {name for name in AXES if 'frequency' in first[name]}
+    if flexible:
+        # The staircase of the torque may look like a mode. The twin has the same staircase without a structure.
+        motions = [replayed(recording, RIGID) for recording in recordings]
+        for name in sorted(flexible):
+            again = estimate(recordings, [of_axes[name] for of_axes in motions], name)
+            if 'frequency' in again:
+                flexible.remove(name)
+                first[name] = estimate(recordings, true[name], name, flexible=False)
     values = {name: {key: value for key, (value, *_) in found.items()} for name, found in first.items()}
     for name, found in values.items():
-        # The estimate of the inertia is too small by the same amount in the twin, whatever its inertia is.
-        found['inertia'] = getattr(recordings[0].drive, name).load.inertia + extra[name]
+        # The estimate of the inertia is too small by the same amount in the twin, whatever its inertia is. Teeth that
+        # rattle show too little lash and stiffness. A twin with these would rattle in another way.
+        axis = getattr(recordings[0].drive, name)
+        found['inertia'] = axis.load.inertia + extra[name]
+        found |= {key: getattr(axis.gear_train, key) for key in MESH_NAMES if key in found}
     for _ in range(ROUND_COUNT):
         changes = parameters(recordings, values)
         motions = [replayed(recording, changes) for recording in recordings]
         for name in AXES:
-            again = estimate(recordings, [of_axes[name] for of_axes in motions], name)
+            again = estimate(recordings, [of_axes[name] for of_axes in motions], name, name in flexible)
             for key in set(again) & set(first[name]):
                 if key in ADDED_NAMES:
                     values[name][key] += first[name][key][0] - again[key][0]
@@ -129,25 +153,30 @@ def estimated(recordings):
                 elif key in SCALED_NAMES and again[key][0] != 0.0:
                     ratio = first[name][key][0] / again[key][0]
                     values[name][key] *= min(max(ratio, 1.0 / MAX_RATIO), MAX_RATIO)
-    corrected = {name: {key: _moved(values[name][key], *found) for key, found in first[name].items()} for name in AXES}
+    corrected = {name: {key: _moved(values[name][key], *found, key in MESH_NAMES)
+                        for key, found in first[name].items()} for name in AXES}
     return first, corrected
 
 
-def _extra(recordings):
+def extra_inertia(recordings):
     """Return {axis: inertia [kg m2]} that the elevating part adds to load.inertia at the elevation of the motions."""
     elevation = float(np.median(recordings[0].motions['elevation'].theta))
     return {'azimuth': load_inertia_change(recordings[0].drive, elevation), 'elevation': 0.0}
 
 
-def _moved(value, first, low, high):
-    """Return (value, low, high) with the width of the interval of a first estimate, scaled if the value is larger."""
-    scale = max(1.0, abs(value / first)) if first else 1.0
-    return value, value + scale * (low - first), value + scale * (high - first)
+def _moved(value, first, low, high, rattling):
+    """Return (value, low, high) with the width of the interval of a first estimate, scaled if the value is larger.
+
+    rattling: True for an estimate of a mesh. Teeth that rattle make its correction by the twin uncertain, so the
+    interval also covers the first estimate.
+    """
+    scale, more = max(1.0, abs(value / first)) if first else 1.0, abs(value - first) if rattling else 0.0
+    return value, value + scale * (low - first) - more, value + scale * (high - first) + more
 
 
 def parameters(recordings, values):
     """Return the parameters {name: value} of adu for the estimates {axis: {name: value}} from Recordings."""
-    drive, extra, found = recordings[0].drive, _extra(recordings), {}
+    drive, extra, found = recordings[0].drive, extra_inertia(recordings), {}
     for name, known in values.items():
         nominal = getattr(drive, name)
         known = {**known, 'inertia': known['inertia'] - extra[name]} if 'inertia' in known else known
