@@ -123,6 +123,9 @@ def test_the_file_is_for_control_unit_and_plant(result):
     assert acu.azimuth.feedforward.friction == pytest.approx(90.0, rel=0.01)
     assert {name: drive[name] for name in content['parameters']['adu']} == content['parameters']['adu']
     assert page.read_text().count('<svg') == 3
+    table = np.array(content['encoder_map_deg']['azimuth'])
+    expected = np.degrees(TRUE['azimuth.encoder.error.eccentricity_sin']) * np.sin(np.radians(table[:, 0]))
+    assert np.abs(table[:, 1] - expected).max() < 2e-4 and np.ptp(table[:, 0]) >= 300.0
     assert cli.main(['calibrate', 'drive', '--scenario', 'leo_pass', '--output', str(file)]) == 1
 
 
@@ -160,6 +163,28 @@ def test_the_plan_of_a_short_travel_stays_inside():
     starts = np.array([float(given['azimuth']) for given in at])
     ways = np.array([float(given.get('azimuth_rate', 0.0)) * float(given.get('moves', 0.0)) for given in at])
     assert np.abs(starts).max() <= 0.45 + 1e-6 and np.abs(starts + ways).max() <= 0.45 + 1e-6
+
+
+def test_the_plan_stays_above_the_floor(tmp_path, capfd):
+    """The elevation stays above the floor at every azimuth; a floor that leaves no travel is refused."""
+    given = ['calibrate', 'drive', '--scenario', 'leo_pass', '--plan', str(tmp_path / 'plan.yaml'), '--param']
+    low = [part for name in ('preset', 'stow', 'limits.high') for part in ('--param', f'acu.elevation.{name}=1.56')]
+    assert cli.main([*given, 'acu.floor=-3 1.5; 0 1.5; 3 1.5', *low]) == 1
+    assert 'acu.floor: leaves' in capfd.readouterr().err
+    assert cli.main([*given, 'acu.floor=-3 0.5; 0 0.5; 3 0.5']) == 0
+    assert 'elevation: 31.9 to 88.8 deg' in capfd.readouterr().out
+    chosen = scenario.load('leo_pass', scenario.file_overrides(tmp_path / 'plan.yaml'))
+    assert memory_recording.record(chosen).table('joint_states')['elevation.position'].min() > 0.5
+
+
+def test_a_long_plan_is_remarked_or_refused(tmp_path, capfd):
+    given = ['calibrate', 'drive', '--scenario', 'leo_pass', '--plan', str(tmp_path / 'plan.yaml'), '--param']
+    assert cli.main([*given, 'acu.azimuth.shaper.rate=0.001']) == 0
+    printed = capfd.readouterr().out
+    assert 'motions of 10 h ' in printed and 'acu.azimuth.shaper.rate = 0.001 rad/s: azimuth needs 10 h' in printed
+    (tmp_path / 'plan.yaml').unlink()
+    assert cli.main([*given, 'acu.azimuth.shaper.rate=0.0001']) == 1
+    assert 'for the motions; a run has at most 24 h 0 min' in capfd.readouterr().err
 
 
 def test_friction_is_fitted_to_computed_torques():

@@ -27,8 +27,10 @@ MIN_LASH_ROWS = 40
 STRONG_TORQUE_SHARE, CONTACT_TIME_S = 0.15, 0.02
 """Share of the largest torque of a motor [-], and time before and after a step [s]. With this torque during this time
 the teeth are in firm contact. This avoids steps at which a motor still crosses the lash."""
-MIN_TURN_RAD = math.radians(300.0)
-"""Smallest angle over which the error of the encoder is fitted [rad]."""
+MIN_TURN_RAD, TURN_RATE_SHARE, TURN_SETTLING_S = math.radians(300.0), 0.98, 1.0
+"""Smallest angle of a turn [rad], least rate over the usual rate [-], and time at the begin that is left out [s]."""
+TABLE_STEP_RAD = math.radians(5.0)
+"""Step of the table of the encoder, and width of the angles whose mean is one row [rad]."""
 
 
 def interleaved(rows):
@@ -200,26 +202,30 @@ def encoder(motion, pinion_ratio):
 
 
 def _turn(motion, sign):
-    """Return the slice of the longest stretch in one direction, of at least MIN_TURN_RAD; None if there is none."""
-    longest = None
+    """Return the slice of the longest stretch in one direction, of at least MIN_TURN_RAD; None if there is none.
+
+    The accelerations at its ends are left out, because their torques twist the gears.
+    """
+    longest, settling = None, round(TURN_SETTLING_S / float(np.median(np.diff(motion.t))))
     for first, last in tracking.stretches(sign * motion.v > 1e-2):
-        way = abs(motion.theta[last - 1] - motion.theta[first])
+        rate = sign * motion.v[first:last]
+        fast = first + np.flatnonzero(rate > TURN_RATE_SHARE * np.median(rate))
+        way = abs(motion.theta[fast[-1]] - motion.theta[fast[0]])
         if way >= MIN_TURN_RAD and (longest is None or way > longest[0]):
-            longest = way, slice(first, last)
+            longest = way, slice(fast[0] + settling, fast[-1] + 1)
     return longest and longest[1]
 
 
 def _table(motion, ways):
     """Return the table of `encoder` from the two slices of the turn."""
-    low = max(motion.theta[part].min() for part in ways)
-    high = min(motion.theta[part].max() for part in ways)
-    step = math.radians(5.0)
-    angles = step * np.arange(math.ceil(low / step), math.floor(high / step) + 1)
+    half = 0.5 * TABLE_STEP_RAD
+    low = max(motion.theta[part].min() for part in ways) + half
+    high = min(motion.theta[part].max() for part in ways) - half
+    angles = TABLE_STEP_RAD * np.arange(math.ceil(low / TABLE_STEP_RAD), math.floor(high / TABLE_STEP_RAD) + 1)
     errors = []
     for part in ways:
-        order = np.argsort(motion.theta[part])
-        theta = motion.theta[part][order]
-        error = theta - motion.motor_angle[part].mean(1)[order]
-        errors.append([error[np.abs(theta - angle) < math.radians(2.5)].mean() for angle in angles])
+        theta = motion.theta[part]
+        error = theta - motion.motor_angle[part].mean(1)
+        errors.append([error[np.abs(theta - angle) < half].mean() for angle in angles])
     mean = np.mean(errors, axis=0)
     return np.column_stack((angles, mean - mean.mean()))

@@ -47,6 +47,7 @@ class Identified:
 
     source       names of the recordings
     recordings   [twin.Recording]
+    first        {axis: {name: (value, low, high)}} before the correction by the twin
     found        {axis: {name: (value, low, high)}} in the order of QUANTITIES
     maps         {axis: (m, 2) error of the load encoder [rad] over the angle [rad]}, empty without a turn
     changes      {name: value} of the parameters of adu: identified values, or nominal values of the names in `kept`
@@ -57,6 +58,7 @@ class Identified:
     """
     source: str
     recordings: list
+    first: dict
     found: dict
     maps: dict
     changes: dict
@@ -69,7 +71,7 @@ class Identified:
 def calibrate(recordings, source) -> Identified:
     """Return the Identified of twin.Recordings. Raises ValueError."""
     found, maps = {}, {}
-    _, corrected = twin.estimated(recordings)
+    first, corrected = twin.estimated(recordings)
     for name in AXES:
         axis = getattr(recordings[0].drive, name)
         own = dict(corrected[name])
@@ -87,7 +89,7 @@ def calibrate(recordings, source) -> Identified:
     values = {name: {key: value for key, (value, *_) in own.items()} for name, own in found.items()}
     identified = {name: _rounded(value) for name, value in twin.parameters(recordings, values).items()}
     changes, kept, before, error = _chosen(recordings, found, identified)
-    return Identified(source, recordings, found, maps, changes, kept, before, error,
+    return Identified(source, recordings, first, found, maps, changes, kept, before, error,
                       twin.torque_errors(recordings, changes))
 
 
@@ -138,12 +140,12 @@ def lines(result):
     """Return the lines of the table of an Identified, with the torque errors and remarks."""
     drive, listed = as_dict(result.recordings[0].drive), []
     for name, found in result.found.items():
-        listed += [f'{name:17} {"nominal":>11} {"identified":>11}  {"95 % interval":25} {"unit":8} meaning']
+        listed += [f'{name:17} {"nominal":>11} {"identified":>11}  {"95 % interval":26} {"unit":8} meaning']
         for key, (value, low, high) in found.items():
             parameter = twin.PARAMETER_NAMES.get(key)
             nominal = f'{drive[f"{name}.{parameter}"]:.5g}' if parameter else ''
             interval = f'{low:.5g} to {high:.5g}' if math.isfinite(low) else ''
-            listed.append(f'  {key:15} {nominal:>11} {value:11.5g}  {interval:25} {QUANTITIES[key][0]:8} '
+            listed.append(f'  {key:16}{nominal:>11} {value:11.5g}  {interval:26} {QUANTITIES[key][0]:8} '
                           f'{QUANTITIES[key][1]}')
         chosen = f', {100.0 * result.after[name]:.1f} % with the chosen values' if result.kept[name] else ''
         listed += [f'  torque of the twin is off by {100.0 * result.before[name]:.1f} % rms with nominal values, '
@@ -218,7 +220,7 @@ def write_plan(chosen, given, path):
     """
     run = shlex.join(('pedestal', 'run', given, '--params-file', str(path)))
     plan, sections = plan_parameters(chosen)
-    stated = [f'motions of {plan.duration:g} s for the antenna of {chosen.name}, within', *plan.limits]
+    stated = [f'motions of {motions.time_text(plan.duration)} for the antenna of {chosen.name}, within', *plan.limits]
     path.write_text(''.join(f'# {line}\n' for line in stated) + parameter_file.text(sections), encoding='utf-8')
     return [*stated, f'written: {path}', 'Record the motions twice:',
             f'    {run} --bag drive_1',

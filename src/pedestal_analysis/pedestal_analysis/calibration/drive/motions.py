@@ -8,11 +8,12 @@ Each axis moves alone, about the middle of its travel, in this order:
     turn         a turn both ways, if the travel allows a turn: encoder
 
 The motions stay inside the limits of the control unit: MAX_RATE_SHARE of the shaper's rate, the shaper's acceleration,
-and the travel less MARGIN_SHARE at each end.
+and the travel less MARGIN_SHARE at each end. The elevation stays above the highest point of the floor.
 """
 import dataclasses
 import math
 
+from acu_tracker.servo import floor
 from pedestal_common.graph.topics import AXES
 
 MAX_RATE_SHARE, MARGIN_SHARE = 0.5, 0.05
@@ -35,6 +36,10 @@ TURN_RAD, TURN_RATE_RAD_S = 1.02 * 2.0 * math.pi, 0.5
 """Angle of a turn with an overlap [rad] and its largest rate [rad/s]."""
 SETTLING_TIME_S = 0.6
 """Time after a motion before the next [s]."""
+MIN_TRAVEL_RAD = math.radians(5.0)
+"""Smallest travel of an axis, less its margins [rad]."""
+LONG_TIME_S, MAX_TIME_S = 3600.0, 86400.0
+"""Duration that is remarked, and longest duration of a run [s]."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -44,7 +49,7 @@ class Plan:
     commands   text for the parameter acu.commands
     start      (azimuth, elevation) at the start [rad]
     duration   of the run [s]
-    limits     lines that state the limits of the motions
+    limits     lines that state the limits of the motions, and the reason of a long duration
     """
     commands: str
     start: tuple
@@ -57,7 +62,8 @@ class _Schedule:
 
     def __init__(self, acu):
         self.acu, self.parts, self.t = acu, [], 2.0
-        self.angles = [0.5 * (axis.limits.low + axis.limits.high) for axis in (acu.azimuth, acu.elevation)]
+        self.ranges = [_range(acu, name) for name in AXES]
+        self.angles = [0.5 * (low + high) for low, high in self.ranges]
         self.start = tuple(self.angles)
 
     def command(self, i, angle, wait, rate=0.0, moves=0.0):
@@ -81,12 +87,33 @@ class _Schedule:
             self.angles[i] = angle
 
 
+def _range(acu, name):
+    """Return (low, high) angle [rad] of the motions of an axis. Raises ValueError for a travel that is too short."""
+    limits, cause = getattr(acu, name).limits, f'acu.{name}.limits'
+    low, high = limits.low, limits.high
+    _, heights = floor.points(acu.floor)
+    if name == 'elevation' and heights and max(heights) + floor.FLOOR_CLEARANCE_RAD > low:
+        low, cause = max(heights) + floor.FLOOR_CLEARANCE_RAD, 'acu.floor'
+    margin = MARGIN_SHARE * (high - low)
+    if high - low - 2.0 * margin < MIN_TRAVEL_RAD:
+        raise ValueError(f'{cause}: leaves {math.degrees(max(high - low - 2.0 * margin, 0.0)):.1f} deg of {name} for '
+                         f'the motions, must be at least {math.degrees(MIN_TRAVEL_RAD):g} deg')
+    return low + margin, high - margin
+
+
+def time_text(seconds):
+    """Return a duration as '260 s', or as '10 h 44 min' from LONG_TIME_S on."""
+    if seconds < LONG_TIME_S:
+        return f'{seconds:g} s'
+    hours, minutes = divmod(round(seconds / 60.0), 60)
+    return f'{hours} h {minutes} min'
+
+
 def plan(acu) -> Plan:
-    """Return the Plan for the limits of AcuParameters."""
-    schedule, limits = _Schedule(acu), []
+    """Return the Plan for the limits of AcuParameters. Raises ValueError for a short travel or too long motions."""
+    schedule, limits, times = _Schedule(acu), [], {}
     for i, (name, axis) in enumerate(zip(AXES, (acu.azimuth, acu.elevation))):
-        travel = axis.limits.high - axis.limits.low
-        low, high = axis.limits.low + MARGIN_SHARE * travel, axis.limits.high - MARGIN_SHARE * travel
+        (low, high), begin = schedule.ranges[i], schedule.t
         middle, largest = 0.5 * (low + high), MAX_RATE_SHARE * axis.shaper.rate
         _rates(schedule, i, middle, 0.6 * (high - low), largest, axis.shaper.acceleration)
         _reversals(schedule, i, middle, 0.5 * largest)
@@ -100,6 +127,14 @@ def plan(acu) -> Plan:
         schedule.slew(i, middle)
         limits.append(f'{name}: {math.degrees(low):.1f} to {math.degrees(high):.1f} deg, at most {largest:.3g} rad/s '
                       f'and {axis.shaper.acceleration:.3g} rad/s2')
+        times[name] = schedule.t - begin
+    if schedule.t > LONG_TIME_S:
+        slow = max(times, key=lambda name: times[name])
+        reason = f'acu.{slow}.shaper.rate = {getattr(acu, slow).shaper.rate:g} rad/s: {slow} needs '
+        if schedule.t > MAX_TIME_S:
+            raise ValueError(f'{reason}{time_text(times[slow])} for the motions; a run has at most '
+                             f'{time_text(MAX_TIME_S)}')
+        limits.append(f'{reason}{time_text(times[slow])} of it; a larger rate shortens the motions')
     return Plan('; '.join(schedule.parts), schedule.start, math.ceil(schedule.t + 1.0), tuple(limits))
 
 

@@ -98,6 +98,14 @@ def load_inertia_change(drive, elevation):
     return float(about @ bodies['I'] @ about + bodies['J_yoke'] - drive.azimuth.load.inertia)
 
 
+def constant_rates(motion, load, found):
+    """Return the estimates.plateaus of a Motion, without the torques that accelerate its base and dish.
+
+    load (n,): torque on the load [Nm]; found: estimates of mode.identify.
+    """
+    return estimates.plateaus(motion, load - mode.inertia_torque(motion, found))
+
+
 def estimate(recordings, motions, name, flexible=True) -> dict:
     """Return the estimates {name: (value, low, high)} of an axis. Raises ValueError, which names too few motions.
 
@@ -110,8 +118,7 @@ def estimate(recordings, motions, name, flexible=True) -> dict:
     found: dict = {}
     for _ in range(PASS_COUNT):
         # At a constant rate a dish may swing for seconds, so the friction needs the inertias and the inertias need it.
-        rests = [load - mode.inertia_torque(motion, found) for motion, load in zip(motions, loads)]
-        pieces = np.concatenate([estimates.plateaus(motion, rest) for motion, rest in zip(motions, rests)])
+        pieces = np.concatenate([constant_rates(motion, load, found) for motion, load in zip(motions, loads)])
         found = dict(estimates.friction(pieces, gravity))
         found |= mode.identify(list(zip(motions, loads)), found, gravity, flexible)
     found |= estimates.lash([(motion, motion.mesh_torque(axis)) for motion, axis in zip(motions, axes)],
