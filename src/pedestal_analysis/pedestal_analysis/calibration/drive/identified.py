@@ -3,7 +3,6 @@
 The result is a table with nominal and identified values, rows for --json, a page, and a ROS 2 parameter file with
 acu.AXIS.feedforward.* and adu.AXIS.*. The twin with these values must reproduce the torques of the recording.
 """
-import argparse
 import dataclasses
 import math
 import shlex
@@ -283,9 +282,7 @@ def main(options, changes):
     except motion_data.MotionError as error:
         raise ValueError(f'{source}: {error}') from None
     printed = [f'drive of {source}, {len(recordings)} recordings', '', *lines(result)]
-    if options.output and not passed(result):
-        printed.append(f'not written: {options.output}, because the result is not verified')
-        options = argparse.Namespace(**{**vars(options), 'output': None})
     printed += output_files.write(options, printed, {'acu': acu_parameters(result), 'adu': result.changes},
-                                  lambda: identified_page.page(result, lines(result), options.command))
+                                  lambda: identified_page.page(result, lines(result), options.command),
+                                  verified=passed(result))
     return printed, content(result), passed(result)
