@@ -148,6 +148,59 @@ def test_a_table_continues_after_its_last_complete_row(tmp_path):
         open_table({'--seed': '2'}).__enter__()
 
 
+DAMAGED = {
+    'text for a number': ((2, 3, 'abc'), "line 3: loss_s = 'abc': must be a number, or empty for no result"),
+    'decimal comma': ((2, 3, '"2,7E-3"'), "line 3: loss_s = '2,7E-3': must be a number"),
+    'digits with _': ((2, 3, '1_0'), "line 3: loss_s = '1_0': must be a number"),
+    'text for a parameter': ((2, 2, 'x'), f"line 3: {INERTIA} = 'x': must be 210.5"),
+    'another seed': ((1, 1, '9'), "line 2: seed = '9': must be 7"),
+    'a row less': ((1, None, None), "line 2: trial = '1': must be 0"),
+    'a short row': ((2, slice(2, None), []), 'line 3: 2 cells: must be 5 as in line 1'),
+    'a foreign last line': ((3, slice(None), ['end of file']), 'line 4: 1 cells: must be 5 as in line 1'),
+    'a blank line': ((2, slice(None), []), 'line 3: 0 cells: must be 5'),
+    'other names': ((0, 3, 'loss'), 'line 1: must hold the names of the columns'),
+    'other letters': ((2, 4, '\udcff'), 'line 3: byte 0xff: must be text in UTF-8'),
+    'a quote': ((2, 3, '"1.5'), 'line 4: 4 cells: must be 5'),
+}
+
+
+@pytest.mark.parametrize('case', DAMAGED)
+def test_a_damaged_row_is_named_and_not_read(tmp_path, case):
+    def open_table():
+        return Table(tmp_path, 'trials', {}, [INERTIA], ['loss_s'], ['why'], [(7 + i, 210.5) for i in range(3)])
+
+    with open_table() as table:
+        table.append([[i, 7 + i, 210.5, 0.1 * i, 'lost: at 3 s'] for i in range(3)])
+    (line, cell, value), expected = DAMAGED[case]
+    rows = [row.split(',') for row in table.file.read_text().splitlines()]
+    if cell is None:
+        del rows[line]
+    else:
+        rows[line][cell] = value
+    before = '\n'.join([*map(','.join, rows), '']).encode(errors='surrogateescape')
+    table.file.write_bytes(before)
+    with pytest.raises(TableError) as raised:
+        open_table().__enter__()
+    assert f'{table.file}: {expected}' in str(raised.value) and '\n' not in str(raised.value)
+    assert table.file.read_bytes() == before
+
+
+def test_a_table_that_a_spreadsheet_wrote_again_goes_on(tmp_path):
+    """Other line ends and a byte order mark leave the rows equal; a text for a result is refused."""
+    command = ('leo_pass', '--runs', 2, '--duration', 3, '--workers', 1)
+    assert cli.main(['trials', *map(str, command), '--output', str(tmp_path)]) == 0
+    file = tmp_path / 'trials.csv'
+    content = file.read_bytes()
+    file.write_bytes(b'\xef\xbb\xbf' + content.replace(b'\n', b'\r\n'))
+    made = plan('leo_pass', 2, duration=3.0)
+    with ensemble.open_table(made, tmp_path) as table:
+        assert len(table.rows) == 2
+    name, cell = 'azimuth_following_rms_deg', str(table.column('azimuth_following_rms_deg')[1])
+    file.write_bytes(content.replace(cell.encode(), b'abc'))
+    with pytest.raises(TableError, match=f"line 3: {name} = 'abc': must be a number"):
+        ensemble.open_table(made, tmp_path).__enter__()
+
+
 def make(made, folder, pool):
     with ensemble.open_table(made, folder) as table:
         ensemble.run_missing_trials([made], [table], pool)

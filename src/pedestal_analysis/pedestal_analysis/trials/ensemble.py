@@ -47,7 +47,13 @@ def open_table(plan, folder, name='trials') -> Table:
     prefixes = plan.scenario(0).prefixes
     heads = [f'{prefix}{result}' for prefix in prefixes for result in TRIAL_RESULTS]
     return Table(folder, name, {**plan.identity, 'sources': monte_carlo.sources()}, plan.varied, heads,
-                 [f'{prefix}{WHY}' for prefix in prefixes])
+                 [f'{prefix}{WHY}' for prefix in prefixes],
+                 [[plan.seed + i, *own] for i, own in enumerate(_drawn(plan))])
+
+
+def _drawn(plan):
+    """Return [values of the varied parameters] of each trial of a plan.Plan."""
+    return zip(*plan.varied.values()) if plan.varied else [()] * plan.runs
 
 
 @contextlib.contextmanager

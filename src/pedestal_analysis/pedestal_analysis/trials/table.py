@@ -19,8 +19,8 @@ LEADING_COLUMNS = ('trial', 'seed')
 
 
 class TableError(ValueError):
-    """Error of a table whose file belongs to other trials, or is being written by another process. Its text is one
-    line.
+    """Error of a table whose file is damaged, belongs to other trials, or is being written by another process. Its
+    text is one line.
     """
 
 
@@ -31,15 +31,17 @@ class Table:
     varied     heads of the columns of varied parameters
     results    heads of the columns of results, which are numbers
     texts      heads of the columns of sentences
+    planned    rows of seed and varied parameters, which the trials must have; may be shorter than the file
 
     Use as a context: `with` opens the file, reads its complete rows into `rows`, and locks it against other processes.
-    Raises TableError if the file exists and belongs to other trials.
+    Raises TableError if the file exists and is damaged or belongs to other trials.
     """
 
-    def __init__(self, folder, name, identity, varied, results, texts=()):
+    def __init__(self, folder, name, identity, varied, results, texts=(), planned=()):
         folder = pathlib.Path(folder)
         self.file, self._description_file = folder / f'{name}.csv', folder / f'{name}.json'
         self.varied, self.results, self.texts = list(varied), list(results), list(texts)
+        self._planned = planned
         self._identity = {**identity, 'columns': ' '.join(self.head)}
         self._stream, self.rows = None, []
 
@@ -71,7 +73,7 @@ class Table:
         whole = content[:content.rfind(b'\n') + 1]     # without an incomplete last line of a killed process
         if whole:
             self._compare()
-            self.rows = list(csv.reader(io.StringIO(whole.decode())))[1:]
+            self.rows = self._checked(whole)
             os.truncate(self.file, len(whole))
             return
         part = self._description_file.with_suffix('.part')
@@ -86,6 +88,7 @@ class Table:
             found = json.loads(self._description_file.read_text())
         except (OSError, ValueError):
             found = {}
+        found = found if isinstance(found, dict) else {}
         for key, value in self._identity.items():
             if found.get(key) != value:
                 names = {'columns': 'other columns', 'content': 'another scenario file of that name',
@@ -93,6 +96,43 @@ class Table:
                 difference = names.get(key, f'{key} {found.get(key)}, not {value}')
                 raise TableError(f'{self.file} contains other trials ({difference}): use another --output, or delete '
                                  'the file')
+
+    def _checked(self, content):
+        """Return the rows of trials in the bytes of the file. Raises TableError for a damaged row."""
+        try:
+            text = content.decode('utf-8-sig')
+        except UnicodeDecodeError as error:
+            line = 1 + content.count(b'\n', 0, error.start)
+            raise self._damage(line, f'byte {content[error.start]:#04x}: must be text in UTF-8') from None
+        reader, rows = csv.reader(io.StringIO(text, newline='')), []
+        try:
+            if next(reader, []) != self.head:
+                raise self._damage(1, 'must hold the names of the columns, as this program writes them')
+            for row in reader:
+                self._check(row, len(rows), reader.line_num)
+                rows.append(row)
+        except csv.Error as error:
+            raise self._damage(reader.line_num, f'is no line of a CSV file: {error}') from None
+        return rows
+
+    def _check(self, row, i, line):
+        """Raise TableError unless a row [text of a cell] is that of trial i. line: number of the line in the file."""
+        if len(row) != len(self.head):
+            raise self._damage(line, f'{len(row)} cells: must be {len(self.head)} as in line 1')
+        planned = [i, *(self._planned[i] if i < len(self._planned) else ())]
+        first = len(LEADING_COLUMNS) + len(self.varied)
+        for k, (name, cell) in enumerate(zip(self.head, row)):
+            if k < len(planned):
+                expected = _written(planned[k])
+                if cell != expected and _number(cell) != _number(expected):
+                    raise self._damage(line, f'{name} = {cell!r:.60}: must be {expected}')
+            elif first <= k < first + len(self.results) and cell and _number(cell) is None:
+                raise self._damage(line, f'{name} = {cell!r:.60}: must be a number, or empty for no result')
+
+    def _damage(self, line, text):
+        """Return the TableError of a damaged line."""
+        return TableError(f'{self.file}: line {line}: {text}; mend the line, or delete the file to run its trials '
+                          'again')
 
     def append(self, rows):
         """Write rows to the file. A row is a list of values in the order of `head`, None for a missing value."""
@@ -139,6 +179,14 @@ class Table:
         """Names of the results that at least one trial has."""
         first = len(LEADING_COLUMNS) + len(self.varied)
         return [name for i, name in enumerate(self.results, first) if any(row[i] for row in self.rows)]
+
+
+def _number(cell):
+    """Return the number in a cell, None if the cell holds no number."""
+    try:
+        return None if '_' in cell else float(cell)
+    except ValueError:
+        return None
 
 
 def _written(value):
