@@ -327,8 +327,8 @@ class GustParameters(Parameters):
     """
     kind: str = choice('none', ('none', 'step', 'sine', 'davenport', 'von_karman'), 'gust in addition to '
                        'the mean torque')
-    azimuth: float = parameter(0.0, -1e5, 1e5, 'Nm', 'step, sine: amplitude on azimuth')
-    elevation: float = parameter(0.0, -1e5, 1e5, 'Nm', 'step, sine: amplitude on elevation')
+    azimuth: float = parameter(0.0, -1e9, 1e9, 'Nm', 'step, sine: amplitude on azimuth')
+    elevation: float = parameter(0.0, -1e9, 1e9, 'Nm', 'step, sine: amplitude on elevation')
     start: float = parameter(1.0, 0.0, 86400.0, 's', 'step, sine: time of the drive at which the gust begins')
     frequency: float = parameter(1.0, 1e-3, 50.0, 'Hz', 'sine: frequency')
     speed: float = parameter(10.0, 1.0, 60.0, 'm/s', 'spectra: speed V of the mean wind')
@@ -357,8 +357,8 @@ class WindFieldParameters(Parameters):
 @dataclasses.dataclass(frozen=True)
 class WindParameters(Parameters):
     """Torque of the wind on both axes."""
-    azimuth: float = parameter(0.0, -5000.0, 5000.0, 'Nm', 'mean torque on azimuth')
-    elevation: float = parameter(0.0, -5000.0, 5000.0, 'Nm', 'mean torque on elevation')
+    azimuth: float = parameter(0.0, -1e9, 1e9, 'Nm', 'mean torque on azimuth')
+    elevation: float = parameter(0.0, -1e9, 1e9, 'Nm', 'mean torque on elevation')
     gust: GustParameters = group(GustParameters)
     field: WindFieldParameters = group(WindFieldParameters)
 

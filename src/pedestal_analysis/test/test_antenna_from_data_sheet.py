@@ -1,16 +1,19 @@
 """`pedestal new`: the antenna that comes with the product from its own data sheet, the three that ship, refusals."""
+import contextlib
+import dataclasses
 import math
+import re
 import shlex
 
 import pytest
 
 from adu_drive import drive_state
 from pedestal_analysis.results import results
-from pedestal_analysis.tuning import antenna_from_data_sheet, loops
+from pedestal_analysis.tuning import antenna_from_data_sheet, data_sheet_limits, loops
 from pedestal_analysis.tuning.data_sheet_format import TEMPLATE_SCENARIOS, DataSheet
 from pedestal_bringup.loop import closed_loop, memory_recording
 from pedestal_bringup.scenario import scenario
-from pedestal_common.parameters import as_dict
+from pedestal_common.parameters import ParameterError, as_dict
 
 SHIPPED = ('uav_tracker_3m', 'leo_station_7m', 'ship_terminal_1m2')
 
@@ -77,16 +80,78 @@ def test_what_ships_is_made_by_the_commands_in_its_head(pedestal, tmp_path, name
 
 
 @pytest.mark.parametrize('arguments, expected', [
-    (('--mirror', '400'), 'mirror = 400 m: must be 0.1 to 40'),
-    (('--mode', '0.5'), 'mode = 0.5 Hz: must be 1 to 200'),
-    (('--like', 'leo_pas'), "like = 'leo_pas': must be one of leo_pass, geo_station, uav_flyby, ship_pass, ship_uav"),
-    (('--motor-torque', '0.2'), 'adu.azimuth: motor_1.resistance = 128.706 ohm: must be 0.01 to 100'),
-    (('--motor-torque', '1', '--inertia-azimuth', '40000'), 'adu.azimuth: the motors cannot move the axis'),
+    (('--mirror', '400'), '--mirror = 400 m: must be 0.1 to 40'),
+    (('--mode', '0.5'), '--mode = 0.5 Hz: must be 1 to 200, or 0 for the average'),
+    (('--mode', '500'), '--mode = 500 Hz: must be 1 to 200, or 0 for the average'),
+    (('--like', 'leo_pas'), "--like = 'leo_pas': must be one of leo_pass, geo_station, uav_flyby, ship_pass, "),
+    (('--motor-torque', '0.2'), '(adu.azimuth: motor_1.resistance = 128.706 ohm: must be 0.01 to 100)'),
+    (('--motor-torque', '0.5'), '--motor-torque 0.5 Nm: must be 0.525 to 1000, with the other values'),
+    (('--ratio-azimuth', '20000'), '--ratio-azimuth 20000: must be 8 to 7990, with the other values'),
+    (('--motor-torque', '1', '--inertia-azimuth', '40000'), '(adu.azimuth: the motors cannot move the axis'),
+    (('--mirror', '18', '--inertia-azimuth', '200000', '--inertia-elevation', '150000'),
+     '--inertia-azimuth 200000 kg m2: must be 0.1 to 92800, or --ratio-azimuth 64: must be 93.9 to 7990, or '),
+    (('--beamwidth', '0.001'), '--beamwidth 0.001 deg: must be 0.00573 to 20, with the other values'),
+    (('--mirror', '0.1'), '--mirror 0.1 m: must be 0.319 to 40, or --frequency 2.3 GHz: must be 7.33 to 100, with'),
 ])
 def test_a_sheet_that_cannot_be_is_refused(pedestal, tmp_path, arguments, expected):
     code, output, errors = pedestal('new', 'my.yaml', *arguments)
     assert (code, output) == (1, '') and expected in errors and errors.count('\n') == 1
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize('arguments', [
+    {'motor_torque': 0.5}, {'ratio_azimuth': 2e4}, {'motor_speed': 100.0}, {'mirror': 0.1}, {'inertia_azimuth': 1e6}])
+def test_the_ranges_of_a_refusal_are_those_of_the_antenna(arguments):
+    """An antenna can be made at both ends of each range, and not 2 % outside, except where the range of the option
+    ends."""
+    sheet = DataSheet(**arguments)
+    with pytest.raises(data_sheet_limits.SheetError) as raised:
+        antenna_from_data_sheet.new(sheet, 'my', '')
+    found = re.findall(r'--([a-z-]+) [^:]*: must be ([\d.e+-]+) to ([\d.e+-]+),', str(raised.value))
+    assert found
+    for option, *ends in found:
+        name = option.replace('-', '_')
+        for end, factor in zip(map(float, ends), (0.98, 1.02)):
+            antenna_from_data_sheet.new(dataclasses.replace(sheet, **{name: end}), 'my', '')
+            with contextlib.suppress(ParameterError):
+                outside = dataclasses.replace(sheet, **{name: end * factor})
+                with pytest.raises(data_sheet_limits.SheetError):
+                    antenna_from_data_sheet.new(outside, 'my', '')
+
+
+@pytest.mark.parametrize('arguments', [('--frequency', '0.4'), ('--frequency', '0.4', '--like', 'uav_flyby')])
+def test_a_wide_beam_starts_within_the_travel(pedestal, tmp_path, arguments):
+    assert pedestal('new', 'my.yaml', *arguments)[0] == 0
+    drive = scenario.load(tmp_path / 'my.yaml').node_parameters('adu')
+    assert drive.elevation.limits.lower <= drive.initial_elevation <= drive.elevation.limits.upper
+
+
+@pytest.mark.parametrize('arguments', [
+    ('--mode', '1'), ('--mode', '200'), ('--inertia-elevation', '0.1'),
+    ('--mirror', '40', '--inertia-azimuth', '9e6', '--inertia-elevation', '9e6', '--ratio-azimuth', '8000',
+     '--ratio-elevation', '9000', '--motor-torque', '100')])
+def test_loops_are_tuned_over_the_whole_range(pedestal, tmp_path, arguments):
+    """The variation of inertia and structure ends at the ranges of these parameters."""
+    assert pedestal('new', 'my.yaml', *arguments)[::2] == (0, '')
+    code, output, errors = pedestal('tune', 'my.yaml', '--loops', '--axis', 'elevation')
+    assert (code, errors) == (0, '') and 'elevation position, worst' in output
+
+
+def test_the_next_command_is_quoted(pedestal, tmp_path):
+    _, output, _ = pedestal('new', 'my antenna.yaml')
+    assert output.endswith("written: my antenna.yaml  (pedestal tune 'my antenna.yaml' --loops)\n")
+    assert "pedestal run 'my antenna.yaml' --params-file 'my antenna-loops.yaml'" in (
+        tmp_path / 'my antenna.yaml').read_text()
+    _, output, _ = pedestal('tune', 'my antenna.yaml', '--loops', '--axis', 'elevation')
+    assert output.endswith("(pedestal run 'my antenna.yaml' --params-file 'my antenna-loops.yaml')\n")
+
+
+def test_a_large_antenna_is_studied(pedestal, tmp_path):
+    """The gust of the study is a share of the torque of the motors, here 576 kNm."""
+    assert pedestal('new', 'my.yaml', '--mirror', '18', '--inertia-azimuth', '400000', '--inertia-elevation', '300000',
+                    '--ratio-azimuth', '4000', '--ratio-elevation', '4000', '--motor-torque', '120')[0] == 0
+    code, output, errors = pedestal('study', 'servo', '--scenario', 'my.yaml')
+    assert (code, errors) == (0, '') and '5.76e+05' in output
 
 
 @pytest.mark.parametrize('arguments, axis, expected', [

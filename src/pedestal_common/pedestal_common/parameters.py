@@ -101,6 +101,11 @@ def without_ros(values: Mapping[str, typing.Any]) -> dict[str, typing.Any]:
     return {name: value for name, value in values.items() if name not in own and not name.startswith(_ROS_PREFIX)}
 
 
+def number_text(value: float) -> str:
+    """Return the text of a number for an error: all digits of an integer, six digits of a float."""
+    return str(value) if isinstance(value, int) else f'{value:g}'
+
+
 def _check_field(field: dataclasses.Field, name: str, value: typing.Any) -> None:
     meta = field.metadata
     if 'low' in meta:
@@ -109,8 +114,9 @@ def _check_field(field: dataclasses.Field, name: str, value: typing.Any) -> None
         if field.type is int and not isinstance(value, int):
             raise ParameterError(f'{name} = {value!r}: must be a whole number')
         if not (math.isfinite(value) and meta['low'] <= value <= meta['high']):
-            given = f'{value:g} {meta["unit"]}'.rstrip()
-            raise ParameterError(f'{name} = {given}: must be {meta["low"]:g} to {meta["high"]:g}')
+            given, low, high = (number_text(number) for number in (value, meta['low'], meta['high']))
+            unit = f' {meta["unit"]}'.rstrip()
+            raise ParameterError(f'{name} = {given}{unit}: must be {low} to {high}')
     elif 'options' in meta and value not in meta['options']:
         raise ParameterError(f'{name} = {value!r}: must be one of {", ".join(meta["options"])}')
     elif field.type is bool and not isinstance(value, bool):

@@ -24,6 +24,7 @@ from pedestal_common.parameters import (
 class Loop(Parameters):
     Kp: float = parameter(6.0, 0.0, 100.0, 'Nm s/rad', 'proportional gain')
     order: int = parameter(2, 1, 4, '', 'order')
+    seed: int = parameter(1, 0, 2**31 - 1, '', 'seed')
 
     def check(self):
         if self.Kp > 50.0 and self.order > 3:
@@ -51,6 +52,8 @@ def test_build_changes_what_is_named_and_keeps_the_rest():
     ({'azimuth.Kp': math.nan}, ['azimuth.Kp = nan', '0 to 100']),
     ({'azimuth.Kp': 'six'}, ["azimuth.Kp = 'six'", 'number']),
     ({'azimuth.order': 1.5}, ['azimuth.order = 1.5', 'whole number']),
+    ({'azimuth.seed': 2**31}, ['azimuth.seed = 2147483648: must be 0 to 2147483647']),
+    ({'azimuth.Kp': 1e7}, ['azimuth.Kp = 1e+07 Nm s/rad: must be 0 to 100']),
     ({'kind': 'medium'}, ["kind = 'medium'", 'slow, fast']),
     ({'inverted': 1}, ['inverted = 1', 'true or false']),
     ({'name': 3}, ['name = 3', 'text']),

@@ -1,4 +1,6 @@
 """Files that each step of `pedestal calibrate` writes: a parameter file and a page."""
+import shlex
+
 from pedestal_common.graph import nodes
 from pedestal_common.parameters import check_each
 from pedestal_common.text_files import parameter_file
@@ -20,7 +22,8 @@ def write(options, printed, sections, page, iq=False, verified=True) -> list[str
         head = ''.join(f'# {line}'.rstrip() + '\n' for line in (f'made by: {" ".join(options.command.split())}',
                                                                *printed))
         options.output.write_text(head + parameter_file.text(sections), encoding='utf-8')
-        said.append(f'written: {options.output}  (pedestal run SCENARIO --params-file {options.output})')
+        said.append(f'written: {options.output}  (pedestal run SCENARIO '
+                    f'--params-file {shlex.quote(str(options.output))})')
     if options.report:
         options.report.write_text(page(), encoding='utf-8')
         said.append(f'page: {options.report}')

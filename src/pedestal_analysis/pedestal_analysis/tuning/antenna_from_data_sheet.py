@@ -19,9 +19,11 @@ If an axis cannot reach the rate of the data sheet, the scenario has RATE_SHARE 
 import dataclasses
 import functools
 import math
+import shlex
 
 from acu_tracker.servo import ends
 from adu_drive.params import PLANT_PERIOD_S, AduParameters, mesh_inertia
+from pedestal_analysis.tuning import data_sheet_limits
 from pedestal_bringup.scenario import scenario
 from pedestal_bringup.scenario.program import Plan
 from pedestal_common.graph.topics import AXES
@@ -202,10 +204,14 @@ def sections(sheet, title):
 def _at_the_target(sheet, found):
     """Return {key of adu: initial angle [rad]}, three beamwidths from the predicted target.
 
-    A slow antenna then reaches the target soon. found: {node: {key: value}} of the scenario.
+    A slow antenna then reaches the target soon. The angles of a wide beam end at the travel of the axis.
+    found: {node: {key: value}} of the scenario.
     """
-    _, angles = Plan(scenario.parse(sheet.like, parameter_file.text(found))).tables['']
-    return {f'initial_{name}': float(f'{angle + 3.0 * sheet.theta:.4g}') for name, angle in zip(AXES, angles[0])}
+    chosen = scenario.parse(sheet.like, parameter_file.text(found))
+    _, angles = Plan(chosen).tables['']
+    travels = [getattr(chosen.node_parameters('adu'), name).limits for name in AXES]
+    return {f'initial_{name}': min(max(float(f'{angle + 3.0 * sheet.theta:.4g}'), travel.lower), travel.upper)
+            for name, angle, travel in zip(AXES, angles[0], travels)}
 
 
 def text(found, head):
@@ -228,16 +234,26 @@ def text(found, head):
 def new(sheet, name, command):
     """Return (text of the scenario file of a DataSheet, [line about each changed or assumed value]).
 
-    name: name of the scenario; command: the command line, for the head of the file. Raises ScenarioError for values
-    that contradict each other.
+    name: name of the scenario; command: the command line, for the head of the file. Raises SheetError for values
+    that contradict each other, which names the options of `pedestal new` to change.
     """
+    try:
+        return _new(sheet, name, command)
+    except ValueError as error:
+        raise data_sheet_limits.refusal(sheet, error, lambda other: _new(other, name, command)) from None
+
+
+def _new(sheet, name, command):
+    """Return the values of `new`. Raises ScenarioError, ParameterError, LoopError for values that contradict each
+    other."""
     sheet, remarks = attainable(sheet)
     remarks += _assumed(sheet)
     title = f'{sheet.mirror:g} m antenna, beam {math.degrees(sheet.theta):.3g} deg, on the mission of {sheet.like}'
     found = sections(sheet, title)
+    tune = shlex.join(('pedestal', 'tune', f'{name}.yaml', '--loops'))
+    run = shlex.join(('pedestal', 'run', f'{name}.yaml', '--params-file', f'{name}-loops.yaml'))
     content = text(found, (f'made by: {command}', 'Values that are not in the data sheet are scaled from the antenna '
                            'of the product: replace them by known values.',
-                           f'Next: pedestal tune {name}.yaml --loops, then pedestal run {name}.yaml --params-file '
-                           f'{name}-loops.yaml', *remarks))
+                           f'Next: {tune}, then {run}', *remarks))
     scenario.parse(name, content)
     return content, remarks

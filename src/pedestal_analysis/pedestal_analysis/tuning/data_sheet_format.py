@@ -7,8 +7,8 @@ from pedestal_common.parameters import ParameterError, Parameters, choice, param
 LIGHT_SPEED_M_GHZ = 0.299792458
 """Speed of light [m GHz]."""
 
-MIN_MODE_HZ = 1.0
-"""Smallest structural frequency that the simulated plant allows [Hz]."""
+MIN_MODE_HZ, MAX_MODE_HZ = 1.0, 200.0
+"""Smallest and largest structural frequency that the simulated plant allows [Hz]."""
 
 TEMPLATE_SCENARIOS = ('leo_pass', 'geo_station', 'uav_flyby', 'ship_pass', 'ship_uav')
 """Scenarios from which a new scenario takes its target and its site."""
@@ -23,8 +23,8 @@ class DataSheet(Parameters):
                            '0: computed from that of the scenario for the area of the mirror')
     beamwidth: float = parameter(0.0, 0.0, 20.0, 'deg',
                                  'half-power beamwidth; 0: computed as 70 deg times wavelength divided by diameter')
-    inertia_azimuth: float = parameter(210.0, 0.1, 1e6, 'kg m2', 'inertia of the load about the azimuth axis')
-    inertia_elevation: float = parameter(150.0, 0.1, 1e6, 'kg m2', 'inertia of the load about the elevation axis')
+    inertia_azimuth: float = parameter(210.0, 0.1, 1e7, 'kg m2', 'inertia of the load about the azimuth axis')
+    inertia_elevation: float = parameter(150.0, 0.1, 1e7, 'kg m2', 'inertia of the load about the elevation axis')
     ratio_azimuth: float = parameter(64.0, 8.0, 1e5, '', 'gear ratio from motor to azimuth axis')
     ratio_elevation: float = parameter(90.0, 8.0, 1e5, '', 'gear ratio from motor to elevation axis')
     motor_torque: float = parameter(30.0, 0.1, 1000.0, 'Nm',
@@ -33,18 +33,19 @@ class DataSheet(Parameters):
     lash: float = parameter(1.0, 0.0, 50.0, 'mrad', 'lash of one gear mesh, referred to the load axis')
     rate_azimuth: float = parameter(140.0, 0.6, 1000.0, 'deg/s', 'largest rate of azimuth')
     rate_elevation: float = parameter(97.0, 0.6, 1000.0, 'deg/s', 'largest rate of elevation')
-    mode: float = parameter(0.0, 0.0, 200.0, 'Hz', 'lowest structural frequency with locked motors, 1 to 200; 0: '
-                            'computed as 20 Hz times the diameter in m to the power -0.7')
+    mode: float = parameter(0.0, 0.0, MAX_MODE_HZ, 'Hz', 'lowest structural frequency with locked motors, 1 to 200; '
+                            '0: computed as 20 Hz times the diameter in m to the power -0.7')
     mode_share: float = parameter(0.5, 0.0, 0.9, '', 'share of the load inertia that swings with the lowest '
                                   'structural frequency; 0: rigid structure')
     encoder_bits: int = parameter(22, 8, 32, 'bit', 'resolution of the load encoders, per turn')
     like: str = choice('leo_pass', TEMPLATE_SCENARIOS, 'scenario that provides target and site')
 
-    def check(self):
-        """Raise ParameterError for a structural frequency that the simulated plant does not allow."""
-        if 0.0 < self.mode < MIN_MODE_HZ:
-            raise ParameterError(f'mode = {self.mode:g} Hz: must be {MIN_MODE_HZ:g} to 200, or 0 for the average of '
-                                 'antennas of this diameter')
+    def __post_init__(self):
+        """Check all fields. The range of `mode` excludes the numbers between 0 and the smallest frequency."""
+        if self.mode != 0.0 and not MIN_MODE_HZ <= self.mode <= MAX_MODE_HZ:
+            raise ParameterError(f'mode = {self.mode:g} Hz: must be {MIN_MODE_HZ:g} to {MAX_MODE_HZ:g}, or 0 for the '
+                                 'average of antennas of this diameter')
+        super().__post_init__()
 
     @property
     def structural_frequency(self):

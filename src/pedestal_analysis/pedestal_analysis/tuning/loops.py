@@ -38,18 +38,21 @@ The receiver sees this swing as a motion of the target, and the shaper must not 
                     density of the noise of the receiver [rad/sqrt(Hz)].
 
 Of the two designs the smaller value counts, of h0 the larger. The margins are then measured with the structure in the
-plant. They are measured again with the load inertia changed by 30 % and f by 20 %. The smallest margins count.
+plant. They are measured again with the load inertia changed by 30 % and f by 20 %, within the ranges of these
+parameters. The smallest margins count.
 """
 import dataclasses
 import math
 import pathlib
+import shlex
 
 import numpy as np
 
 from acu_tracker.estimation.params import FilterParameters, ImmParameters
-from adu_drive.params import SPEED_LOOP_PERIOD_S
+from adu_drive.params import SPEED_LOOP_PERIOD_S, AxisParameters
 from pedestal_analysis.tuning import frequency_response as frequency
 from pedestal_bringup.scenario import scenario
+from pedestal_common import parameters
 from pedestal_common.graph.topics import AXES
 from pedestal_common.text_files import parameter_file
 from pedestal_recording import configuration
@@ -253,6 +256,16 @@ def control_gains(plant, w_s, w_p):
             'limits.rate': plant.axis.limits.rate, 'limits.acceleration': rate_slope(plant)}
 
 
+_AXIS_FIELDS = dict(parameters.flatten(AxisParameters))
+"""{key of adu.AXIS: dataclass field}."""
+
+
+def _allowed(key, value):
+    """Return the value of a parameter of adu.AXIS that is nearest to `value` in the range of the parameter."""
+    allowed = _AXIS_FIELDS[key].metadata
+    return min(max(value, allowed['low']), allowed['high'])
+
+
 def _rounded(gains):
     return {key: float(f'{value:.4g}') if isinstance(value, float) else value for key, value in gains.items()}
 
@@ -312,8 +325,8 @@ class Loops:
         changed = {}
         for name, plant in self.plants.items():
             if plant.mode and corner != (1.0, 1.0):
-                changed |= {f'adu.{name}.load.inertia': corner[0] * plant.axis.load.inertia,
-                            f'adu.{name}.structure.frequency': corner[1] * plant.mode}
+                changed |= {f'adu.{name}.load.inertia': _allowed('load.inertia', corner[0] * plant.axis.load.inertia),
+                            f'adu.{name}.structure.frequency': _allowed('structure.frequency', corner[1] * plant.mode)}
         return frequency.case(self.name, self.source, {**given, **self.gains, **changed, **STILL_AIR_PARAMETERS})
 
     def _sweep(self, axis, sweep, period):
@@ -487,5 +500,6 @@ def main(options, progress):
     sections = {node: {key.removeprefix(f'{node}.'): value for key, value in loops.gains.items()
                        if key.startswith(f'{node}.')} for node in ('adu', 'acu')}
     file.write_text(''.join(f'# {line}\n' for line in made) + parameter_file.text(sections))
+    following = shlex.join(('pedestal', 'run', options.source, '--params-file', str(file)))
     return [*lines, '', *(f'{name:44} {value}' for name, value in loops.gains.items()),
-            f'written: {file}  (pedestal run {options.source} --params-file {file})']
+            f'written: {file}  ({following})']

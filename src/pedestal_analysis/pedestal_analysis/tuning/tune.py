@@ -19,6 +19,7 @@ The search is that of parameter_search.py. The result is a ROS 2 parameter file 
 import dataclasses
 import math
 import pathlib
+import shlex
 
 import numpy as np
 
@@ -324,9 +325,9 @@ def main(options, command, progress):
     made = [f'made by: {" ".join(command.split())}', f'git {configuration.git_revision() or "unknown"}', *lines]
     file.write_text(''.join(f'# {line}\n' for line in made) + parameter_file.text({'acu': settings}))
     values = [f'{name:48} {value}' for name, value in settings.items()]
-    hint = f'pedestal run ... --params-file {file}'
+    hint = f'pedestal run ... --params-file {shlex.quote(str(file))}'
     if not source.of_beams:
-        hint += f', or ros2 run acu_tracker acu_node --ros-args --params-file {file}'
+        hint += f', or ros2 run acu_tracker acu_node --ros-args --params-file {shlex.quote(str(file))}'
     return [*lines, '', *values, f'written: {file}  ({hint})']
 
 

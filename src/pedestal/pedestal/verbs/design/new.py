@@ -5,6 +5,7 @@ each value. `pedestal tune FILE --loops` then tunes the loops and measures their
 """
 import argparse
 import pathlib
+import shlex
 
 from pedestal_common import parameters
 
@@ -25,15 +26,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def main(options: argparse.Namespace) -> int:
     """Write the file. Return exit code 0. Raises ValueError for a wrong value, FileExistsError for an
     existing file."""
-    from pedestal_analysis.tuning import antenna_from_data_sheet
+    from pedestal_analysis.tuning import antenna_from_data_sheet, data_sheet_limits
     from pedestal_analysis.tuning.data_sheet_format import DataSheet
     if options.file.suffix not in ('.yaml', '.yml'):
         raise ValueError(f'{options.file}: must end in .yaml or .yml')
     if options.file.exists():
         raise FileExistsError(f'{options.file} already exists and is not overwritten')
-    sheet = DataSheet(**{name: getattr(options, name) for name, _ in parameters.flatten(DataSheet)})
+    try:
+        sheet = DataSheet(**{name: getattr(options, name) for name, _ in parameters.flatten(DataSheet)})
+    except parameters.ParameterError as error:
+        name, equals, rest = str(error).partition(' = ')
+        raise ValueError(f'{data_sheet_limits.option(name)}{equals}{rest}') from None
     content, remarks = antenna_from_data_sheet.new(sheet, options.file.stem, options.command)
     options.file.write_text(content)
     print(*remarks, sep='\n', end='\n' if remarks else '')
-    print(f'written: {options.file}  (pedestal tune {options.file} --loops)')
+    following = shlex.join(('pedestal', 'tune', str(options.file), '--loops'))
+    print(f'written: {options.file}  ({following})')
     return 0
