@@ -4,6 +4,7 @@ import dataclasses
 import json
 import math
 import os
+import shlex
 import signal
 import subprocess
 import sys
@@ -15,6 +16,7 @@ import pytest
 from scipy import stats
 
 from pedestal import cli
+from pedestal.verbs import arguments
 from pedestal_analysis.results import results
 from pedestal_analysis.trials import comparison, ensemble, monte_carlo, statistics
 from pedestal_analysis.trials.distributions import parse
@@ -61,9 +63,26 @@ def test_sobol_points_fill_every_cell():
 
 def test_the_command_of_a_trial_says_what_the_trial_is():
     made = plan('leo_pass', 3, VARY, ['acu.azimuth.filter.kind=ca'], seed=5, duration=6.0)
-    arguments = cli._parser().parse_args(made.command(2).split()[1:])
-    assert made.scenario(2) == scenario.load(arguments.scenario, arguments.param, arguments.seed, arguments.duration)
+    options = cli._parser().parse_args(made.command(2).split()[1:])
+    assert made.scenario(2) == scenario.load(options.scenario, options.param, options.seed, options.duration)
     assert made.part(range(1, 3)).scenario(1) == made.scenario(2)
+
+
+def test_the_command_of_a_trial_names_the_parameter_files(pedestal, tmp_path):
+    """In place of their values; --param replaces these."""
+    file = tmp_path / 'my loops.yaml'
+    file.write_text(f'acu:\n  ros__parameters:\n    {BANDWIDTH.partition(".")[2]}: 12.0\n'
+                    '    azimuth.filter.kind: ca\n')
+    made = plan('leo_pass', 2, VARY[:1], ['acu.azimuth.filter.kind=cv'], seed=5, files=[file])
+    words = shlex.split(made.command(1))[1:]
+    assert words[:5] == ['run', 'leo_pass', '--seed', '6', '--params-file'] and words[5] == str(file)
+    assert words[6:8] == ['--param', 'acu.azimuth.filter.kind=cv'] and len(words) == 10
+    options = cli._parser().parse_args(words)
+    assert made.scenario(1) == scenario.load(options.scenario, arguments.changes(options), options.seed)
+    code, output, errors = pedestal('trials', 'leo_pass', '--runs', 1, '--duration', 3, '--workers', 1,
+                                    '--params-file', file, '--param', 'acu.azimuth.filter.kind=cv')
+    assert (code, errors) == (0, '') and BANDWIDTH not in output
+    assert f"--duration 3.0 --params-file '{file}' --param acu.azimuth.filter.kind=cv\n" in output
 
 
 def test_rows_of_a_file_are_trials(tmp_path, pedestal):
@@ -115,6 +134,8 @@ def test_refused_before_anything_runs(pedestal, tmp_path, case):
     (('--side', 'base', f'{BANDWIDTH}=20'), 'other than base'),
     (('--require', 'pointing_max_deg'), 'must be RESULT < LIMIT'),
     (('--require', 'pointing_mx_deg < 1'), "did you mean 'pointing_max_deg'?"),
+    (('--by', 'bar'), "--by bar: no trial has a result 'bar'"),
+    (('--by', 'pointing_mx_deg'), "did you mean 'pointing_max_deg'?"),
     (('--solve', BANDWIDTH), '--solve: needs --until'), (('--until', 'loss_s = 1'), '--until: needs --solve'),
     (('--solve', BANDWIDTH, '--until', 'loss_s < 1'), 'must be RESULT = LIMIT'),
     (('--solve', BANDWIDTH, '--until', 'los_s = 1'), "did you mean 'loss_s'?"),

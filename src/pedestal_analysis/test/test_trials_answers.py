@@ -1,6 +1,7 @@
 """Sides of a comparison, criteria of the user, and the search for the value at which a result reaches a limit."""
 import json
 import math
+import re
 
 import numpy as np
 import pytest
@@ -59,7 +60,22 @@ def test_a_trial_without_the_result_does_not_meet_a_requirement(tmp_path):
     assert (row['metric'], row['value'], row['runs']) == ('require(pointing_max_deg <= 0.1)/rate', 50.0, 4)
     mean = statistics.of_results('case', table)[0]
     assert statistics.coverage(mean) == '3 of 4, 1 tripped'
+    assert (row['of'], row['left_out']) == (4, {'tripped': 1})
     assert statistics.failures(table) == '1 of 4 runs failed: 1 tripped; column `why` of the table'
+
+
+def test_sides_are_named_with_their_sensitivities_and_missing_results(pedestal):
+    """No trial ashore has an isolation."""
+    code, said, errors = pedestal('trials', 'uav_flyby', '--runs', 4, '--duration', 3, '--workers', 1, '--vary',
+                                  f'{KIND}=choice(imm, alpha_beta)', '--sobol', '--side', 'windy',
+                                  'adu.wind.field.speed=8', '--side', 'storm',
+                                  'adu.wind.field.speed=20', '--require', 'isolation_db > 20')
+    assert (code, errors) == (0, '')
+    for side in ('base', 'windy', 'storm'):
+        found = [line for line in said.splitlines() if line.startswith(f'{side}') and f'eta_squared({KIND}): ' in line]
+        assert len(found) == 1, said
+        assert re.search(rf'^{side}\b.*: isolation_db > 20 in 0 of 4 trials, 0 % .*; without the result: 4 not '
+                         'measured', said, re.MULTILINE), said
 
 
 def test_a_side_without_some_trials_is_compared_over_the_common_ones(tmp_path):
@@ -71,17 +87,28 @@ def test_a_side_without_some_trials_is_compared_over_the_common_ones(tmp_path):
     assert found.startswith('B is better than A by ') and '3 of 4 pairs' in found
 
 
+def test_a_search_names_the_value_at_which_the_target_is_lost():
+    """And states it before the values without a result."""
+    def law(value):
+        return value if value < 5.5 else math.nan
+
+    rig = Rig(law)
+    rig.tracked_percent = 93.1
+    assert re.fullmatch(r'.* trials; at [\d.]+ the target is tracked for 93.1 % of the time only; most trials have no '
+                        r'pointing_rms_deg from 6 to 8', rig.run().sentence)
+
+
 class Rig(solve.Search):
     """A Search over a law instead of trials: law(value) -> mean, NaN without a result."""
 
     def __init__(self, law, low=0.0, high=8.0, limit=2.0, whole=False):
         wanted = solve.Range('adu.wind.field.speed', low, high, whole, 'm/s')
         super().__init__(None, wanted, solve.Goal('pointing_rms_deg', limit), None, None)
-        self.law = law
+        self.law, self.tracked_percent = law, None
 
     def _try(self, values):
         found = [solve.Tried(value, {'value': self.law(value), 'runs': 3, 'of': 3, 'left_out': {},
-                                     'tracked_percent': None}, '', math.isfinite(self.law(value)))
+                                     'tracked_percent': self.tracked_percent}, '', math.isfinite(self.law(value)))
                  for value in values]
         self.tried = sorted((*self.tried, *found), key=lambda one: one.value)
         return found

@@ -38,6 +38,8 @@ class Plan:
     runs           number of trials
     varied         {node.key: list of the values in the trials}
     texts          texts of --vary, which are part of the identity
+    files          paths of the parameter files whose values begin `overrides`
+    file_changes   number of the texts in `overrides` that are from the files
     """
     source: str
     name: str
@@ -48,6 +50,8 @@ class Plan:
     runs: int
     varied: dict
     texts: tuple
+    files: tuple = ()
+    file_changes: int = 0
 
     def changes(self, i):
         """Return the texts 'node.key=value' of all changed and varied parameters of trial i."""
@@ -60,8 +64,9 @@ class Plan:
     def command(self, i):
         """Return the command line that runs trial i with ROS nodes."""
         duration = [] if self.duration is None else ['--duration', repr(self.duration)]
-        changes = [part for change in self.changes(i) for part in ('--param', change)]
-        return shlex.join(['pedestal', 'run', self.source, '--seed', str(self.seed + i), *duration, *changes])
+        files = [part for file in self.files for part in ('--params-file', str(file))]
+        changes = [part for change in self.changes(i)[self.file_changes:] for part in ('--param', change)]
+        return shlex.join(['pedestal', 'run', self.source, '--seed', str(self.seed + i), *duration, *files, *changes])
 
     def part(self, numbers):
         """Return the Plan of some consecutive trials; numbers: range of their numbers, from 0 on."""
@@ -76,7 +81,7 @@ class Plan:
                 '--duration': str(self.duration)}
 
 
-def plan(source, runs=None, vary=(), overrides=(), seed=None, duration=None, sobol=False) -> Plan:
+def plan(source, runs=None, vary=(), overrides=(), seed=None, duration=None, sobol=False, files=()) -> Plan:
     """Return the Plan of trials of a scenario.
 
     source     name or path of the scenario
@@ -86,10 +91,13 @@ def plan(source, runs=None, vary=(), overrides=(), seed=None, duration=None, sob
     seed       seed of the first trial, None for that of the scenario
     duration   [s], None for that of the scenario
     sobol      True for the points of a Sobol sequence instead of independent draws
+    files      paths of ROS 2 parameter files with parameters that are changed in all trials; `overrides` replace them
 
-    Raises ScenarioError, VaryError or TableError if a trial could not be run.
+    Raises ScenarioError, ParameterFileError, VaryError or TableError if a trial could not be run.
     """
     name, content = scenario.text(source)
+    of_files = [change for file in files for change in scenario.file_overrides(file)]
+    overrides = (*of_files, *overrides)
     nominal = scenario.parse(name, content, overrides, seed, duration)
     if nominal.header.pacing != 'lockstep':
         overrides = (*overrides, 'scenario.pacing=lockstep')
@@ -119,7 +127,8 @@ def plan(source, runs=None, vary=(), overrides=(), seed=None, duration=None, sob
             varied[column] = values[:runs]
     texts = (*(f'{column}={distribution.text}' for column, distribution in drawn.items()), *['--sobol'] * sobol,
              *(hashlib.sha256(repr(table).encode()).hexdigest() for table in rows))
-    made = Plan(source, name, content, tuple(overrides), duration, first, runs, varied, texts)
+    made = Plan(source, name, content, overrides, duration, first, runs, varied, texts,
+                tuple(files), len(of_files))
     for column in varied:
         _check(nominal, made, column, drawn.get(column))
     return made

@@ -196,7 +196,7 @@ class Search:
         value = round(value) if wanted.whole else value
         return Solution(value, self.tried, f'{wanted.key} = {value:.4g} {wanted.unit}'.rstrip()
                         + f': {what} is reached between {low.value:.4g} and {high.value:.4g}, with '
-                        f'{statistics.coverage(low.row)} trials{self._gaps()}{_losses(low, high)}')
+                        f'{statistics.coverage(low.row)} trials{_losses(low, high)}{self._gaps()}')
 
     def _crossings(self, tried):
         """Return the pairs of neighbouring Tried whose means lie on different sides of the limit.
@@ -272,10 +272,11 @@ class Search:
 
 def _losses(low, high):
     """Return a warning for a pair of Tried whose trials have lost the target for a part of the time, else ''."""
-    shares = [one.row['tracked_percent'] for one in (low, high) if one.row['tracked_percent'] is not None]
-    if not shares or min(shares) >= MIN_TRACKED_PERCENT:
+    known = [one for one in (low, high) if one.row['tracked_percent'] is not None]
+    worst = min(known, key=lambda one: one.row['tracked_percent'], default=None)
+    if worst is None or worst.row['tracked_percent'] >= MIN_TRACKED_PERCENT:
         return ''
-    return f'; there the target is tracked for {min(shares):.3g} % of the time only'
+    return f'; at {worst.value:.4g} the target is tracked for {worst.row["tracked_percent"]:.3g} % of the time only'
 
 
 def _tracked(table, name):

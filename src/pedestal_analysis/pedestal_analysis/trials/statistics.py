@@ -122,7 +122,7 @@ def number(text) -> float:
 def of_requirements(case, table, requirements):
     """Return the rows of --json: the rate at which the trials of a table.Table meet each of some Requirements.
 
-    A trial without the result does not meet its requirement.
+    A trial without the result does not meet its requirement. Each row also has the fields of coverage_fields.
     """
     found = []
     for required in requirements:
@@ -131,8 +131,9 @@ def of_requirements(case, table, requirements):
             if required.result in (name, metric):
                 values = table.column(name)
                 met = [bool(math.isfinite(value) and intervals.meets(value, required.target)) for value in values]
-                found.append(intervals.estimated(own, f'require({required.text})/rate', rate(sum(met), len(met)), '%',
-                                                 len(met)))
+                found.append({**intervals.estimated(own, f'require({required.text})/rate', rate(sum(met), len(met)),
+                                                    '%', len(met)),
+                              **coverage_fields(table, name, np.isfinite(values))})
     return found
 
 

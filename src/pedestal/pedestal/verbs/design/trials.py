@@ -102,6 +102,8 @@ def _compare(options: argparse.Namespace) -> int:
     plans, labels, files = _sides(options)
     known = _result_names(plans[0])
     required = [statistics.requirement(text, known) for text in options.require]
+    if options.by:
+        statistics.check_result(f'--by {options.by}', options.by, known)
     folder = options.output or pathlib.Path('trials', plans[0].name)
     with contextlib.ExitStack() as stack:
         tables = [stack.enter_context(ensemble.open_table(plan, folder, file)) for plan, file in zip(plans, files)]
@@ -161,11 +163,10 @@ def _solve(options: argparse.Namespace) -> int:
     """Search for the parameter value that --solve and --until define. Return exit code 0."""
     from pedestal_analysis.trials import monte_carlo, solve
     from pedestal_analysis.trials.plan import plan
-    changes = arguments.changes(options)
 
     def make_plan(more: Sequence[str]) -> 'Plan':
-        return plan(options.scenario, options.runs or solve.DEFAULT_RUNS, options.vary, (*changes, *more),
-                    options.seed, options.duration, options.sobol)
+        return plan(options.scenario, options.runs or solve.DEFAULT_RUNS, options.vary, (*options.param, *more),
+                    options.seed, options.duration, options.sobol, options.params_file)
 
     nominal = make_plan(())
     wanted = solve.search_range(options.solve, nominal.scenario(0))
@@ -189,13 +190,13 @@ def _solve(options: argparse.Namespace) -> int:
 def _sides(options: argparse.Namespace) -> 'tuple[list[Plan], list[str], list[str]]':
     """Return (Plans, labels, names of the tables) of the trials and of all other sides. Raises ValueError."""
     from pedestal_analysis.trials.plan import plan
-    changes = arguments.changes(options)
-    first = plan(options.scenario, options.runs, options.vary, changes, options.seed, options.duration, options.sobol)
+    first = plan(options.scenario, options.runs, options.vary, options.param, options.seed, options.duration,
+                 options.sobol, options.params_file)
     plans, labels, files = [first], [BASE_SIDE if options.side else ''], ['trials']
 
     def add(source: str, more: Sequence[str], label: str, file: str) -> None:
-        plans.append(plan(source, first.runs, options.vary, (*changes, *more), first.seed, options.duration,
-                          options.sobol))
+        plans.append(plan(source, first.runs, options.vary, (*options.param, *more), first.seed,
+                          options.duration, options.sobol, options.params_file))
         labels.append(label)
         files.append(file)
 
@@ -218,21 +219,26 @@ def _result_names(plan: 'Plan') -> list[str]:
 
 
 def _requirement_lines(rows: Iterable[Mapping[str, typing.Any]], required: Iterable[typing.Any]) -> list[str]:
-    """Return a line for each requirement and case: the share of the trials that meet it."""
+    """Return a line for each requirement and case: the share of the trials that meet it, and the trials without the
+    result."""
     found = []
     for one in required:
         for row in rows:
             if row['metric'] == f'require({one.text})/rate':
                 count = round(row['value'] * row['runs'] / 100.0)
+                left_out = ', '.join(f'{number} {word}' for word, number in row['left_out'].items())
+                without = f'; without the result: {left_out}' if left_out else ''
                 found.append(f'{row["case"]}: {one.text} in {count} of {row["runs"]} trials, {row["value"]:.3g} % '
-                             f'({console.interval(row)} %)')
+                             f'({console.interval(row)} %){without}')
     return found
 
 
 def _sensitivity_lines(rows: Iterable[Mapping[str, typing.Any]], ranking: str) -> list[str]:
-    """Return lines with the sensitivity of the ranking result to each varied parameter, the strongest first."""
+    """Return lines with the sensitivity of the ranking result to each varied parameter, the strongest first. A line
+    names its case if there are several."""
     # Because eta_squared is the square of a correlation, its square root is compared with a rank correlation.
     powers = {f'{ranking}/rank_correlation': 1.0, f'{ranking}/eta_squared': 0.5}
     found = [row for row in rows if row['metric'].partition('(')[0] in powers]
-    return [f'{row["metric"]}: {console.number(row["value"])} ({console.interval(row)})'
+    several = len({row['case'] for row in found}) > 1
+    return [f'{row["case"]}: ' * several + f'{row["metric"]}: {console.number(row["value"])} ({console.interval(row)})'
             for row in sorted(found, key=lambda row: -abs(row['value'])**powers[row['metric'].partition('(')[0]])]
