@@ -140,6 +140,11 @@ class Table:
         self._write(rows)
         self.rows += rows
 
+    @property
+    def count_in_file(self):
+        """Number of the rows in the file; a stopped `append` may have written rows that `rows` does not hold."""
+        return max(self.file.read_bytes().count(b'\n') - 1, 0)
+
     def _write(self, rows):
         text = io.StringIO()
         csv.writer(text, lineterminator='\n').writerows(rows)

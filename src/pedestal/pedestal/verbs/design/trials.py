@@ -112,8 +112,9 @@ def _compare(options: argparse.Namespace) -> int:
         try:
             ensemble.run_missing_trials(plans, tables, pool, progress)
         except KeyboardInterrupt:
-            print(f'pedestal: {sum(len(table.rows) for table in tables)} of {sum(plan.runs for plan in plans)} trials '
-                  f'are in {folder}; the same command continues', file=sys.stderr)
+            done = sum(table.count_in_file for table in tables)
+            print(f'pedestal: {done} of {sum(plan.runs for plan in plans)} trials are in {folder}; the same command '
+                  'continues', file=sys.stderr)
             raise
     # differences: parameters in which the sides differ; names: label of a side, else these; full: both
     differences = comparison.names(*plans)
