@@ -126,10 +126,9 @@ def _tracking(bag, run) -> tuple[str, str]:
     shares = {mode: 100.0 * float(np.mean(run.mode == mode)) for mode in modes.MODES if (run.mode == mode).any()}
     distance = np.hypot(run.cross_elevation, run.elevation_error)
     near = distance < 0.5 * run.beamwidth
-    off = distance > run.beamwidth
     by_level = run.mode == 'steptrack'
     if 'autotrack' in shares:
-        return _autotracked(bag, run, near, off, distance)
+        return _autotracked(bag, run, distance, near)
     if by_level.any() and (near[by_level].any() or not math.isfinite(run.beamwidth)):
         return TRACKED, f'tracked by its level for {shares["steptrack"]:.3g} % of {run.t[-1] - run.t[0]:.4g} s'
     if not any(_leads_to_tracking(mode, acu.get('tracker.handover', True)) for mode in wanted):
@@ -139,14 +138,14 @@ def _tracking(bag, run) -> tuple[str, str]:
     return _never_tracked(bag, run, distance, near, acu)
 
 
-def _autotracked(bag, run, near, off, distance):
+def _autotracked(bag, run, distance, near):
     """Return (word, sentence) on a run with autotrack.
 
-    near, off (n,): True with the target within half a beamwidth, beyond a beamwidth; distance (n,): angle from beam
-    to target [rad].
+    distance (n,): angle from beam to target [rad]; near (n,): True with the target within half a beamwidth.
     """
     auto = run.mode == 'autotrack'
-    off_s, wide = np.sum(auto & off) * run.period, np.max(distance[auto & off], initial=0.0) * DEG_PER_RAD
+    off = auto & (distance > run.beamwidth)
+    off_s, wide = np.sum(off) * run.period, np.max(distance[off], initial=0.0) * DEG_PER_RAD
     if off_s > MIN_OFF_TARGET_S and not near[auto].any():
         return NOT_TRACKED, (f'tracked 0 %: autotrack for {np.sum(auto) * run.period:.3g} s, always off the target by '
                              f'up to {wide:.3g} deg: a side lobe, or another signal')
