@@ -91,7 +91,6 @@ class Parser(argparse.ArgumentParser):
                 joined.append(arg)
         return super().parse_known_args(joined, namespace)
 
-
     def parse_args(self, args=None, namespace=None):  # type: ignore[no-untyped-def,override]
         """Return the namespace. Arguments NAME=VALUE of a command may also stand behind its options, where the parser
         of argparse does not accept them."""

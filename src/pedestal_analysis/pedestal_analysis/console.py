@@ -98,6 +98,11 @@ def progress_of_trials():
     return _bar(columns, advance, '', rate='compiling the laws (first time only)')
 
 
+def option_of(name):
+    """Return the option of a name in the namespace of argparse: --params-file for params_file."""
+    return f'--{name.replace("_", "-")}'
+
+
 def add_json(parser):
     """Add the option --json [FILE] to the parser of a verb that measures."""
     parser.add_argument('--json', type=lambda text: STDOUT_PATH if text == '-' else pathlib.Path(text), metavar='FILE',

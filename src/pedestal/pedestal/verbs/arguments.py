@@ -5,7 +5,7 @@ import os
 import pathlib
 import types
 import typing
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 from pedestal_analysis import console
 
@@ -158,7 +158,7 @@ def check_recording(options: argparse.Namespace) -> None:
     """Raise ValueError for parameters with --bag, whose run is over."""
     for name in ('param', 'params_file'):
         if options.bag is not None and getattr(options, name):
-            raise ValueError(f'--{name.replace("_", "-")}: has no effect with --bag')
+            raise ValueError(f'{console.option_of(name)}: has no effect with --bag')
 
 
 def recording(options: argparse.Namespace) -> tuple[typing.Any, str]:
@@ -183,17 +183,25 @@ def add_result_files(parser: argparse.ArgumentParser, output: str, report: str) 
     console.add_json(parser)
 
 
+def refuse_unused(options: argparse.Namespace, names: Iterable[str], other: str) -> None:
+    """Raise ValueError for a given option that has no effect with the option `other`; names: those options."""
+    for name in names:
+        if getattr(options, name) is not None:
+            raise ValueError(f'{console.option_of(name)}: has no effect with {console.option_of(other)}')
+
+
 def check_result_files(options: argparse.Namespace, *more: str) -> None:
-    """Check --output and --report, and the options `more` that name new files. Raises ValueError, also for two options
-    of which one would overwrite the file of the other."""
+    """Check --output, --report and --json, and the options `more` that name new files. Raises ValueError, also for two
+    options of which one would overwrite the file of the other."""
+    console.check_json(options.json)
     new = ('output', 'report', *more)
     for name in new:
-        check_new_file(f'--{name.replace("_", "-")}', getattr(options, name))
+        check_new_file(console.option_of(name), getattr(options, name))
     paths = [(name, path) for name, given in vars(options).items()
              for path in (given if isinstance(given, list) else [given]) if isinstance(path, pathlib.Path)]
     for (name, path), (other, same) in itertools.combinations(paths, 2):
         if {name, other} & {*new, 'json'} and path.resolve() == same.resolve():
-            raise ValueError(f'--{name.replace("_", "-")} {path}: is also the file of --{other.replace("_", "-")}')
+            raise ValueError(f'{console.option_of(name)} {path}: is also the file of {console.option_of(other)}')
 
 
 def check_new_file(option: str, path: pathlib.Path | None) -> None:

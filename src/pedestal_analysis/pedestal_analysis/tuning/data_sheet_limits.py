@@ -9,6 +9,7 @@ import math
 
 import numpy as np
 
+from pedestal_analysis import console
 from pedestal_common.graph.topics import AXES
 from pedestal_common.parameters import flatten
 
@@ -22,11 +23,6 @@ NO_CAUSE = ('encoder_bits', 'cn0', 'lash')
 
 class SheetError(ValueError):
     """Error of a data sheet whose values contradict each other. Its text is one line that names options."""
-
-
-def option(name):
-    """Return the option of `pedestal new` for a field of the DataSheet."""
-    return f'--{name.replace("_", "-")}'
 
 
 def refusal(sheet, error, make):
@@ -47,10 +43,12 @@ def refusal(sheet, error, make):
     found = []
     # The options that differ from the default come first, because the user gave them.
     for name, field in sorted(fields, key=lambda item: getattr(sheet, item[0]) == item[1].default):
+        if len(found) == MAX_OPTIONS:
+            break
         edges = _edges(name, getattr(sheet, name), field.metadata, is_made)
-        if edges and len(found) < MAX_OPTIONS:
+        if edges:
             value = f'{getattr(sheet, name):g} {field.metadata["unit"]}'.rstrip()
-            found.append(f'{option(name)} {value}: must be {edges[0]:g} to {edges[1]:g}')
+            found.append(f'{console.option_of(name)} {value}: must be {edges[0]:g} to {edges[1]:g}')
     if not found:
         return SheetError(f'the values of the data sheet contradict each other: {error}')
     return SheetError(f'{", or ".join(found)}, with the other values of the data sheet ({error})')

@@ -27,6 +27,7 @@ from acu_tracker.estimation.filters.kinds import FILTER_KINDS
 from acu_tracker.modes import Mode
 from acu_tracker.params import AcuParameters
 from acu_tracker.unit import RANGE_TOPIC
+from pedestal_analysis import console
 from pedestal_analysis.reprocess import recompute, what_if
 from pedestal_analysis.results import identification
 from pedestal_analysis.results.tracking import HANDOVER_SETTLING_S
@@ -337,7 +338,7 @@ def _check(options, is_bag, file):
         raise TuneError('one of --filter KIND and --feedforward must be given')
     for name in loops.REQUIREMENT_OPTIONS:
         if getattr(options, name) is not None:
-            raise TuneError(f'--{name.replace("_", "-")} {getattr(options, name):g}: needs --loops')
+            raise TuneError(f'{console.option_of(name)} {getattr(options, name):g}: needs --loops')
     if options.filter and options.filter not in FILTER_KINDS:
         raise TuneError(f'--filter {options.filter}: must be one of {", ".join(FILTER_KINDS)}')
     if is_bag and options.feedforward:

@@ -38,14 +38,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def main(options: argparse.Namespace) -> int:
     """Plan or identify, write the files and print the result. Return exit code 0, or EXIT_FAILED_RUN."""
     from pedestal_analysis.calibration.drive import identified
-    console.check_json(options.json)
     for name, unused in UNUSED_OPTIONS.items():
-        for other in unused if getattr(options, name) else ():
-            if getattr(options, other) is not None:
-                raise ValueError(f'--{other}: has no effect with --{name}')
+        if getattr(options, name):
+            arguments.refuse_unused(options, unused, name)
     arguments.check_result_files(options, 'plan')
-    if options.bag and (options.param or options.params_file):
-        raise ValueError(f'--{"param" if options.param else "params-file"}: has no effect with --bag')
+    arguments.check_recording(options)
     changes = arguments.changes(options)
     if options.plan:
         from pedestal_bringup.scenario import scenario

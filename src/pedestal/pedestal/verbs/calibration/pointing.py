@@ -51,11 +51,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def main(options: argparse.Namespace) -> int:
     """Fit or plan, write the files and print the result. Return exit code 0."""
     from pedestal_analysis.calibration import plan, pointing
-    console.check_json(options.json)
     source = next(name for name in UNUSED_OPTIONS if getattr(options, name) is not None)
-    for name in UNUSED_OPTIONS[source]:
-        if getattr(options, name) is not None:
-            raise ValueError(f'--{name}: has no effect with --{source}')
+    arguments.refuse_unused(options, UNUSED_OPTIONS[source], source)
     arguments.check_result_files(options, 'collected')
     if options.plan is not None:
         print('\n'.join(plan.main(options)))

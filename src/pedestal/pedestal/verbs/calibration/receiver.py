@@ -37,7 +37,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(options: argparse.Namespace) -> int:
     """Calibrate, write the files and print the result. Return exit code 0, or EXIT_FAILED_RUN if not verified."""
-    console.check_json(options.json)
     arguments.check_result_files(options)
     if options.iq is not None:
         from pedestal_analysis.calibration.receiver import iq_phasing

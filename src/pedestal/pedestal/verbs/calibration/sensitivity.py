@@ -37,7 +37,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def main(options: argparse.Namespace) -> int:
     """Measure, write the files and print the result. Return exit code 0."""
     from pedestal_analysis.calibration.sensitivity import sensitivity
-    console.check_json(options.json)
     arguments.check_result_files(options)
     printed, content = sensitivity.main(options)
     print('\n'.join(printed))

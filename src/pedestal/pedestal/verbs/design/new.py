@@ -7,6 +7,7 @@ import argparse
 import pathlib
 import shlex
 
+from pedestal_analysis import console
 from pedestal_common import parameters
 
 
@@ -18,7 +19,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         unit = field.metadata.get('unit')
         allowed = ', '.join(field.metadata.get('options', ()))
         described = f'{field.metadata["doc"]}{f": {allowed}" if allowed else ""}; default: {field.default}'
-        parser.add_argument(f'--{name.replace("_", "-")}', type=field.type, default=field.default,
+        parser.add_argument(console.option_of(name), type=field.type, default=field.default,
                             metavar=unit.upper().replace(' ', '') if unit else 'SCENARIO' if allowed else 'RATIO',
                             help=described.replace('%', '%%'))
 
@@ -26,7 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def main(options: argparse.Namespace) -> int:
     """Write the file. Return exit code 0. Raises ValueError for a wrong value, FileExistsError for an
     existing file."""
-    from pedestal_analysis.tuning import antenna_from_data_sheet, data_sheet_limits
+    from pedestal_analysis.tuning import antenna_from_data_sheet
     from pedestal_analysis.tuning.data_sheet_format import DataSheet
     if options.file.suffix not in ('.yaml', '.yml'):
         raise ValueError(f'{options.file}: must end in .yaml or .yml')
@@ -36,7 +37,7 @@ def main(options: argparse.Namespace) -> int:
         sheet = DataSheet(**{name: getattr(options, name) for name, _ in parameters.flatten(DataSheet)})
     except parameters.ParameterError as error:
         name, equals, rest = str(error).partition(' = ')
-        raise ValueError(f'{data_sheet_limits.option(name)}{equals}{rest}') from None
+        raise ValueError(f'{console.option_of(name)}{equals}{rest}') from None
     content, remarks = antenna_from_data_sheet.new(sheet, options.file.stem, options.command)
     options.file.write_text(content)
     print(*remarks, sep='\n', end='\n' if remarks else '')

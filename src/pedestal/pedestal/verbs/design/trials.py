@@ -91,7 +91,7 @@ def _check_together(options: argparse.Namespace) -> None:
         raise ValueError(f'--{"solve" if options.solve else "until"}: needs --{"until" if options.solve else "solve"}')
     for name in ('side', 'against', 'against_param', 'require', 'by'):
         if options.solve and getattr(options, name):
-            raise ValueError(f'--{name.replace("_", "-")}: has no effect with --solve')
+            raise ValueError(f'{console.option_of(name)}: has no effect with --solve')
 
 
 def _compare(options: argparse.Namespace) -> int:

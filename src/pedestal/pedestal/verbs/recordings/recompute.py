@@ -62,7 +62,7 @@ def main(options: argparse.Namespace) -> int:
         for name in ('node', 'param', 'params_file', 'pacing', 'absolute', 'relative', 'ignore', 'allow_idle', 'live',
                      'explain', 'output'):
             if getattr(options, name):
-                raise ValueError(f'--{name.replace("_", "-")}: has no effect with --iq')
+                raise ValueError(f'{console.option_of(name)}: has no effect with --iq')
         from pedestal_analysis.reprocess import iq
         lines, rows, well = iq.main(options)
         print('\n'.join(lines))
