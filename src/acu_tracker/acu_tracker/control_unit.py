@@ -37,7 +37,7 @@ from acu_tracker.pointing import model
 from acu_tracker.program import bridge, tables
 from acu_tracker.servo import axes, ends, floor, frozen, notch, position_loop, uncommanded_motion
 from acu_tracker.servo.position_loop import Instants
-from pedestal_common.compiled import compiled
+from pedestal_common.compiled import compiled, separate
 from pedestal_common.geometry import blockage
 from pedestal_common.parameters import record, record_type
 
@@ -156,7 +156,7 @@ def reset(s):
     return annunciator.NO_ALARM
 
 
-@compiled
+@separate
 def step(s, c, u, o, all_tables):
     """Run one drive step.
 
@@ -253,7 +253,7 @@ def _rests(s, c, u):
     return stow.commands_no_motion(s.stow, c.p.stow_pins, u.pins, s.mode.now)
 
 
-@compiled
+@separate
 def _change(s, c, u, o, all_tables, request, no_signal):
     """Select the mode at s.stamp, and carry out the consequences of a change of mode.
 
@@ -284,7 +284,7 @@ def _change(s, c, u, o, all_tables, request, no_signal):
     return result, flags
 
 
-@compiled
+@separate
 def _situation(s, c, u, all_tables, request, no_signal):
     """Return (modes.Situation at s.stamp, flags of bad tables).
 

@@ -211,22 +211,14 @@ class Acu(Unit):
             annunciator.set_condition(self.alarms, DRIVE_SILENT_ALARM, True, stamp if math.isfinite(stamp) else 0.0)
             self.outputs[ALARMS_TOPIC] = self.alarms['revision']
 
-    def prepare(self):
-        """Compile the law, the functions behind the alarm commands, and the diagnosis."""
-        super().prepare()
-        before = self.memory.record.copy()
+    def prepare_requests(self):
+        """Compile the functions behind the requests and the alarm commands, and those of the diagnosis."""
+        super().prepare_requests()
         self.desk.prepare()
         self.encode(ALARMS_TOPIC, 0)
         annunciator.set_condition(self.alarms, DRIVE_SILENT_ALARM, True, 0.0)
         self.diagnose()
         self.air.raised(np.zeros(2), np.zeros((2, 2)))
-        self.memory.record[...] = before
-
-    def prepare_ahead(self):
-        """Compile the functions behind the commands and the diagnosis."""
-        self.request(self.REQUESTS[0])
-        self.desk.prepare()
-        self.diagnose()
 
     def configure(self, parameters):
         """Put new values of the LIVE parameters into the constants; the state stays as it is.

@@ -11,7 +11,7 @@ from adu_drive import axis, drive_state, stow_pins
 from adu_drive.lanes import at, count
 from adu_drive.params import SPEED_LOOP_PERIOD_S, AduParameters, whole_speed_periods
 from adu_drive.plant import gimbal, mount, wind, wind_field
-from pedestal_common.compiled import compiled, inlined
+from pedestal_common.compiled import compiled, inlined, separate
 
 COMMAND_RING_SIZE = 256
 """Number of commands in the ring of the transport delay.
@@ -297,7 +297,7 @@ def between_speed_periods(s, c, substeps):
                 axis.plant_step(at(s, i), at(c, i), at(s, i).external)
 
 
-@compiled
+@separate
 def step(s, c, u, y):
     """Advance one control period from t_k to t_k+1. s and y are written.
 

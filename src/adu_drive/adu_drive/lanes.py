@@ -35,6 +35,8 @@ from numba.extending import (
     type_callable,
 )
 
+from pedestal_common.law_key import template
+
 LANE_COUNT = 32
 """Number of lanes of a flat array. With 16 lanes LLVM does not vectorise; 64 lanes exceed the first-level cache."""
 
@@ -80,6 +82,10 @@ def count(records):
 def at(records, i):
     """Return record i of Lanes, or the record itself."""
     return records
+
+
+template(count)
+template(at)
 
 
 @type_callable(count)

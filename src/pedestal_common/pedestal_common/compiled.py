@@ -1,64 +1,44 @@
-"""Decorators that compile every law, and the marks by which processes know that the laws of a unit are compiled.
+"""Decorators that compile every law.
 
 The arithmetic is strict IEEE 754 (no fastmath): a law gives the same bits wherever it is inlined. A study, a node and
 a recomputed bag therefore agree exactly, and NaN keeps its meaning on the topics.
 """
-import contextlib
-import pathlib
+from collections.abc import Callable
+from typing import Any
 
 import numba
 
-from pedestal_common import law_cache
 from pedestal_common.law import Law
 
-
-def done_file(owner, form='') -> pathlib.Path | None:
-    """Return the path of a mark: a file that exists once the laws of a class are in the law cache. None without a law
-    cache.
-
-    owner: the class, such as the type of a unit's memory; form: text that distinguishes several sets of laws of one
-    class, '' for a single set.
-    """
-    folder = law_cache.folder(owner)
-    return pathlib.Path(folder, f'{owner.__module__}.{owner.__name__}{form}.done') if folder else None
+_config: Any = numba.config     # its variables are made when it is imported
 
 
-def is_compiled(unit) -> bool:
-    """Return True if the laws of a unit are in the law cache. The type of its memory identifies the laws."""
-    mark = done_file(type(unit.memory))
-    return mark is not None and mark.exists()
+def is_compiled(unit: Any) -> bool:
+    """Return True if the laws of a unit are in the law cache."""
+    law, arguments = unit.last_prepared
+    return _config.DISABLE_JIT or law.is_cached(*arguments)
 
 
-@contextlib.contextmanager
-def compiled_once(unit):
-    """Hold a lock during the first call of the laws of a unit, as a context.
-
-    If several processes start with an empty cache, one compiles the laws. The others wait and then load the laws from
-    the cache, so four beams start as fast as one.
-    """
-    mark = done_file(type(unit.memory))
-    if mark is None or mark.exists():
-        yield
-        return
-    with law_cache.locked_file(mark.with_suffix('.lock')):
-        yield
-        mark.touch()
-
-
-def _law(law, **options):
-    if numba.config.DISABLE_JIT:     # for a debugger: the laws run as plain Python
+def _law(law: Callable, separate: bool = False, **options: Any) -> Any:
+    if _config.DISABLE_JIT:     # for a debugger: the laws run as plain Python
         return law
-    dispatcher = Law(law, targetoptions={'nopython': True, 'error_model': 'numpy', **options})
-    dispatcher.enable_caching()
-    return dispatcher
+    return Law(law, targetoptions={'nopython': True, 'error_model': 'numpy', **options}, separate=separate)
 
 
-def compiled(law):
+def compiled(law: Callable) -> Any:
     """Compile a law, as decorator. Division by zero gives inf or NaN as in numpy, never an exception."""
     return _law(law)
 
 
-def inlined(law):
+def separate(law: Callable) -> Any:
+    """Compile a large law into machine code of its own, as decorator. The laws that call it do not contain it.
+
+    After an edit of the law its callers are not compiled again, and laws that share it contain it once.
+    """
+    return _law(law, separate=True)
+
+
+def inlined(law: Callable) -> Any:
     """Compile a small law as `compiled` does, and inline it into its callers, as decorator.
 
     A loop over the lanes of the drive (trials that are computed together) becomes vector instructions only if its laws
@@ -68,7 +48,7 @@ def inlined(law):
 
 
 @compiled
-def assign(target, source):
+def assign(target: Any, source: Any) -> None:
     """Copy the array source into target, both (n, m). This replaces `target[:] = source`, because numba takes three
     seconds to compile numpy's check of the shapes."""
     for i in range(target.shape[0]):

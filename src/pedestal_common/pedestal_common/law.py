@@ -1,56 +1,80 @@
 """Compiler of the laws, which the decorator `compiled` uses in place of numba's own dispatcher.
 
-A law that only other laws call is translated to LLVM's intermediate code, and no more. A law that Python calls becomes
-an executable: machine code of this law with all the laws that it calls. Numba itself makes machine code and a wrapper
-for Python of each function, and optimises the function again in each of its callers. Because Python calls only ten of
-500 laws, this would double the time of compilation.
+A law that only other laws call is translated to LLVM's intermediate code, and no more. A law that Python calls
+becomes an executable: machine code of this law with all the laws that it calls. A separate law is an executable of its
+own. Its callers contain a call of its machine code, so that an edit of it does not compile its callers again. Numba
+itself makes machine code and a wrapper for Python of each function, and optimises the function again in each of its
+callers. Because Python calls only ten of 500 laws, this would double the time of compilation.
+
+Each symbol in the machine code contains the key of its law (law_key), or the name of a separate law. Nothing that is
+loaded can therefore be taken for something else, whatever was loaded before.
 """
+import contextlib
+import copy
 import functools
-import hashlib
+import gc
 import importlib
 import inspect
+import pathlib
+import sys
 import weakref
-from typing import NamedTuple
+from collections.abc import Callable, Iterator
+from typing import Any, NamedTuple
 
-from llvmlite.binding import Linkage, parse_bitcode
+import llvmlite.binding
 from numba.core import compiler, sigutils, types, typing
-from numba.core.caching import NullCache
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.datamodel.models import OpaqueModel
+from numba.core.environment import Environment
 from numba.core.funcdesc import default_mangler
 from numba.core.imputils import lower_constant
 from numba.core.registry import CPUDispatcher
 from numba.core.runtime import rtsys
 from numba.extending import lower_builtin, register_model, type_callable
 
-from pedestal_common import law_cache
+from pedestal_common import law_cache, law_key
+
+Linkage = llvmlite.binding.Linkage
+NumbaDispatcher: Any = CPUDispatcher     # numba's declared types do not cover what is used here
 
 
 class _Translation(JITCodeLibrary):
     """Translation: LLVM code of one Law for arguments of the types `args`, not yet linked with the laws that it calls.
     """
 
-    def __init__(self, codegen, law, args):
+    def __init__(self, codegen: Any, law: 'Law', args: tuple) -> None:
         super().__init__(codegen, law.py_func.__qualname__)
         self.law, self.args = law, args
 
     @property
-    def calls(self):
+    def calls(self) -> list['_Translation']:
         """Translations of the laws that this law calls."""
         return [library for library in self._linking_libraries if isinstance(library, _Translation)]
 
     @property
-    def code(self):
+    def parts(self) -> tuple[list['_Translation'], list['_Translation']]:
+        """(this translation with those that it calls, directly or not; those of separate laws that these call)."""
+        inside: list[_Translation] = [self]
+        separate: list[_Translation] = []
+        for part in inside:      # the list grows in the loop
+            for called in part.calls:
+                among = separate if called.law.separate else inside
+                if called not in among:
+                    among.append(called)
+        return inside, separate
+
+    @property
+    def code(self) -> Any:
         """LLVM module of this law, without the laws that it calls."""
         return self._final_module
 
-    def add_llvm_module(self, ll_module):
+    def add_llvm_module(self, ll_module: Any) -> None:
         """Add an LLVM module. Numba would also optimise each function here. This is left out, because the whole
         executable is optimised later."""
         self._final_module.link_in(ll_module)
 
-    def finalize(self):
+    def finalize(self) -> None:
         """Complete the code of this law with the functions of numba's libraries that it calls.
 
         Numba numbers its own functions in the order of their use, so two processes give different functions the same
@@ -68,13 +92,10 @@ class _Translation(JITCodeLibrary):
         self._finalize_dynamic_globals()
         self._finalized = True
 
-    def _get_module_for_linking(self):
-        """Return one LLVM module of this law with all the laws that it calls."""
+    def _get_module_for_linking(self) -> Any:
+        """Return one LLVM module of this law with all the laws that it calls, except separate laws."""
         if self._shared_module is None:
-            parts = [self]
-            for part in parts:      # the list grows in the loop
-                parts += [called for called in part.calls if called not in parts]
-            modules = [part.code.clone() for part in parts]
+            modules = [part.code.clone() for part in self.parts[0]]
             modules.append(rtsys.library._get_module_for_linking().clone())
             while len(modules) > 1:     # linked in pairs, because the time of a link grows with the size of both
                 for one, other in zip(modules[::2], modules[1::2]):
@@ -82,10 +103,13 @@ class _Translation(JITCodeLibrary):
                 modules = modules[::2]
             self._shared_module = modules[0]
             _relink(self._shared_module, Linkage.weak_odr, 'linkonce_odr')
+            if self.law.separate:
+                name = self.law.translation(self.args).fndesc.llvm_func_name
+                self._shared_module.get_function(name).linkage = 'external'
         return self._shared_module
 
 
-def _relink(module, before, after):
+def _relink(module: Any, before: llvmlite.binding.Linkage, after: str) -> None:
     """Give the linkage `after` to the functions of an LLVM module that have the linkage `before`.
 
     With weak_odr the linker keeps one of several equal functions. With linkonce_odr it also drops a function that has
@@ -96,6 +120,14 @@ def _relink(module, before, after):
             function.linkage = after
 
 
+class _Arguments(tuple):
+    """Types of arguments with a short text: numba makes a text of them in each of its passes, and that of a record
+    with hundreds of fields takes longer than the rest."""
+
+    def __str__(self) -> str:
+        return f'{len(self)} arguments'
+
+
 class _Compiler(compiler.Compiler):
     """Numba's compiler, which gives a law the same symbol (name in the machine code) in every process.
 
@@ -103,87 +135,63 @@ class _Compiler(compiler.Compiler):
     and the types of records in the order of their use, which differs from process to process.
     """
 
-    def __init__(self, *arguments):
+    def __init__(self, *arguments: Any) -> None:
         super().__init__(*arguments)
         self.state.targetctx = self.state.targetctx.subtarget(mangler=_symbol)
 
-    def _compile_bytecode(self):
-        identity = self.state.func_id
-        if _has_name(identity.func_qualname):
-            identity.unique_id = int.from_bytes(hashlib.sha256(repr(self.state.args).encode()).digest()[:6])
-            identity.unique_name = f'{identity.func_qualname}${identity.unique_id}'
+    def _compile_bytecode(self) -> Any:
+        identity, library = self.state.func_id, self.state.library
+        identity.unique_id = int(library.law.symbol(library.args)[:12], 16)
+        identity.unique_name = f'{identity.func_qualname}${identity.unique_id}'
+        self.state.args = _Arguments(self.state.args)
         return super()._compile_bytecode()
 
 
-def _symbol(name, types, *, abi_tags=(), uid=None):
-    """Return the symbol of a law. uid: number that stands for the types of its arguments."""
+def _symbol(name: str, types: tuple, *, abi_tags: tuple = (), uid: int | None = None) -> str:
+    """Return the symbol of a law. uid: number that stands for its key and for the types of its arguments."""
     return default_mangler(name, (), uid=uid)
 
 
-def _has_name(qualname):
-    """Return True if a law can be imported by its qualified name. A law that is made inside a function cannot: its
-    name contains '<locals>'."""
-    return '<' not in qualname
+class _Call(NamedTuple):
+    """A call of a law: what another process needs to find the called law again."""
+    module: str
+    name: str
+    key: str          # '' for a separate law, which may change
+    args: tuple       # numba's types of the arguments
+    returns: types.Type
+
+    @property
+    def law(self) -> 'Law | None':
+        """Called law; None if this process has another law, or none, under its name."""
+        try:
+            law = functools.reduce(getattr, self.name.split('.'), importlib.import_module(self.module))
+        except (ImportError, AttributeError):
+            return None
+        return law if isinstance(law, Law) and self.key == ('' if law.separate else law.key) else None
 
 
-class _Kept(NamedTuple):
-    """Cached form of a translation.
-
-    args     types of the arguments of the law
-    code     its LLVM module as bitcode
-    calls    [(module, name, types of the arguments)] of the laws that it calls
-    fndesc, environment, signature    fields of numba's CompileResult
-    """
-    args: tuple
-    code: bytes
-    calls: list
-    fndesc: object
-    environment: object
-    signature: object
+def _calls(translations: list[_Translation]) -> list[_Call] | None:
+    """Return the calls of the laws with these translations; None if another process cannot find one of these laws by
+    its name, such as a law that is made inside a function."""
+    calls = [_Call(part.law.py_func.__module__, part.law.py_func.__qualname__,
+                   '' if part.law.separate else part.law.key, part.args,
+                   part.law.translation(part.args).signature.return_type) for part in translations]
+    return calls if all(call.law is part.law for call, part in zip(calls, translations)) else None
 
 
-class _Translated(law_cache.Contents):
-    """Conversion of a translation to its cached form (_Kept) and back."""
-
-    def get_filename_base(self, fullname, abiflags):
-        """Return the base of the name of the file, which is in the same folder as that of the executable."""
-        return f'{super().get_filename_base(fullname, abiflags)}.ir'
-
-    def check_cachable(self, cres):
-        """Return True if another process can find the law, and the laws that it calls, by their names."""
-        return super().check_cachable(cres) and all(
-            _has_name(part.law.py_func.__qualname__) for part in (cres.library, *cres.library.calls))
-
-    def reduce(self, cres):
-        """Return the _Kept of numba's CompileResult, which can be pickled."""
-        cres.fndesc.typemap = cres.fndesc.calltypes = None
-        laws = [(part.law.py_func, part.args) for part in cres.library.calls]
-        calls = [(function.__module__, function.__qualname__, args) for function, args in laws]
-        return _Kept(cres.library.args, cres.library.code.as_bitcode(), calls, cres.fndesc, cres.environment,
-                     cres.signature)
-
-    def rebuild(self, target_context, payload):
-        """Return the CompileResult of a _Kept, the result of `reduce`."""
-        fndesc = payload.fndesc
-        library = _Translation(target_context.codegen(), _named(fndesc.modname, fndesc.qualname), payload.args)
-        library._final_module = parse_bitcode(payload.code)
-        library._linking_libraries = [_named(module, name).translation(args).library
-                                      for module, name, args in payload.calls]
-        library._finalized = True
-        return compiler.compile_result(
-            typing_context=target_context.typing_context, target_context=target_context, entry_point=None,
-            typing_error=None, type_annotation='', library=library, call_helper=None, signature=payload.signature,
-            objectmode=False, lifted=(), fndesc=fndesc, environment=payload.environment, metadata=None, reload_init=())
+class _KeptTranslation(NamedTuple):
+    """Cached form of a translation. fndesc, environment, signature: fields of numba's CompileResult."""
+    code: bytes       # LLVM module as bitcode
+    calls: list[_Call]
+    fndesc: Any
+    environment: Environment
+    signature: Any
 
 
-class _Translations(law_cache.Cache):
-    """Cached translations of one law, one for each set of argument types."""
-    _impl_class = _Translated
-
-
-def _named(module, name):
-    """Return the Law with a qualified name in a module."""
-    return functools.reduce(getattr, name.split('.'), importlib.import_module(module))
+class _KeptExecutable(NamedTuple):
+    """Cached form of an executable."""
+    separate: list[_Call]       # separate laws whose machine code it calls
+    compiled: tuple             # numba's own form of a CompileResult
 
 
 class _LawType(types.Dispatcher):
@@ -199,29 +207,57 @@ def _law_constant(context, builder, law_type, law):
     return context.get_dummy_value()
 
 
-class Law(CPUDispatcher):
+class Law(NumbaDispatcher):
     """Compiled law: a numba dispatcher, which translates the law once for each set of argument types (overload).
 
-    An overload becomes an executable only when Python calls it. Translations and executables are cached.
+    An overload becomes an executable only when Python calls it, or when the law is separate. Translations and
+    executables are cached. separate: True if the law is not contained in the machine code of its callers.
     """
 
-    def __init__(self, *arguments, **keywords):
+    def __init__(self, *arguments: Any, separate: bool = False, **keywords: Any) -> None:
         super().__init__(*arguments, **keywords)
+        self.separate = separate
         self._type = _LawType(self)
         self.typingctx._globals.pop(weakref.ref(self))     # remove the type that numba gave to the law
         self.typingctx.insert_global(self, self._type)
-        self._translated, self._translations = {}, NullCache()
+        self._translated: dict[tuple, Any] = {}
 
     @property
-    def _numba_type_(self):
+    def _numba_type_(self) -> types.Type:
         return self._type
 
-    def enable_caching(self):
-        """Cache the compiled law if the law cache has a folder for it."""
-        if law_cache.folder(self.py_func) is not None:
-            self._cache, self._translations = law_cache.Cache(self.py_func), _Translations(self.py_func)
+    @property
+    def _name(self) -> str:
+        return f'{self.py_func.__module__}.{self.py_func.__qualname__}'
 
-    def get_call_template(self, args, kws):
+    @functools.cached_property
+    def key(self) -> str:
+        """Key of the law (law_key)."""
+        return law_key.of_law(self)
+
+    def symbol(self, args: tuple) -> str:
+        """Return a digest that becomes part of the symbol of this law for arguments of these types.
+
+        The symbol of a separate law outlives a change of the law, because the machine code of its callers contains it.
+        """
+        stands_for = self._name if self.separate and '<' not in self._name else self.key
+        return law_key.digest((stands_for, law_key.of_types(args)))
+
+    def is_cached(self, *values: Any) -> bool:
+        """Return True if the executable for arguments of the types of these values is in the law cache, with those of
+        the separate laws that it calls."""
+        return self._is_cached(tuple(map(self.typeof_pyval, values)))
+
+    def _is_cached(self, args: tuple) -> bool:
+        kept = law_cache.load(self._file('executable', args))
+        return isinstance(kept, _KeptExecutable) and all(
+            (law := call.law) is not None and law._is_cached(call.args) for call in kept.separate)
+
+    def _file(self, form: str, args: tuple) -> pathlib.Path:
+        """Return the path of the file of a translation or an executable in the law cache."""
+        return law_cache.file(self._name, _COMPILER, form, self.key, law_key.of_types(args))
+
+    def get_call_template(self, args: tuple, kws: dict) -> tuple:
         """Return numba's template of a call from another law. Such a call needs the translation only."""
         signature, args = self._compiler.fold_argument_types(args, kws)
         self.translation(tuple(args))
@@ -229,38 +265,55 @@ class Law(CPUDispatcher):
         template = typing.make_concrete_template(name, name, [made.signature for made in self._translated.values()])
         return template, signature, args, {}
 
-    def get_overload(self, sig):
+    def get_overload(self, sig: Any) -> _Translation:
         """Return the translation for a signature, by which numba finds the implementation of a call from a law."""
         args, _ = sigutils.normalize_signature(sig)
         return self._translated[tuple(args)].library
 
-    def compile(self, sig):
+    def compile(self, sig: Any) -> Any:
         """Return the entry point of the executable for a signature, for a call from Python."""
         args, _ = sigutils.normalize_signature(sig)
+        return self.executable(tuple(args)).entry_point
+
+    def executable(self, args: tuple) -> Any:
+        """Return the CompileResult of the executable for arguments of these types.
+
+        If several processes need an executable that is not cached, one compiles it and the others wait.
+        """
         with global_compiler_lock:
             if args not in self.overloads:
-                made = self._cache.load_overload(args, self.targetctx)
-                (self._cache_misses if made is None else self._cache_hits)[args] += 1
+                path = self._file('executable', args)
+                made = self._load_executable(path)
                 if made is None:
-                    made = _executable(self.translation(args))
-                    self._cache.save_overload(args, made)
+                    with law_cache.lock(path), _garbage_kept():
+                        made = self._load_executable(path)
+                        (self._cache_misses if made is None else self._cache_hits)[args] += 1
+                        if made is None:
+                            made = self._make_executable(args, path)
+                else:
+                    self._cache_hits[args] += 1
                 self.add_overload(made)
-            return self.overloads[args].entry_point
+            return self.overloads[args]
 
-    def translation(self, args):
+    def translation(self, args: tuple) -> Any:
         """Return the CompileResult of the translation for arguments of these types, for calls from other laws."""
         if args not in self._translated:
-            made = self._translations.load_overload(args, self.targetctx)
+            path = self._file('translation', args)
+            made = self._load_translation(path, args)
             if made is None:
                 made = self._translate(args)
-                self._translations.save_overload(args, made)
+                calls = _calls(made.library.calls)
+                if calls is not None and not made.library.has_dynamic_globals:
+                    made.fndesc.typemap = made.fndesc.calltypes = None
+                    law_cache.save(path, _KeptTranslation(made.library.code.as_bitcode(), calls, made.fndesc,
+                                                          made.environment, made.signature))
             self.targetctx.insert_user_function(made.library, made.fndesc, [made.library])
             self._translated[args] = made
         return self._translated[args]
 
-    def _translate(self, args):
+    def _translate(self, args: tuple) -> Any:
         """Return the CompileResult of a new translation for arguments of these types."""
-        flags = compiler.Flags()
+        flags: Any = compiler.Flags()
         self.targetdescr.options.parse_as_flags(flags, self.targetoptions)
         flags.no_compile = flags.no_cpython_wrapper = flags.no_cfunc_wrapper = True
         library = _Translation(self.targetctx.codegen(), self, args)
@@ -269,29 +322,99 @@ class Law(CPUDispatcher):
         library.finalize()
         return made
 
+    def _load_translation(self, path: pathlib.Path, args: tuple) -> Any:
+        """Return the CompileResult of a cached translation; None where there is none that fits."""
+        kept = law_cache.load(path)
+        if not isinstance(kept, _KeptTranslation):
+            return None
+        called = []
+        for call in kept.calls:
+            law = call.law
+            if law is None or law.translation(call.args).signature.return_type != call.returns:
+                return None
+            called.append(law.translation(call.args))
+        library = _Translation(self.targetctx.codegen(), self, args)
+        library._final_module = llvmlite.binding.parse_bitcode(kept.code)
+        library._linking_libraries = [now.library for now in called]
+        library._finalized = True
+        return compiler.compile_result(
+            typing_context=self.typingctx, target_context=self.targetctx, entry_point=None, typing_error=None,
+            type_annotation='', library=library, call_helper=None, signature=kept.signature, objectmode=False,
+            lifted=(), fndesc=kept.fndesc, environment=kept.environment, metadata=None, reload_init=())
 
-def _executable(law):
-    """Return the CompileResult of an executable, which contains all the laws that a law calls. law: CompileResult of
-    its translation."""
-    context = law.target_context
-    context.refresh()
-    library = context.codegen().create_library(law.fndesc.qualname)
-    library.enable_object_caching()
-    library.add_linking_library(law.library)
-    with context.push_code_library(library):
-        context.create_cpython_wrapper(library, law.fndesc, law.environment, law.call_helper)
-    made = law._replace(library=library, entry_point=context.get_executable(library, law.fndesc, law.environment))
-    for environment in made._find_referenced_environments():
-        library.codegen.set_env(environment.env_name, environment)
-    return made
+    def _make_executable(self, args: tuple, path: pathlib.Path) -> Any:
+        """Return the CompileResult of a new executable, and save it in the file of the law cache."""
+        law = self.translation(args)
+        separate = law.library.parts[1]
+        for part in separate:
+            part.law._link(part.args)
+        # As numba's compiler does for the law: the wrapper owns the arrays that it returns.
+        context = self.targetctx.subtarget(enable_nrt=True)
+        context.refresh()
+        library = context.codegen().create_library(law.fndesc.qualname)
+        library.enable_object_caching()
+        library.add_linking_library(law.library)
+        # The wrapper for Python has constants of its own, such as the type of a returned array. They are in an
+        # environment of its own: that of the law is part of the translation, and complete before.
+        wrapper = copy.copy(law.fndesc)
+        wrapper.env_name = f'{law.fndesc.env_name}.wrapper'
+        environment = Environment.from_fndesc(wrapper)
+        with context.push_code_library(library):
+            context.create_cpython_wrapper(library, wrapper, environment, law.call_helper)
+        made = law._replace(library=library, fndesc=wrapper, environment=environment,
+                            entry_point=context.get_executable(library, wrapper, environment))
+        for referenced in made._find_referenced_environments():
+            library.codegen.set_env(referenced.env_name, referenced)
+        calls = _calls(separate)
+        if calls is not None and not library.has_dynamic_globals:
+            law_cache.save(path, _KeptExecutable(calls, made._reduce()))
+        return made
+
+    def _load_executable(self, path: pathlib.Path) -> Any:
+        """Return the CompileResult of a cached executable; None where there is none that fits."""
+        kept = law_cache.load(path)
+        if not isinstance(kept, _KeptExecutable):
+            return None
+        # To prepare numba's compiler takes a third of a second and imports all of scipy.linalg. Machine code needs the
+        # run-time library only.
+        rtsys.initialize(self.targetctx)
+        for call in kept.separate:
+            law = call.law
+            if law is None or law._link(call.args) != call.returns:
+                return None
+        return compiler.CompileResult._rebuild(self.targetctx, *kept.compiled)
+
+    def _link(self, args: tuple) -> types.Type:
+        """Make the machine code of a separate law known to the executables that call it; return the type of its
+        result."""
+        made = self.executable(args)
+        name = made.fndesc.llvm_func_name
+        llvmlite.binding.add_symbol(name, made.library.get_pointer_to_function(name))
+        return made.signature.return_type
 
 
-def by_type(function, law_of):
+@contextlib.contextmanager
+def _garbage_kept() -> Iterator[None]:
+    """Switch Python's garbage collector off, as a context: it searches all objects of the compiler again and again,
+    and finds little."""
+    enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if enabled:
+            gc.enable()
+
+
+def by_type(function: Callable, law_of: Callable) -> None:
     """Let compiled code call `function`, which stands for a Law that depends on the type of its first argument.
 
     law_of(type of the first argument) returns the Law, or None if the call does nothing. Numba's own function
     `overload` is not used, because it would make an executable of each of these laws.
     """
+    law_key.template(function, *(cell.cell_contents for cell in law_of.__closure__ or ()), *(
+        law_of.__globals__[name] for name in law_of.__code__.co_names if name in law_of.__globals__))
+
     @type_callable(function)
     def type_call(context):
         def returned(*args):
@@ -307,3 +430,7 @@ def by_type(function, law_of):
             return context.get_dummy_value()
         known = context.typing_context.resolve_function_type(law._type, signature.args, {})
         return context.get_function(law._type, known)(builder, args)
+
+
+_COMPILER = law_key.of_module(sys.modules[__name__])
+"""Text that changes with this module, whose code makes the code of the laws."""

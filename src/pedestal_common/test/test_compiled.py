@@ -1,5 +1,4 @@
 """The cache of compiled laws, shared by processes that start together."""
-import contextlib
 import os
 import shutil
 import subprocess
@@ -9,45 +8,27 @@ import pytest
 from numba.core import types
 
 from pedestal_common import law_cache
-from pedestal_common.compiled import compiled, inlined
+from pedestal_common.compiled import compiled, inlined, separate
 from pedestal_common.law import by_type
 
 LAW = """
 import sys
 import time
-import typing
 
 import numpy
-from numba.core.caching import IndexDataCacheFile
 
-from pedestal_common.compiled import compiled, compiled_once
+from pedestal_common.compiled import compiled
 from pedestal_common.law import Law
 
 @compiled
 def law(x):
     return x[0] + x[1]
 
-class Memory(typing.NamedTuple):
-    pass
-
-class Unit:
-    memory = Memory()
-
-    def prepare(self):
-        law(numpy.ones(3))
-
 if __name__ == '__main__':
     from one_law import law as module
-    unit = module.Unit()
-    if len(sys.argv) > 1:
-        write = IndexDataCacheFile._save_index
-        IndexDataCacheFile._save_index = lambda *index: (time.sleep(1.0), write(*index))
-        module.law(numpy.ones(3, sys.argv[1]))
-    else:
-        translate = Law._translate
-        Law._translate = lambda *law: (time.sleep(1.0), translate(*law))[1]
-        with compiled_once(unit):
-            unit.prepare()
+    translate = Law._translate
+    Law._translate = lambda *law: (time.sleep(1.0), translate(*law))[1]
+    module.law(numpy.ones(3, *sys.argv[1:]))
     print(sum(module.law.stats.cache_misses.values()))
 """
 
@@ -55,12 +36,8 @@ TYPES = ('f8', 'f4')
 
 
 def environment(folder, cache):
-    """Of a process that has a cache without laws, with the digests of the sources of the product."""
-    with contextlib.suppress(OSError):
-        (cache / 'pedestal').mkdir(parents=True)
-        for kept in law_cache._ROOT.glob('digest-*'):
-            shutil.copy(kept, cache / 'pedestal')
-    return {**os.environ, 'XDG_CACHE_HOME': str(cache),
+    """Of a process that has the law cache in the folder `cache`."""
+    return {**os.environ, 'NUMBA_CACHE_DIR': str(cache),
             'PYTHONPATH': os.pathsep.join([str(folder), *filter(None, sys.path)])}
 
 
@@ -108,20 +85,20 @@ def test_a_checkout_finds_what_another_of_the_same_sources_compiled(folder):
     assert compilations(folder, folder / 'cache', [()]) == [1]
 
 
-def test_a_process_saves_no_law_of_sources_that_changed_under_it(folder):
-    """The second module is imported after the edit, so its new law would be saved in the folder of the old sources."""
-    (folder / 'one_law' / 'late.py').write_text(LAW)
-    code = ('import numpy, pathlib, one_law.law; path = pathlib.Path(one_law.law.__file__).with_name("late.py"); '
-            'text = path.read_text(); path.write_text(text.replace("x[1]", "x[2]")); import one_law.late; '
-            'one_law.late.law(numpy.ones(3)); path.write_text(text)')
-    subprocess.run([sys.executable, '-c', code], env=environment(folder, folder / 'cache'), check=True, timeout=120.0)
-    saved = lambda: [str(path) for path in (folder / 'cache').rglob('*.nbc') if 'one_law' in str(path)]  # noqa: E731
-    assert saved() == []
-    assert compilations(folder, folder / 'cache', [()]) == [1] and saved()
+def test_a_law_has_the_key_of_the_source_that_was_read(folder):
+    """The source is edited after the process has read it and before the process saves the compiled law."""
+    code = ('import numpy, pathlib, one_law.law; path = pathlib.Path(one_law.law.__file__); '
+            'path.write_text(path.read_text().replace("x[1]", "x[2]")); print(one_law.law.law(numpy.arange(3.0)))')
+
+    def said():
+        return subprocess.run([sys.executable, '-c', code], env=environment(folder, folder / 'cache'), check=True,
+                              capture_output=True, text=True, timeout=120.0).stdout
+
+    assert [said(), said()] == ['1.0\n', '2.0\n']
 
 
 def test_laws_saved_at_once_are_all_kept(folder):
-    """Of one law for several signatures, whose index is one file."""
+    """Of one law for several types."""
     types = [(name,) for name in TYPES]
     assert compilations(folder, folder / 'cache', types) == [1] * len(types)
     assert compilations(folder, folder / 'cache', types) == [0] * len(types)
@@ -153,11 +130,6 @@ def test_laws_translated_by_different_processes_keep_their_own_functions_of_numb
                               env=environment(folder, folder / 'cache'), stdout=subprocess.PIPE, text=True,
                               timeout=120.0)
         assert done.stdout == f'{value}\n'
-
-
-def test_without_a_cache_everyone_compiles(folder):
-    (folder / 'cache').touch()
-    assert compilations(folder, folder / 'cache', [()] * 2) == [1, 1]
 
 
 @compiled
@@ -233,6 +205,48 @@ def test_a_law_finds_what_another_process_translated_of_it(tmp_path):
     assert said(['-c', 'from two_laws.called import called; print(called(2.0))']) == '8.0'
     assert said(['-m', 'two_laws.law']) == '9.0 law'
     assert said(['-m', 'two_laws.law']) == '9.0'
+
+
+def test_an_edit_of_a_separate_law_compiles_that_law_only(tmp_path):
+    """Its caller, which another process compiled, calls the new law; a new type of the result compiles it again."""
+    package = tmp_path / 'two_laws'
+    package.mkdir()
+    (package / '__init__.py').touch()
+    called = package / 'called.py'
+    called.write_text('from pedestal_common.compiled import separate\n\n\n'
+                      '@separate\ndef called(x):\n    return 2.0 * x\n')
+    (package / 'law.py').write_text(CALLER)
+
+    def said():
+        done = subprocess.run([sys.executable, '-m', 'two_laws.law'], capture_output=True, text=True, timeout=120.0,
+                              env=environment(tmp_path, tmp_path / 'cache'))
+        assert not done.stderr
+        return done.stdout.strip()
+
+    assert [said(), said()] == ['5.0 law called', '5.0']
+    called.write_text(called.read_text().replace('2.0', '3.0'))
+    assert [said(), said()] == ['7.0 called', '7.0']
+    called.write_text(called.read_text().replace('3.0', '3j'))
+    assert [said(), said()] == ['(1+6j) called law', '(1+6j)']
+
+
+def test_a_unit_is_compiled_if_its_separate_laws_are(tmp_path, monkeypatch):
+    monkeypatch.setattr(law_cache, '_ROOT', tmp_path)
+    assert not around.is_cached(2.0)
+    around(2.0)
+    assert around.is_cached(2.0)
+    next(path for path in tmp_path.iterdir() if '.apart-' in path.name and len(path.read_bytes()) > 5000).unlink()
+    assert not around.is_cached(2.0)
+
+
+@separate
+def apart(x):
+    return x * x
+
+
+@compiled
+def around(x):
+    return apart(x) + 1.0
 
 
 def by_kind(x):

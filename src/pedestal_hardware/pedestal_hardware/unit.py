@@ -198,12 +198,12 @@ class ServoDrives(adu_unit.Adu):
         """Values whose change is published at once: those of the drive unit, and the errors of the drives."""
         return (*super().urgent, *self.parts['drives']['error'].tolist(), *self.problems)
 
-    def prepare(self):
-        """Compile all functions that a node calls, without a change of the unit."""
-        arrays = self.memory.record, self.inputs, self.outputs
-        before = [array.copy() for array in arrays]
-        servo_drives.control(self.memory.record, np.int64(0), self.inputs[0])
-        servo_drives.measure(self.memory.record, np.int64(0), self.outputs[0])
+    def prepare_requests(self):
+        """Compile the functions behind the requests, and the law that commands the drives."""
         super().request(self.REQUESTS[0])
-        for array, values in zip(arrays, before):
-            array[...] = values
+        servo_drives.control(self.memory.record, np.int64(0), self.inputs[0])
+
+    @property
+    def last_prepared(self):
+        """(law that reads the drives, its arguments): `prepare` calls it last."""
+        return servo_drives.measure, (self.memory.record, np.int64(0), self.outputs[0])

@@ -19,7 +19,7 @@ from collections import namedtuple
 import numpy as np
 
 from pedestal_common.codes import codes
-from pedestal_common.compiled import compiled
+from pedestal_common.compiled import compiled, separate
 from pedestal_common.geometry import blockage
 from pedestal_common.geometry.line_of_sight import angles, earth_angles, offsets, to_deck, to_earth
 from pedestal_common.parameters import ParameterError
@@ -457,7 +457,7 @@ def finish(s, o, true, seen):
                 Status.BELOW_HORIZON if seen.amplitude == 0.0 else Status.LOCKED if s.locked != 0 else Status.NO_LOCK)
 
 
-@compiled
+@separate
 def step(s, c, i, o, breaks, coefficients, normals):
     """Execute one drive step. Never raises: the status of the outputs names a missing input.
 

@@ -13,7 +13,7 @@ import numpy as np
 from acu_tracker.estimation import roughness
 from acu_tracker.estimation.filters import target_filter
 from acu_tracker.estimation.filters.measurement import NO_INNOVATION, Measurement, with_azimuth_near, with_rate
-from pedestal_common.compiled import compiled
+from pedestal_common.compiled import compiled, separate
 
 CONSTANTS_DTYPE = np.dtype([('filter', target_filter.CONSTANTS_DTYPE), ('gates', 'f8', (2,))], align=True)
 """Constants of the tracker.
@@ -127,7 +127,7 @@ def _with_accepted_rates(t, p, c, m, innovation):
     return Measurement(m.stamp, (a, e), m.range, m.range_variance)
 
 
-@compiled
+@separate
 def observe(t, p, c, m, restart_gap):
     """Take a Measurement. Return (its outcome, the Innovation, of NaN if nothing was predicted).
 

@@ -30,7 +30,7 @@ from acu_tracker.pointing import model
 from acu_tracker.program import bridge, program_track
 from acu_tracker.search import acquisition
 from acu_tracker.servo import position_loop
-from pedestal_common.compiled import compiled
+from pedestal_common.compiled import compiled, separate
 
 GUIDANCE_DTYPE = np.dtype([
     ('preset', direction.DIRECTION_DTYPE), ('slave', direction.DIRECTION_DTYPE), ('manual', manual.MANUAL_DTYPE),
@@ -268,7 +268,7 @@ def check_slope(g, k, c, u, at, way):
     signal_level_modes.check_slope(g.acquisition, at, motion, (u.cross_elevation, u.elevation))
 
 
-@compiled
+@separate
 def look_ahead(g, k, c, mode, program, gap, t):
     """Plan for the keyholes and hidden sectors on the path of the target, once in planner.LOOK_AHEAD_PERIOD_S.
 

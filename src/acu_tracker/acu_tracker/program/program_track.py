@@ -12,7 +12,7 @@ from acu_tracker.geometry.azimuth_wrap import Travel
 from acu_tracker.geometry.motion import AxisMotion, Motion, angles, normalised, north_west_up
 from acu_tracker.geometry.vector import Vector
 from acu_tracker.modes import Reason
-from pedestal_common.compiled import compiled
+from pedestal_common.compiled import compiled, separate
 from pedestal_common.geometry.interval import interval
 from pedestal_common.geometry.line_of_sight import earth_direction, wrap
 
@@ -151,7 +151,7 @@ def _interpolated_component(program, i, t, axis):
                     T * _component_slope(program, i + 1, axis), (t - times[i]) / T, T)
 
 
-@compiled
+@separate
 def motion_at(program, t):
     """Return the Motion in earth angles at t [s].
 

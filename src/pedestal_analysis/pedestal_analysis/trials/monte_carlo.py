@@ -5,18 +5,25 @@ batches do not depend on the workers, the numbers are equal to the last bit on a
 returns sums and a few numbers of each run instead of records.
 """
 import contextlib
+import functools
+import hashlib
+import importlib.util
 import logging
 import multiprocessing.resource_tracker
+import pathlib
 import re
 import signal
 import threading
 import warnings
 
 import joblib
+import numba
 import numpy as np
 from joblib.externals import loky
 
-from pedestal_common.law_cache import COLUMN_PACKAGES, UPPER_PACKAGES, digest
+PACKAGES = ('pedestal_common', 'ship_motion_sim', 'tracking_receiver_sim', 'acu_tracker', 'adu_drive',
+            'pedestal_hardware', 'pedestal_bringup', 'pedestal_analysis', 'pedestal_studies')
+"""Packages with laws, or with code that calls laws in trials and studies."""
 
 SCHEDULER_TIMEOUT_S = 10.0
 """Longest wait for the Dask scheduler, and for its first worker [s]."""
@@ -156,6 +163,14 @@ def _client(address):
     return client
 
 
-def sources():
+@functools.cache
+def sources() -> str:
     """Return a digest of the sources of all packages and of the version of numba, which determine the numbers."""
-    return digest(('pedestal_common', *COLUMN_PACKAGES, *UPPER_PACKAGES))
+    sha = hashlib.sha256(numba.__version__.encode())
+    for package in PACKAGES:
+        spec = importlib.util.find_spec(package)
+        assert spec is not None and spec.origin is not None
+        folder = pathlib.Path(spec.origin).parent
+        for path in sorted(folder.rglob('*.py')):
+            sha.update(f'{package}/{path.relative_to(folder)}\n'.encode() + path.read_bytes())
+    return sha.hexdigest()[:16]

@@ -1,7 +1,6 @@
 """Supervisor of the nodes of a realtime run, inside `pedestal run`. Because the antenna must continue, the supervisor
 starts a dead node again. It kills a node that was silent for too long, and then starts this node again."""
 import contextlib
-import os
 import signal
 import subprocess
 import sys
@@ -47,9 +46,7 @@ def prepare(scenario):
     finally:
         for process in processes.values():
             if process.poll() is None:
-                # The compilation of a node uses a second process (prepare.compile_unit), so its process group is
-                # killed.
-                os.killpg(process.pid, signal.SIGKILL)
+                process.kill()
             process.wait()
             process.stderr.close()
 

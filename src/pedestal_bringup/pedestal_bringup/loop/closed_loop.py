@@ -20,6 +20,7 @@ from pedestal_common.compiled import compiled
 from pedestal_common.graph import layouts, nodes, topics
 from pedestal_common.graph.steps import NS_PER_SECOND
 from pedestal_common.law import by_type
+from pedestal_common.law_key import template
 from pedestal_common.node.unit import MAX_BLOCK_STEPS, Unit, announced
 from pedestal_common.wire import records
 
@@ -62,6 +63,9 @@ def _true_bias(drive, truth):
         truth.bias[0], truth.bias[1] = y.azimuth.bias, y.elevation.bias
 
     return {drive_unit.Memory: of_axes, beam_unit.Memory: lambda drive, truth: None}[drive.instance_class]
+
+
+template(true_bias)
 
 
 @compiled

@@ -8,14 +8,17 @@ the supervisor of a realtime run start this module as a program.
     NODE NAME    the laws of one node of the scenario NAME, whose YAML text is read from the standard input
 """
 import concurrent.futures
-import multiprocessing
 import os
+import pathlib
 import sys
 import time
 
+from numba.core import config
+
 from pedestal_bringup.loop import closed_loop, side_by_side
 from pedestal_bringup.scenario import scenario
-from pedestal_common.compiled import compiled_once, done_file, is_compiled
+from pedestal_common import law_cache, law_key
+from pedestal_common.compiled import is_compiled
 
 SERVO_DRIVES = 'scenario.drives=simulated', 'scenario.pacing=realtime'
 """Changes of a scenario with which four servo drives take the place of the drive unit."""
@@ -34,16 +37,6 @@ COMPILE_RUN_S = 0.1
 """Duration of the scenario that is run to compile a closed loop [s]."""
 
 
-def compile_unit(unit):
-    """Compile the laws of a unit in two processes, which is faster than in one."""
-    # Several runs may start at the same time. compiled_once lets only one of them compile a given unit.
-    with compiled_once(unit):
-        ahead = multiprocessing.get_context('fork').Process(target=unit.prepare_ahead)
-        ahead.start()
-        unit.prepare()
-        ahead.join()
-
-
 def _unit_of_scenario(name, node, *changes):
     """Return the unit of a node of the scenario `name` with changes."""
     return scenario.load(name, changes).unit(node)
@@ -53,14 +46,14 @@ def _compile_unit(name, node, *changes):
     """Compile the laws of a node of the scenario `name` with changes. Return (text that names them, time that this
     took [s])."""
     begun = time.perf_counter()
-    compile_unit(_unit_of_scenario(name, node, *changes))
+    _unit_of_scenario(name, node, *changes).prepare()
     return f'{node} of {name}{" with servo drives" * bool(changes)}', time.perf_counter() - begun
 
 
-def _loop_done(name, count):
-    """Return the path of the file that marks `count` closed loops of a scenario as compiled; None without a law
-    cache."""
-    return done_file(closed_loop.Loop, f'.{name}.{count}')
+def _loop_done(name: str, count: int) -> pathlib.Path:
+    """Return the path of the file that marks `count` closed loops of a scenario as compiled."""
+    law = closed_loop.loop if count == 1 else side_by_side.loops_in_lanes
+    return law_cache.file(f'compiled-{name}-{count}', law_key.of_law(law, whole=True))
 
 
 def _compile_loop(name, count):
@@ -71,17 +64,17 @@ def _compile_loop(name, count):
         side_by_side.runs(loops, ('joint_states',))
     else:
         loops[0].run()
-    mark = _loop_done(name, count)
-    if mark:
-        mark.touch()
+    law_cache.save(_loop_done(name, count), 'compiled')
     return f'closed loop{"s" * (count > 1)} of {name}{" side by side" * (count > 1)}', time.perf_counter() - begun
 
 
 def compile_cold(units, loops):
     """Compile the laws that are not cached, and print a line for each unit and closed loop. units: rows of
     COMPILED_UNITS; loops: rows of COMPILED_LOOPS."""
+    if config.DISABLE_JIT:      # for a debugger: there is nothing to compile
+        return
     units = [part for part in units if not is_compiled(_unit_of_scenario(*part))]
-    loops = [part for part in loops if (mark := _loop_done(*part)) is None or not mark.exists()]
+    loops = [part for part in loops if not _loop_done(*part).exists()]
     if not units and not loops:
         return
     print('compiling the laws (once for these sources) ...', flush=True)
@@ -100,7 +93,7 @@ def main():
         case [name]:
             compile_cold([part for part in COMPILED_UNITS if part[0] == name], ())
         case [node, name]:
-            compile_unit(scenario.parse(name, sys.stdin.read()).unit(node))
+            scenario.parse(name, sys.stdin.read()).unit(node).prepare()
     return 0
 
 

@@ -34,7 +34,7 @@ MAX_MEMORY_BYTES = 2**30
 
 @compiled
 def _receiver_law(receivers, i, stamp, step):
-    """Make the step of receiver i. receivers: as of `_loop`; stamp: of the step [ns]; step: its record of
+    """Make the step of receiver i. receivers: as of `loops_in_lanes`; stamp: of the step [ns]; step: its record of
     STEP_DTYPE."""
     r = receivers
     receiver_unit.law(receiver_unit.Memory(r.record[i:i + 1], r.breaks[i], r.coefficients[i], r.normals[i]), stamp,
@@ -68,11 +68,11 @@ def _acu_law(acus, i, stamp, step):
 
 
 class KeptSteps(typing.NamedTuple):
-    """Part of each step that is kept after it, as 8-byte words. Words are used because `_loop` would otherwise be
-    compiled again for each choice of topics.
+    """Part of each step that is kept after it, as 8-byte words, because `loops_in_lanes` would otherwise be compiled
+    again for each choice of topics.
 
     words  (m,): indices of the kept words in a record of STEP_DTYPE
-    steps  (2, trials, words of a STEP_DTYPE): the steps of `_loop`, as `_words` gives them
+    steps  (2, trials, words of a STEP_DTYPE): the steps of `loops_in_lanes`, as `_words` gives them
     rows   (trials, n, m): the kept words of all n steps, filled
     """
     words: np.ndarray
@@ -81,7 +81,7 @@ class KeptSteps(typing.NamedTuple):
 
 
 @compiled
-def _loop(drives, receivers, acus, first, last, period_ns, steps, kept):
+def loops_in_lanes(drives, receivers, acus, first, last, period_ns, steps, kept):
     """Make the steps first ... last - 1 of every trial.
 
     drives     flat array of the drives on lanes, as lanes.to_lanes gives it
@@ -178,9 +178,9 @@ def runs(loops, names, kept=None):
         last = min(first + MAX_STEPS_PER_CALL, *(loop.next_event_step(first) for loop in loops))
         blocks = [unit.block(last - first) for unit in receivers]
         tables, ends = zip(*map(_joined_tracks, zip(*(unit.memory.tables for unit in acus))))
-        _loop(moving, receiver_unit.Memory(receiver_record, breaks, coefficients,
-                                           np.stack([block.normals for block in blocks])),
-              ControlUnits(acu_record, Tables(*tables), np.array(ends)), first, last, period_ns, steps, keeps)
+        loops_in_lanes(moving, receiver_unit.Memory(receiver_record, breaks, coefficients,
+                                                    np.stack([block.normals for block in blocks])),
+                       ControlUnits(acu_record, Tables(*tables), np.array(ends)), first, last, period_ns, steps, keeps)
         first = last
     lanes.from_lanes(moving, drive_record)
     return [Run(steps, np.zeros(0, TRUTH_DTYPE), np.arange(count) * period_ns, loop.units, forecast, loop.replies,

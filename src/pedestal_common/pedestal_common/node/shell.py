@@ -335,13 +335,11 @@ class Shell(Node):
     def prepare(self, unit):
         """Compile the laws of a unit, which takes half a minute and more when they are not cached. Raises Stopped
         after a signal."""
-        from pedestal_common.compiled import compiled_once  # with numba, which a node without a law does not need
         _compiling.append(True)
         try:
             if _stop:
                 raise Stopped
-            with compiled_once(unit):
-                unit.prepare()
+            unit.prepare()
         finally:
             _compiling.clear()
 

@@ -239,20 +239,27 @@ class Unit(typing.Protocol):
         return ''
 
     def prepare(self) -> None:
-        """Compile all functions that a node calls, without a change of the unit."""
+        """Compile all functions that a node calls, without a change of the unit. If `last_prepared` is in the law
+        cache, all others are there too."""
         arrays = self.memory.record, self.inputs, self.outputs
         before = [array.copy() for array in arrays]
-        _, law_of_many = self.LAWS[type(self.memory)]
-        law_of_many(self.memory, np.zeros(1, np.int64), self.inputs, self.outputs)
-        for name in self.REQUESTS[:1]:
-            self.request(name)
+        self.prepare_requests()
+        law, arguments = self.last_prepared
+        law(*arguments)
         for array, values in zip(arrays, before):
             array[...] = values
 
-    def prepare_ahead(self) -> None:
-        """Compile the laws that `prepare` compiles last. A second process calls this method while the first process
-        runs `prepare`, which then finds these laws in the cache. The unit cannot be used afterwards. Overridden where
-        the second process saves time."""
+    @property
+    def last_prepared(self) -> tuple[typing.Any, tuple]:
+        """(law that `prepare` calls last, its arguments): the law of many steps."""
+        _, law_of_many = self.LAWS[type(self.memory)]
+        return law_of_many, (self.memory, np.zeros(1, np.int64), self.inputs, self.outputs)
+
+    def prepare_requests(self) -> None:
+        """Compile the functions behind the requests. A unit that calls other functions between two steps overrides
+        this method. `prepare` restores the records afterwards."""
+        for name in self.REQUESTS[:1]:
+            self.request(name)
 
 
 def announced(unit: Unit, topic: str, stamps: np.ndarray,

@@ -11,6 +11,7 @@ import itertools
 from numba.extending import overload
 
 from pedestal_common.graph import layouts, topics
+from pedestal_common.law_key import template
 from pedestal_common.wire.records import NO_STAMP
 
 
@@ -57,4 +58,6 @@ def taking(names):
     # Because numba needs the names of the fields in the source, the function is made as text.
     exec('\n'.join(('def take(u, inputs):', *lines)), made)
     overload(made['take'], inline='always')(lambda u, inputs: made['take'])
+    made['take'].__module__ = __name__
+    template(made['take'])
     return made['take']

@@ -180,9 +180,9 @@ class SimulatedIq(Simulated):
                              f'{", ".join(SIGNAL_FAULTS[kind])}')
         return super().execute(command, arguments)
 
-    def prepare(self):
-        """Compile all functions that the node calls, without a change of the unit."""
-        super().prepare()
+    def prepare_requests(self):
+        """Compile the functions that the node calls between two steps."""
+        super().prepare_requests()
         modulate(self.memory.voltages, self.scale, np.zeros(2),
                  np.zeros((1, self.memory.voltages.shape[1]), np.complex64), 0.0)
 

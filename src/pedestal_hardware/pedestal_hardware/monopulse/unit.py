@@ -127,15 +127,13 @@ class MonopulseReceiver(Unit):
         else:
             self.search.clear()
 
-    def prepare(self):
-        """Compile all functions that the node calls, without a change of the unit."""
-        super().prepare()
-        record = self.memory.record.copy()
+    def prepare_requests(self):
+        """Compile the functions that the node calls between two steps."""
+        super().prepare_requests()
         front_end.use_carrier(self.parts['state'], 0.0)
         front_end.pass_gap(self.parts['state'], True)
         if self.parameters.feed.scanned:
             scan.begin_again(self.parts['window'])
-        self.memory.record[...] = record
 
     @property
     def urgent(self):

@@ -86,12 +86,10 @@ class SimulatedDrives(Simulated):
         """Values whose change is published at once: the errors of the drives."""
         return tuple(self.parts['drive']['error'].tolist())
 
-    def prepare(self):
-        """Compile all functions that the node calls, without a change of the unit."""
-        super().prepare()
-        record = self.memory.record.copy()
+    def prepare_requests(self):
+        """Compile the functions that the node calls between two steps."""
+        super().prepare_requests()
         self.measure()
         law.advance(self.memory.record, np.int64(NO_STAMP))
         law.obey(self.parts['drive'][0], 0)
         law.raise_fault(self.parts['drive'][0], errors.ERROR_HEARTBEAT_LOST)
-        self.memory.record[...] = record

@@ -22,7 +22,7 @@ from acu_tracker.estimation.filters import axes_filter, axis_filter, unscented
 from acu_tracker.estimation.filters.kinds import FILTER_KINDS
 from acu_tracker.estimation.filters.measurement import AxisInnovation, Estimate, Innovation, Measurement, with_rate
 from acu_tracker.geometry.motion import AxisMotion, Motion
-from pedestal_common.compiled import compiled
+from pedestal_common.compiled import compiled, separate
 from pedestal_common.geometry.line_of_sight import wrap
 
 CONSTANTS_DTYPE = np.dtype([('axis', axis_filter.CONSTANTS_DTYPE, (2,)), ('cartesian', unscented.CONSTANTS_DTYPE),
@@ -78,7 +78,7 @@ def walk(f, azimuth, elevation):
     f.axis[0].drift_variance_rate, f.axis[1].drift_variance_rate = azimuth, elevation
 
 
-@compiled
+@separate
 def predict(f, c, T):
     """Predict by T [s] >= 0 from the last measurement; the result is in the prior fields.
 
@@ -144,7 +144,7 @@ def expected(f):
     return Motion(azimuth, cartesian.elevation if f.used[1] else axes.elevation)
 
 
-@compiled
+@separate
 def outlook(f, c, T):
     """Return the predicted Motion T [s] >= 0 after the last measurement.
 
