@@ -1,8 +1,10 @@
-"""What holds for every test: it ends processes by signals, and none of its phases lasts for ever."""
+"""What holds for every test: it ends processes by signals, none of its phases lasts for ever, and its session leaves
+no process behind."""
 import faulthandler
 import os
 import signal
 
+import guard
 import pytest
 
 # A shell starts a command in the background with SIGINT ignored, and nohup one with SIGHUP ignored. The processes of
@@ -13,6 +15,7 @@ for number, handler in ((signal.SIGINT, signal.default_int_handler), (signal.SIG
         signal.signal(number, handler)
 
 STDERR = pytest.StashKey()
+GUARD = pytest.StashKey()
 
 STATION = ('test/test_live.py', 'test/test_rotctld.py', 'test/test_page.py')
 """The files whose tests share the graph of the fixture station, in their order: the first finds it in standby, and the
@@ -27,6 +30,27 @@ def pytest_addoption(parser):
 def pytest_configure(config):
     """Keep the standard error that is not captured."""
     config.stash[STDERR] = os.dup(2)
+
+
+def pytest_sessionstart(session):
+    """Start the guard of the session. The workers of xdist are among the processes that it kills."""
+    if not hasattr(session.config, 'workerinput'):
+        session.config.stash[GUARD] = guard.Guard()
+
+
+def pytest_terminal_summary(terminalreporter, config):
+    """Kill and name the processes that the tests leave behind. All fixtures and workers have ended before."""
+    leftovers = config.stash[GUARD].clear()
+    if leftovers:
+        terminalreporter.section('left behind and killed')
+        for process in leftovers:
+            terminalreporter.line(process)
+
+
+def pytest_unconfigure(config):
+    """End the guard."""
+    if GUARD in config.stash:
+        config.stash[GUARD].end()
 
 
 def pytest_collection_modifyitems(items):
