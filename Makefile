@@ -31,10 +31,11 @@ LAWS := $(foreach package,ship_motion_sim tracking_receiver_sim acu_tracker adu_
 # The files in the order of pyproject.toml, where those of graphs come first: a file of few tests, each a graph, would
 # else be the last, and one core idle.
 IN_TURN := --dist loadfile --no-loadscope-reorder
-# SECONDS COMMAND: three times what it takes. A test process that hangs is ended and named, and is the last: xdist would
-# try its test again and again.
+# SECONDS COMMAND: three times what it takes.
 LIMITED := .venv/bin/python test/limited.py
-PYTEST_IN_TURN = .venv/bin/python -m pytest $(IN_TURN) --max-worker-restart 0 $(PYTEST)
+# What fails runs once more, alone. A test process that hangs is ended and named, and another process runs the tests after
+# it (conftest.py). Because each such process costs a phase_timeout, few are replaced.
+PYTEST_IN_TURN = .venv/bin/python test/run_tests.py $(IN_TURN) --max-worker-restart 3 $(PYTEST)
 LINT = .venv/bin/ruff check . && .venv/bin/codespell && .venv/bin/mypy
 # Containers often set it: every process would compile the sources again.
 unexport PYTHONDONTWRITEBYTECODE

@@ -68,6 +68,19 @@ def pytest_xdist_make_scheduler(config, log):
         def _split_scope(self, nodeid):
             file = super()._split_scope(nodeid)
             return STATION if file in STATION else file
+
+        def remove_node(self, node):
+            """Return the test with which a worker crashed, and give the tests after it to other workers. xdist would
+            repeat the test in each new worker, and would wait for finished files."""
+            files = self.assigned_work[node]
+            crashed = next((test for tests in files.values() for test, done in tests.items() if not done), None)
+            for file, tests in list(files.items()):
+                if crashed in tests:
+                    tests[crashed] = True
+                if all(tests.values()):
+                    del files[file]
+            super().remove_node(node)
+            return crashed
     return Scheduling(config, log) if config.getvalue('dist') == 'loadfile' else None
 
 
