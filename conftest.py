@@ -5,6 +5,7 @@ import os
 import signal
 
 import guard
+import not_judged
 import pytest
 
 # A shell starts a command in the background with SIGINT ignored, and nohup one with SIGHUP ignored. The processes of
@@ -39,7 +40,9 @@ def pytest_sessionstart(session):
 
 
 def pytest_terminal_summary(terminalreporter, config):
-    """Kill and name the processes that the tests leave behind. All fixtures and workers have ended before."""
+    """Name the tests that are not judged. Kill and name the processes that the tests leave behind: all fixtures and
+    workers have ended before."""
+    not_judged.summarize(terminalreporter)
     leftovers = config.stash[GUARD].clear()
     if leftovers:
         terminalreporter.section('left behind and killed')

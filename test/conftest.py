@@ -15,6 +15,7 @@ import sys
 import time
 
 import limited
+import not_judged
 import numpy as np
 import pytest
 from shared import PEDESTAL, begins_with, free_port
@@ -27,6 +28,15 @@ MOST_DOMAINS = 25
 
 START = 180.0
 """Seconds within which nodes have started, also on a loaded machine."""
+
+
+WATCH = not_judged.Watch()
+
+
+def pytest_configure(config):
+    """The plugin of not_judged.py, and its mark."""
+    config.pluginmanager.register(WATCH)
+    config.addinivalue_line('markers', 'excused_by(count): what may excuse the test, see test/not_judged.py')
 
 
 @pytest.fixture(scope='session')
@@ -196,6 +206,7 @@ def _run(scenario, arguments, domain, folder, bag=None, prefix=()):
     run = Run(None, bag or folder / 'bag', domain)
     command = [*prefix, *PEDESTAL, 'run', scenario, '--bag', run.bag, '--json', run.json, *arguments]
     run.process = _popen(command, folder, _environment(domain, folder))
+    WATCH.add(lambda: run.process.poll() is None, not_judged.recorded(run.bag, run.process))
     return run
 
 
@@ -290,6 +301,7 @@ class Client:
         with contextlib.redirect_stderr(sys.__stderr__):    # faulthandler wants a file, which capsys has none of
             self.executor = middleware.make_executor(self.context)
         self.executor.add_node(self.node)
+        self.is_open, self.counts = True, None
         self.heard = {}
         self.publishers = {}
 
@@ -311,9 +323,13 @@ class Client:
         from pedestal_common.wire import messages
         topic = topics.TOPIC_BY_NAME[name]
         heard = self.heard[name] = []
+        if name == 'diagnostics' and self.counts is None:
+            self.counts = []
 
         def on_bytes(data):
             heard.append(messages.deserialize(data, topic.type))
+            if name == 'diagnostics':
+                self.counts += not_judged.counts_of(heard[-1])
             if take is not None:
                 take(heard[-1])
         self.node.create_subscription(middleware.message_class(topic.type), name, on_bytes,
@@ -370,11 +386,20 @@ class Client:
             return [status for array in heard[first:] for status in array.status if text in status.message]
         return self.until(found, timeout, lambda: f'no diagnostic says {text!r}; said: {self.said(first)}')[0]
 
+    def counted(self, until):
+        """The counts of lost steps in the diagnostics that it reads, up to a time [ns] while it is open."""
+        end = time.monotonic() + not_judged.LAST_COUNT_TIME_S
+        while self.counts is not None and self.is_open and time.monotonic() < end and not (
+                self.counts and self.counts[-1][0] > until):
+            self.executor.spin_once(timeout_sec=0.05)
+        return self.counts or []
+
     def said(self, first):
         """The messages of the diagnostics from the first-th on."""
         return [status.message for array in self.heard['diagnostics'][first:] for status in array.status]
 
     def close(self):
+        self.is_open = False
         self.executor.shutdown()
         self.node.destroy_node()
         self.context.try_shutdown()
@@ -389,8 +414,10 @@ def _clients():
     middleware.set_defaults()
 
     def open_client(domain_id, name='client'):
-        clients.append(Client(domain_id, name))
-        return clients[-1]
+        client = Client(domain_id, name)
+        clients.append(client)
+        WATCH.add(lambda: client.is_open, client.counted)
+        return client
 
     try:
         yield open_client

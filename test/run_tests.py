@@ -1,10 +1,9 @@
-"""Run pytest, and run the tests that fail once more, alone.
+"""Run pytest, and run the tests that fail or are not judged (not_judged.py) once more, alone.
 
     python test/run_tests.py [ARGUMENT OF PYTEST ...]
 
 A test that fails beside other tests and does not fail alone is unsteady. This program prints such a test with the
-output of both runs, so that the second run hides no fault. The exit code is that of the second run, or that of the
-first run where no test failed.
+output of both runs, so that the second run hides no fault. The exit code is that of the last run.
 
 The second run also contains the tests that the first run did not reach, because too many of its workers crashed.
 """
@@ -14,6 +13,7 @@ import pathlib
 import sys
 import tempfile
 
+import not_judged
 import pytest
 
 AGAIN = '--again'
@@ -27,6 +27,7 @@ class Outcomes:
     """Plugin of pytest that notes the result of each test.
 
     reports     {test: [(phase, outcome, output)]}
+    unjudged    tests that are not judged
     collected   all tests
     options     arguments of pytest without the files to test
     root        folder to which the names of the tests are relative
@@ -34,6 +35,7 @@ class Outcomes:
 
     def __init__(self) -> None:
         self.reports: dict[str, list[tuple[str, str, str]]] = {}
+        self.unjudged: list[str] = []
         self.collected: list[str] = []
         self.options: list[str] = []
         self.root = pathlib.Path()
@@ -54,6 +56,8 @@ class Outcomes:
         """Note a phase of a test. xdist reports a crash of a worker as a failure without a phase."""
         # xdist adds the name of the worker to a report without a failure.
         failure = report.longreprtext if report.outcome != 'passed' else ''
+        if not_judged.reason(report):
+            self.unjudged.append(report.nodeid)
         output = '\n'.join([failure, *(f'{title}:\n{text}' for title, text in report.sections)])
         self.reports.setdefault(report.nodeid, []).append((report.when, report.outcome, output.strip()))
         self._crashed |= report.when == '???'
@@ -79,22 +83,22 @@ def _text(phases: list[tuple[str, str, str]]) -> str:
 
 
 def _first(arguments: list[str]) -> int:
-    """Run pytest with arguments. Replace this process by the second run if tests failed, otherwise return the exit
-    code."""
+    """Run pytest with arguments. Replace this process by the second run if tests failed or are not judged, otherwise
+    return the exit code."""
     outcomes = Outcomes()
     code = pytest.main(arguments, [outcomes])
-    failed = outcomes.failed()
-    if code != pytest.ExitCode.TESTS_FAILED or not failed:
+    failed, unjudged = outcomes.failed(), outcomes.unjudged
+    repeated = [*failed, *(test for test in unjudged if test not in failed)]
+    if code not in (pytest.ExitCode.OK, pytest.ExitCode.TESTS_FAILED) or not repeated:
         return int(code)
     with tempfile.NamedTemporaryFile('w', prefix='first-run-', suffix='.json', delete=False) as file:
-        json.dump({test: outcomes.reports[test] for test in failed}, file)
-    tests = [*failed, *outcomes.missing()]
-    print(f'\n{len(failed)} failed, {len(tests) - len(failed)} not reached: these tests run once more, alone',
-          flush=True)
+        json.dump({test: outcomes.reports[test] for test in repeated}, file)
+    missing = outcomes.missing()
+    print(f'\n{len(failed)} failed, {len(unjudged)} not judged, {len(missing)} not reached: these tests run once '
+          'more, alone', flush=True)
     # No process is left that waits: a signal to this process ends the second run.
     os.execv(sys.executable, [sys.executable, __file__, AGAIN, file.name, *outcomes.options, *ALONE,
-                               *(str(outcomes.root / test) for test in tests)])
-    return int(code)
+                              *(str(outcomes.root / test) for test in (*repeated, *missing))])
 
 
 def _second(path: str, arguments: list[str]) -> int:
@@ -104,13 +108,17 @@ def _second(path: str, arguments: list[str]) -> int:
     os.remove(path)
     outcomes = Outcomes()
     code = int(pytest.main(arguments, [outcomes]))
-    failed = set(outcomes.failed())
-    for test in first.keys() - outcomes.reports.keys():
-        print(f'not run again: {test}')
-        code = code or int(pytest.ExitCode.TESTS_FAILED)
-    for test in (test for test in first if test in outcomes.reports and test not in failed):
-        print(f'\nunsteady: {test}\n--- beside other tests\n{_text(first[test])}\n--- alone\n'
-              f'{_text(outcomes.reports[test])}', flush=True)
+    failed, unjudged = outcomes.failed(), outcomes.unjudged
+    for test, phases in first.items():
+        if test not in outcomes.reports:
+            print(f'not run again: {test}')
+            code = code or int(pytest.ExitCode.TESTS_FAILED)
+        elif test in unjudged and any(phase[1] == 'failed' for phase in phases):
+            print(f'failed beside other tests, and not judged alone: {test}')
+            code = code or int(pytest.ExitCode.TESTS_FAILED)
+        elif test not in failed and test not in unjudged:
+            print(f'\nunsteady: {test}\n--- beside other tests\n{_text(phases)}\n--- alone\n'
+                  f'{_text(outcomes.reports[test])}', flush=True)
     return code
 
 

@@ -144,6 +144,7 @@ def test_a_drive_that_drops_off_the_bus_is_a_lost_motor_and_returns(bench):
     bench.until_drives('operation enabled')
 
 
+@pytest.mark.excused_by('missed_steps')
 def test_a_killed_node_stops_the_drives_and_a_new_node_goes_on(bench):
     bench.command(0.3, 1.0)
     bench.node.process.send_signal(signal.SIGKILL)
@@ -191,6 +192,7 @@ def test_the_drives_had_stopped_within_the_time_of_the_heartbeat(bench):
     assert max(off[:4]) < HEARTBEAT + STOP + BUSY
 
 
+@pytest.mark.excused_by('missed_steps')
 def test_a_bus_that_vanishes_and_returns(bench, start_node):
     """After the last test of the first drives: their program is killed under a running node, and started again."""
     def drives():

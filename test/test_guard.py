@@ -41,7 +41,7 @@ WAITS = "open('begun', 'w').close()\n    time.sleep(600)"
 def begin(tmp_path, domain_id, monkeypatch):
     """begin(test file, *options) -> Popen of pytest, which has the session's domain."""
     monkeypatch.setenv('ROS_DOMAIN_ID', str(domain_id))
-    for module in ('conftest.py', 'test/guard.py'):
+    for module in ('conftest.py', 'test/guard.py', 'test/not_judged.py'):
         shutil.copy(HOME / module, tmp_path)
     (tmp_path / 'pytest.ini').write_text('[pytest]\nphase_timeout = 400\n')
     begun = []

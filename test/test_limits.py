@@ -39,7 +39,7 @@ def test_that_comes_after():
 
 def run(folder, library, limit, phase_timeout, *options):
     """CompletedProcess of HANGS under both limits [s], of which 600 is none."""
-    for module in ('conftest.py', 'test/guard.py'):
+    for module in ('conftest.py', 'test/guard.py', 'test/not_judged.py'):
         shutil.copy(HOME / module, folder)
     (folder / 'pytest.ini').write_text(f'[pytest]\ntimeout = 1\nphase_timeout = {phase_timeout}\n')
     (folder / 'test_hangs.py').write_text(HANGS.format(library))

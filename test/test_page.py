@@ -449,6 +449,7 @@ def test_an_operator_at_the_page(antenna, browser):
     page.context.close()
 
 
+@pytest.mark.excused_by(None)
 def test_ten_pages_that_never_read_cost_the_control_unit_no_step(antenna):
     """Steps for which the drive had no command, in spans without and with such pages by turns, once these have what
     they are sent unread: the difference of the shares is not above its own scatter, which is the machine's."""

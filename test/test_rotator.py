@@ -155,6 +155,7 @@ def program_track(points):
 
 
 @pytest.mark.parametrize('device', ('rotctld',), indirect=True)
+@pytest.mark.excused_by(None)
 def test_a_rotator_that_vanishes_is_named_and_returns(station):
     """A silent device publishes no angles. The control unit holds its mode for the time of a short silence."""
     client, rotator, step = station

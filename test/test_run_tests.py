@@ -24,7 +24,7 @@ def times(name):
 @pytest.fixture
 def run(tmp_path):
     """run({file: content}, *options) -> CompletedProcess of run_tests.py with two workers."""
-    for module in ('conftest.py', 'test/guard.py'):
+    for module in ('conftest.py', 'test/guard.py', 'test/not_judged.py'):
         shutil.copy(HOME / module, tmp_path)
 
     def start(files, *options):
@@ -55,7 +55,7 @@ def test_an_unsteady_test_is_named_with_both_outputs_and_one_that_fails_twice_fa
     beside, alone = done.stdout.partition('\nunsteady: test_a.py::test_first\n')[2].split('--- alone\n')
     assert 'assert 2 > 2' in beside and 'the load is 1' in beside and '[call: failed]' in beside
     assert 'the load is 3' in alone and '[call: passed]' in alone
-    assert '2 failed, 0 not reached: these tests run once more, alone' in done.stdout
+    assert '2 failed, 0 not judged, 0 not reached: these tests run once more, alone' in done.stdout
 
 
 def test_only_named_files_and_what_failed_in_them_run(run):
@@ -93,12 +93,33 @@ def test_a_parameter_may_hold_any_text(run):
     assert done.returncode == 0 and done.stdout.count('\nunsteady: ') == 2, done.stdout
 
 
+UNJUDGED = """
+import pytest
+
+def test_{0}():
+    reason = 'not judged: 7 steps lost'
+    outcome = {1}[times('{0}') - 1]
+    pytest.skip(reason) if outcome == 'skip' else print(outcome)
+    assert outcome == 'pass'
+"""
+
+
+@pytest.mark.parametrize('first, second, code, said', [
+    ('skip', 'pass', 0, 'unsteady: test_a.py::test_a\n'),
+    ('skip', 'skip', 0, 'not judged: test_a.py::test_a: 7 steps lost\n'),
+    ('skip', 'fail', 1, 'FAILED test_a.py::test_a'),
+    ('fail', 'skip', 1, 'failed beside other tests, and not judged alone: test_a.py::test_a\n')])
+def test_what_is_not_judged_runs_once_more(run, first, second, code, said):
+    done = run({'test_a.py': UNJUDGED.format('a', [first, second])})
+    assert done.returncode == code and said in done.stdout.partition('once more, alone')[2], done.stdout
+
+
 @pytest.mark.parametrize('restarts, not_reached', [(3, 0), (0, 1)])
 def test_a_crash_costs_no_other_test(run, restarts, not_reached):
     """Also where xdist replaces no worker: the second run reaches the tests that the first did not."""
     done = run({'test_a.py': 'def test_before(): pass\n' + CRASHES.format(1) + PASSES},
                '--max-worker-restart', str(restarts))
-    assert done.returncode == 0 and f'1 failed, {not_reached} not reached' in done.stdout, done.stdout
+    assert done.returncode == 0 and f'1 failed, 0 not judged, {not_reached} not reached' in done.stdout, done.stdout
     assert "crashed while running 'test_a.py::test_crashes'" in done.stdout.partition('unsteady: ')[2]
     assert 'unsteady: test_a.py::test_passes' not in done.stdout
 
