@@ -6,22 +6,18 @@ import dataclasses
 import fcntl
 import os
 import pathlib
-import random
 import shutil
 import signal
-import socket
 import subprocess
 import sys
 import time
 
+import domains
 import limited
 import not_judged
 import numpy as np
 import pytest
 from shared import PEDESTAL, begins_with, free_port
-
-FIRST_PORT = 22119
-"""Port of domain id 0 in the scheme of ROS's domain_coordinator; binding it reserves the id for this session."""
 
 MOST_DOMAINS = 25
 """Domains that a test session holds: several sit side by side, and others want some too."""
@@ -41,24 +37,19 @@ def pytest_configure(config):
 
 @pytest.fixture(scope='session')
 def reserve_domain():
-    """reserve(lasting=False) -> a ROS_DOMAIN_ID that no other test session of this machine holds. Those of Linux whose
-    ports lie outside of the ephemeral ones are 1 to 101 and 215 to 229; when this session has MOST_DOMAINS of them, or
-    all are taken, the one that it was given first is given again, except lasting ones, whose graph lives as long as
-    the session: Fast DDS remembers a killed process for 20 s."""
-    usable = [*range(1, 102), *range(215, 230)]
-    candidates = iter(random.sample(usable, len(usable)))
-    reservations = []
+    """reserve(lasting=False) -> a ROS_DOMAIN_ID that no other test session of this machine holds (domains.py). When
+    this session has MOST_DOMAINS of them, or all are taken, the one that it was given first is given again, except
+    lasting ones, whose graph lives as long as the session: Fast DDS remembers a killed process for 20 s."""
+    candidates = iter(domains.candidates())
+    locks = []
     given = collections.deque()
 
     def reserve(lasting=False):
         for candidate in candidates if len(given) < MOST_DOMAINS else ():
-            reservation = socket.socket()
-            try:
-                reservation.bind(('127.0.0.1', FIRST_PORT + candidate))
-            except OSError:
-                reservation.close()
+            lock = domains.hold(candidate)
+            if lock is None:
                 continue
-            reservations.append(reservation)
+            locks.append(lock)
             if not lasting:
                 given.append(candidate)
             return candidate
@@ -68,8 +59,8 @@ def reserve_domain():
         return given[-1]
 
     yield reserve
-    for reservation in reservations:
-        reservation.close()
+    for lock in locks:
+        lock.close()
 
 
 @pytest.fixture(scope='session')

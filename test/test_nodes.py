@@ -49,7 +49,7 @@ def test_a_node_ends_in_silence_when_told_to(ended, node):
 def test_a_node_that_compiles_ends_at_once(start_process, reserve_domain, tmp_path):
     """Nothing is compiled yet: it would take the control unit half a minute to come to its end."""
     process = start_process([sys.executable, '-m', 'acu_tracker.acu_node'], XDG_CACHE_HOME=str(tmp_path / 'cache'),
-                            ROS_DOMAIN_ID=str(reserve_domain()))
+                            NUMBA_CACHE_DIR=None, ROS_DOMAIN_ID=str(reserve_domain()))
     deadline = time.monotonic() + 60.0
     while not any((tmp_path / 'cache').rglob('*.nbi')):
         assert process.poll() is None, process.communicate()

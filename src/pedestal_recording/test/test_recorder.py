@@ -6,11 +6,11 @@ import pathlib
 import random
 import resource
 import signal
-import socket
 import subprocess
 import sys
 import time
 
+import domains
 import pytest
 
 rclpy = pytest.importorskip('rclpy')
@@ -42,13 +42,11 @@ PROFILE = """<dds xmlns="http://www.eprosima.com"><profiles>
 
 @pytest.fixture
 def domain(monkeypatch, tmp_path_factory):
-    """A ROS domain that no other test on this machine uses (reserved as ROS's domain_coordinator does)."""
-    for number in random.sample(range(1, 101), 100):
-        with socket.socket() as reservation:
-            try:
-                reservation.bind(('127.0.0.1', 22119 + number))
-            except OSError:
-                continue
+    """A ROS domain that no other test on this machine uses."""
+    for number in domains.candidates():
+        if (lock := domains.hold(number)) is None:
+            continue
+        with lock:
             monkeypatch.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
             monkeypatch.setenv('ROS_DOMAIN_ID', str(number))
             profile = tmp_path_factory.mktemp('dds') / 'profile.xml'
