@@ -11,7 +11,7 @@ import time
 from rcl_interfaces.srv import GetParameters
 
 from pedestal_common import parameters
-from pedestal_common.graph import nodes
+from pedestal_common.graph import domain, nodes
 from pedestal_common.graph.steps import GraphError
 from pedestal_common.node import middleware
 from pedestal_common.node.shell import Shell
@@ -184,8 +184,9 @@ class RemoteSession:
         _, reply_topic = remote._link(row.replies)
         if not self.until(lambda: remote.count_subscribers(command_topic) > 0
                           and remote.count_publishers(reply_topic) > 0, seconds):
-            raise GraphError(f'no {remote.beam}{row.name} on ROS_DOMAIN_ID {remote.context.get_domain_id()} within '
-                             f'{seconds:g} s: is a graph running?')
+            domain_id = remote.context.get_domain_id()
+            raise GraphError(f'no {remote.beam}{row.name} on ROS_DOMAIN_ID {domain_id} within {seconds:g} s: '
+                             f'{domain.hint(domain_id)}')
         self.until(lambda: False, DISCOVERY_MARGIN_S)
 
     def request(self, verb, arguments=None, seconds=REPLY_TIMEOUT_S) -> Reply:

@@ -17,10 +17,10 @@ from rclpy.executors import SingleThreadedExecutor
 from std_srvs.srv import Trigger
 
 from pedestal_analysis.reprocess import difference, recompute
-from pedestal_bringup.graph.operator_node import Operator, sole_run
+from pedestal_bringup.graph.operator_node import Operator
 from pedestal_bringup.graph.processes import RunError, command_line
 from pedestal_common import parameters
-from pedestal_common.graph import nodes
+from pedestal_common.graph import domain, nodes
 from pedestal_common.graph.steps import NS_PER_SECOND
 from pedestal_common.node import middleware
 from pedestal_common.text_files import parameter_file
@@ -142,12 +142,12 @@ def outputs(recording, done, params):
     if not recording.lockstep:
         raise recompute.RecomputeError('--live feeds in lockstep, and steps of a realtime recording may lack inputs; '
                                        'recompute it without --live')
-    middleware.initialise([])
-    try:
-        with tempfile.TemporaryDirectory() as folder:
+    with domain.of_run(), tempfile.TemporaryDirectory() as folder:
+        middleware.initialise([])
+        try:
             return _run(recording, done, params, pathlib.Path(folder))
-    finally:
-        rclpy.try_shutdown()
+        finally:
+            rclpy.try_shutdown()
 
 
 def _graph(recording, unit):
@@ -169,7 +169,7 @@ def _run(recording, done, params, folder):
     file.write_text(parameter_file.text({done.node: values}))
     inputs = [name for name in done.unit.reads if recording.feeds(name) and name not in done.unit.NODE.writes]
     feeder = Feeder(done.node, inputs, done.outputs)
-    with sole_run(feeder.context.get_domain_id()), open(log, 'wb') as output:
+    with open(log, 'wb') as output:
         feeder.check_domain_free()
         feeder.stand_in(names)
         process = subprocess.Popen(command_line(done.node, done.unit.NODE.module, file),

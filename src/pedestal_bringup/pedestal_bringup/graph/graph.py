@@ -7,6 +7,7 @@ import pathlib
 
 from pedestal_bringup.graph.processes import Graph
 from pedestal_bringup.graph.start import START_LEAD_TIME_S
+from pedestal_common.graph import domain
 
 
 def _free_bag(scenario):
@@ -45,10 +46,11 @@ def run(plan, bag, progress, servers=None):
 
     bag: folder for the recording. progress: context manager that gives a function; this function is called during
     the run with the time of the run [s]. servers: {name: processes.ServerProcess} beside the nodes. Raises RunError if
-    the run cannot continue. The recording up to that moment stays readable.
+    the run cannot continue. The recording up to that moment stays readable. Raises GraphError if the domain of the
+    user has another graph, see domain.of_run.
     """
     _, tracks = read_files(plan)
-    with Graph(plan.scenario, bag, servers) as graph:
+    with domain.of_run(), Graph(plan.scenario, bag, servers) as graph:
         graph.start_servers()
         if servers:
             print(f'the servers are usable as soon as the antenna runs, in {START_LEAD_TIME_S:g} s at the soonest',

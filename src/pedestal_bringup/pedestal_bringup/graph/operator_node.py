@@ -1,14 +1,12 @@
 """Node `operator` inside the processes `pedestal run` and `pedestal program`: it sends the program tracks to the
 control units, and receives the diagnostics of the other nodes."""
-import contextlib
-import socket
 import time
 
 from rcl_interfaces.srv import GetParameters
 
 from pedestal_bringup.graph.processes import RunError
 from pedestal_common import parameters
-from pedestal_common.graph import nodes
+from pedestal_common.graph import domain, nodes
 from pedestal_common.node.shell import Shell
 from pedestal_common.wire import messages
 
@@ -66,13 +64,13 @@ class Operator(Shell):
                 self._publish_by_topic[name] = self.writer(name)
 
     def check_domain_free(self):
-        """Raise RunError if nodes of another graph are on this ROS domain, because those nodes would receive the
+        """Raise GraphError if nodes of another graph are on this ROS domain, because those nodes would receive the
         messages of this graph."""
         deadline = time.monotonic() + DISCOVERY_TIME_S
         while time.monotonic() < deadline:
             names = self.get_node_names()
             if names.count(self.name) > 1 or any(node.name in names for node in nodes.NODES if node.module):
-                raise another_graph(self.context.get_domain_id())
+                raise domain.another_graph(self.context.get_domain_id())
             time.sleep(0.02)
 
     def _note_diagnostics(self, array):
@@ -102,8 +100,9 @@ class Operator(Shell):
         node. Raises RunError if the node does not answer."""
         answers = self._get_parameters([node], GetParameters.Request(names=['graph.start']), executor)
         if node not in answers or not answers[node].values:
-            raise RunError(f'{node} does not answer with graph.start, the beginning of its time: is it running on '
-                           f'ROS_DOMAIN_ID {self.context.get_domain_id()}?')
+            domain_id = self.context.get_domain_id()
+            raise RunError(f'{node} on ROS_DOMAIN_ID {domain_id} does not answer with graph.start, the beginning of '
+                           f'its time: {domain.hint(domain_id)}')
         return answers[node].values[0].integer_value
 
     def _get_parameters(self, names, request, executor):
@@ -118,23 +117,3 @@ class Operator(Shell):
                     calls[node] = client.call_async(request)
             executor.spin_once(timeout_sec=0.02)
         return {node: call.result() for node, call in calls.items() if call.done()}
-
-
-def another_graph(domain_id):
-    """Return the RunError of a ROS domain on which another graph runs."""
-    return RunError(f'another graph runs on ROS_DOMAIN_ID {domain_id}; set a free one')
-
-
-@contextlib.contextmanager
-def sole_run(domain_id):
-    """Reserve a ROS domain for one run on this machine, as a context. The reservation is an abstract Unix socket,
-    which the kernel closes however this process ends.
-
-    Raises RunError if another run holds the domain. Discovery alone is too slow for this check on a busy machine.
-    """
-    with socket.socket(socket.AF_UNIX) as holder:
-        try:
-            holder.bind(f'\0pedestal-domain-{domain_id}')
-        except OSError:
-            raise another_graph(domain_id) from None
-        yield

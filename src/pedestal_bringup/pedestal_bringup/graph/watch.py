@@ -12,7 +12,7 @@ import rclpy
 from rclpy.executors import SingleThreadedExecutor
 
 from pedestal_bringup.graph import lockstep, supervisor
-from pedestal_bringup.graph.operator_node import Operator, sole_run
+from pedestal_bringup.graph.operator_node import Operator
 from pedestal_bringup.graph.processes import RunError, exit_description
 from pedestal_bringup.graph.start import LATEST_START_S, START_LEAD_TIME_S, Outcome, begins, parameters_of_all
 from pedestal_common.graph import nodes
@@ -27,16 +27,15 @@ def run(graph, tracks, progress):
     Outcome.
 
     graph: processes.Graph; tracks: {topic: program track}; progress: function of the time of the run [s]. Raises
-    RunError.
+    RunError, and GraphError if another graph runs on the domain.
     """
     middleware.initialise([])
     try:
         operator = Operator(graph.scenario.header.graph_beams, graph.scenario.nodes)
         try:
-            with sole_run(operator.context.get_domain_id()):
-                operator.check_domain_free()
-                realtime = graph.scenario.header.pacing == 'realtime'
-                return (_in_realtime if realtime else _in_lockstep)(graph, operator, tracks, progress)
+            operator.check_domain_free()
+            realtime = graph.scenario.header.pacing == 'realtime'
+            return (_in_realtime if realtime else _in_lockstep)(graph, operator, tracks, progress)
         finally:
             operator.destroy_node()
     finally:
