@@ -26,6 +26,7 @@ def tripped(start_run):
     return bags.read(run.bag)
 
 
+@pytest.mark.thorough
 def test_the_recording_is_complete_and_says_why(tripped):
     assert verify(load(tripped.path)).complete
     states, told = tripped.table('adu/state'), tripped.table('acu/mode')
@@ -39,6 +40,7 @@ def test_the_recording_is_complete_and_says_why(tripped):
     assert (said['azimuth faults'], said['elevation faults'], said['brakes']) == ('overspeed', '', 'on')
 
 
+@pytest.mark.thorough
 def test_it_stands(tripped):
     assert np.ptp(tripped.table('joint_states')['azimuth.position'][-200:]) < 1e-6
 
@@ -50,6 +52,7 @@ def lists(bag):
             for *_, array in bag.messages('acu/alarms')]
 
 
+@pytest.mark.thorough
 def test_the_list_is_told_whenever_it_changes_and_obeys(tripped):
     told = lists(tripped)
     assert told[0] == (0.0, {})
@@ -64,6 +67,7 @@ def test_the_list_is_told_whenever_it_changes_and_obeys(tripped):
     assert next(row for _, row in fault if row['state'] == 'shelved')['shelved_reason'] == 'tests'
 
 
+@pytest.mark.thorough
 def test_the_closed_loop_trips_and_tells_it_at_the_same_steps(tripped, differences):
     run = closed_loop.Loop(scenario.load('servo_sine', TRIP, duration=2.0)).run()
     assert differences(run, tripped) == {}

@@ -168,6 +168,7 @@ def test_bad_bag(make, tmp_path, capsys, one_line):
     WRITERS.clear()
 
 
+@pytest.mark.thorough
 def test_the_report_of_numbers_that_are_strange_but_readable(tmp_path):
     wrong_type(tmp_path / 'bag')
     assert cli.main(['report', str(tmp_path / 'bag')]) == 0

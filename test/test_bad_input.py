@@ -212,6 +212,7 @@ def graphs(start_run):
         ('second', second), ('full', full), ('full at its end', at_its_end))}}
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize('when, steps', [('full', 50), ('full at its end', 0)])
 def test_full_disk(when, steps, graphs):
     """The run ends, names the file, and the rest is readable."""
@@ -223,6 +224,7 @@ def test_full_disk(when, steps, graphs):
     assert len(bags.read(run.bag).table('joint_states')['t']) >= steps
 
 
+@pytest.mark.thorough
 def test_a_second_graph_on_the_domain_is_refused(graphs, one_line):
     run, result = graphs['second']
     assert result.returncode == 1
@@ -266,12 +268,14 @@ def misled(start_node, connect):
     return results
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize('case', STAMPS)
 def test_lockstep_ends_on_a_wrong_stamp(misled, case, one_line):
     assert misled[case].returncode == 1
     assert STAMPS[case][3] in one_line(misled[case].stderr)
 
 
+@pytest.mark.thorough
 def test_receiver_names_bad_input_in_realtime(start_node, connect):
     node = start_node('tracking_receiver')
     client = connect(node.domain_id)
@@ -303,6 +307,7 @@ def test_receiver_names_bad_input_in_realtime(start_node, connect):
     assert (result.returncode, result.stderr) == (0, '')
 
 
+@pytest.mark.thorough
 def test_the_first_graph_goes_on_to_its_end(graphs):
     """The last test of this file, because the others run while the graph does."""
     run, _ = graphs['first']

@@ -21,6 +21,8 @@ from pedestal_recording import export
 from pedestal_recording.bag import load
 from pedestal_recording.verify import verify
 
+pytestmark = pytest.mark.thorough
+
 FOUR, SWAY = 'phased_array_four', 'phased_array_sway'
 BEAMS = [f'beam_{i}' for i in range(1, 5)]
 FAST = ('--param', 'acu.tracker.lock_count=20')

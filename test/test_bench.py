@@ -2,9 +2,9 @@
 import json
 import sys
 
-SHORT = ('import json; from pedestal_studies.bench import recording; '
+SHORT = ('import sys; from pedestal import cli; from pedestal_studies.bench import recording; '
          'recording.BAG_DURATION_S = 2.0; recording.DISK_TEST_BYTES = 10_000_000; '
-         'rows = recording.run(); print(json.dumps(rows))')
+         'sys.exit(cli.main(["bench", "bag", "--json", "rows.json"]))')
 
 RING = ('from pedestal_studies.bench import lockstep; '
         'lockstep.RING_STEPS = 200; print(lockstep.bare_lap())')
@@ -16,10 +16,11 @@ def test_the_bare_ring_closes(run_process, reserve_domain):
     assert float(done.stdout) > 0.0
 
 
-def test_rows_of_bags(run_process, reserve_domain):
+def test_rows_of_bags(run_process, reserve_domain, tmp_path):
     done = run_process([sys.executable, '-c', SHORT], 60.0, ROS_DOMAIN_ID=str(reserve_domain()))
     assert done.returncode == 0, done.stderr
-    values = {(row['case'], row['metric']): row['value'] for row in json.loads(done.stdout.splitlines()[-1])}
+    values = {(row['case'], row['metric']): row['value'] for row in json.loads(
+        (tmp_path / 'rows.json').read_text())['rows']}
     assert values['record', 'lost'] == values['record', 'limit_lost'] == 0
     assert 0.0 < values['record', 'bytes_per_message'] < values['record', 'cdr_bytes_per_message'] < 1000.0
     assert values['record', 'cpu_percent'] > 0.0

@@ -31,6 +31,7 @@ def scheduled(start_run):
     return run.bag
 
 
+@pytest.mark.thorough
 def test_a_schedule_is_obeyed_in_its_steps_and_what_came_of_it_is_recorded(scheduled):
     told = replies(scheduled)
     assert [(at, command.verb, command.who, reply.granted) for at, command, reply in told] == [
@@ -43,6 +44,7 @@ def test_a_schedule_is_obeyed_in_its_steps_and_what_came_of_it_is_recorded(sched
     assert modes['data'][-1] == 'autotrack'
 
 
+@pytest.mark.thorough
 def test_the_output_of_a_run_may_be_a_file_beside_the_bag(start_run, tmp_path):
     """As by `pedestal run --bag bag > bag.log`. A parameter file without the operator is no reason for a warning."""
     file = tmp_path / 'tuned.yaml'
@@ -55,6 +57,7 @@ def test_the_output_of_a_run_may_be_a_file_beside_the_bag(start_run, tmp_path):
     assert (run.bag.with_name('bag.logs') / 'parameters.yaml').is_file()
 
 
+@pytest.mark.thorough
 def test_a_refused_command_leaves_the_preset_as_it_was(scheduled):
     table = bags.read(scheduled).table('acu/reference')
     before_program = (table['t'] > 3.9) & (table['t'] < 4.0)
@@ -62,16 +65,19 @@ def test_a_refused_command_leaves_the_preset_as_it_was(scheduled):
     assert table['elevation.position'][before_program] == pytest.approx(0.6, abs=1e-6)
 
 
+@pytest.mark.thorough
 def test_the_closed_loop_obeys_it_in_the_same_steps(scheduled, differences):
     run = closed_loop.Loop(scenario.load('uav_flyby', [SCHEDULE], duration=SECONDS)).run()
     assert differences(run, bags.read(scheduled)) == {}
 
 
+@pytest.mark.thorough
 def test_it_is_recomputed(scheduled, pedestal):
     code, said, _ = pedestal('recompute', scheduled, '--node', 'acu', *EXACT)
     assert code == 0 and said.splitlines()[-1] == 'acu: identical'
 
 
+@pytest.mark.thorough
 def test_a_run_with_an_operator_is_made_again_to_the_byte(scheduled, start_process, tmp_path):
     process = start_process([*PEDESTAL, 'rerun', scheduled, '--bag', tmp_path / 'again'])
     said, _ = process.communicate(timeout=180)

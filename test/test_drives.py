@@ -123,6 +123,7 @@ def test_the_axes_follow_a_rate(bench):
     bench.command(0.0, 0.3)
 
 
+@pytest.mark.thorough
 def test_a_fault_of_a_drive_is_named_and_reset_on_request(bench):
     bench.rehearse(1, 1, 0x8311)
     bench.until_state('enabled: azimuth motor lost')
@@ -135,6 +136,7 @@ def test_a_fault_of_a_drive_is_named_and_reset_on_request(bench):
     bench.reset()
 
 
+@pytest.mark.thorough
 def test_a_drive_that_drops_off_the_bus_is_a_lost_motor_and_returns(bench):
     bench.rehearse(3, 2, 1500)
     bench.until_state('enabled: elevation motor lost')
@@ -145,6 +147,7 @@ def test_a_drive_that_drops_off_the_bus_is_a_lost_motor_and_returns(bench):
 
 
 @pytest.mark.excused_by('missed_steps')
+@pytest.mark.thorough
 def test_a_killed_node_stops_the_drives_and_a_new_node_goes_on(bench):
     bench.command(0.3, 1.0)
     bench.node.process.send_signal(signal.SIGKILL)
@@ -158,6 +161,7 @@ def test_a_killed_node_stops_the_drives_and_a_new_node_goes_on(bench):
     assert after - before > 0.05
 
 
+@pytest.mark.thorough
 def test_a_short_frame_is_named_and_dropped(bench):
     bench.send(0x181, b'abc')
     bench.command(0.0, 0.2)
@@ -169,6 +173,7 @@ def test_a_short_frame_is_named_and_dropped(bench):
     bench.until_drives('switch on disabled')
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize('argument, text', [
     ('drives.azimuth.node_2:=9', r'azimuth motor 2 \(node 9\): object 1000:0: no answer within 0\.3 s'),
     ('elevation.thermal.rated_torque:=300.0', r'elevation motor 1 \(node 3\): object 6076: rated torque 30000'),
@@ -181,6 +186,7 @@ def test_a_bus_that_does_not_fit_is_named(bench, start_node, argument, text):
     assert re.search(text, result.stderr), result.stderr
 
 
+@pytest.mark.thorough
 def test_the_drives_had_stopped_within_the_time_of_the_heartbeat(bench):
     """After all other tests of the bench: its drives end, and have logged what they did without their node."""
     bench.drives.process.send_signal(signal.SIGTERM)
@@ -193,6 +199,7 @@ def test_the_drives_had_stopped_within_the_time_of_the_heartbeat(bench):
 
 
 @pytest.mark.excused_by('missed_steps')
+@pytest.mark.thorough
 def test_a_bus_that_vanishes_and_returns(bench, start_node):
     """After the last test of the first drives: their program is killed under a running node, and started again."""
     def drives():
@@ -210,6 +217,7 @@ def test_a_bus_that_vanishes_and_returns(bench, start_node):
     assert after - before > 0.05
 
 
+@pytest.mark.thorough
 def test_a_device_of_another_profile_is_named(start_node):
     port = free_port()
     arguments = ('-p', f'bus.port:={port}', '-p', 'bus.connect_time:=5.0')
@@ -219,6 +227,7 @@ def test_a_device_of_another_profile_is_named(start_node):
     assert 'object 1000: device profile 401: must be 402' in result.stderr
 
 
+@pytest.mark.thorough
 def test_a_pass_is_tracked_with_simulated_drives(start_run, patient):
     run = start_run('leo_pass', '--pacing', 'realtime', '--drives', 'simulated', '--duration', '6', *patient,
                     '--param', 'adu.period=0.01', '--param', 'scenario.priority=10')

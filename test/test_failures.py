@@ -10,6 +10,8 @@ from pedestal_recording import bag as bags
 from pedestal_recording.bag import load
 from pedestal_recording.verify import verify
 
+pytestmark = pytest.mark.thorough
+
 NODES = ('tracking_receiver', 'acu', 'adu', 'recorder')
 DEADLINE_S = 10
 """Six graphs start side by side on the machine's cores, beside other tests: each of them may be slow."""

@@ -17,6 +17,8 @@ from pedestal_common.graph.steps import NS_PER_SECOND
 from pedestal_common.node import middleware
 from pedestal_common.wire import messages
 
+pytestmark = pytest.mark.thorough
+
 TOOLS = pathlib.Path(__file__).parents[1] / 'docs' / 'reliability'
 PERIOD = 5_000_000
 SOON = 60.0

@@ -55,6 +55,7 @@ def told(runs):
     return bag, consistency.read(bag, tracking.read(bag))
 
 
+@pytest.mark.thorough
 def test_every_topic_is_recorded(runs):
     report = verify(load(runs['measured'].bag))
     assert report.complete, report.lines()
@@ -64,6 +65,7 @@ def test_every_topic_is_recorded(runs):
         topic.name for topic in verify(load(runs['switched'].bag)).topics}
 
 
+@pytest.mark.thorough
 def test_recomputed_to_the_last_bit(runs, pedestal):
     for node in ('tracking_receiver', 'acu'):
         code, said, _ = pedestal('recompute', runs['measured'].bag, '--node', node, '--absolute', 0, '--relative', 0)
@@ -71,6 +73,7 @@ def test_recomputed_to_the_last_bit(runs, pedestal):
     assert 'acu/filter' in said
 
 
+@pytest.mark.thorough
 def test_the_closed_loop_equals_the_run(told, differences):
     run = closed_loop.Loop(scenario.load('ship_pass', PARAMS, duration=SECONDS)).run()
     bag, consistency_of_it = told
@@ -79,6 +82,7 @@ def test_the_closed_loop_equals_the_run(told, differences):
         assert np.array_equal(getattr(consistency_of_it, name), layouts.of_filter(run.steps, name), equal_nan=True)
 
 
+@pytest.mark.thorough
 def test_what_the_filter_tells(told):
     """Azimuth from angle and rate, elevation from angle and range, with the noise the filter expects, on a rolling
     deck."""
@@ -99,6 +103,7 @@ def test_what_the_filter_tells(told):
     assert 'range [m]' in export.table(bag, 'tracking_receiver/range')
 
 
+@pytest.mark.thorough
 def test_rows_and_report(runs, told, run_process, pedestal):
     run = runs['measured']
     values = {row['metric']: row['value'] for row in json.loads(run.json.read_text())['rows']}
@@ -111,6 +116,7 @@ def test_rows_and_report(runs, told, run_process, pedestal):
     assert 'Azimuth: ' in page and 'of consistent filters have' in page
 
 
+@pytest.mark.thorough
 def test_a_filter_changed_while_it_tracks_makes_no_bump(runs):
     bag = bags.read(runs['switched'].bag)
     found = consistency.read(bag, tracking.read(bag))

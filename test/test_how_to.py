@@ -12,6 +12,8 @@ import pytest
 
 from pedestal_common.wire import commands, messages
 
+pytestmark = pytest.mark.thorough
+
 FILE = pathlib.Path(__file__).parents[1] / 'docs' / 'how-to' / 'receiver.py'
 
 

@@ -32,6 +32,7 @@ def injected(start_run):
     return run.bag
 
 
+@pytest.mark.thorough
 def test_a_lockstep_run_with_faults_is_the_closed_loop_to_the_last_bit(injected, differences):
     run = closed_loop.Loop(scenario.load('ship_pass', FAULTS, duration=SECONDS)).run()
     assert differences(run, bags.read(injected)) == {}
@@ -42,6 +43,7 @@ def test_a_lockstep_run_with_faults_is_the_closed_loop_to_the_last_bit(injected,
         'enabled', 'fault: elevation encoder disagreement']
 
 
+@pytest.mark.thorough
 def test_each_node_tells_of_its_faults_in_their_steps(injected):
     told = [(at, command.verb, command.who, reply) for at, command, reply in replies(injected, 'adu/injected')]
     assert told == [
@@ -51,6 +53,7 @@ def test_each_node_tells_of_its_faults_in_their_steps(injected):
         assert [command.verb for _, command, _ in replies(injected, f'{node}/injected')] == verbs
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize('node', ('adu', 'tracking_receiver', 'ins'))
 def test_a_node_with_faults_is_recomputed(injected, node, pedestal):
     code, said, _ = pedestal('recompute', injected, '--node', node, '--absolute', 0, '--relative', 0)

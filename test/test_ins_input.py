@@ -20,6 +20,7 @@ NODES = {'ship_motion': 'ship_motion_sim.ship_motion_node', 'acu': 'acu_tracker.
 INPUT = 'pedestal_hardware.ins.ins_input_node'
 
 
+@pytest.mark.thorough
 def test_a_ship_scenario_tracks_with_an_ins_that_sends_nmea(patient, start_process, connect, reserve_domain, tmp_path):
     """The control unit comes to autotrack, the attitude is that of the ship. An INS that vanishes is named, and the
     control unit tracks after its return."""
@@ -99,6 +100,7 @@ def deviations(samples, chosen, start):
     return math.degrees(max(attitudes)), math.degrees(math.sqrt(np.mean(np.square(rates))))
 
 
+@pytest.mark.thorough
 def test_the_wrong_frame_of_a_driver_ends_its_attitude_within_10_s(start_process, connect, reserve_domain):
     """A driver like NovAtel's, at 50 Hz, whose rates have the axes right, forward, up. The deck rolls."""
     domain = reserve_domain()

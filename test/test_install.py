@@ -77,6 +77,7 @@ def manifest(package):
     return xml.etree.ElementTree.parse(ROOT / 'src' / package / 'package.xml').getroot()
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize('package', PACKAGES)
 def test_pip_installs_commands_and_ros_files(installed, package):
     [distribution] = metadata.distributions(name=package, path=[str(installed)])
@@ -88,6 +89,7 @@ def test_pip_installs_commands_and_ros_files(installed, package):
     assert not (installed / 'test').exists()
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize('package', PACKAGES)
 def test_pip_and_ros_say_the_same(installed, package):
     [distribution] = metadata.distributions(name=package, path=[str(installed)])
@@ -103,6 +105,7 @@ def test_one_version():
     assert len({manifest(package).findtext('version') for package in PACKAGES}) == 1
 
 
+@pytest.mark.thorough
 def test_scenarios_and_launch_files_are_installed(installed):
     source = ROOT / 'src' / 'pedestal_bringup'
     scenarios = {path.name for path in (source / 'pedestal_bringup' / 'scenarios').glob('*.yaml')}
@@ -113,6 +116,7 @@ def test_scenarios_and_launch_files_are_installed(installed):
     assert {path.name for path in (installed / 'share' / 'pedestal_bringup' / 'launch').glob('*.py')} == launch
 
 
+@pytest.mark.thorough
 def test_every_command_leads_to_a_function(installed, run_process):
     lines = ['import importlib, pathlib']
     for package, commands in EXECUTABLES.items():
@@ -125,6 +129,7 @@ def test_every_command_leads_to_a_function(installed, run_process):
     assert done.returncode == 0, done.stderr
 
 
+@pytest.mark.thorough
 def test_the_installed_command_finds_its_scenarios(installed, run_process):
     done = run_process([installed / 'bin' / 'pedestal', 'scenarios'], 120.0, PYTHONPATH=str(installed))
     assert done.returncode == 0, done.stderr

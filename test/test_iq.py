@@ -101,6 +101,7 @@ def not_finite(samples):
     return samples
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize('fault, text', [
     ('vanishes', 'no samples for'), ('nan', 'samples hold NaN or infinity'),
     ('cut', 'packet states 400 bytes and has'),
@@ -123,6 +124,7 @@ def test_a_fault_of_the_samples_is_named_and_the_receiver_continues(bench, fault
     locked(client)
 
 
+@pytest.mark.thorough
 def test_a_silent_receiver_publishes_no_error(bench):
     client, front_end, _ = bench
     front_end.make = lambda samples: None
@@ -134,6 +136,7 @@ def test_a_silent_receiver_publishes_no_error(bench):
     locked(client)
 
 
+@pytest.mark.thorough
 def test_messages_of_a_wrong_number_of_channels_and_rate(start_node, connect):
     """By ZMQ, whose messages contain neither the number of channels nor a time."""
     address = f'tcp://127.0.0.1:{free_port()}'
@@ -162,6 +165,7 @@ def test_messages_of_a_wrong_number_of_channels_and_rate(start_node, connect):
     assert node.finish(40.0).returncode == 0
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize('change, text', [
     ('source.address:=udp://192.0.2.1:4991', 'source.address = udp://192.0.2.1:4991: Cannot assign'),
     ('graph.pacing:=lockstep', 'graph.pacing = lockstep: must be realtime for a receiver of I/Q samples')])
@@ -170,6 +174,7 @@ def test_a_start_that_cannot_be_is_named(start_node, change, text):
     assert result.returncode == 1 and text in result.stderr
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize('feed, limit', [('three_channels', 0.2), ('one_channel', 0.3), ('conical_scan', 0.3)])
 def test_a_pass_is_tracked_from_samples_and_computed_again(start_run, patient, pedestal, feed, limit):
     run = start_run('leo_pass', '--pacing', 'realtime', '--receiver', 'simulated-iq', '--duration', '7', *patient,
@@ -198,6 +203,7 @@ def test_a_pass_is_tracked_from_samples_and_computed_again(start_run, patient, p
     assert code == 1 and 'the file is cut' in said and '0 differ' in said and 'DIFFERS' in said
 
 
+@pytest.mark.thorough
 def test_the_calibration_matrix_is_measured_from_a_run_and_its_samples(start_run, patient, pedestal):
     """A shorter receiver_phasing: a cross of 0.1 and 0.3 beamwidths, then six points of the circle."""
     steps = ((0.001994, 0.5), (-0.001994, 0.5), (0.005982, 0.5), (-0.005982, 0.5), (0.0, 0.50525), (0.0, 0.49475),
@@ -238,6 +244,7 @@ def test_a_calibration_of_other_recordings_is_refused(pedestal):
     assert code == 1 and '--param: has no effect with --bag' in said
 
 
+@pytest.mark.thorough
 def test_samples_at_full_scale_are_named(start_node, connect, tmp_path):
     count = 10 * round(RATE)
     carrier = 40e3 * np.exp(2j * math.pi * OFFSET_HZ / RATE * np.arange(count))
@@ -268,6 +275,7 @@ def test_lockstep_and_the_simulated_receiver_have_no_samples(pedestal):
     assert code == 1 and '--param: has no effect with --iq' in said
 
 
+@pytest.mark.thorough
 def test_samples_of_a_scenario_are_written_and_streamed(pedestal, tmp_path, start_node, connect):
     arguments = ('--duration', '2', '--param', f'tracking_receiver.source.rate={RATE}', '--param', 'adu.period=0.02',
                  '--param', 'iq.simulated.carrier=1e9')

@@ -12,6 +12,8 @@ import pytest
 
 from pedestal_common.wire import commands
 
+pytestmark = pytest.mark.thorough
+
 TARGET, BEAMWIDTH = np.array((0.506, 0.6)), 0.0175
 GRAPH = ('graph.pacing:=realtime', 'graph.nodes:=acu,adu')
 MODULES = {'adu_drive.adu_node': (*GRAPH, 'period:=0.02', 'initial_azimuth:=0.7', 'initial_elevation:=0.6'),

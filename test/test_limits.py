@@ -52,6 +52,7 @@ def is_gone(folder):
     return not pathlib.Path('/proc', (folder / 'grandchild').read_text().strip()).exists()
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize('library', ['CDLL', 'PyDLL'])
 def test_a_phase_that_hangs_is_named_with_its_stack(tmp_path, library):
     done = run(tmp_path, library, 600, 3, '--max-worker-restart', '0')
@@ -61,6 +62,7 @@ def test_a_phase_that_hangs_is_named_with_its_stack(tmp_path, library):
     assert is_gone(tmp_path)
 
 
+@pytest.mark.thorough
 def test_a_command_that_hangs_is_named_with_the_stacks_of_its_processes(tmp_path):
     if not limited.PY_SPY.exists():
         pytest.skip('py-spy is not installed')
@@ -71,6 +73,7 @@ def test_a_command_that_hangs_is_named_with_the_stacks_of_its_processes(tmp_path
     assert is_gone(tmp_path)
 
 
+@pytest.mark.thorough
 def test_tests_that_send_signals_pass_in_the_background():
     """Where a shell ignores SIGINT, and nohup SIGHUP, for all processes below."""
     done = subprocess.run(['nohup', 'sh', '-c', 'trap "" INT; exec "$@"', 'sh', sys.executable, '-m', 'pytest',

@@ -157,6 +157,7 @@ def test_the_frames_are_told_and_lead_to_the_beam(graph, viewer):
     assert turn.apply([1.0, 0.0, 0.0]) == pytest.approx(line_of_sight.earth_direction(*joints), abs=1e-3)
 
 
+@pytest.mark.thorough
 def test_who_does_not_read_holds_up_nobody(graph, viewer):
     _, client, port = graph
     asleep = Viewer(port)
@@ -188,6 +189,7 @@ def refusals(run):
     return (run.log / 'acu.log').read_text().count('acu/program_track refused')
 
 
+@pytest.mark.thorough
 def test_a_program_track_is_taken_once_whether_its_writer_latches_or_not(graph):
     """`ros2 topic pub` does not latch; a writer that does matches both subscriptions of the control unit."""
     run, client, _ = graph
@@ -217,6 +219,7 @@ def test_a_viewer_of_its_own_ends_when_told_to(graph, start_process):
     assert (process.returncode, errors) == (0, '') and f'ws://127.0.0.1:{own}' in output
 
 
+@pytest.mark.thorough
 def test_the_recording_has_every_track_once(station):
     """That of the scenario, and two that were refused."""
     assert [len(track.points) for track in station.recorded(TRACK)][1:] == [2, 2]

@@ -31,30 +31,33 @@ def digest(run):
 
 
 @pytest.fixture(scope='module')
-def runs(start_run, recorded):
-    """Finished runs by name: two leo_pass of one seed, one of them beside other graphs, one of another seed, and two
-    ship_pass."""
+def runs(recorded):
+    """Finished runs by name: a leo_pass and a ship_pass."""
     done = {}
     for name, case in (('first', 'leo_pass'), ('ship', 'ship_pass')):
         done[name], done[name].output = recorded(case)
-
-    def start(name, *more):
-        return start_run(name, '--pacing', 'lockstep', '--duration', LENGTH[name], '--param', PARAM, *more)
-
-    def finish(**started):
-        for name, run in started.items():
-            result = run.finish()
-            assert result.returncode == 0, result.stderr
-            run.output = result.stdout
-            done[name] = run
-
-    finish(under_load=start('leo_pass'), other_seed=start('leo_pass', '--seed', '2'), ship_again=start('ship_pass'))
     return done
 
 
+@pytest.fixture(scope='module')
+def others(start_run):
+    """Finished runs by name, side by side: a leo_pass and a ship_pass of the seed of `runs`, and a leo_pass of another
+    seed."""
+    def start(name, *more):
+        return start_run(name, '--pacing', 'lockstep', '--duration', LENGTH[name], '--param', PARAM, *more)
+
+    done = {'under_load': start('leo_pass'), 'other_seed': start('leo_pass', '--seed', '2'),
+            'ship_again': start('ship_pass')}
+    for run in done.values():
+        result = run.finish()
+        assert result.returncode == 0, result.stderr
+    return done
+
+
+@pytest.mark.thorough
 @pytest.mark.parametrize('first, second', [('first', 'under_load'), ('ship', 'ship_again')])
-def test_same_seed_gives_the_same_file(runs, first, second):
-    assert digest(runs[first]) == digest(runs[second])
+def test_same_seed_gives_the_same_file(runs, others, first, second):
+    assert digest(runs[first]) == digest(others[second])
 
 
 @pytest.mark.parametrize('name', ['first', 'ship'])
@@ -74,8 +77,9 @@ def test_the_recording_says_how_it_was_made(runs, name):
     assert any(line.startswith(made) for line in verify(load(runs[name].bag)).lines())
 
 
-def test_another_seed_gives_another_file(runs):
-    assert digest(runs['first']) != digest(runs['other_seed'])
+@pytest.mark.thorough
+def test_another_seed_gives_another_file(runs, others):
+    assert digest(runs['first']) != digest(others['other_seed'])
 
 
 def test_rerun_makes_the_same_file_again(runs, run_process, tmp_path):
@@ -149,6 +153,7 @@ def test_readers_of_others_see_the_same(runs):
 FOREIGN_BYTES = b'\0\1\0\0' + b'\xff' * 20
 
 
+@pytest.mark.thorough
 def test_foreign_messages_in_a_run_are_left_out_and_named(start_run, connect):
     """The run ends with its results, and its recording is complete without the foreign messages."""
     run = start_run('leo_pass', '--pacing', 'lockstep', '--duration', '20', '--param', PARAM)

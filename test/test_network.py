@@ -16,6 +16,8 @@ from pedestal_bringup.scenario import scenario
 from pedestal_common.graph.steps import NS_PER_SECOND
 from pedestal_recording import bag as bags
 
+pytestmark = pytest.mark.thorough
+
 
 def sockets(pid):
     """{(protocol, local IPv4 address)} of the internet sockets of a process."""

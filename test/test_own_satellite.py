@@ -3,6 +3,7 @@ import datetime
 import re
 
 import numpy as np
+import pytest
 import yaml
 
 from acu_tracker.modes import Mode
@@ -24,6 +25,7 @@ def test_passes_are_listed(capsys):
     assert [row.split()[0] for row in rows] == [str(n) for n in range(1, 1 + len(rows))] and len(rows) > 10
 
 
+@pytest.mark.thorough
 def test_a_pass_of_a_tle_file_is_run_from_its_rise(start_run, tmp_path):
     tle = tmp_path / 'iss.tle'
     tle.write_text(f'ISS\n{LeoPassParameters().line_1}\n{LeoPassParameters().line_2}\n')

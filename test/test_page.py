@@ -149,6 +149,7 @@ def test_what_is_no_message_is_answered_in_a_line(lone, text):
     assert server.process.poll() is None
 
 
+@pytest.mark.thorough
 def test_pages_that_never_read_are_dropped(lone):
     """Ten of them, and a page beside them is told as before; what they are sent is not kept."""
     server, site = lone
@@ -255,6 +256,7 @@ def proxied(start_node):
     return Site(begins_with(page.process, 3))
 
 
+@pytest.mark.thorough
 @needs_chromium
 def test_a_page_through_a_tunnel_and_through_an_encrypting_proxy(proxied, browser, tls):
     """Its web socket opens and STOP arrives; a foreign name is refused in words, and so is a second page."""
@@ -288,6 +290,7 @@ def stops_in_vain(page):
     reads(page, '#banner', 'Use the emergency stop of the antenna.')
 
 
+@pytest.mark.thorough
 @needs_chromium
 def test_a_page_without_its_scripts_says_so(proxied, browser):
     page = browser[1].new_context().new_page()
@@ -299,6 +302,7 @@ def test_a_page_without_its_scripts_says_so(proxied, browser):
     page.context.close()
 
 
+@pytest.mark.thorough
 @needs_chromium
 def test_a_recording_on_the_page(browser, start_process):
     port = free_port()
@@ -327,6 +331,7 @@ def test_a_recording_on_the_page(browser, start_process):
     assert player.wait(PATIENCE) == 0
 
 
+@pytest.mark.thorough
 @needs_chromium
 def test_the_residuals_of_the_model_in_force_as_a_sky_plot_and_as_arrows(browser, start_process, start_run):
     """The recording has a model with three residuals; the longest arrow is that of the largest."""
@@ -450,6 +455,7 @@ def test_an_operator_at_the_page(antenna, browser):
 
 
 @pytest.mark.excused_by(None)
+@pytest.mark.thorough
 def test_ten_pages_that_never_read_cost_the_control_unit_no_step(antenna):
     """Steps for which the drive had no command, in spans without and with such pages by turns, once these have what
     they are sent unread: the difference of the shares is not above its own scatter, which is the machine's."""
@@ -492,6 +498,7 @@ def last_rate(client):
     return commands.of_reply(heard[-1])[0] if heard else None
 
 
+@pytest.mark.thorough
 def test_a_jog_ends_with_its_page_or_its_silence(antenna):
     """Held on a web socket: while it is repeated the axis moves; silent but open, late, or gone, it stands."""
     _, client, site = antenna
@@ -515,6 +522,7 @@ def test_a_jog_ends_with_its_page_or_its_silence(antenna):
         assert 'the state on the page is' in hear(page, reply('rate'))[0]['reply']
 
 
+@pytest.mark.thorough
 @needs_chromium
 def test_a_jog_by_keys(antenna, browser):
     """Space and Enter move the axis while they are held, and no longer than the button has the focus."""
@@ -539,6 +547,7 @@ def test_a_jog_by_keys(antenna, browser):
     page.context.close()
 
 
+@pytest.mark.thorough
 @needs_chromium
 def test_every_screen_passes_axe_in_health(antenna, browser):
     page, _ = tunnelled(antenna, browser)
@@ -546,6 +555,7 @@ def test_every_screen_passes_axe_in_health(antenna, browser):
     page.context.close()
 
 
+@pytest.mark.thorough
 @needs_chromium
 def test_every_screen_keeps_what_a_fault_needs(antenna, browser):
     _, client, _ = antenna
@@ -563,6 +573,7 @@ def test_every_screen_keeps_what_a_fault_needs(antenna, browser):
     page.context.close()
 
 
+@pytest.mark.thorough
 @needs_chromium
 def test_a_page_that_loses_its_link_dims_and_counts_the_age_of_its_data(antenna, browser):
     page, tunnel = tunnelled(antenna, browser)
@@ -605,6 +616,7 @@ def look_at_sizes(page):
         assert len(found['passes']) > 10
 
 
+@pytest.mark.thorough
 @needs_chromium
 def test_a_jog_ends_with_its_browser(antenna, browser):
     """Chromium is killed while the button is held: the page can no longer do anything about it."""
@@ -623,6 +635,7 @@ def test_a_jog_ends_with_its_browser(antenna, browser):
     assert mode(client) == 'rate'
 
 
+@pytest.mark.thorough
 def test_the_antenna_tracks_on_when_the_server_is_killed(antenna):
     run, client, site = antenna
     with site.open(name='carla') as page:
@@ -646,5 +659,6 @@ def _arguments(process):
         return []
 
 
+@pytest.mark.thorough
 def test_the_recording_says_who_asked_at_which_page(station):
     assert {'bert@page 127.0.0.1', 'carla@page 127.0.0.1'} <= {command.who for command in station.asked()}

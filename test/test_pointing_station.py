@@ -35,6 +35,7 @@ def recorded(start_run):
     return run.bag
 
 
+@pytest.mark.thorough
 def test_the_program_points_to_the_sky_after_the_command(recorded):
     """And neither the change of the model nor a hand-over makes the beam jump."""
     run = tracking.read(bags.read(recorded))
@@ -66,6 +67,7 @@ def test_a_run_refuses_a_model_of_the_future(capsys):
     assert "pointing.date = '2999-01-01': must not be later than now" in capsys.readouterr().err
 
 
+@pytest.mark.thorough
 def test_the_recording_has_the_model(recorded):
     found = beam_direction.reports(bags.read(recorded))
     assert [(report.file, bool(report.before or report.ends_s)) for _, report in found] == [
@@ -75,10 +77,12 @@ def test_the_recording_has_the_model(recorded):
     assert diagnostics['pointing_model'] == 'first.yaml, 2026-11-26, rms 0.004 deg; P1 0.1 P4 0.05 P7 -0.1'
 
 
+@pytest.mark.thorough
 def test_it_is_recomputed_with_the_command(recorded, capsys):
     assert cli.main(['recompute', str(recorded)]) == 0, capsys.readouterr()
 
 
+@pytest.mark.thorough
 def test_report_and_tracking_data_have_the_direction_on_the_sky(recorded, tmp_path):
     assert cli.main(['report', str(recorded), '--output', str(tmp_path / 'report.html')]) == 0
     assert 'P1 0.1 P4 0.05 P7 -0.1' in (tmp_path / 'report.html').read_text()

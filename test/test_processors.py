@@ -6,6 +6,7 @@ import subprocess
 import sys
 
 import numpy as np
+import pytest
 
 from pedestal_bringup.loop import closed_loop
 from pedestal_bringup.scenario import scenario
@@ -37,6 +38,7 @@ def digests(**environment):
     return done.stdout.splitlines()
 
 
+@pytest.mark.thorough
 def test_units_begin_alike_on_another_processor():
     here = digests()
     assert len(here) > 50 and digests(**OTHER) == here

@@ -16,6 +16,8 @@ from pedestal_recording import bag as bags
 from pedestal_recording.bag import load
 from pedestal_recording.verify import verify
 
+pytestmark = pytest.mark.thorough
+
 PAUSE = 1.6
 """Drive time [s] for which the ACU of the run stands still: longer than a second, so a diagnostic falls in it."""
 

@@ -73,7 +73,9 @@ def end(process):
     return output
 
 
-@pytest.mark.parametrize('pace', [['--lockstep'], ['--rate', '1'], ['--rate', '4']], ids=' '.join)
+@pytest.mark.parametrize('pace', [
+    ['--lockstep'], pytest.param(['--rate', '1'], marks=pytest.mark.thorough),
+    pytest.param(['--rate', '4'], marks=pytest.mark.thorough)], ids=' '.join)
 def test_a_live_acu_answers_as_it_did(pace, run, acu_and_recorder, run_process, domain, tmp_path):
     pacing = 'lockstep' if pace == ['--lockstep'] else 'realtime'
     acu, recorder = acu_and_recorder(pacing)
@@ -92,6 +94,7 @@ def test_a_live_acu_answers_as_it_did(pace, run, acu_and_recorder, run_process, 
             assert len(again) == int(answered), name
 
 
+@pytest.mark.thorough
 def test_a_second_replay_begins_again(run, connect, start_process, run_process, domain):
     """The answers are the recorded answers each time."""
     acu = start_process([sys.executable, '-m', 'acu_tracker.acu_node', '--ros-args', '--params-file',
@@ -112,6 +115,7 @@ def test_a_second_replay_begins_again(run, connect, start_process, run_process, 
     end(acu)
 
 
+@pytest.mark.thorough
 def test_a_second_replay_into_the_drive_begins_again(run, connect, start_process, run_process, domain):
     """The drive waits longer than its deadline for the second replay."""
     drive = start_process([sys.executable, '-m', 'adu_drive.adu_node', '--ros-args', '--params-file',
@@ -129,6 +133,7 @@ def test_a_second_replay_into_the_drive_begins_again(run, connect, start_process
     end(drive)
 
 
+@pytest.mark.thorough
 def test_all_of_it_into_a_recorder_gives_the_same_file(run, start_process, run_process, domain, tmp_path,
                                                        complaints):
     recorder = start_process([sys.executable, '-m', 'pedestal_recording.recorder_node', '--ros-args', '--params-file',
@@ -143,6 +148,7 @@ def test_all_of_it_into_a_recorder_gives_the_same_file(run, start_process, run_p
     assert len(digests) == 1
 
 
+@pytest.mark.thorough
 def test_start_and_duration(run, connect, start_process, domain):
     client = connect(domain)
     replay = start_process([*PEDESTAL, 'replay', run.bag, '--topics', 'joint_states', 'acu/program_track', '--start',
@@ -203,6 +209,7 @@ def terminal(environment, domain):
         one.close()
 
 
+@pytest.mark.thorough
 def test_pause_step_and_quit_from_the_keyboard(run, connect, terminal, domain):
     client = connect(domain)
     replay = terminal(run.bag, '--topics', 'joint_states', '--paused')
@@ -242,6 +249,7 @@ def test_pause_step_and_quit_from_the_keyboard(run, connect, terminal, domain):
     assert termios.tcgetattr(replay.slave) == replay.before
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_ends_it_cleanly(number, run, connect, terminal, domain):
     client = connect(domain)
@@ -257,6 +265,7 @@ def test_a_signal_ends_it_cleanly(number, run, connect, terminal, domain):
     assert termios.tcgetattr(replay.slave) == replay.before
 
 
+@pytest.mark.thorough
 def test_a_topic_that_has_a_writer_is_refused(run, connect, run_process, one_line, domain):
     client = connect(domain)
     topic = topics.TOPIC_BY_NAME['joint_states']
@@ -267,6 +276,7 @@ def test_a_topic_that_has_a_writer_is_refused(run, connect, run_process, one_lin
                                      'come twice')
 
 
+@pytest.mark.thorough
 def test_a_topic_without_subscriber_is_named(run, run_process, one_line, domain):
     for options, node in ((['--node', 'acu'], 'acu'), (['--topics', 'joint_states'], 'any node')):
         done = run_process([*PEDESTAL, 'replay', run.bag, *options, '--deadline', '1'], 60.0,
@@ -276,6 +286,7 @@ def test_a_topic_without_subscriber_is_named(run, run_process, one_line, domain)
                                          f'{node}; present: no node')
 
 
+@pytest.mark.thorough
 def test_a_reader_that_goes_ends_it(run, connect, start_process, one_line, domain):
     client = connect(domain)
     replay = start_process([*PEDESTAL, 'replay', run.bag, '--topics', 'joint_states', '--rate', '0.2'],

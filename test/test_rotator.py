@@ -82,7 +82,8 @@ def distance(client, azimuth, elevation):
     return float(np.max(np.abs(np.degrees(client.heard['joint_states'][-1].position) - (azimuth, elevation))))
 
 
-@pytest.mark.parametrize('device', ('rotctld', 'gs232', 'easycomm', 'rot2prog'), indirect=True)
+@pytest.mark.parametrize('device', ('rotctld', *(pytest.param(protocol, marks=pytest.mark.thorough) for protocol in (
+    'gs232', 'easycomm', 'rot2prog'))), indirect=True)
 def test_a_rotator_goes_where_a_preset_says(station):
     """The mode stays, and no alarm takes the motion of a rotator for uncommanded motion."""
     client, _, step = station
@@ -93,6 +94,7 @@ def test_a_rotator_goes_where_a_preset_says(station):
     assert client.heard['adu/state'][-1].data == 'enabled'
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize('device', ('easycomm',), indirect=True)
 def test_a_program_track_within_what_the_rotator_can_do(station):
     """1 deg/s in azimuth: the axis stays within the stated accuracy and one period of motion."""
@@ -112,6 +114,7 @@ def test_a_program_track_within_what_the_rotator_can_do(station):
     assert client.heard['acu/mode'][-1].data == 'program'
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize('device', ('easycomm',), indirect=True)
 def test_step_track_finds_the_peak_of_a_level(station):
     """With a beam of 10 deg, whose steps of 1 deg are ten steps of the rotator. The noise is learnt off target."""
@@ -154,6 +157,7 @@ def program_track(points):
     return track
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize('device', ('rotctld',), indirect=True)
 @pytest.mark.excused_by(None)
 def test_a_rotator_that_vanishes_is_named_and_returns(station):

@@ -86,6 +86,7 @@ def test_a_program_without_line_ends_is_answered(antenna):
             assert windows.recv(4096).count(b'\n') == lines
 
 
+@pytest.mark.thorough
 def test_without_an_antenna_no_answer_is_a_position(start_process, complaints):
     """One line in the log for each kind of refusal, however often it happens."""
     nodes = {name: start_process([sys.executable, '-m', f'pedestal_operator.{name}_node', '--ros-args', '-p',
@@ -128,6 +129,7 @@ def test_a_set_point_moves_the_antenna_from_standby(antenna):
         assert gpredict.recv(10) == b''
 
 
+@pytest.mark.thorough
 def test_a_pass_through_north_in_set_points_is_met_without_unwinding(antenna):
     """One each 0.8 s, azimuth 0 to 360, 1 deg/s through north; test_set_points says how evenly."""
     _, client, port = antenna
@@ -144,6 +146,7 @@ def test_a_pass_through_north_in_set_points_is_met_without_unwinding(antenna):
     assert 0.15 < max(angles) - min(angles) < 0.3                           # 12 deg and no turn the other way
 
 
+@pytest.mark.thorough
 @pytest.mark.skipif(bool(gpredict.MISSING), reason=f'not installed: {", ".join(gpredict.MISSING)}')
 def test_gpredict_itself_points_at_a_satellite_that_passes(antenna, tmp_path):
     """Debian's, on a screen of its own; against sgp4."""
@@ -189,6 +192,7 @@ def server(request, antenna, start_process):
     assert node.wait(30.0) == 0
 
 
+@pytest.mark.thorough
 @pytest.mark.skipif(ROTCTL is None, reason='rotctl is not installed (libhamlib-utils)')
 def test_a_program_that_connects_for_each_set_point_is_one_program(antenna, server):
     """rotctl, a process for each set-point. A busy machine may spoil the pace of some of them."""
@@ -239,6 +243,7 @@ def test_a_program_that_connects_for_each_set_point_is_one_program(antenna, serv
             client.until(lambda: ask(other, 'GS') == b'GS1\n', 60.0)
 
 
+@pytest.mark.thorough
 def test_clients_that_misbehave_disturb_nobody(antenna):
     _, _, port = antenna
     mute = [connected(port) for _ in range(3)]
@@ -306,6 +311,7 @@ def _serial(end, line):
     return b''
 
 
+@pytest.mark.thorough
 def test_a_server_that_is_killed_serves_again_and_releases_the_control_of_its_clients(antenna):
     _, client, port = antenna
     with connected(port) as first:

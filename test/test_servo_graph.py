@@ -8,6 +8,8 @@ from pedestal_analysis.trials.cases import Case
 from pedestal_recording import bag as bags
 from pedestal_studies.papers import servo
 
+pytestmark = pytest.mark.thorough
+
 ALLOWED = 1e-6
 """Largest difference between a run of the nodes and the study [rad, rad/s]."""
 

@@ -137,6 +137,7 @@ def test_the_loss_overhead_is_announced_beforehand(seed):
     assert abs(rate).max() <= chosen.node_parameters('acu').azimuth.limits.rate + 1e-12
 
 
+@pytest.mark.thorough
 def test_equipment_that_is_not_there_is_told_in_every_diagnosis(start_node, connect):
     """Where nobody listens the system refuses every other datagram only, 10 of them a second."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as gone:
@@ -222,6 +223,7 @@ def told(start_run):
     return Told(bags.read(run.bag), rows, heard)
 
 
+@pytest.mark.thorough
 def test_the_chain_from_power_up_to_autotrack(told):
     """The control unit waits for the INS, whose heading is 180 deg wrong at first, then acquires and tracks."""
     known = known_attitude.read(told.bag)
@@ -250,12 +252,14 @@ def test_the_chain_from_power_up_to_autotrack(told):
     assert told.rows['pointing_rms_deg']['value'] < 0.01 and told.rows['loss_s']['value'] == 0.0
 
 
+@pytest.mark.thorough
 def test_the_rows_of_a_run_say_its_isolation(told):
     found = isolation.read(told.bag, tracking.read(told.bag))
     assert told.rows['isolation_db']['value'] == found.isolation and told.rows['isolation_db']['target'] == '>= 60'
     assert told.rows['isolation_limit_db']['value'] == found.limit
 
 
+@pytest.mark.thorough
 def test_the_chain_is_recomputed_from_its_recording(told):
     """The INS that aligns and the control unit that waits for it answer the recorded messages with the same bits."""
     recording = recompute.Recording(told.bag.path)
@@ -266,6 +270,7 @@ def test_the_chain_is_recomputed_from_its_recording(told):
             assert topic.identical, topic.lines()
 
 
+@pytest.mark.thorough
 def test_datagrams_are_the_recorded_attitude_at_their_stamps(told):
     truth = told.bag.table('ship/truth')
     assert 0.9 * SECONDS * DATAGRAMS < len(told.datagrams) <= SECONDS * DATAGRAMS + 1      # UDP may lose some

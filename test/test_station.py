@@ -60,6 +60,7 @@ def test_the_container_starts_an_installed_command():
     assert set(copied) == {f'src/{path.parent.name}' for path in STATION.parents[1].glob('src/*/setup.py')}
 
 
+@pytest.mark.thorough
 def test_the_parameters_start_every_service(start_node, connect):
     started = [start_node(path.stem.removeprefix('pedestal-'), '--params-file', STATION / 'parameters.yaml')
                for path in SERVICES]

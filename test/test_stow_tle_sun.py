@@ -44,6 +44,7 @@ def recorded(start_run):
     return run.bag
 
 
+@pytest.mark.thorough
 def test_what_is_asked_is_granted_or_says_why_not(recorded):
     told = [(at, command.verb, reply.granted, reply.text) for at, command, reply in replies(recorded)]
     assert told == [
@@ -55,6 +56,7 @@ def test_what_is_asked_is_granted_or_says_why_not(recorded):
     assert table['data'] == ['standby', 'tle', 'autotrack', 'sun', 'stow', 'unstow', 'standby', 'preset']
 
 
+@pytest.mark.thorough
 def test_it_tracks_what_it_predicted(recorded):
     """By the elements the receiver has within a second what it needs to track; the sun stands where it did."""
     modes_told = bags.read(recorded).table('acu/mode')
@@ -66,6 +68,7 @@ def test_it_tracks_what_it_predicted(recorded):
     assert math.degrees(table['elevation.position'][at]) == pytest.approx(9.2, abs=0.3)
 
 
+@pytest.mark.thorough
 def test_the_pins_go_in_once_it_stands_and_out_before_it_moves(recorded):
     bag = bags.read(recorded)
     pins, asked, states = bag.table('adu/stow_pins'), bag.table('acu/stow_pins'), bag.table('adu/state')
@@ -82,6 +85,7 @@ def test_the_pins_go_in_once_it_stands_and_out_before_it_moves(recorded):
                                         np.searchsorted(command['t'], pins['t'][4])] == 0.0).all()
 
 
+@pytest.mark.thorough
 def test_closed_loop_and_recomputation_are_the_same_to_the_last_bit(recorded, differences, pedestal):
     loop = closed_loop.Loop(scenario.load('leo_pass', [*GIVEN], duration=SECONDS, pacing='lockstep'))
     assert differences(loop.run(), bags.read(recorded)) == {}

@@ -11,6 +11,8 @@ from pedestal_bringup.graph import reaper
 from pedestal_common.wire import messages
 from pedestal_recording import bag as bags
 
+pytestmark = pytest.mark.thorough
+
 NODES = ('tracking_receiver', 'acu', 'adu', 'recorder')
 
 

@@ -10,6 +10,8 @@ from pedestal_analysis.trials import ensemble, monte_carlo
 from pedestal_analysis.trials.plan import plan
 from pedestal_bringup.scenario import scenario
 
+pytestmark = pytest.mark.thorough
+
 CASES = {
     'leo_pass': (5.0, 0.005, ['adu.azimuth.load.inertia=normal(1, 0.1)x', 'acu.azimuth.filter.kind=choice(ca, imm)']),
     'ship_pass': (4.0, 0.005, ['ship_motion.ship.sea_state=choice(3, 5)', 'ins.tilt_noise=uniform(0.0, 1e-4)']),

@@ -67,11 +67,13 @@ def gusty(start_run):
     return started, run
 
 
+@pytest.mark.thorough
 def test_nodes_and_closed_loop_agree_on_a_dish_that_swings(gusty, differences):
     started, run = gusty
     assert differences(run, bags.read(started.bag)) == {}
 
 
+@pytest.mark.thorough
 def test_the_dish_swings_as_the_two_masses_do(gusty):
     """On a base that moves by b a dish of its own frequency f_0 swings off it by (T / k + r b) / (1 - r), where
     r = (f / f_0)^2 and all of them are phasors. The wind is held through each step, half a step late in the mean."""
@@ -87,6 +89,7 @@ def test_the_dish_swings_as_the_two_masses_do(gusty):
     assert np.hypot(*(swing - expected)) < 0.03 * np.hypot(*expected)
 
 
+@pytest.mark.thorough
 def test_a_gusting_dish_shows_in_the_results_and_its_encoders_have_their_own(gusty):
     started, run = gusty
     values = {row['metric']: row['value'] for row in json.loads(started.json.read_text())['rows']}

@@ -86,6 +86,7 @@ def test_an_outlier_counts_little():
     assert -2500.0 < found[3] < -1500.0
 
 
+@pytest.mark.thorough
 def test_scenario_and_the_file_in_a_run(pedestal, folder, one_line):
     """Tuned on one seed; `pedestal run --params-file` gets the values."""
     file = folder / 'scenario.yaml'
@@ -106,6 +107,7 @@ def test_scenario_and_the_file_in_a_run(pedestal, folder, one_line):
     assert code == 1 and "did you mean 'azimuth.filter.alpha_beta.alpha'" in one_line(errors)
 
 
+@pytest.mark.thorough
 def test_feedforward(pedestal, folder):
     file = folder / 'feedforward.yaml'
     code, output, errors = pedestal('tune', 'servo_sine', '--feedforward', '--axis', 'azimuth', '--duration', '5',
@@ -116,6 +118,7 @@ def test_feedforward(pedestal, folder):
     assert set(written(file)) == {f'azimuth.feedforward.{name}_feedforward' for name in ('rate', 'acceleration')}
 
 
+@pytest.mark.thorough
 def test_of_several_beams_the_file_is_for_pedestal_run(pedestal, folder):
     """It hands `acu` to every beam_1/acu; a node of that name loads nothing of it."""
     file = folder / 'beams.yaml'
@@ -138,6 +141,7 @@ def test_an_optimum_at_the_end_of_its_range_has_a_remark():
                                  'the range']
 
 
+@pytest.mark.thorough
 def test_a_node_loads_the_file(tuned_bag, start_node, connect):
     file, _ = tuned_bag
     client = connect(start_node('acu', '--params-file', file).domain_id)

@@ -20,6 +20,7 @@ RUNS = {'tripped': ('leo_pass', ('adu.azimuth.faults.overspeed=0.02',),
 SECONDS = 5.0
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize('word', RUNS)
 def test_a_run_begins_its_results_with_a_verdict(start_run, word):
     name, changes, text = RUNS[word]

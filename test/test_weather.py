@@ -8,6 +8,8 @@ from pedestal_common.parameters import build
 from pedestal_common.wire import messages
 from pedestal_recording import bag as bags
 
+pytestmark = pytest.mark.thorough
+
 READINGS = {'weather/pressure': ('fluid_pressure', 96000.0), 'weather/temperature': ('temperature', 5.0),
             'weather/humidity': ('relative_humidity', 0.8)}
 
