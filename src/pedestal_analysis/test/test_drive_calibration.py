@@ -40,6 +40,7 @@ def result(tmp_path_factory):
     return code, json.loads(paths[0].read_text()), paths[1], paths[2]
 
 
+@pytest.mark.thorough
 def test_the_changed_drive_is_identified(result):
     code, content, *_ = result
     assert code == 0 and content['verified']
@@ -58,6 +59,7 @@ def test_the_changed_drive_is_identified(result):
     assert any('structure: no mode' in text for text in content['remarks']['azimuth'])
 
 
+@pytest.mark.thorough
 def test_the_twin_predicts_the_torques(result):
     rows = {row['metric']: row['value'] for row in result[1]['rows']}
     for name in ('azimuth', 'elevation'):
@@ -74,6 +76,7 @@ def calibrated(folder, *given):
     return code, content, {row['metric']: row for row in content['rows']}
 
 
+@pytest.mark.thorough
 def test_nominal_values_that_fit_better_are_kept(tmp_path):
     """An antenna whose dish swings for seconds: identified values are near the true nominal ones, which are kept."""
     antenna = tmp_path / 'my.yaml'
@@ -93,6 +96,7 @@ def test_nominal_values_that_fit_better_are_kept(tmp_path):
     assert rows['elevation_viscous']['value'] == pytest.approx(180.0, abs=10.0)
 
 
+@pytest.mark.thorough
 def test_a_mode_that_a_rigid_twin_shows_too_is_not_claimed(tmp_path):
     """The teeth of this station rattle without bias torque; its structure is rigid."""
     code, content, rows = calibrated(tmp_path, '--scenario', 'leo_station_7m')
@@ -106,6 +110,7 @@ def test_a_mode_that_a_rigid_twin_shows_too_is_not_claimed(tmp_path):
             assert row['ci_low'] < true[f'{name}.{twin.PARAMETER_NAMES[key]}'] < row['ci_high'], row['metric']
 
 
+@pytest.mark.thorough
 def test_a_result_that_is_not_verified_is_not_written(tmp_path, capfd):
     """The speed loop of the drive differs from its data."""
     code, content, _ = calibrated(tmp_path, '--scenario', 'leo_pass', '--param',
@@ -114,6 +119,7 @@ def test_a_result_that_is_not_verified_is_not_written(tmp_path, capfd):
     assert f'not written: {tmp_path / "drive.yaml"}, because the result is not verified' in capfd.readouterr().out
 
 
+@pytest.mark.thorough
 def test_the_file_is_for_control_unit_and_plant(result):
     """The feed-forward has the inertia of load and motors, and the friction of the load."""
     _, content, file, page = result

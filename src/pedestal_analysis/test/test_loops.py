@@ -36,6 +36,7 @@ def test_the_plant_that_comes_with_the_product_gets_the_gains_it_has(pedestal, t
     assert len(rows) == 4 and all(line.count('(>= ') == 2 for line in rows)
 
 
+@pytest.mark.thorough
 def test_a_loop_slower_than_required_and_one_without_a_gain_margin_are_named(pedestal):
     """The speed loop of leo_pass crosses below 28 Hz. The soft gear needs a slower position loop for its margins.
     30 Hz is above an eighth of the speed loop. The current loops never reach -180 deg."""
@@ -90,6 +91,7 @@ NINE_METRES = ('--mirror', '9', '--inertia-azimuth', '28000', '--inertia-elevati
 """A dish of 9 m whose structure is at 4 Hz."""
 
 
+@pytest.mark.thorough
 def test_a_flexible_dish_is_tracked_also_if_inertia_and_frequency_are_wrong(pedestal, tmp_path):
     """40 % of the dish swing at 4 Hz. The shaper of a rigid dish with these motors loses the target in a second."""
     assert pedestal('new', 'dish.yaml', *NINE_METRES, '--mode', '4', '--mode-share', '0.4')[0] == 0

@@ -44,6 +44,7 @@ def test_a_failing_batch_says_what_failed():
             list(pool.map(refuse, range(3)))
 
 
+@pytest.mark.thorough
 def test_a_study_gives_the_same_numbers_whoever_works():
     runs = manoeuvre.BATCH_RUNS + 3
     expected = manoeuvre.run(lambda share, text: None, runs).rows
@@ -61,6 +62,7 @@ def living(group):
     return [args for pgid, stat, args in fields if int(pgid) == group and not stat.startswith('Z')]
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize('whom', ['terminal', 'process'])
 def test_ctrl_c_ends_a_study_and_its_workers(whom, tmp_path):
     """A terminal sends it to every process, `kill` to one."""

@@ -228,6 +228,7 @@ def make(made, folder, pool):
         return table
 
 
+@pytest.mark.thorough
 def test_the_same_numbers_whoever_works_and_a_plan_that_goes_on(tmp_path):
     made = plan('leo_pass', 6, VARY, duration=4.0)
     expected = make(made, tmp_path / 'one', monte_carlo.Pool(1))
@@ -263,6 +264,7 @@ def never_stopped(tmp_path_factory):
     return finish_many(tmp_path_factory.mktemp('many') / 'whole')
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGKILL])
 def test_a_command_that_was_stopped_goes_on(never_stopped, tmp_path, number):
     """Its rows are those of a command that was not."""
