@@ -17,6 +17,7 @@ def on_swell():
     return [alignment.simulated_run(alignment.Batch('swell', 0, RUNS), run) for run in range(RUNS)]
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize('method', ['adrc', 'riccati_eso'])
 def test_the_stated_sigma_is_honest_on_swell_without_log_or_gnss(on_swell, method):
     """Rms over the runs of the error in azimuth over its 1 sigma, from 150 s on: within a factor of 1.3 of 1."""
@@ -36,6 +37,7 @@ def test_the_stated_sigma_is_honest_on_swell_without_log_or_gnss(on_swell, metho
     assert all(1.0 / 1.3 < value < 1.3 for value in shown.values())
 
 
+@pytest.mark.thorough
 def test_higher_bandwidths_level_faster_and_less_precisely(pedestal, tmp_path):
     """Paper 001, section 6. White noise of the velocity: the noise of the tilt grows with the bandwidth^1.5."""
     code, _, errors = pedestal('study', 'alignment-speed', '--runs', 4, '--workers', 1, '--json', 'rows.json')

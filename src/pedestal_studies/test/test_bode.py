@@ -192,6 +192,7 @@ def test_speed_loops():
         assert margins_agree(measured, loop, 1.0, gain=0.3, phase=0.7)
 
 
+@pytest.mark.thorough
 def test_speed_loops_of_a_new_antenna_near_its_required_margins():
     """A 3 m dish with light motors: 46.3 deg and 7.6 dB in azimuth at the step of a run, in truth 43.3 and 6.7."""
     sheet = DataSheet(mirror=3.0, inertia_azimuth=350.0, inertia_elevation=260.0, ratio_azimuth=110.0,
@@ -212,6 +213,7 @@ def test_speed_loops_of_a_new_antenna_near_its_required_margins():
 QUICK = dataclasses.replace(frequency.POSITION_SWEEP, points=80)
 
 
+@pytest.mark.thorough
 def test_position_loops():
     case, axes = bode.LOOP_CASES['feedforward']
     loaded = case.loaded()
@@ -225,6 +227,7 @@ def test_position_loops():
         assert margins_agree(measured[f'position/{name}/feedforward'], loop, 0.25)
 
 
+@pytest.mark.thorough
 def test_position_loop_of_the_paper():
     case, axes = bode.LOOP_CASES['paper-r1']
     loaded = case.loaded()
@@ -237,6 +240,7 @@ def test_position_loop_of_the_paper():
     assert margins_agree(measured, loop, 0.25)
 
 
+@pytest.mark.thorough
 def test_flexible_structure_and_the_notch_against_it():
     """The resonance removes the margins, the notch restores them."""
     ours = {}
@@ -255,6 +259,7 @@ def test_flexible_structure_and_the_notch_against_it():
     assert ours['structure-notch']['phase_margin_deg'] > 40.0 and ours['structure-notch']['gain_margin_db'] > 10.0
 
 
+@pytest.mark.thorough
 def test_loops_of_a_flexible_dish_hold_their_margins_with_another_inertia_and_frequency(tmp_path):
     """The exact model of the 3 m dish with 40 % at 4 Hz: 45 deg and 6 dB with inertia +-30 % and frequency +-20 %."""
     sheet = DataSheet(mirror=3.0, inertia_azimuth=350.0, inertia_elevation=260.0, ratio_azimuth=110.0,
@@ -314,6 +319,7 @@ def test_response_of_a_known_filter_and_its_deviation():
     assert error.max() < 0.02 and 0.5 < tracking.rms(error) / tracking.rms(measured.deviation) < 2.0
 
 
+@pytest.mark.thorough
 def test_study_through_the_command_line(pedestal, tmp_path):
     code, output, errors = pedestal('study', 'bode', '--json', 'rows.json')
     assert code == 0, errors

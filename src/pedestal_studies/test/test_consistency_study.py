@@ -1,5 +1,6 @@
 """The study consistency: its rows, and the filter of leo_pass after its start."""
 import numpy as np
+import pytest
 
 from pedestal_studies.system import consistency as study
 
@@ -12,6 +13,7 @@ def test_rows_name_axis_and_time_and_leave_out_what_no_run_reached():
     assert table['nees_elevation_60_s']['value'] == values[:, 3, 1].mean()
 
 
+@pytest.mark.thorough
 def test_the_filter_of_a_satellite_is_not_too_sure_after_its_start():
     """With models that all began with the same acceleration the elevation had a NEES of 8 to 37 here; mean of 8."""
     found = study.batch(('leo_pass', 0, 8)).mean(axis=0)

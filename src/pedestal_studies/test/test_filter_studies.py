@@ -41,12 +41,14 @@ def flyby(filters_result):
     return lambda name, metric, noise='white-0.03': values[f'flyby-60m/{name}/{noise}', metric]
 
 
+@pytest.mark.thorough
 def test_every_filter_has_its_rows(flyby):
     for name in set(filters.SHOWN_FILTERS) - set(filters.NOISE_AWARE_FILTERS):
         assert 1.0 < flyby(name, 'reduction') < 30.0
         assert 0.03 / flyby(name, 'angle_rms_deg') == pytest.approx(flyby(name, 'reduction'), rel=0.03)
 
 
+@pytest.mark.thorough
 def test_a_measured_rate_helps_the_more_the_better_it_is(flyby):
     names = 'current_statistical', *filters.RATE_SIGMAS_RAD_S
     for metric in ('angle_rms_deg', 'rate_rms_deg_s'):
@@ -54,11 +56,13 @@ def test_a_measured_rate_helps_the_more_the_better_it_is(flyby):
         assert errors == sorted(errors, reverse=True) and errors[-1] < 0.5 * errors[0]
 
 
+@pytest.mark.thorough
 def test_no_filter_reduces_coloured_noise_as_much(flyby):
     for name in set(filters.FILTERS) - set(filters.NOISE_AWARE_FILTERS):
         assert flyby(name, 'reduction', 'coloured-0.03') < 0.7 * flyby(name, 'reduction')
 
 
+@pytest.mark.thorough
 def test_a_filter_that_expects_coloured_noise_knows_its_error_better(flyby):
     """A filter that knows the colour of the noise is not too sure; one that takes the noise for white is."""
     for name in ('ca', 'imm'):
@@ -69,11 +73,13 @@ def test_a_filter_that_expects_coloured_noise_knows_its_error_better(flyby):
     assert flyby('ca-expecting', 'reduction', 'coloured-0.03') > flyby('ca', 'reduction', 'coloured-0.03')
 
 
+@pytest.mark.thorough
 def test_a_model_of_the_flight_beats_models_of_the_angle(flyby):
     """On a straight line an acceleration of the angle is geometry, which the range shows."""
     assert flyby('imm_ukf', 'rate_rms_deg_s') < 0.6 * flyby('imm', 'rate_rms_deg_s')
 
 
+@pytest.mark.thorough
 def test_tuned_kalman_filters_know_their_errors(flyby):
     for name in ('ca', 'singer', 'current_statistical'):
         assert flyby(name, 'nis_mean') == pytest.approx(1.0, abs=0.05)
@@ -82,12 +88,14 @@ def test_tuned_kalman_filters_know_their_errors(flyby):
     assert flyby('current_statistical-rate-0.1', 'nis_mean') == pytest.approx(2.0, abs=0.1)
 
 
+@pytest.mark.thorough
 def test_rows_with_a_target_are_printed_and_doubts_are_said(filters_result):
     assert 0 < len(filters_result.shown) < len(filters_result.rows)
     assert all(row['target'] for row in filters_result.shown)
     assert any('Inconsistent filters under coloured noise' in line for line in filters_result.remarks)
 
 
+@pytest.mark.thorough
 def test_figures_of_filters(filters_result, tmp_path):
     assert set(filters_result.figures) == {'errors', 'rates', 'rms', 'nis', 'probabilities', 'noise'}
     for name, draw in filters_result.figures.items():

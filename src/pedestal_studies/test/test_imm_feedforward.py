@@ -120,6 +120,7 @@ def result():
     return study.run(lambda share, text: None, runs=12)
 
 
+@pytest.mark.thorough
 def test_no_row_misses_its_target_but_those_that_are_said_to(result):
     """Through the product, with 40 ms of latency, the default bank is not three times as good as kalman-cv."""
     named = {(row['case'], row['metric']): row for row in result.rows}
@@ -133,6 +134,7 @@ def test_no_row_misses_its_target_but_those_that_are_said_to(result):
         for case in ('azimuth/drive-imm-default', 'elevation/drive-imm', 'elevation/drive-imm-default')]
 
 
+@pytest.mark.thorough
 def test_every_figure_is_drawn(result, tmp_path):
     for name, draw in result.figures.items():
         drawing.save(draw, tmp_path / f'{name}.png')
@@ -186,6 +188,7 @@ def speed_rows():
     return {(row['case'], row['metric']): row for row in found.rows}
 
 
+@pytest.mark.thorough
 def test_at_50_m_s_the_imm_still_is_three_times_as_good(speed_rows):
     for axis in study.REVERSAL_S_BY_AXIS:
         slow, fast = (speed_rows[f'{axis}/{speed}/imm', 'miss_rms_deg']['value'] for speed in ('30m_s', '50m_s'))
@@ -195,6 +198,7 @@ def test_at_50_m_s_the_imm_still_is_three_times_as_good(speed_rows):
     assert ('azimuth/50m_s/drive-imm', 'miss_ratio_to_kalman_cv') not in speed_rows     # kalman-cv leaves autotrack
 
 
+@pytest.mark.thorough
 def test_differences_are_worse_estimates(speed_rows):
     for axis in study.REVERSAL_S_BY_AXIS:
         for name in ('difference-1', 'difference-15'):

@@ -32,12 +32,14 @@ def values_of(result):
     return {(row['case'], row['metric']): row['value'] for row in result.rows}
 
 
+@pytest.mark.thorough
 def test_every_target_is_met(result):
     targets = {(row['case'], row['metric']): row['target'] for row in result.rows if row['target'] is not None}
     assert targets == phased_array.METRIC_TARGETS
     assert [row for row in result.rows if intervals.missed(row)] == []
 
 
+@pytest.mark.thorough
 def test_limits_found_by_bisection_are_those_of_the_eigenvalues(values):
     cases = {case for case, metric in values if case.startswith('delay-limit/')}
     assert len(cases) == 29
@@ -45,6 +47,7 @@ def test_limits_found_by_bisection_are_those_of_the_eigenvalues(values):
         assert values[case, 'delay_ms'] == values[case, 'eigenvalue_delay_ms'] > 0
 
 
+@pytest.mark.thorough
 def test_without_smoothing_the_limit_is_in_whole_periods(values):
     """20, 10, 4, 3 periods: delays up to just below the next one act alike (nav.md 2.2, by eigenvalues there too)."""
     for alpha, periods in ((0.05, 20), (0.1, 10), (0.2, 4), (0.3, 3)):
@@ -52,6 +55,7 @@ def test_without_smoothing_the_limit_is_in_whole_periods(values):
             assert values[f'delay-limit/alpha={alpha:g}/T={T}ms/S0', 'delay_ms'] == (periods + 1) * T - 1
 
 
+@pytest.mark.thorough
 def test_readings_are_the_closed_forms(values):
     for rate in (10, 20, 30, 40):
         assert values[f'ramp/{rate}deg_s/T=10ms', 'lag_deg'] == pytest.approx(rate * 0.01, abs=1e-9)
@@ -61,12 +65,14 @@ def test_readings_are_the_closed_forms(values):
         1.0 / 0.15, rel=1e-3)
 
 
+@pytest.mark.thorough
 def test_the_beam_is_lost_when_its_lag_passes_half_a_beamwidth(values):
     for form in ('type-1', 'type-2'):
         assert values[f'loss/half-beamwidth/{form}', 'linear_lag_beamwidths'] == pytest.approx(0.5, abs=0.05)
         assert values[f'loss/pattern/{form}', 'linear_lag_beamwidths'] > 0.7
 
 
+@pytest.mark.thorough
 def test_the_graph_has_no_more_than_half_a_period_and_the_loops_own_error(values):
     """A beam that stands for T is off by half of it at either end; the paper's loop lags by more."""
     rate = math.degrees(phased_array.SWAY_AMPLITUDE_RAD) * 2.0 * math.pi / phased_array.SWAY_PERIOD_S
@@ -76,6 +82,7 @@ def test_the_graph_has_no_more_than_half_a_period_and_the_loops_own_error(values
     assert values['graph/T=10ms/paper-delta', 'max_error_deg'] > 1.2 * values['graph/T=10ms', 'max_error_deg']
 
 
+@pytest.mark.thorough
 def test_figures_are_drawn(result, tmp_path):
     assert set(result.figures) >= {f'figure-{n}' for n in (3, 4, 5, 7, 9)} | {'figure-6-left', 'figure-6-right'}
     for name, draw in result.figures.items():
@@ -86,6 +93,7 @@ def test_figures_are_drawn(result, tmp_path):
     assert (tmp_path / 'figure-7.png').stat().st_size > 10000
 
 
+@pytest.mark.thorough
 def test_a_beam_that_is_right_in_the_middle_is_off_at_the_ends_of_its_millisecond(values):
     """By the rate of the target: 30 deg/s, and what is left of the sway's 7.85 deg/s."""
     assert values['best/ramp', 'ends_max_error_deg'] == pytest.approx(0.015, abs=1e-4)
@@ -164,6 +172,7 @@ def test_paper_loop_against_its_equations_written_out(smoothing):
     np.testing.assert_allclose(loop.run(target, noise=noise)[0], in_force, atol=1e-13)
 
 
+@pytest.mark.thorough
 def test_a_steeper_slope_divides_the_lag(values):
     """Without smoothing the true lag is that of slope 1 over the slope, and the reading stays v T."""
     for case in ('ramp/30deg_s/T=10ms', 'sine'):
@@ -174,6 +183,7 @@ def test_a_steeper_slope_divides_the_lag(values):
             < values['delay-limit/alpha=0.1/T=10ms/S1', 'delay_ms'])
 
 
+@pytest.mark.thorough
 def test_a_larger_gain_is_faster_and_noisier(values):
     alphas = [f'alpha={alpha:g}' for alpha in phased_array.ALPHA_GAINS]
     rise = [values[f'step/{alpha}/T=10ms/S1', 'rise_90percent_s'] for alpha in alphas]
@@ -181,6 +191,7 @@ def test_a_larger_gain_is_faster_and_noisier(values):
     assert rise == sorted(rise, reverse=True) and jitter == sorted(jitter) and rise[0] > 4.0 * rise[-1]
 
 
+@pytest.mark.thorough
 def test_a_delay_hardly_changes_the_rise_and_adds_overshoot(values):
     step, delayed = 'step/alpha=0.1/T=10ms/S0', 'step/alpha=0.1/T=10ms/S0/delay=20ms'
     assert values[delayed, 'rise_90percent_s'] == pytest.approx(values[step, 'rise_90percent_s'], abs=0.01)

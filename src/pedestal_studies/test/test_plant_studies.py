@@ -13,6 +13,7 @@ def values(path):
     return {(row['case'], row['metric']): row['value'] for row in json.loads(path.read_text())['rows']}
 
 
+@pytest.mark.thorough
 def test_the_loops_of_a_tuned_antenna_have_their_margins(pedestal, tmp_path):
     code, output, errors = pedestal('study', 'bode', '--scenario', 'ship_terminal_1m2', '--json', 'rows.json')
     assert (code, errors) == (0, '')
@@ -23,6 +24,7 @@ def test_the_loops_of_a_tuned_antenna_have_their_margins(pedestal, tmp_path):
     assert (tmp_path / 'studies' / 'bode' / 'speed.png').stat().st_size > 10_000
 
 
+@pytest.mark.thorough
 def test_a_plant_steps_is_pushed_and_follows_a_sine(pedestal, tmp_path):
     """The step settles without overshoot; a gust moves the dish less than it would a free one within 0.1 s."""
     code, output, errors = pedestal('study', 'servo', '--scenario', 'leo_station_7m', '--json', 'rows.json')
@@ -39,6 +41,7 @@ def test_a_plant_steps_is_pushed_and_follows_a_sine(pedestal, tmp_path):
                                                                                        'step.png']
 
 
+@pytest.mark.thorough
 def test_bias_takes_the_backlash_out_of_a_plant(pedestal, tmp_path):
     """With its bias an axis stands within steps of its encoder and reverses better; without it the load is loose in
     the lash."""

@@ -76,6 +76,7 @@ def result():
     return study.run(lambda share, text: None, runs=5)
 
 
+@pytest.mark.thorough
 def test_rows(result):
     values = {(row['case'], row['metric']): row['value'] for row in result.rows}
     assert len(values) == len(result.rows)
@@ -88,6 +89,7 @@ def test_rows(result):
         values['position', 'dynamic_error_0p2hz'] / values['position-rate', 'dynamic_error_0p2hz'])
 
 
+@pytest.mark.thorough
 def test_only_an_independent_rate_helps(result):
     error = {row['case'].partition('/')[2]: row['value'] for row in result.rows if row['metric'] == 'angle_rms_deg'}
     assert error['position-rate-0.02'] < 0.5 * error['position-rate'] < 0.3 * error['position']
@@ -95,6 +97,7 @@ def test_only_an_independent_rate_helps(result):
     assert error['differenced-20'] > 1.2 * error['position']
 
 
+@pytest.mark.thorough
 def test_every_figure_is_drawn(result, tmp_path):
     for name, draw in result.figures.items():
         drawing.save(draw, tmp_path / f'{name}.png')

@@ -61,6 +61,7 @@ BOUNDS = {
 """Of the rows that issue 3 names; the lower ends of ours are limits of the plant."""
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize('name, case, metric', [(name, *key) for name, rows in BOUNDS.items() for key in rows])
 def test_rows_are_within_their_bounds(studied, name, case, metric):
     content = json.loads((studied(name)[0] / 'rows.json').read_text())
@@ -69,6 +70,7 @@ def test_rows_are_within_their_bounds(studied, name, case, metric):
     assert low <= value <= high
 
 
+@pytest.mark.thorough
 def test_two_loops_fight_at_rest_where_one_does_not(studied):
     content = json.loads((studied('backlash')[0] / 'rows.json').read_text())
     values = {(row['case'], row['metric']): row['value'] for row in content['rows']}
@@ -76,6 +78,7 @@ def test_two_loops_fight_at_rest_where_one_does_not(studied):
         assert values['independent-loops', metric] > 20.0 * values['mean-speed', metric] > 0.0
 
 
+@pytest.mark.thorough
 def test_what_misses_its_target_is_marked(done):
     from pedestal_analysis.results.intervals import missed
     _, folder, result = done
@@ -83,6 +86,7 @@ def test_what_misses_its_target_is_marked(done):
     assert result.stdout.count('MISSED') == sum(map(missed, rows))
 
 
+@pytest.mark.thorough
 def test_rows_are_written_and_printed_one_a_line(done):
     name, folder, result = done
     content = json.loads((folder / 'rows.json').read_text())
@@ -95,6 +99,7 @@ def test_rows_are_written_and_printed_one_a_line(done):
         assert f'{row["value"]:.4g}' in line
 
 
+@pytest.mark.thorough
 def test_a_figure_is_a_png_in_the_default_folder_and_is_named(done):
     name, folder, result = done
     files = sorted((folder / 'studies' / name).iterdir())
@@ -104,6 +109,7 @@ def test_a_figure_is_a_png_in_the_default_folder_and_is_named(done):
         assert path.name in result.stdout
 
 
+@pytest.mark.thorough
 def test_a_pipe_gets_no_progress(done):
     assert done[2].stderr == ''
 

@@ -131,6 +131,7 @@ def test_off_is_a_word():
     assert yaml.safe_load(loaded.as_yaml())['adu']['ros__parameters']['azimuth.bias.schedule'] == 'off'
 
 
+@pytest.mark.thorough
 def test_alignment_in_a_quick_form():
     """Four runs: an rms is known to a third, so the bounds are three of those."""
     rows = {(row['case'], row['metric']): row['value'] for row in alignment.run(lambda share, text: None, runs=4).rows}

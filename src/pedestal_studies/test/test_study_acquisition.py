@@ -68,6 +68,7 @@ def test_rows():
     assert {case for (case, _), row in table.items() if missed(row)} == {'fade', 'steptrack_geo'}
 
 
+@pytest.mark.thorough
 def test_the_runs_do_not_depend_on_their_batch():
     together = study.batch(('sidelobe', 0, 2))
     assert np.array_equal(together[1:], study.batch(('sidelobe', 1, 1)))

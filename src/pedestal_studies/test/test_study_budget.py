@@ -35,6 +35,7 @@ def place():
     return study.pass_angles(DURATION)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize('mode', study.MODE_OVERRIDES)
 def test_the_budget_is_the_whole_run_within_ten_percent(made, place, mode):
     table = study.rows(mode, made[mode], place)
@@ -60,6 +61,7 @@ def test_all_of_the_station_is_in_the_budget():
             assert of_none[name] == default[name] != of_whole[name], key
 
 
+@pytest.mark.thorough
 def test_zero_and_collimation_in_program_track_are_their_closed_forms(made, place):
     """The loop holds the encoders: the beam is off by the whole zero, and by the collimation in cross-elevation."""
     values = scenario.load(study.SCENARIO_NAME).node_parameters('adu')
@@ -73,18 +75,21 @@ def test_zero_and_collimation_in_program_track_are_their_closed_forms(made, plac
     assert once['sag'][:, 1].mean() == pytest.approx(np.mean(math.degrees(values.mount.sag) * cos_E), abs=5e-5)
 
 
+@pytest.mark.thorough
 def test_refraction_is_what_the_operator_does_not_know_of_it(made, place):
     measured, true = (math.degrees(1.0) * np.array([arrival.refraction(N, E)[0] for E in np.radians(place.elevation)])
                       for N in (311.0, 330.0))
     assert np.mean(made['program'].once['refraction'][:, 1] - (true - measured)) == pytest.approx(0.0, abs=5e-5)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize('name', ['encoder-zero', 'tilt', 'collimation', 'sag', 'refraction', 'prediction'])
 def test_autotrack_nulls_what_program_track_keeps(made, name):
     kept, nulled = (study.rms(made[mode].once[name]) for mode in ('program', 'autotrack'))
     assert nulled < 0.1 * kept
 
 
+@pytest.mark.thorough
 def test_autotrack_keeps_the_null_of_its_receiver(made):
     antenna = scenario.load(study.SCENARIO_NAME).node_parameters('tracking_receiver').antenna
     expected = np.degrees([antenna.boresight_cross_elevation, antenna.boresight_elevation])

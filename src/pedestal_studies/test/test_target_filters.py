@@ -33,6 +33,7 @@ def test_tables_of_hard_targets_have_the_accelerations_of_their_texts(tmp_path):
     assert 5.0 < largest['jet'] < 15.0
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize('place', ['', '-ship'])
 def test_a_target_that_reverses_stays_in_autotrack(place):
     default, tuned = (study.batch((f's-motion{place}/{name}', 0, 2)) for name in ('default', 'tuned'))
@@ -49,12 +50,14 @@ def test_rows_of_every_case():
         assert row['value'] == 0.5 and row['runs'] == 3 and bool(row['target']) == case.endswith('/default')
 
 
+@pytest.mark.thorough
 def test_the_default_rules_out_the_noisy_models_on_a_target_that_stands_still():
     pointing = {name: study.batch((f'geo/{name}', 0, 2)) for name in ('default', 'tuned', 'manoeuvre')}
     assert np.all(pointing['default'] < 1.5 * pointing['tuned'])
     assert np.all(pointing['default'] < 0.5 * pointing['manoeuvre'])
 
 
+@pytest.mark.thorough
 def test_on_a_ship_what_the_ins_wanders_by_is_no_manoeuvre():
     default, tuned = (study.batch((f'geo-ship/{name}', 0, 2)) for name in ('default', 'tuned'))
     assert np.all(default < study.MAX_POINTING_RATIO * tuned)

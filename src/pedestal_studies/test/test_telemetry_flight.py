@@ -38,6 +38,7 @@ def test_the_matrices_are_those_of_the_continuous_model():
     assert found['observability/angle-rate'][0].shape == (6, 3)
 
 
+@pytest.mark.thorough
 def test_the_filter_is_better_than_what_is_measured_and_both_pairs_have_full_rank(result):
     assert len({(row['case'], row['metric']) for row in result.rows}) == len(result.rows)
     assert [row for row in result.rows if intervals.missed(row)] == []
@@ -46,6 +47,7 @@ def test_the_filter_is_better_than_what_is_measured_and_both_pairs_have_full_ran
     assert values['elevation/measured', 'rate_rms'] == pytest.approx(math.degrees(study.RATE_SIGMA_RAD_S), rel=0.02)
 
 
+@pytest.mark.thorough
 def test_every_figure_is_drawn(result, tmp_path):
     for name, draw in result.figures.items():
         drawing.save(draw, tmp_path / f'{name}.png')
