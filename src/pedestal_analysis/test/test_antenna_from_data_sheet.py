@@ -93,7 +93,7 @@ def test_what_ships_is_made_by_the_commands_in_its_head(pedestal, tmp_path, name
         (('--mirror', '18', '--inertia-azimuth', '200000', '--inertia-elevation', '150000'),
          '--inertia-azimuth 200000 kg m2: must be 0.1 to 92800, or --ratio-azimuth 64: must be 93.9 to 7990, or '),
         (('--beamwidth', '0.001'), '--beamwidth 0.001 deg: must be 0.00573 to 20, with the other values'),
-        (('--mirror', '0.1'), '--mirror 0.1 m: must be 0.319 to 40, or --frequency 2.3 GHz: must be 7.33 to 100, with'),
+        (('--mirror', '0.1'), '--mirror 0.1 m: must be 0.319 to 40, or --frequency 2.3 GHz: must be 7.33 to 100'),
     ))])
 def test_a_sheet_that_cannot_be_is_refused(pedestal, tmp_path, arguments, expected):
     code, output, errors = pedestal('new', 'my.yaml', *arguments)
