@@ -48,6 +48,7 @@ def test_a_thousandth_of_the_motion_is_60_db_with_and_without_a_lag(ship, lag):
     assert found.limit > 75.0
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize('pole', [0.0, 0.98])
 def test_noise_alone_gives_the_floor_and_hides_only_what_is_below_it(ship, pole):
     """White noise and noise of 1 s correlation: the rms of the coherent part over draws is the floor."""

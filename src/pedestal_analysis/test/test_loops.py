@@ -53,6 +53,7 @@ def test_a_loop_slower_than_required_and_one_without_a_gain_margin_are_named(ped
         assert 'beyond' not in output
 
 
+@pytest.mark.thorough
 def test_a_soft_gear_makes_the_loop_slower_until_it_holds_its_margins():
     asked = loops.LoopRequirements()
     stiff, soft = (loops.Loops('leo_pass', changes) for changes in ((), SOFT))
@@ -64,6 +65,7 @@ def test_a_soft_gear_makes_the_loop_slower_until_it_holds_its_margins():
     assert soft.gains[key] < 0.75 * stiff.gains[key]
 
 
+@pytest.mark.thorough
 def test_what_is_asked_is_the_crossover_of_the_position_loop():
     for asked in (1.5, 3.0):
         each = loops.Loops('leo_pass')
@@ -72,6 +74,7 @@ def test_what_is_asked_is_the_crossover_of_the_position_loop():
         assert rows['position']['crossover_hz'][0] == pytest.approx(asked, rel=0.12)
 
 
+@pytest.mark.thorough
 def test_an_axis_slower_than_the_rate_of_the_measurement():
     """2 deg/s in azimuth, 1 deg/s in elevation: the same loops as of the fast axis. The friction of a motor that turns
     below 1 rad/s damps the speed loop by 2 to 5 deg more."""

@@ -312,6 +312,7 @@ def test_the_frame_is_that_of_the_tracking_and_not_of_the_slew(whole):
     assert any('off scale outside the evaluated part' in text.get_text() for text in axes.texts)
 
 
+@pytest.mark.thorough
 @pytest.mark.skipif(not any(map(shutil.which, print_pdf.BROWSERS)), reason='no browser is installed')
 def test_the_report_as_pdf_with_its_author(story, tmp_path, capsys):
     assert cli.main(['report', str(story), '--output', str(tmp_path / 'r.html'), '--author', 'A. <B>', '--pdf']) == 0
@@ -343,6 +344,7 @@ def test_text_of_the_bag_is_escaped_and_repeats_are_one_row(page):
     assert page[0].rows['0.0 to 1.0'] == ['acu', 'WARN', 'waits for <lock> & more']
 
 
+@pytest.mark.thorough
 def test_same_bag_gives_same_bytes(page, whole, tmp_path):
     first = page[1]
     again = write_report(whole, tmp_path / 'b.html', tmp_path)
@@ -378,6 +380,7 @@ def test_a_recording_from_before_the_truth_says_that_its_errors_are_those_of_the
         assert old.rows[f'pointing error, {name}'] == page[0].rows[f'pointing error by the encoders, {name}']
 
 
+@pytest.mark.thorough
 def test_never_locked(tmp_path):
     page = page_of(make_bag(tmp_path / 'dark', locked=False))
     assert 'Not drawn: the receiver never locked.' in page.text
@@ -386,6 +389,7 @@ def test_never_locked(tmp_path):
     assert {'pointing', 'torques', 'carrier', 'timeline'} <= set(page.drawn)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize('steps', [0, 1, 2])
 def test_hardly_anything_recorded(tmp_path, steps):
     page = page_of(make_bag(tmp_path / 'short', steps=steps))

@@ -290,6 +290,7 @@ def test_a_command_that_was_stopped_goes_on(never_stopped, tmp_path, number):
     assert finish_many(tmp_path / 'cut') == never_stopped
 
 
+@pytest.mark.thorough
 def test_intervals_hold_the_truth_as_often_as_they_say():
     """Of the median, of a rate and of a rank correlation, over 1000 samples of 30."""
     rng, hit = np.random.default_rng(3), np.zeros(3)
@@ -332,6 +333,7 @@ def test_texts_have_no_order(tmp_path):
     assert 0.2 < found[0]['ci_low'] < expected < found[0]['ci_high'] < 0.8
 
 
+@pytest.mark.thorough
 def test_the_interval_of_eta_squared_holds_the_truth_as_often_as_it_says():
     """Three kinds, with no effect and with one; the truth is that of 100,000 trials each."""
     rng = np.random.default_rng(8)
@@ -415,6 +417,7 @@ def test_no_gain_is_said_where_there_is_none(tmp_path):
     assert 'identical values of pointing_rms_deg' in comparison.sentence(same, 'pointing_rms_deg')
 
 
+@pytest.mark.thorough
 def test_a_table_of_a_ship_against_another_setting(pedestal, tmp_path):
     """Through the command line: table, page, rows with intervals; both sides have the same seeds and draws."""
     code, output, errors = pedestal('trials', 'ship_pass', '--runs', 5, '--duration', 8, '--vary',

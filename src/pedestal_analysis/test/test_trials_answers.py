@@ -13,6 +13,7 @@ from pedestal_bringup.scenario import scenario
 KIND = 'acu.azimuth.filter.kind'
 
 
+@pytest.mark.thorough
 def test_the_best_of_three_sides_comes_first(pedestal, tmp_path):
     code, said, errors = pedestal('trials', 'uav_flyby', '--runs', 3, '--duration', 6, '--workers', 1, '--json',
                                   'r.json', '--side', 'slow', f'{KIND}=alpha_beta', '--side', 'ca', f'{KIND}=ca',
@@ -37,6 +38,7 @@ def test_the_best_of_three_sides_comes_first(pedestal, tmp_path):
     assert f'{named[order[0]]} is ' in page and 'in 3 of 3 trials' in page
 
 
+@pytest.mark.thorough
 def test_sides_with_the_same_parameters_are_named_so(pedestal):
     """One sentence for a pair of sides: imm and program are the values that uav_flyby has anyway."""
     code, said, errors = pedestal('trials', 'uav_flyby', '--runs', 2, '--duration', 3, '--workers', 1,
