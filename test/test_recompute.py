@@ -362,6 +362,7 @@ def test_what_was_asked_for_is_found_and_asked_for_again(requested, pedestal):
     assert [text for text, t in zip(table['data'], table['t']) if t > 1.9][:len(states)] == states
 
 
+@pytest.mark.thorough
 def test_the_process_of_the_node_says_the_same(requested, run_process, reserve_domain):
     """Inputs, program track and services, over DDS."""
     node, path = requested

@@ -168,6 +168,7 @@ def shuffled(rows, seed):
     return out
 
 
+@pytest.mark.thorough
 def test_lockstep_any_arrival_gives_the_same_file(tmp_path, graph, rows):
     hashes = set()
     for seed in (1, 2):
@@ -215,6 +216,7 @@ def test_realtime_records_in_order_of_arrival_at_the_wall_time_of_the_writer(tmp
     assert before < published.min() and published.max() < time.time_ns() and (published[1:] > published[:-1]).all()
 
 
+@pytest.mark.thorough
 def test_broken_messages_are_recorded_all_the_same(tmp_path, graph, rows):
     recorder = Recorder(tmp_path / 'b', 'realtime')
     graph.await_recorder()
@@ -229,6 +231,7 @@ def test_broken_messages_are_recorded_all_the_same(tmp_path, graph, rows):
     assert broken[1] in recorded
 
 
+@pytest.mark.thorough
 def test_a_message_before_the_start_may_have_the_stamp_of_the_start(tmp_path, graph):
     """As the program track has; a later stamp is from the future."""
     start = time.time_ns() + 600 * 10**9
@@ -256,6 +259,7 @@ def test_a_message_before_the_start_may_have_the_stamp_of_the_start(tmp_path, gr
     assert [log for _, log, _, _ in bag.read(tmp_path / 'b').raw()] == [start, start]
 
 
+@pytest.mark.thorough
 def test_lost_messages_end_a_lockstep_recorder_with_topic_and_count(tmp_path, graph, rows):
     joints = [row for row in rows[:44] if row[0] == 'joint_states']
     for name, _, data in joints[:-1]:
@@ -271,6 +275,7 @@ def test_lost_messages_end_a_lockstep_recorder_with_topic_and_count(tmp_path, gr
     assert any(f'{lost} messages lost, by the sequence numbers' in line for line in lines)
 
 
+@pytest.mark.thorough
 def test_a_realtime_recorder_that_comes_late_or_hears_two_writers_has_lost_nothing(tmp_path, graph, rows):
     """Each writer has numbers of its own."""
     joints = [row for row in rows if row[0] == 'joint_states']
@@ -290,6 +295,7 @@ def test_a_realtime_recorder_that_comes_late_or_hears_two_writers_has_lost_nothi
     assert (code, err, said['lost'], said['messages']) == (0, '', 0, 100)
 
 
+@pytest.mark.thorough
 def test_messages_of_a_foreign_node_are_marked_and_no_loss(tmp_path, domain, graph, rows):
     """The foreign node publishes messages of the type, and bytes of no message."""
     joints = [row for row in rows if row[0] == 'joint_states'][:100]
@@ -317,6 +323,7 @@ def test_messages_of_a_foreign_node_are_marked_and_no_loss(tmp_path, domain, gra
     node.destroy_node()
 
 
+@pytest.mark.thorough
 def test_messages_of_a_foreign_node_in_lockstep_are_marked_and_no_loss(tmp_path, graph, rows):
     """The foreign node publishes a message of the type, and bytes of no message."""
     recorder = Recorder(tmp_path / 'b', 'lockstep')
@@ -348,6 +355,7 @@ def refused(tmp_path, *arguments, directory, **options):
     return err
 
 
+@pytest.mark.thorough
 def test_a_directory_that_exists_or_cannot_be_made_is_refused(tmp_path, domain):
     (tmp_path / 'there').mkdir()
     (tmp_path / 'file').write_text('')
@@ -357,6 +365,7 @@ def test_a_directory_that_exists_or_cannot_be_made_is_refused(tmp_path, domain):
     assert not list((tmp_path / 'there').iterdir())
 
 
+@pytest.mark.thorough
 def test_a_full_disk_is_one_line_and_what_was_written_stays_readable(tmp_path, graph, rows):
     size = 400_000
 

@@ -35,6 +35,7 @@ def held(path):
     return [(name, log, data) for name, log, _, data in bag.read(path).raw()]
 
 
+@pytest.mark.thorough
 def test_twenty_deaths_lose_at_most_the_last_second(tmp_path, made):
     done = subprocess.run([sys.executable, killed_writer.__file__, tmp_path, '1', '20'], check=True, timeout=120,
                           text=True, stdout=subprocess.PIPE)
