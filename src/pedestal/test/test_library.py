@@ -106,6 +106,7 @@ def test_trials_are_compared_in_pairs():
         made.against(pedestal.trials(scenario.changed(seed=9), 3, workers=1))
 
 
+@pytest.mark.thorough
 def test_it_works_without_ros():
     """Scenario, run, results, figure, recording and trials, where no rclpy can be imported."""
     code = f"""
@@ -124,6 +125,7 @@ assert not any(name.startswith(('rclpy.', 'rcl_interfaces', 'rpyutils')) for nam
     assert (done.returncode, done.stderr) == (0, '')
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize('notebook', sorted((ROOT / 'docs').glob('*.ipynb')), ids=lambda path: path.stem)
 def test_notebooks_run(notebook, tmp_path):
     content = nbformat.read(notebook, as_version=4)

@@ -184,6 +184,7 @@ def test_current_loops():
         assert ours['phase_margin_deg'][0] == pytest.approx(control.margin(loop)[1], abs=3.0)
 
 
+@pytest.mark.thorough
 def test_speed_loops():
     p = AduParameters()
     for name, measured in frequency.speed(p, dataclasses.replace(frequency.SPEED_SWEEP, points=60, kept=3)).items():
