@@ -2,6 +2,8 @@
 import json
 import sys
 
+import pytest
+
 SHORT = ('import sys; from pedestal import cli; from pedestal_studies.bench import recording; '
          'recording.BAG_DURATION_S = 2.0; recording.DISK_TEST_BYTES = 10_000_000; '
          'sys.exit(cli.main(["bench", "bag", "--json", "rows.json"]))')
@@ -10,6 +12,7 @@ RING = ('from pedestal_studies.bench import lockstep; '
         'lockstep.RING_STEPS = 200; print(lockstep.bare_lap())')
 
 
+@pytest.mark.thorough
 def test_the_bare_ring_closes(run_process, reserve_domain):
     done = run_process([sys.executable, '-c', RING], 60.0, ROS_DOMAIN_ID=str(reserve_domain()))
     assert (done.returncode, done.stderr) == (0, '')

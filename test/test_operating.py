@@ -14,6 +14,8 @@ from shared import PEDESTAL
 from pedestal_common.wire import commands, messages
 from pedestal_recording import bag as bags
 
+pytestmark = pytest.mark.thorough
+
 ARROW_RIGHT = b'\x1b[C'
 ISS = {'OBJECT_NAME': 'ISS (ZARYA)', 'OBJECT_ID': '1998-067A', 'CENTER_NAME': 'EARTH', 'REF_FRAME': 'TEME',
        'TIME_SYSTEM': 'UTC', 'MEAN_ELEMENT_THEORY': 'SGP4', 'EPOCH': '2019-12-09T16:38:29.363424',
@@ -29,7 +31,7 @@ def replies(path):
             for *_, data in bags.read(path).raw('acu/command_result')]
 
 
-@pytest.fixture(scope='module', params=('uav_flyby', pytest.param('ship_pass', marks=pytest.mark.thorough)))
+@pytest.fixture(scope='module', params=('uav_flyby', 'ship_pass'))
 def running(request, start_run, connect, patient):
     """(Run in realtime ashore or on a ship, its Client) from the moment in which it tracks. Its pass has its middle in
     the middle of the run: in a longer one the satellite would have to rise first."""
@@ -197,7 +199,6 @@ def test_without_a_graph_it_is_said_in_one_line(run_process, reserve_domain, one
     assert done.returncode == 1 and 'needs a terminal' in one_line(done.stderr)
 
 
-@pytest.mark.thorough
 def test_live_commands_are_answered_recorded_and_recomputed(start_run, connect, patient, pedestal):
     """In realtime, by topic and by service, from two who are strangers to the graph."""
     run = start_run('uav_flyby', '--duration', '240', '--pacing', 'realtime', *patient)

@@ -338,5 +338,5 @@ def _arguments(process):
 
 def test_the_recording_says_who_moved_the_antenna(station):
     told = station.asked()
-    assert told and {command.who.split()[0] for command in told} <= {'rotctld', 'easycomm'}
+    assert told and {command.who.split()[0] for command in told} <= {'rotctld', 'easycomm', 'hand'}
     assert {'take', 'preset', 'stop', 'stow', 'rate', 'release'} <= {command.verb for command in told}

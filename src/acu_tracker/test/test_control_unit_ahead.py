@@ -72,7 +72,9 @@ def test_through_the_keyhole(Rig, mode, with_program):
     assert f'the deck moves by {math.degrees(0.5 * BEAMWIDTH):.2f} deg rms' in announcement.keyhole(moving, rig.params)
 
 
-@pytest.mark.parametrize('late, moved', [(0.5, 0.0), (-0.5, 0.0), (0.0, 0.004)])
+@pytest.mark.parametrize('late, moved', [
+    pytest.param(0.5, 0.0, marks=pytest.mark.thorough), pytest.param(-0.5, 0.0, marks=pytest.mark.thorough),
+    (0.0, 0.004)])
 def test_the_plan_follows_the_tracked_target_and_not_its_program(Rig, late, moved):
     """The plan is made on a program that is late, or beside the target; autotrack begins after it. The plan before the
     slew is then the plan of a right program, and the measured loss is the announced loss."""

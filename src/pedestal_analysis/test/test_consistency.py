@@ -121,7 +121,7 @@ def test_names_are_those_of_the_models_and_axes():
 
 
 @pytest.mark.parametrize('smoothing', SMOOTHING_KINDS)
-@pytest.mark.parametrize('cn0_dbhz', [42.0, 55.0])
+@pytest.mark.parametrize('cn0_dbhz', [42.0, pytest.param(55.0, marks=pytest.mark.thorough)])
 def test_the_variance_the_control_unit_expects_is_the_receivers(smoothing, cn0_dbhz):
     """A filter averages many errors: what counts is the variance of their mean. A smoothed error itself has less, and
     its neighbours share it; unsmoothed it is that of each."""

@@ -360,6 +360,7 @@ def test_where_it_is_written(tmp_path):
     assert write_report(bare) == tmp_path / 'report.html'
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize('names, drawn, said', [
     (('clock', 'adu/motor_states'), ['torques'], 'no message of joint_states and target/truth'),
     (('joint_states', 'target/truth'), ['pointing', 'azimuth', 'sky'], 'no message of tracking_receiver/angle_error'),

@@ -128,6 +128,7 @@ def test_a_recording_cut_in_time_is_a_part_of_its_run(tmp_path, capsys):
     assert cut['tracked_percent'][0] == 100.0 and cut['autotrack_time_s'][0] == pytest.approx(1.0, abs=0.01)
 
 
+@pytest.mark.thorough
 def test_a_recording_without_a_mode_does_not_state_it(tmp_path, capsys):
     [end] = {bag.read(REFERENCE).end}
     path = copied(tmp_path / 'cut', parts=((end - 0.5, end - 0.1),))

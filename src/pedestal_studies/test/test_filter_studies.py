@@ -206,6 +206,7 @@ def test_window_estimates_follow_a_line_exactly():
         assert rate[:, 400:] == pytest.approx(np.full((2, 500), 0.2), abs=1e-7)
 
 
+@pytest.mark.thorough
 def test_tuned_equally_well_the_wiener_filter_equals_the_kalman_filter():
     values = by_case(filter_families.run(quiet, 4, motions=('flyby-60m',)).rows)
     ratio = {name: values[f'flyby-60m/{name}/own-tuning', 'angle_ratio_to_kalman']

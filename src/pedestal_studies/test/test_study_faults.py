@@ -29,6 +29,7 @@ def test_an_expectation_in_words(expected, mode, sentence):
     assert expected.sentence(mode) == sentence
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize('mode', study.MODE_PARAMETERS)
 def test_without_a_fault_a_mode_is_kept_on_its_place(mode):
     run, reports = study.run_of(mode)
@@ -46,6 +47,7 @@ def test_a_trip_is_seen_in_its_step_with_its_text_and_the_mode_it_ends_in():
     assert found.error < 0.1
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(('heading', 'let_in', 'rel'), ((0.002, 0.002, 0.3), (0.01, 0.005, 0.1)))
 def test_the_error_of_a_heading_fault_is_the_angle_that_is_let_in(heading, let_in, rel):
     """A heading error beyond 3 mrad is let in at 1 mrad/s."""
@@ -54,6 +56,7 @@ def test_the_error_of_a_heading_fault_is_the_angle_that_is_let_in(heading, let_i
     assert found.error == pytest.approx(math.degrees(let_in) * math.cos(study.SLAVE_DIRECTION_RAD[1]), rel=rel)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize('case', (
     'adu.freeze/program', 'adu.drop/autotrack', 'tracking_receiver.freeze/autotrack',
     'tracking_receiver.noise/autotrack',
