@@ -20,7 +20,7 @@ from ikpy.chain import Chain
 from mcap.records import Schema
 from mcap_ros2.decoder import DecoderFactory
 from scipy.spatial.transform import Rotation
-from shared import PEDESTAL, free_port
+from shared import PEDESTAL, begins_with, free_port
 from websockets.sync.client import connect as open_socket
 
 from pedestal_bringup.scenario.program import program_message
@@ -223,7 +223,7 @@ def test_a_viewer_of_its_own_ends_when_told_to(graph, start_process):
     assert (process.returncode, errors) == (0, '') and f'ws://127.0.0.1:{own}' in output
 
 
-def test_the_verbs_of_a_terminal_are_served(graph, run_process, environment):
+def test_the_verbs_of_a_terminal_are_served(graph, run_process, start_process, environment):
     """Each once; test_operating.py has the rest. The antenna is in standby afterwards, as before."""
     run, client, _ = graph
 
@@ -235,7 +235,9 @@ def test_the_verbs_of_a_terminal_are_served(graph, run_process, environment):
     done = verb('mode', 'preset', '--az', '20', '--el', '35', '--who', 'hand')
     assert (done.returncode, done.stdout) == (0, 'acu: mode is preset\n'), done.stderr
     client.until(lambda: client.heard['acu/mode'][-1].data == 'preset')
-    assert verb('program', 'leo_pass').returncode == 0
+    table = start_process([*PEDESTAL, 'program', 'leo_pass'], ROS_DOMAIN_ID=str(run.domain_id))
+    assert 'acu/program_track sent' in begins_with(table, 2)
+    table.send_signal(signal.SIGINT)
     assert verb('mode', 'standby', '--who', 'hand').returncode == 0
     assert verb('ask', 'release', '--who', 'hand').returncode == 0
     screen, theirs = pty.openpty()
