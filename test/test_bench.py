@@ -20,7 +20,7 @@ def test_the_bare_ring_closes(run_process, reserve_domain):
 
 
 def test_rows_of_bags(run_process, reserve_domain, tmp_path):
-    done = run_process([sys.executable, '-c', SHORT], 60.0, ROS_DOMAIN_ID=str(reserve_domain()))
+    done = run_process([sys.executable, '-c', SHORT], 180.0, ROS_DOMAIN_ID=str(reserve_domain()))
     assert done.returncode == 0, done.stderr
     values = {(row['case'], row['metric']): row['value'] for row in json.loads(
         (tmp_path / 'rows.json').read_text())['rows']}
