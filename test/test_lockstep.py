@@ -82,7 +82,6 @@ def test_another_seed_gives_another_file(runs, others):
     assert digest(runs['first']) != digest(others['other_seed'])
 
 
-@pytest.mark.thorough
 def test_rerun_makes_the_same_file_again(runs, run_process, tmp_path):
     done = run_process([*PEDESTAL, 'rerun', runs['first'].bag, '--bag', tmp_path / 'again'], 90.0)
     assert (done.returncode, done.stderr) == (0, '')

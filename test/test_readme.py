@@ -65,6 +65,7 @@ def test_nothing_is_excepted_that_is_not_there():
         assert any(line.startswith(head) for line in README), head
 
 
+@pytest.mark.thorough
 def test_readme_runs_in_its_own_order(reserve_domain, tmp_path, capsys):
     """One shell, one empty folder: what a line leaves the next one finds."""
     (tmp_path / '.venv' / 'bin').mkdir(parents=True)

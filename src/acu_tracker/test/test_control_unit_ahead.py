@@ -41,7 +41,8 @@ def pointing_errors(rig, seconds, visible=lambda deck: True):
     return np.array(rows)
 
 
-@pytest.mark.parametrize('mode, with_program', [('program', True), ('autotrack', False)])
+@pytest.mark.parametrize('mode, with_program', [
+    ('program', True), pytest.param('autotrack', False, marks=pytest.mark.thorough)])
 def test_through_the_keyhole(Rig, mode, with_program):
     """10 deg/s where following takes 25: the loss is what was announced, and the target is met again."""
     rig = Rig(overhead(math.radians(88.0)), at=overhead(math.radians(88.0))(0.0), initial_mode='program', sigma=2e-4,
@@ -108,6 +109,7 @@ def test_the_plan_follows_the_tracked_target_and_not_its_program(Rig, late, move
     assert lost == pytest.approx(plan['loss'], abs=0.2)
 
 
+@pytest.mark.thorough
 def test_a_cancelled_slew_is_announced(Rig):
     """A program through the zenith plans a slew; the tracked target stays low enough for the azimuth."""
     rig = Rig(overhead(math.radians(84.6)), at=overhead(math.radians(84.6))(0.0), initial_mode='program', sigma=2e-5,
@@ -135,6 +137,7 @@ def slewing(Rig, **parameters):
     return rig
 
 
+@pytest.mark.thorough
 def test_a_slew_that_is_ended_leaves_no_error_unbelieved(Rig):
     rig = slewing(Rig)
     assert rig.mode == 'program' and np.isnan(rig.step()['innovation']).all()
@@ -144,6 +147,7 @@ def test_a_slew_that_is_ended_leaves_no_error_unbelieved(Rig):
     assert rig.mode == 'standby' and np.isfinite(rig.step()['innovation']).all()
 
 
+@pytest.mark.thorough
 def test_another_program_ends_what_was_planned_for_the_last(Rig):
     rig = slewing(Rig)
     A = rig.angle[0] - 0.5
