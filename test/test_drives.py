@@ -269,6 +269,7 @@ def test_simulated_drives_have_a_bus_of_this_machine(change, message):
         scenario.load('leo_pass', ['scenario.drives=simulated', f'adu.{change}'], pacing='realtime')
 
 
+@pytest.mark.thorough
 def test_pedestal_simulate_drives_serves_a_bus(start_process):
     port = free_port()
     process = start_process([*PEDESTAL, 'simulate', 'drives', '--port', port])

@@ -61,6 +61,7 @@ def test_own_elements_end_the_prediction_errors_of_the_scenario_but_no_given_one
                      'of geo_station' for axis, value in (('azimuth', '0.003'), ('elevation', '-0.002'))]
 
 
+@pytest.mark.thorough
 def test_a_pass_is_tracked_until_it_sets():
     """From the second in which it rises; the receiver locks as soon as the satellite is near enough."""
     pass_of = satellite.PassSelection(scenario.draft('leo_pass'), NOW)

@@ -82,8 +82,8 @@ def distance(client, azimuth, elevation):
     return float(np.max(np.abs(np.degrees(client.heard['joint_states'][-1].position) - (azimuth, elevation))))
 
 
-@pytest.mark.parametrize('device', ('rotctld', *(pytest.param(protocol, marks=pytest.mark.thorough) for protocol in (
-    'gs232', 'easycomm', 'rot2prog'))), indirect=True)
+@pytest.mark.parametrize('device', ('gs232', *(pytest.param(protocol, marks=pytest.mark.thorough) for protocol in (
+    'rotctld', 'easycomm', 'rot2prog'))), indirect=True)
 def test_a_rotator_goes_where_a_preset_says(station):
     """The mode stays, and no alarm takes the motion of a rotator for uncommanded motion."""
     client, _, step = station

@@ -74,6 +74,7 @@ def test_thresholds(state):
     assert level.thresholds(state) == (16.0, 17.0, 15.0)
 
 
+@pytest.mark.thorough
 def test_noise_alone_is_no_target_for_an_hour(state):
     learnt(state, noise(2.1))
     seen = feed(state, noise(3600.0, 3))
