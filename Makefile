@@ -29,7 +29,7 @@ REALTIME := test/test_live.py test/test_rotctld.py test/test_page.py test/test_o
 # Tests of laws, which lie beside their packages and start no graph. That of the compiler starts processes by the
 # dozen, and compiles.
 LAWS := $(foreach package,ship_motion_sim tracking_receiver_sim acu_tracker adu_drive pedestal_common,src/$(package)) \
-	--ignore src/pedestal_common/test/test_compiled.py
+	$(patsubst %,--ignore src/pedestal_common/test/test_%.py,compiled law_cache law_orders)
 # The files in the order of pyproject.toml, where those of graphs come first: a file of few tests, each a graph, would
 # else be the last, and one core idle.
 IN_TURN := --dist loadfile --no-loadscope-reorder

@@ -39,7 +39,7 @@ class Outcomes:
         self.collected: list[str] = []
         self.options: list[str] = []
         self.root = pathlib.Path()
-        self._crashed = False
+        self.crashed = False
 
     def pytest_configure(self, config: pytest.Config) -> None:
         """Note the arguments and the folder."""
@@ -52,6 +52,10 @@ class Outcomes:
         """Note the tests, of which each worker has the same."""
         self.collected = ids
 
+    def pytest_collection_finish(self, session: pytest.Session) -> None:
+        """Note the tests of a session without workers."""
+        self.collected = [item.nodeid for item in session.items] or self.collected
+
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         """Note a phase of a test. xdist reports a crash of a worker as a failure without a phase."""
         # xdist adds the name of the worker to a report without a failure.
@@ -60,7 +64,7 @@ class Outcomes:
             self.unjudged.append(report.nodeid)
         output = '\n'.join([failure, *(f'{title}:\n{text}' for title, text in report.sections)])
         self.reports.setdefault(report.nodeid, []).append((report.when, report.outcome, output.strip()))
-        self._crashed |= report.when == '???'
+        self.crashed |= report.when == '???'
 
     def pytest_collectreport(self, report: pytest.CollectReport) -> None:
         """Note a file that cannot be imported as if it was a test."""
@@ -72,8 +76,8 @@ class Outcomes:
         return [test for test, phases in self.reports.items() if any(phase[1] == 'failed' for phase in phases)]
 
     def missing(self) -> list[str]:
-        """Return the tests that the run did not reach because of a crash."""
-        return [test for test in self.collected if test not in self.reports] if self._crashed else []
+        """Return the tests that the run did not reach, because of a crash or of an option such as -x."""
+        return [test for test in self.collected if test not in self.reports]
 
 
 def _text(phases: list[tuple[str, str, str]]) -> str:
@@ -89,16 +93,18 @@ def _first(arguments: list[str]) -> int:
     code = pytest.main(arguments, [outcomes])
     failed, unjudged = outcomes.failed(), outcomes.unjudged
     repeated = [*failed, *(test for test in unjudged if test not in failed)]
+    missing = outcomes.missing()
     if code not in (pytest.ExitCode.OK, pytest.ExitCode.TESTS_FAILED) or not repeated:
         return int(code)
+    if missing and not outcomes.crashed:
+        return int(code) or int(pytest.ExitCode.TESTS_FAILED)
     with tempfile.NamedTemporaryFile('w', prefix='first-run-', suffix='.json', delete=False) as file:
-        json.dump({test: outcomes.reports[test] for test in repeated}, file)
-    missing = outcomes.missing()
+        json.dump({test: outcomes.reports.get(test, []) for test in (*repeated, *missing)}, file)
     print(f'\n{len(failed)} failed, {len(unjudged)} not judged, {len(missing)} not reached: these tests run once '
           'more, alone', flush=True)
     # No process is left that waits: a signal to this process ends the second run.
     os.execv(sys.executable, [sys.executable, __file__, AGAIN, file.name, *outcomes.options, *ALONE,
-                              *(str(outcomes.root / test) for test in (*repeated, *missing))])
+                              *(f'{outcomes.root}/{test}' for test in (*repeated, *missing))])
 
 
 def _second(path: str, arguments: list[str]) -> int:
@@ -116,7 +122,12 @@ def _second(path: str, arguments: list[str]) -> int:
         elif test in unjudged and any(phase[1] == 'failed' for phase in phases):
             print(f'failed beside other tests, and not judged alone: {test}')
             code = code or int(pytest.ExitCode.TESTS_FAILED)
-        elif test not in failed and test not in unjudged:
+        elif test in failed or test in unjudged:
+            pass
+        elif not any(when == 'call' and outcome == 'passed' for when, outcome, _ in outcomes.reports[test]):
+            print(f'failed beside other tests, and did not run alone: {test}')
+            code = code or int(pytest.ExitCode.TESTS_FAILED)
+        elif phases:
             print(f'\nunsteady: {test}\n--- beside other tests\n{_text(phases)}\n--- alone\n'
                   f'{_text(outcomes.reports[test])}', flush=True)
     return code

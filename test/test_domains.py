@@ -7,7 +7,8 @@ import sys
 import domains
 import pytest
 
-HOLDS = 'import sys, time; import domains; print(domains.hold(int(sys.argv[1])), flush=True); time.sleep(600)'
+HOLDS = ('import sys, time; import domains; lock = domains.hold(int(sys.argv[1])); '
+         'print(lock, flush=True); time.sleep(600)')
 
 
 @pytest.fixture

@@ -145,3 +145,21 @@ def test_a_second_run_without_the_test_is_no_success(run):
     content = 'import pytest\n@pytest.mark.parametrize("x", [times("name")])\ndef test_a(x): assert False\n'
     done = run({'test_a.py': content}, '-n0')
     assert done.returncode != 0, done.stdout
+
+
+def test_a_run_that_stops_at_a_failure_is_red_even_if_the_failure_is_unsteady(run):
+    done = run({'test_a.py': UNSTEADY, 'test_b.py': FAILS}, '-x', '--numprocesses', '0')
+    assert done.returncode == 1 and 'alone' not in done.stdout, done.stdout
+
+
+def test_a_test_that_is_skipped_alone_has_not_passed(run):
+    skips = 'import pytest\ndef test_skips():\n    if times("skips") == 1: assert False\n    pytest.skip("alone")\n'
+    done = run({'test_a.py': skips})
+    assert done.returncode == 1 and 'did not run alone: test_a.py::test_skips' in done.stdout, done.stdout
+
+
+def test_a_name_of_a_test_may_contain_slashes(run):
+    unsteady = ('import pytest\n@pytest.mark.parametrize("url", ["http://a//b"])\ndef test_url(url):\n'
+                '    assert times("url") > 1\n')
+    done = run({'test_a.py': unsteady})
+    assert done.returncode == 0 and 'unsteady: test_a.py::test_url[http://a//b]' in done.stdout, done.stdout

@@ -152,6 +152,24 @@ def _symbol(name: str, types: tuple, *, abi_tags: tuple = (), uid: int | None = 
     return default_mangler(name, (), uid=uid)
 
 
+def _named(module: str, name: str) -> Any:
+    """Return what has a qualified name in a module; None if there is none."""
+    try:
+        return functools.reduce(getattr, name.split('.'), importlib.import_module(module))
+    except (ImportError, AttributeError):
+        return None
+
+
+def _has_names(kind: Any) -> bool:
+    """Return True if another process finds the classes of a numba type by their names.
+
+    The class of a named tuple that has no name in its module would be another one after it is loaded.
+    """
+    of = getattr(kind, 'instance_class', None)
+    members: Any = kind if isinstance(kind, types.BaseTuple) else ()
+    return (of is None or _named(of.__module__, of.__qualname__) is of) and all(map(_has_names, members))
+
+
 class _Call(NamedTuple):
     """A call of a law: what another process needs to find the called law again."""
     module: str
@@ -163,20 +181,26 @@ class _Call(NamedTuple):
     @property
     def law(self) -> 'Law | None':
         """Called law; None if this process has another law, or none, under its name."""
-        try:
-            law = functools.reduce(getattr, self.name.split('.'), importlib.import_module(self.module))
-        except (ImportError, AttributeError):
-            return None
+        law = _named(self.module, self.name)
         return law if isinstance(law, Law) and self.key == ('' if law.separate else law.key) else None
 
 
 def _calls(translations: list[_Translation]) -> list[_Call] | None:
-    """Return the calls of the laws with these translations; None if another process cannot find one of these laws by
-    its name, such as a law that is made inside a function."""
+    """Return the calls of the laws with these translations; None if another process cannot find one of these laws, or
+    of its types, by its name. A law that is made inside a function has none."""
     calls = [_Call(part.law.py_func.__module__, part.law.py_func.__qualname__,
                    '' if part.law.separate else part.law.key, part.args,
                    part.law.translation(part.args).signature.return_type) for part in translations]
-    return calls if all(call.law is part.law for call, part in zip(calls, translations)) else None
+    return calls if all(call.law is part.law and part.law.goes_by_name == part.law.separate
+                        and all(map(_has_names, (*call.args, call.returns)))
+                        for call, part in zip(calls, translations)) else None
+
+
+def _can_be_kept(law: 'Law', made: Any) -> bool:
+    """Return True if another process can use a CompileResult of a law, whose values are still those of its key."""
+    signature = made.signature
+    return (not made.library.has_dynamic_globals and all(map(_has_names, (*signature.args, signature.return_type)))
+            and law_key.of_law(law) == law.key)
 
 
 class _KeptTranslation(NamedTuple):
@@ -207,6 +231,10 @@ def _law_constant(context, builder, law_type, law):
     return context.get_dummy_value()
 
 
+_SEPARATE: dict[str, 'Law'] = {}
+"""Separate laws of this process by their names, which stand in the machine code of their callers."""
+
+
 class Law(NumbaDispatcher):
     """Compiled law: a numba dispatcher, which translates the law once for each set of argument types (overload).
 
@@ -221,6 +249,8 @@ class Law(NumbaDispatcher):
         self.typingctx._globals.pop(weakref.ref(self))     # remove the type that numba gave to the law
         self.typingctx.insert_global(self, self._type)
         self._translated: dict[tuple, Any] = {}
+        # Of two laws of one name, as after a reload of a module, only the first one goes by the name.
+        self.goes_by_name = separate and '<' not in self._name and _SEPARATE.setdefault(self._name, self) is self
 
     @property
     def _numba_type_(self) -> types.Type:
@@ -240,7 +270,7 @@ class Law(NumbaDispatcher):
 
         The symbol of a separate law outlives a change of the law, because the machine code of its callers contains it.
         """
-        stands_for = self._name if self.separate and '<' not in self._name else self.key
+        stands_for = self._name if self.goes_by_name else self.key
         return law_key.digest((stands_for, law_key.of_types(args)))
 
     def is_cached(self, *values: Any) -> bool:
@@ -303,7 +333,7 @@ class Law(NumbaDispatcher):
             if made is None:
                 made = self._translate(args)
                 calls = _calls(made.library.calls)
-                if calls is not None and not made.library.has_dynamic_globals:
+                if calls is not None and _can_be_kept(self, made):
                     made.fndesc.typemap = made.fndesc.calltypes = None
                     law_cache.save(path, _KeptTranslation(made.library.code.as_bitcode(), calls, made.fndesc,
                                                           made.environment, made.signature))
@@ -366,7 +396,7 @@ class Law(NumbaDispatcher):
         for referenced in made._find_referenced_environments():
             library.codegen.set_env(referenced.env_name, referenced)
         calls = _calls(separate)
-        if calls is not None and not library.has_dynamic_globals:
+        if calls is not None and _can_be_kept(self, made):
             law_cache.save(path, _KeptExecutable(calls, made._reduce()))
         return made
 
@@ -412,8 +442,7 @@ def by_type(function: Callable, law_of: Callable) -> None:
     law_of(type of the first argument) returns the Law, or None if the call does nothing. Numba's own function
     `overload` is not used, because it would make an executable of each of these laws.
     """
-    law_key.template(function, *(cell.cell_contents for cell in law_of.__closure__ or ()), *(
-        law_of.__globals__[name] for name in law_of.__code__.co_names if name in law_of.__globals__))
+    law_key.template(function, law_of)
 
     @type_callable(function)
     def type_call(context):

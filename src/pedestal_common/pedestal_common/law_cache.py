@@ -11,7 +11,7 @@ import hashlib
 import os
 import pathlib
 import pickle
-import shutil
+import re
 import sys
 import tempfile
 import time
@@ -42,6 +42,10 @@ if not _ROOT.is_absolute():
     _ROOT = pathlib.Path(tempfile.gettempdir()) / f'pedestal-{os.getuid()}'
 
 
+_OWN_NAME = re.compile(r'.+-[0-9a-f]{32}(\.lock)?|\.law-.+')
+"""Names of the files that this module makes; nothing else in the folder is deleted."""
+
+
 @functools.cache
 def _machine() -> str:
     """Return a text that identifies what compiles: Python, libraries and processor."""
@@ -65,8 +69,9 @@ def load(path: pathlib.Path) -> Any:
     with contextlib.suppress(OSError):
         data = path.read_bytes()
         if data[:DIGEST_BYTES] == _seal(path, data[DIGEST_BYTES:]):
-            if time.time() - path.stat().st_mtime > TOUCH_PERIOD_S:
-                os.utime(path)
+            with contextlib.suppress(OSError):      # a folder that another user owns
+                if time.time() - path.stat().st_mtime > TOUCH_PERIOD_S:
+                    os.utime(path)
             # The digest guards against damage. The folder belongs to the user, as the program does.
             with contextlib.suppress(Exception):    # of a class that no longer exists
                 return pickle.loads(data[DIGEST_BYTES:])
@@ -78,7 +83,7 @@ def save(path: pathlib.Path, content: Any) -> None:
     data = dumps(content)
     try:
         _ROOT.mkdir(mode=0o700, parents=True, exist_ok=True)
-        with tempfile.NamedTemporaryFile(dir=_ROOT, prefix='.', delete=False) as written:
+        with tempfile.NamedTemporaryFile(dir=_ROOT, prefix='.law-', delete=False) as written:
             try:
                 written.write(_seal(path, data) + data)
                 written.flush()
@@ -103,21 +108,21 @@ def _remove_old_files() -> None:
     """Delete the files that were not used for MAX_CACHE_AGE_DAYS, once in a process that saves."""
     for path in _ROOT.iterdir():
         with contextlib.suppress(OSError):
-            if time.time() - path.stat().st_mtime > MAX_CACHE_AGE_DAYS * 86400:
-                shutil.rmtree(path) if path.is_dir() else path.unlink()
+            if _OWN_NAME.fullmatch(path.name) and time.time() - path.stat().st_mtime > MAX_CACHE_AGE_DAYS * 86400:
+                path.unlink()
 
 
 @contextlib.contextmanager
 def lock(path: pathlib.Path) -> Iterator[None]:
     """Hold the lock of a file of the cache, as a context; other processes wait. Without a folder there is no lock."""
     name = path.with_name(f'{path.name}.lock')
-    try:
-        _ROOT.mkdir(mode=0o700, parents=True, exist_ok=True)
-        held = name.open('w')
-    except OSError:
+    with contextlib.ExitStack() as stack:
+        with contextlib.suppress(OSError):      # some file systems have no locks
+            _ROOT.mkdir(mode=0o700, parents=True, exist_ok=True)
+            held = stack.enter_context(name.open('w'))
+            fcntl.flock(held, fcntl.LOCK_EX)
+            # A copy of this process made by fork would keep the lock. A process that waits for the deleted file finds
+            # the law when it gets the lock.
+            stack.callback(fcntl.flock, held, fcntl.LOCK_UN)
+            stack.callback(name.unlink, missing_ok=True)
         yield
-        return
-    with held:
-        fcntl.flock(held, fcntl.LOCK_EX)
-        yield
-        name.unlink(missing_ok=True)    # a process that waits for the deleted file finds the law when it gets the lock

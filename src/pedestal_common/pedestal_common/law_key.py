@@ -22,6 +22,9 @@ FOREIGN_PACKAGES = frozenset({*sys.stdlib_module_names, 'numpy', 'numba', 'llvml
 """Packages whose code does not change between two releases of Python and of the libraries; the cache knows these. A
 function that is made from a text names `builtins` as its module."""
 
+_PLAIN = bool, int, float, complex, str, bytes, type(None), np.generic, np.dtype, np.ndarray, enum.Enum
+"""Classes of values that need no other value to be described."""
+
 
 def digest(parts: Iterable[str]) -> str:
     """Return a digest of texts, 32 hexadecimal digits."""
@@ -44,7 +47,7 @@ def of_law(law: Any, whole: bool = False) -> str:
         if part not in found:
             text, called = _of_function(part.py_func)
             found[part] = f'{_name(part.py_func)} {part.targetoptions} {text}'
-            todo += [other for other in called if whole or not other.separate]
+            todo += [other for other in called if whole or not other.goes_by_name]
     return digest(sorted(found.values()))
 
 
@@ -56,7 +59,7 @@ def of_types(args: tuple) -> str:
 def template(function: Callable, *values: Any) -> None:
     """Mark a function that numba's `overload` or `type_callable` in its module lets laws call.
 
-    values: what chooses or makes the compiled code, in addition to the code of this module.
+    values: what chooses or makes the compiled code, in addition to the module of the function.
     """
     function.template_values = values       # type: ignore[attr-defined]
 
@@ -66,6 +69,8 @@ def _of_type(kind: Any) -> str:
     if isinstance(kind, numba_types.BaseTuple):
         members: Any = kind
         parts += [_of_type(member) for member in members]
+    parts += [_of_type(part) for name in ('dtype', 'type', 'key_type', 'value_type')
+              if isinstance(part := getattr(kind, name, None), numba_types.Type) and part is not kind]
     if hasattr(kind, 'instance_class'):
         parts.append(_of_class(kind.instance_class))
     if isinstance(kind, numba_types.Dispatcher):
@@ -113,18 +118,22 @@ def _of_function(function: types.FunctionType) -> tuple[str, set]:
 
 
 def of_module(module: types.ModuleType) -> str:
-    """Return the text of the code of all functions and methods of a module, without its laws."""
-    found = {}
+    """Return the text of a module: the code of all its functions and methods, and its plain values; no laws."""
+    found: list[str] = []
 
     def add(things: Iterable) -> None:
         for thing in things:
+            thing = getattr(thing, 'fget', getattr(thing, 'func', thing))       # of a property
             thing = thing if hasattr(thing, 'py_func') else getattr(thing, '__wrapped__', thing)
             if isinstance(thing, types.FunctionType):
-                found[thing.__qualname__] = _of_code(thing.__code__, thing.__doc__)
+                found.append(f'{thing.__qualname__} {_of_code(thing.__code__, thing.__doc__)} {thing.__defaults__!r}')
             elif isinstance(thing, type) and thing.__module__ == module.__name__:
                 add(vars(thing).values())
     add(list(vars(module).values()))
-    return digest(f'{name} {text}' for name, text in sorted(found.items()))
+    plain = _Values(set(), set())
+    found += [f'{name}={plain.text(value)}' for name, value in vars(module).items()
+              if not name.startswith('__') and isinstance(value, _PLAIN)]
+    return digest(sorted(found))
 
 
 def _of_class(kind: type) -> str:
@@ -155,7 +164,12 @@ class _Values:
         kind = type(value).__name__
         if hasattr(value, 'separate') and hasattr(value, 'py_func'):
             self._laws.add(value)
-            return f'law {_name(value.py_func)} {value.py_func.__code__.co_varnames} {value.py_func.__defaults__}'
+            code = value.py_func.__code__
+            names = code.co_varnames[:code.co_argcount + code.co_kwonlyargcount]
+            return (f'law {_name(value.py_func)} {names} {code.co_argcount} {code.co_flags & 0xc} '
+                    f'{value.py_func.__defaults__}')
+        if isinstance(value, enum.Enum):
+            return f'{_of_class(type(value))} {value.name}'
         if isinstance(value, types.ModuleType):
             return self._of_module(value)
         if isinstance(value, type):
@@ -168,13 +182,18 @@ class _Values:
             return f'{_of_class(type(value))} {[self.text(item) for item in value]}'
         if isinstance(value, numba_types.Type):
             return _of_type(value)
-        if isinstance(value, (bool, int, float, complex, str, bytes, type(None), np.generic, np.dtype)):
+        if isinstance(value, np.void):
+            return f'{value.dtype!r} {value.tobytes().hex()}'
+        if isinstance(value, _PLAIN):
             return f'{kind} {value!r}'
         if hasattr(value, 'template_values'):
-            return ' '.join((of_module(sys.modules[value.__module__]), self._of_code(value),
-                             self.text(value.template_values)))
+            return ' '.join((of_module(sys.modules[value.__module__]), self._of_code(value), *(
+                self._of_code(part) if isinstance(part, types.FunctionType) else self.text(part)
+                for part in value.template_values)))
         if isinstance(value, types.FunctionType):
             return kind     # numba does not compile it
+        if hasattr(value, 'py_func') and not _is_foreign(value.__module__):         # numba's own njit
+            return self._of_code(value.py_func)
         if hasattr(value, '__wrapped__') and not _is_foreign(value.__module__):     # an intrinsic of numba
             return f'{of_module(sys.modules[value.__module__])} {self._of_code(value.__wrapped__)}'
         return kind
@@ -187,6 +206,9 @@ class _Values:
         return f'{module.__name__} {[(name, self.text(found[name])) for name in sorted(self._names & found.keys())]}'
 
     def _of_code(self, function: types.FunctionType) -> str:
-        """Return the text of a function that a template of numba compiles, with the values that it encloses."""
-        cells = [cell.cell_contents for cell in function.__closure__ or ()]
-        return f'{_of_code(function.__code__, function.__doc__)} {[self.text(cell) for cell in cells]}'
+        """Return the text of a function that numba compiles or calls, with the values that it names and encloses."""
+        inside = _Values(_names(function.__code__), self._laws)
+        inside._open = self._open
+        values = [function.__defaults__, *(cell.cell_contents for cell in function.__closure__ or ()),
+                  *(function.__globals__[name] for name in sorted(inside._names) if name in function.__globals__)]
+        return f'{_of_code(function.__code__, function.__doc__)} {[inside.text(value) for value in values]}'

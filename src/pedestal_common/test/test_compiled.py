@@ -230,6 +230,41 @@ def test_an_edit_of_a_separate_law_compiles_that_law_only(tmp_path):
     assert [said(), said()] == ['(1+6j) called law', '(1+6j)']
 
 
+NAMELESS = """
+import collections
+import typing
+from pedestal_common.compiled import compiled
+
+pair = collections.namedtuple('Pair', 'first second')(2.0, 3.0)
+
+class Known(typing.NamedTuple):
+    value: float
+
+@compiled
+def law(of, x):
+    return of.first * x + of.second
+
+@compiled
+def caller(of, known):
+    return law(of, known.value)
+
+@compiled
+def same(of, x):
+    return of
+"""
+
+
+def test_a_named_tuple_without_a_name_in_its_module_is_no_other_in_the_next_process(tmp_path):
+    """Pickle would make another class of it."""
+    (tmp_path / 'nameless.py').write_text(NAMELESS)
+    code = ('from nameless import *; print(law(pair, 2.0), caller(pair, Known(1.0)), same(Known(1.0), 1), '
+            'type(same(pair, 1)) is type(pair))')
+    for _ in range(3):
+        done = subprocess.run([sys.executable, '-c', code], capture_output=True, text=True, timeout=120.0,
+                              env=environment(tmp_path, tmp_path / 'cache'))
+        assert (done.stdout, done.stderr) == ('7.0 5.0 Known(value=1.0) True\n', '')
+
+
 def test_a_unit_is_compiled_if_its_separate_laws_are(tmp_path, monkeypatch):
     monkeypatch.setattr(law_cache, '_ROOT', tmp_path)
     assert not around.is_cached(2.0)
