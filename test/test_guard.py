@@ -86,6 +86,7 @@ def _gone(processes):
     return all(_start(pid) != start for pid, start in processes.items())
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize('options', [(), ('--numprocesses', '1')], ids=['alone', 'xdist'])
 @pytest.mark.parametrize('number', [signal.SIGKILL, signal.SIGINT], ids=['killed', 'interrupted'])
 def test_a_session_that_is_ended_leaves_no_process(begin, tmp_path, number, options):
@@ -108,6 +109,7 @@ def test_a_killed_session_leaves_no_node(begin, tmp_path):
     assert _until(lambda: _gone(left))
 
 
+@pytest.mark.thorough
 def test_what_is_left_at_an_ordinary_end_is_killed_and_named(begin):
     session = begin(SLEEPS.format(ending='pass'), '--numprocesses', '1')
     said, _ = session.communicate(timeout=PATIENCE)
@@ -117,11 +119,13 @@ def test_what_is_left_at_an_ordinary_end_is_killed_and_named(begin):
     assert _start(named[1]) is _start(named[3]) is None
 
 
+@pytest.mark.thorough
 def test_a_session_that_leaves_no_process_names_none(begin):
     said, _ = begin('import subprocess\ndef test(): subprocess.run(["sleep", "0.1"])').communicate(timeout=PATIENCE)
     assert '1 passed' in said and 'left behind' not in said
 
 
+@pytest.mark.thorough
 def test_the_guard_of_an_inner_session_outlives_the_outer_one(begin, tmp_path):
     """The outer guard kills the inner session, which then cannot end its own processes."""
     inner = """

@@ -44,6 +44,7 @@ UNSTEADY = 'def test_first():\n    print("the load is", times("unsteady"))\n    
 CRASHES = 'def test_crashes():\n    if times("crashes") <= {}: os._exit(3)\n'
 
 
+@pytest.mark.thorough
 def test_a_run_without_failure_is_not_repeated(run):
     done = run({'test_a.py': PASSES, 'test_b.py': PASSES.replace('"passes"', '"other"')})
     assert done.returncode == 0 and done.stdout.count('2 passed') == 1 and 'alone' not in done.stdout, done.stdout
@@ -58,6 +59,7 @@ def test_an_unsteady_test_is_named_with_both_outputs_and_one_that_fails_twice_fa
     assert '2 failed, 0 not judged, 0 not reached: these tests run once more, alone' in done.stdout
 
 
+@pytest.mark.thorough
 def test_only_named_files_and_what_failed_in_them_run(run):
     """An option with a value is no file."""
     files = {'test_a.py': FAILS + PASSES, 'test_b.py': PASSES, 'test_c.py': FAILS}
@@ -65,6 +67,7 @@ def test_only_named_files_and_what_failed_in_them_run(run):
     assert done.returncode == 1 and done.stdout.count('= 1 failed in') == 2, done.stdout
 
 
+@pytest.mark.thorough
 def test_a_failed_set_up_and_tear_down_run_once_more(run):
     content = """
 import pytest
@@ -86,6 +89,7 @@ def test_after(after): pass
     assert '[teardown: failed]' in done.stdout
 
 
+@pytest.mark.thorough
 def test_a_parameter_may_hold_any_text(run):
     content = 'import pytest\n@pytest.mark.parametrize("x", ["a::b", "[/c d]"])\n' + (
         'def test_a(x): assert times(str(ord(x[0]))) > 1\n')
@@ -104,6 +108,7 @@ def test_{0}():
 """
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize('first, second, code, said', [
     ('skip', 'pass', 0, 'unsteady: test_a.py::test_a\n'),
     ('skip', 'skip', 0, 'not judged: test_a.py::test_a: 7 steps lost\n'),
@@ -124,22 +129,26 @@ def test_a_crash_costs_no_other_test(run, restarts, not_reached):
     assert 'unsteady: test_a.py::test_passes' not in done.stdout
 
 
+@pytest.mark.thorough
 def test_a_test_that_always_crashes_fails_and_the_others_run(run, tmp_path):
     done = run({'test_a.py': PASSES + CRASHES.format(99) + UNSTEADY + FAILS}, '--max-worker-restart', '3')
     assert done.returncode == 1 and 'unsteady: test_a.py::test_first' in done.stdout, done.stdout
     assert len((tmp_path / 'crashes').read_text()) == 2 and len((tmp_path / 'fails').read_text()) == 2
 
 
+@pytest.mark.thorough
 def test_a_file_that_cannot_be_imported_fails(run):
     done = run({'test_a.py': 'import no_such_module\n', 'test_b.py': PASSES})
     assert done.returncode not in (0, 5) and 'no_such_module' in done.stdout, done.stdout
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize('options, code', [(('-k', 'nothing'), 5), (('--no-such-option',), 4)])
 def test_the_exit_code_without_a_failure_is_that_of_the_first_run(run, options, code):
     assert run({'test_a.py': PASSES}, *options).returncode == code
 
 
+@pytest.mark.thorough
 def test_a_second_run_without_the_test_is_no_success(run):
     """As of a test whose name changes from run to run."""
     content = 'import pytest\n@pytest.mark.parametrize("x", [times("name")])\ndef test_a(x): assert False\n'
@@ -152,12 +161,14 @@ def test_a_run_that_stops_at_a_failure_is_red_even_if_the_failure_is_unsteady(ru
     assert done.returncode == 1 and 'alone' not in done.stdout, done.stdout
 
 
+@pytest.mark.thorough
 def test_a_test_that_is_skipped_alone_has_not_passed(run):
     skips = 'import pytest\ndef test_skips():\n    if times("skips") == 1: assert False\n    pytest.skip("alone")\n'
     done = run({'test_a.py': skips})
     assert done.returncode == 1 and 'did not run alone: test_a.py::test_skips' in done.stdout, done.stdout
 
 
+@pytest.mark.thorough
 def test_a_name_of_a_test_may_contain_slashes(run):
     unsteady = ('import pytest\n@pytest.mark.parametrize("url", ["http://a//b"])\ndef test_url(url):\n'
                 '    assert times("url") > 1\n')

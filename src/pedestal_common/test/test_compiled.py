@@ -72,6 +72,7 @@ def test_what_is_in_the_cache_is_loaded_without_what_compiles(tmp_path):
         assert (done.stdout, done.stderr) == (said, '')
 
 
+@pytest.mark.thorough
 def test_a_checkout_finds_what_another_of_the_same_sources_compiled(folder):
     """Of the same but for docstrings and comments, and not what was compiled of others."""
     law = folder / 'one_law' / 'law.py'
@@ -97,6 +98,7 @@ def test_a_law_has_the_key_of_the_source_that_was_read(folder):
     assert [said(), said()] == ['1.0\n', '2.0\n']
 
 
+@pytest.mark.thorough
 def test_laws_saved_at_once_are_all_kept(folder):
     """Of one law for several types."""
     types = [(name,) for name in TYPES]
@@ -121,6 +123,7 @@ def total(x, i, n):
 """
 
 
+@pytest.mark.thorough
 def test_laws_translated_by_different_processes_keep_their_own_functions_of_numba(folder):
     """Numba gives its powers of floats and of integers the same symbol if each is the first in its process."""
     (folder / 'one_law' / 'powers.py').write_text(POWERS)
@@ -187,6 +190,7 @@ if __name__ == '__main__':
 """
 
 
+@pytest.mark.thorough
 def test_a_law_finds_what_another_process_translated_of_it(tmp_path):
     package = tmp_path / 'two_laws'
     package.mkdir()

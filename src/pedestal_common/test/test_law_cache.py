@@ -86,7 +86,9 @@ def folder(path: pathlib.Path) -> None:
     path.mkdir()
 
 
-@pytest.mark.parametrize('change', (truncated, empty, damaged, foreign, of_another_class, of_no_class, folder))
+@pytest.mark.parametrize('change', (truncated, foreign, *(
+    pytest.param(change, marks=pytest.mark.thorough)
+    for change in (empty, damaged, of_another_class, of_no_class, folder))))
 def test_a_bad_file_is_compiled_anew(cache, change):
     for path in files(cache):
         change(path)
@@ -122,6 +124,7 @@ def test_a_full_disk_costs_one_line_and_leaves_no_part_of_a_file(cache):
     assert [path.stat().st_size for path in (cache / 'pedestal').iterdir() if path.suffix != '.lock'] == []
 
 
+@pytest.mark.thorough
 def test_files_that_nobody_used_for_a_month_are_removed(cache):
     old = files(cache)[0]
     os.utime(old, (0, 0))
@@ -134,6 +137,7 @@ def test_files_that_nobody_used_for_a_month_are_removed(cache):
     assert other.name in left and old.name not in left
 
 
+@pytest.mark.thorough
 def test_the_use_of_a_file_keeps_it(cache):
     path = next(path for path in files(cache) if '.law-' in path.name)
     os.utime(path, (0, 0))
