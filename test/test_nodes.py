@@ -55,7 +55,7 @@ def test_a_node_that_compiles_ends_at_once(start_process, reserve_domain, tmp_pa
     process = start_process([sys.executable, '-m', 'acu_tracker.acu_node'], XDG_CACHE_HOME=str(tmp_path / 'cache'),
                             NUMBA_CACHE_DIR=None, ROS_DOMAIN_ID=str(reserve_domain()))
     deadline = time.monotonic() + 60.0
-    while not any((tmp_path / 'cache').rglob('*.nbi')):
+    while not any((tmp_path / 'cache').rglob('acu_tracker.*')):
         assert process.poll() is None, process.communicate()
         assert time.monotonic() < deadline, 'it compiles nothing'
         time.sleep(0.1)
