@@ -55,11 +55,11 @@ demo: .venv/installed
 
 quick: install
 	$(LINT)
-	$(LIMITED) 300 $(PYTEST_IN_TURN) -m 'not thorough' --numprocesses 2 $(LAWS)
+	$(LIMITED) 900 $(PYTEST_IN_TURN) -m 'not thorough' --numprocesses 2 $(LAWS)
 
 test: install
 	$(LINT)
-	$(LIMITED) 1200 $(PYTEST_IN_TURN) -m 'not thorough' --numprocesses 2
+	$(LIMITED) 1800 $(PYTEST_IN_TURN) -m 'not thorough' --numprocesses 2
 
 test-rest: install
 	$(LIMITED) 2400 $(PYTEST_IN_TURN) -m thorough --numprocesses 3 $(addprefix --ignore=,$(REALTIME))
