@@ -108,13 +108,7 @@ def _of_code(code: types.CodeType, docstring: str | None = None) -> str:
 def _of_function(function: types.FunctionType) -> tuple[str, set]:
     """Return (text of a function and of the values that it names, laws that it names)."""
     laws: set = set()
-    names = _names(function.__code__)
-    cells = [cell.cell_contents for cell in function.__closure__ or ()]
-    values = _Values(names, laws)
-    parts = [_of_code(function.__code__, function.__doc__), values.text(function.__defaults__),
-             *(f'{name}={values.text(function.__globals__[name])}' for name in sorted(names)
-               if name in function.__globals__), *map(values.text, cells)]
-    return digest(parts), laws
+    return digest([_Values(set(), laws).of_code(function)]), laws
 
 
 def of_module(module: types.ModuleType) -> str:
@@ -187,15 +181,15 @@ class _Values:
         if isinstance(value, _PLAIN):
             return f'{kind} {value!r}'
         if hasattr(value, 'template_values'):
-            return ' '.join((of_module(sys.modules[value.__module__]), self._of_code(value), *(
-                self._of_code(part) if isinstance(part, types.FunctionType) else self.text(part)
+            return ' '.join((of_module(sys.modules[value.__module__]), self.of_code(value), *(
+                self.of_code(part) if isinstance(part, types.FunctionType) else self.text(part)
                 for part in value.template_values)))
         if isinstance(value, types.FunctionType):
             return kind     # numba does not compile it
         if hasattr(value, 'py_func') and not _is_foreign(value.__module__):         # numba's own njit
-            return self._of_code(value.py_func)
+            return self.of_code(value.py_func)
         if hasattr(value, '__wrapped__') and not _is_foreign(value.__module__):     # an intrinsic of numba
-            return f'{of_module(sys.modules[value.__module__])} {self._of_code(value.__wrapped__)}'
+            return f'{of_module(sys.modules[value.__module__])} {self.of_code(value.__wrapped__)}'
         return kind
 
     def _of_module(self, module: types.ModuleType) -> str:
@@ -205,7 +199,7 @@ class _Values:
         found = vars(module)
         return f'{module.__name__} {[(name, self.text(found[name])) for name in sorted(self._names & found.keys())]}'
 
-    def _of_code(self, function: types.FunctionType) -> str:
+    def of_code(self, function: types.FunctionType) -> str:
         """Return the text of a function that numba compiles or calls, with the values that it names and encloses."""
         inside = _Values(_names(function.__code__), self._laws)
         inside._open = self._open
