@@ -5,8 +5,7 @@ import tempfile
 import nbclient
 import nbformat
 
-CELL_TIME_S = 1200
-"""Largest time of a cell [s]; the first cell compiles the laws if they are not cached."""
+CELL_TIME_S = 1200  # largest time of a cell [s]; the first cell compiles the laws if they are not cached
 
 
 def read(path, execute):

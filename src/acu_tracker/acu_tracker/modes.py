@@ -9,14 +9,12 @@ from pedestal_common.codes import codes
 from pedestal_common.compiled import compiled
 from pedestal_common.graph.modes import MODE_ROWS, MODES
 
-Mode = codes(MODES)
-"""Codes of the modes. Each tuple below holds one value for each mode, from its row of MODE_ROWS."""
+Mode = codes(MODES)  # codes of the modes. Each tuple below holds one value for each mode, from its row of MODE_ROWS.
 FOLLOWS_TARGET = tuple(row.follows for row in MODE_ROWS)
 USES_SIGNAL_LEVEL = tuple(row.by_level for row in MODE_ROWS)
 FOLLOWS_TABLE = tuple(row.table for row in MODE_ROWS)
 _ALLOWED_WHEN_PINNED = tuple(row.pinned for row in MODE_ROWS)
-NO_HANDOVER = -1
-"""Code in _HANDOVER of a mode that does not hand over to another mode by itself."""
+NO_HANDOVER = -1  # code in _HANDOVER of a mode that does not hand over to another mode by itself
 _FALLBACK = tuple(MODES.index(row.fallback) if row.fallback else Mode.STANDBY for row in MODE_ROWS)
 """Mode after the end of each mode."""
 
@@ -28,8 +26,7 @@ FALLBACK_MODES = {'coast': Mode.AUTOTRACK, 'memory': Mode.STOP, 'program': Mode.
 returns to the table that was followed last.
 """
 
-FALLBACK_NAMES = {mode: name for name, mode in FALLBACK_MODES.items()}
-"""{mode: name of the fallback}."""
+FALLBACK_NAMES = {mode: name for name, mode in FALLBACK_MODES.items()}  # {mode: name of the fallback}
 
 _HANDOVER = tuple(MODES.index(row.handover) if row.handover else NO_HANDOVER for row in MODE_ROWS)
 """Mode to which each mode hands over by itself, or NO_HANDOVER."""
@@ -48,10 +45,8 @@ REASON_TEXTS = dict(
     TURN='azimuth turn')
 """{name of a reason: its text in replies and diagnostics}."""
 
-REASONS = tuple(REASON_TEXTS.values())
-"""Texts of the reasons, in the order of their codes."""
-Reason = codes(REASON_TEXTS)
-"""Codes of the reasons."""
+REASONS = tuple(REASON_TEXTS.values())  # texts of the reasons, in the order of their codes
+Reason = codes(REASON_TEXTS)  # codes of the reasons
 
 NO_REQUEST, REQUEST_REFUSED, REQUEST_ACCEPTED = -1, 0, 1
 """Results of a request. NO_REQUEST is also the value of `request` in a step without a request."""

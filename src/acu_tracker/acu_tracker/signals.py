@@ -29,8 +29,7 @@ step_gap        the previous step is more than the parameter step_gap ago
 error_noisy     the errors of the receiver are only noise
 attitude_error  the INS has published statistics of its error that are out of range
 """
-Flag = bits(INVALID_INPUTS)
-"""Bits of outputs.invalid_input, by name."""
+Flag = bits(INVALID_INPUTS)  # bits of outputs.invalid_input, by name
 
 DRIVE_STATES = topics.TOPIC_BY_NAME['adu/state'].texts
 DRIVE_READY = len(topics.ENABLED_STATES) - 1
@@ -41,8 +40,7 @@ The drive follows commands if its code is at most DRIVE_READY. A code from FIRST
 that has published no state has the code topics.NO_TEXT_CODE and counts as ready.
 """
 
-INPUT_TOPICS = nodes.row('acu').reads
-"""Topics that the control unit reads."""
+INPUT_TOPICS = nodes.row('acu').reads  # topics that the control unit reads
 
 INPUTS_DTYPE = np.dtype([
     *inputs.fields(INPUT_TOPICS),                       # numbers of the topics, see topics.TOPICS

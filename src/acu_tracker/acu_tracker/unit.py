@@ -61,8 +61,7 @@ invalid: bits of signals.INVALID_INPUTS that were set since the last diagnosis.
 SILENCE_REFUSAL = f'no {JOINT_STATES_TOPIC}, the drive is silent'
 """Text with which every mode except standby is refused while the drive is silent."""
 
-BEND_INTERVAL_S = 0.1
-"""Time after which the refraction of a direction of the mode slave is computed again [s]."""
+BEND_INTERVAL_S = 0.1  # time after which the refraction of a direction of the mode slave is computed again [s]
 
 RESET_REQUEST_DURATION_S = 0.2
 """Time after a reset by an operator during which the reset of the drive is requested [s]."""

@@ -13,14 +13,12 @@ from adu_drive.params import SPEED_LOOP_PERIOD_S
 from adu_drive.plant import brake, friction, gear_train, motor, structure, thermal
 from pedestal_common.compiled import compiled, inlined
 
-CURRENT_LOOP_STEP_COUNT = 5
-"""Number of current-loop periods in a speed-loop period."""
+CURRENT_LOOP_STEP_COUNT = 5  # number of current-loop periods in a speed-loop period
 
 BRAKE_CONDITIONS = BRAKE_WORKING, BRAKE_STUCK_ON, BRAKE_STUCK_OFF = range(3)
 """Conditions of a brake: it follows its command, or ignores it."""
 
-CURRENT_LOOP_PERIOD_S = SPEED_LOOP_PERIOD_S / CURRENT_LOOP_STEP_COUNT
-"""Period of the current loops [s]."""
+CURRENT_LOOP_PERIOD_S = SPEED_LOOP_PERIOD_S / CURRENT_LOOP_STEP_COUNT  # period of the current loops [s]
 
 SECOND_PINION_OFFSET_RAD = 0.5 * math.pi
 """Angle by which the second pinion is mounted ahead of the first [rad], so that the runouts of both do not add."""

@@ -44,8 +44,7 @@ ELEVATION_FAULTS_SHIFT = AZIMUTH_FAULTS_SHIFT + len(faults.AXIS_FAULTS)
 """Bits of a code of adu/state from len(STATE_TEXTS) on: a fault is latched; an emergency stop is latched; first bits
 of the fault words of azimuth and elevation."""
 
-STANDSTILL_RATE_RAD_S = 1e-3
-"""Load rate below which an axis counts as standing [rad/s]."""
+STANDSTILL_RATE_RAD_S = 1e-3  # load rate below which an axis counts as standing [rad/s]
 
 
 @compiled

@@ -23,8 +23,7 @@ shortest period of 1 ms.
 INITIAL_AGE_PERIODS = 1 << 40
 """Initial number of periods since the last change of the brakes: longer ago than any time of a brake or a delay."""
 
-MAX_PLAUSIBLE_INPUT = 1e6
-"""Largest valid input [rad/s, Nm, rad/s2]. An input beyond it, infinite or NaN is invalid."""
+MAX_PLAUSIBLE_INPUT = 1e6  # largest valid input [rad/s, Nm, rad/s2]. An input beyond it, infinite or NaN is invalid.
 
 _AXIS_INPUTS_DTYPE = np.dtype([('rate', 'f8'), ('torque', 'f8')], align=True)
 

@@ -40,8 +40,7 @@ from pedestal_common.law_key import template
 LANE_COUNT = 32
 """Number of lanes of a flat array. With 16 lanes LLVM does not vectorise; 64 lanes exceed the first-level cache."""
 
-WORD_BYTES = 8
-"""Size of each number [bytes]."""
+WORD_BYTES = 8  # size of each number [bytes]
 
 
 class _LanePointer(types.Type):

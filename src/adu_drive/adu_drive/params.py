@@ -11,20 +11,11 @@ import numpy as np
 from pedestal_common.injection import table
 from pedestal_common.parameters import ParameterError, Parameters, choice, flag, group, parameter, text
 
-SPEED_LOOP_PERIOD_S = 0.5e-3
-"""Period of the speed loop, five periods of the current loop [s]."""
-
-PLANT_PERIOD_S = 50e-6
-"""Step of the simulated plant, half a period of the current loop [s]."""
-
-MAX_TRANSPORT_DELAY_S = 0.1
-"""Longest transport delay [s]."""
-
-BRAKING_REACTION_TIME_S = 0.01
-"""Reaction time of the speed loop before an axis brakes [s]."""
-
-DEFAULT_BUFFER_MARGIN_RAD = math.radians(2.0)
-"""Default distance from the emergency switch to the buffer [rad]."""
+SPEED_LOOP_PERIOD_S = 0.5e-3  # period of the speed loop, five periods of the current loop [s]
+PLANT_PERIOD_S = 50e-6  # step of the simulated plant, half a period of the current loop [s]
+MAX_TRANSPORT_DELAY_S = 0.1  # longest transport delay [s]
+BRAKING_REACTION_TIME_S = 0.01  # reaction time of the speed loop before an axis brakes [s]
+DEFAULT_BUFFER_MARGIN_RAD = math.radians(2.0)  # default distance from the emergency switch to the buffer [rad]
 
 
 def whole_speed_periods(name, value):

@@ -20,8 +20,7 @@ PIN_OUT, PIN_MOVING, PIN_IN, PIN_FAILED = range(len(PIN_STATES))
 """States of a pin, in the order of the texts of adu/stow_pins."""
 
 PIN_COMMAND_TEXTS = topics.TOPIC_BY_NAME['acu/stow_pins'].texts
-PIN_COMMAND_OUT, PIN_COMMAND_IN = (PIN_COMMAND_TEXTS.index(place) for place in ('out', 'in'))
-"""Codes of acu/stow_pins."""
+PIN_COMMAND_OUT, PIN_COMMAND_IN = (PIN_COMMAND_TEXTS.index(place) for place in ('out', 'in'))  # codes of acu/stow_pins
 
 
 def constants(params):

@@ -27,8 +27,7 @@ DRIVE_STATE_TOPIC, PIN_STATES_TOPIC, PIN_COMMAND_TOPIC = 'adu/state', 'adu/stow_
 
 INVALID_INPUT_TOPICS = ('', RATE_COMMAND_TOPIC, SHIP_TRUTH_TOPIC)
 """Topics that can hold an invalid input; `invalid` of LINK_DTYPE is an index of this tuple."""
-INVALID_COMMAND, INVALID_TRUTH = 1, 2
-"""Indices of these topics; index 0: no invalid input."""
+INVALID_COMMAND, INVALID_TRUTH = 1, 2  # indices of these topics; index 0: no invalid input
 
 LINK_DTYPE = np.dtype([('stamp', 'i8'), ('command_stamp', 'i8'), ('truth_stamp', 'i8'), ('deck_rate', 'f8', (3,)),
                        ('timeout', 'i8'), ('period', 'i8'), ('stale', 'i8'), ('invalid', 'i8')])

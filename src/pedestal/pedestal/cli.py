@@ -29,8 +29,7 @@ VERBS = {'run': 'antenna', 'scenarios': 'design', 'samples': 'design', 'new': 'd
 """{verb: its package in `verbs`}, in the order of the help."""
 
 
-NEGATIVE_NUMBER_PATTERN = re.compile(r'-\.?\d')
-"""Beginning of an argument that is a negative number."""
+NEGATIVE_NUMBER_PATTERN = re.compile(r'-\.?\d')  # beginning of an argument that is a negative number
 
 
 def module_of(verb: str) -> types.ModuleType:

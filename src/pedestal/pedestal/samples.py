@@ -8,8 +8,7 @@ from collections.abc import Callable
 from pedestal_common.text_files.columns import METRES_PER_FOOT
 from tracking_receiver_sim.params import LeoPassParameters
 
-FLIGHT_TIMES_S = range(91)
-"""Times of the rows of the flight [s]."""
+FLIGHT_TIMES_S = range(91)  # times of the rows of the flight [s]
 
 ADSB_HEADER = 'timestamp,icao24,callsign,latitude,longitude,geoaltitude'
 

@@ -21,11 +21,8 @@ EXIT_CODES = {
     EXIT_STOPPED: 'the run was stopped, for example by Ctrl-C'}
 """{exit code of `pedestal run`: its meaning}. The codes 1, 3 and 130 take precedence over 4."""
 
-MAX_JSON_MARK_BYTES = 100
-"""Number of first bytes by which a file of JSON is recognised."""
-
-STDOUT_PATH = pathlib.Path('/dev/stdout')
-"""Path of the option --json without a file name, or with the file name -."""
+MAX_JSON_MARK_BYTES = 100  # number of first bytes by which a file of JSON is recognised
+STDOUT_PATH = pathlib.Path('/dev/stdout')  # path of the option --json without a file name, or with the file name -
 
 MAX_NAME_COLUMNS, MAX_CELL_COLUMNS, MIN_SENTENCE_COLUMNS = 44, 24, 40
 """Widths in a list of show_list [characters].

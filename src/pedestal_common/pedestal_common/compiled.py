@@ -4,13 +4,16 @@ The arithmetic is strict IEEE 754 (no fastmath): a law gives the same bits where
 a recomputed bag therefore agree exactly, and NaN keeps its meaning on the topics.
 """
 from collections.abc import Callable
-from typing import Any
+from typing import Any, TypeVar, cast
 
 import numba
 
 from pedestal_common.law import Law
+from pedestal_common.quantities import Pairs
 
 _config: Any = numba.config     # its variables are made when it is imported
+
+_F = TypeVar('_F', bound=Callable[..., object])
 
 
 def is_compiled(unit: Any) -> bool:
@@ -19,18 +22,19 @@ def is_compiled(unit: Any) -> bool:
     return _config.DISABLE_JIT or law.is_cached(*arguments)
 
 
-def _law(law: Callable, separate: bool = False, **options: Any) -> Any:
+def _law(law: _F, separate: bool = False, **options: bool) -> _F:
     if _config.DISABLE_JIT:     # for a debugger: the laws run as plain Python
         return law
-    return Law(law, targetoptions={'nopython': True, 'error_model': 'numpy', **options}, separate=separate)
+    made = Law(law, targetoptions={'nopython': True, 'error_model': 'numpy', **options}, separate=separate)
+    return cast(_F, made)       # a Law is called as the function is
 
 
-def compiled(law: Callable) -> Any:
+def compiled(law: _F) -> _F:
     """Compile a law, as decorator. Division by zero gives inf or NaN as in numpy, never an exception."""
     return _law(law)
 
 
-def separate(law: Callable) -> Any:
+def separate(law: _F) -> _F:
     """Compile a large law into machine code of its own, as decorator. The laws that call it do not contain it.
 
     After an edit of the law its callers are not compiled again, and laws that share it contain it once.
@@ -38,7 +42,7 @@ def separate(law: Callable) -> Any:
     return _law(law, separate=True)
 
 
-def inlined(law: Callable) -> Any:
+def inlined(law: _F) -> _F:
     """Compile a small law as `compiled` does, and inline it into its callers, as decorator.
 
     A loop over the lanes of the drive (trials that are computed together) becomes vector instructions only if its laws
@@ -48,7 +52,7 @@ def inlined(law: Callable) -> Any:
 
 
 @compiled
-def assign(target: Any, source: Any) -> None:
+def assign(target: Pairs, source: Pairs) -> None:
     """Copy the array source into target, both (n, m). This replaces `target[:] = source`, because numba takes three
     seconds to compile numpy's check of the shapes."""
     for i in range(target.shape[0]):

@@ -8,8 +8,7 @@ import signal
 import sys
 import types
 
-STOP_RETRY_S = 0.02
-"""Time after which SIGALRM tries again to stop the process [s]."""
+STOP_RETRY_S = 0.02  # time after which SIGALRM tries again to stop the process [s]
 
 _HOOKS = '_raw_object_cache_getbuffer', '_raw_object_cache_notify'
 """Functions of llvmlite that LLVM calls before and after it makes machine code. An exception in these functions would

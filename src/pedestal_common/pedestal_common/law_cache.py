@@ -27,14 +27,9 @@ from numba.misc.appdirs import user_cache_dir
 
 from pedestal_common.law_key import digest
 
-MAX_CACHE_AGE_DAYS = 30.0
-"""Time without use after which a file of the cache is deleted [days]."""
-
-TOUCH_PERIOD_S = 86400.0
-"""Time after which the use of a file is noted again [s]."""
-
-DIGEST_BYTES = 32
-"""Length of the digest of its content at the beginning of a file [bytes]."""
+MAX_CACHE_AGE_DAYS = 30.0  # time without use after which a file of the cache is deleted [days]
+TOUCH_PERIOD_S = 86400.0  # time after which the use of a file is noted again [s]
+DIGEST_BYTES = 32  # length of the digest of its content at the beginning of a file [bytes]
 
 _ROOT = pathlib.Path(getattr(numba.config, 'CACHE_DIR', '') or user_cache_dir()) / 'pedestal'
 if not _ROOT.is_absolute():

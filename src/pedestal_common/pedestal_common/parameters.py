@@ -88,8 +88,7 @@ class RosParameters(Parameters):
     start_type_description_service: bool = flag(True, 'the node describes its message types')
 
 
-_ROS_PREFIX = 'qos_overrides.'
-"""Beginning of the names of further parameters that rclpy gives every node."""
+_ROS_PREFIX = 'qos_overrides.'  # beginning of the names of further parameters that rclpy gives every node
 
 
 def without_ros(values: Mapping[str, typing.Any]) -> dict[str, typing.Any]:

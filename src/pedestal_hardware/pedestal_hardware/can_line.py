@@ -10,14 +10,9 @@ import time
 
 import can
 
-MAX_CHUNK_BYTES = 65536
-"""Largest number of bytes that are received at once."""
-
-MAX_TEXT_BYTES = 4096
-"""Largest number of bytes without the end of a frame; more end the connection."""
-
-SEND_TIMEOUT_S = 0.2
-"""Time after which a server that takes no frame counts as absent [s]."""
+MAX_CHUNK_BYTES = 65536  # largest number of bytes that are received at once
+MAX_TEXT_BYTES = 4096  # largest number of bytes without the end of a frame; more end the connection
+SEND_TIMEOUT_S = 0.2  # time after which a server that takes no frame counts as absent [s]
 
 LARGEST_STANDARD_ID = 0x7FF
 

@@ -19,30 +19,22 @@ from pedestal_hardware import pdo
 from pedestal_hardware.bus import BusError
 from pedestal_hardware.can_line import PythonCanLine, SocketcandLine
 
-CIA402_PROFILE = 402
-"""Profile of a drive in the low half of its device type (1000)."""
+CIA402_PROFILE = 402  # profile of a drive in the low half of its device type (1000)
 
 SYNC_COB_ID, RPDO_1_COB_ID, HEARTBEAT_COB_ID, EMERGENCY_COB_ID = 0x80, 0x200, 0x700, 0x80
 TPDO_COB_IDS = 0x180, 0x280, 0x380
-MASTER_NODE = 127
-"""CANopen node of this computer, whose heartbeat the drives supervise."""
+MASTER_NODE = 127  # CANopen node of this computer, whose heartbeat the drives supervise
 
 NMT_START, NMT_PRE_OPERATIONAL, NMT_RESET_COMMUNICATION = 1, 128, 130
 HEARTBEAT_OPERATIONAL = b'\x05'
-INVALID_COB_ID, NO_REMOTE_REQUEST = 1 << 31, 1 << 30
-"""Bits of the COB-ID of a PDO: it is off; no remote request."""
-
-HEARTBEATS_PER_TIMEOUT = 5
-"""Number of heartbeats of this node in the time after which the drives miss it."""
-
-BOOT_TIME_S = 1.0
-"""Longest wait for the boot-up message of a drive after a reset of its communication [s]."""
+INVALID_COB_ID, NO_REMOTE_REQUEST = 1 << 31, 1 << 30  # bits of the COB-ID of a PDO: it is off; no remote request
+HEARTBEATS_PER_TIMEOUT = 5  # number of heartbeats of this node in the time after which the drives miss it
+BOOT_TIME_S = 1.0  # longest wait for the boot-up message of a drive after a reset of its communication [s]
 
 IDLE_TIME_S, IDLE_POLL_S = 0.05, 0.005
 """Time after an exchange from which on the thread receives, and its longest wait for a frame [s]."""
 
-MAX_NOTES = 50
-"""Largest number of notes that are kept."""
+MAX_NOTES = 50  # largest number of notes that are kept
 
 # The errors of a bus and of its drives reach the node as BusError; these loggers would print them a second time.
 for _name in ('canopen', 'can'):

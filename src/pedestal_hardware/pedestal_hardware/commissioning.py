@@ -10,8 +10,7 @@ from pedestal_hardware.servo_drives import MODE_CYCLIC_TORQUE, MODE_CYCLIC_VELOC
 MODE_NAMES = {MODE_CYCLIC_VELOCITY: 'cyclic synchronous velocity', MODE_CYCLIC_TORQUE: 'cyclic synchronous torque'}
 """{mode of operation (6060): its name}. Bit `mode - 1` of the supported modes (6502) belongs to it."""
 
-UNIT_RPM, MILLI_PREFIX = 0xB44700, 0xFD
-"""Velocity unit rpm in object 60A9, and the prefix 10^-3 in its first byte."""
+UNIT_RPM, MILLI_PREFIX = 0xB44700, 0xFD  # velocity unit rpm in object 60A9, and the prefix 10^-3 in its first byte
 
 RAD_S_PER_RPM = math.pi / 30.0
 PERMILLE = 1e-3

@@ -18,18 +18,12 @@ from pedestal_hardware.bus import BusError
 from pedestal_hardware.params import START_KEY, time_0_after
 from pedestal_hardware.unit import DRIVE_LABELS
 
-RETRY_PERIOD_S = 0.5
-"""Time between two tries to commission drives that report nothing [s]."""
+RETRY_PERIOD_S = 0.5  # time between two tries to commission drives that report nothing [s]
 
 
-ENABLE_LEAD_S = 2.0
-"""Time before time 0 in which the drives are enabled [s]."""
-
-LEAVE_TIME_S = 2.0
-"""Longest wait for the end of the commissioning thread, after the node has left the bus [s]."""
-
-ANSWER_POLL_S = 0.02
-"""Time between two checks whether all drives answer [s]."""
+ENABLE_LEAD_S = 2.0  # time before time 0 in which the drives are enabled [s]
+LEAVE_TIME_S = 2.0  # longest wait for the end of the commissioning thread, after the node has left the bus [s]
+ANSWER_POLL_S = 0.02  # time between two checks whether all drives answer [s]
 
 
 class DriveNode(AduNode):

@@ -24,8 +24,7 @@ CLASS_NAMES = ('', 'generic error', 'current', 'voltage', 'temperature', 'hardwa
                'monitoring', 'external error')
 """Names of the classes of error codes, by the first digit of the code."""
 
-MAKER_CODE_MIN = 0xFF00
-"""Smallest of the codes that each maker defines."""
+MAKER_CODE_MIN = 0xFF00  # smallest of the codes that each maker defines
 
 
 def name(code):

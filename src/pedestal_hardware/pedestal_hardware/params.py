@@ -6,8 +6,7 @@ from pedestal_common.graph.steps import NS_PER_SECOND
 from pedestal_common.parameters import ParameterError, Parameters, choice, flag, group, parameter, text
 from pedestal_hardware import pdo
 
-CONTROLS = ('velocity', 'drive', 'torque')
-"""Divisions of the control between drive_node and the drives."""
+CONTROLS = ('velocity', 'drive', 'torque')  # divisions of the control between drive_node and the drives
 
 MAX_TORQUE_PERIOD_S = 1e-3
 """Longest period with control `torque` [s]. With a longer period the axis would oscillate (docs/hardware.md)."""
@@ -15,11 +14,8 @@ MAX_TORQUE_PERIOD_S = 1e-3
 START_KEY = 'start'
 """Key of the diagnostics of a node with time 0 (UTC, ns), if time 0 follows the answer of its equipment."""
 
-MAX_CAN_BITRATE = 1_000_000
-"""Largest bit rate of a CAN bus [bit/s]."""
-
-MAX_OBJECT_VALUE = 0xFFFF
-"""Largest value of the objects 60F9:1 and :2."""
+MAX_CAN_BITRATE = 1_000_000  # largest bit rate of a CAN bus [bit/s]
+MAX_OBJECT_VALUE = 0xFFFF  # largest value of the objects 60F9:1 and :2
 
 FRAME_BITS, STUFFED_BITS, BITS_PER_STUFF_BIT = 47, 33, 4
 """Bits of a standard CAN frame without its data, those that may be stuffed, and the bits for each stuff bit."""

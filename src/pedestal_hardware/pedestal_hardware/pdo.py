@@ -5,8 +5,7 @@ list of its objects, (index, subindex, bits), in the order of the record.
 """
 import numpy as np
 
-DRIVE_COUNT = 4
-"""Number of drives of an antenna: two on each of two axes."""
+DRIVE_COUNT = 4  # number of drives of an antenna: two on each of two axes
 
 COMMAND_DTYPE = np.dtype([('controlword', '<u2'), ('velocity', '<i4'), ('torque', '<i2')])
 """Command to a drive: controlword, target velocity, and torque offset in units of the drive; in the mode of torque the

@@ -43,15 +43,13 @@ INPUT_NEGATIVE_LIMIT, INPUT_POSITIVE_LIMIT, INPUT_INTERLOCK = 1, 2, 8
 MODE_CYCLIC_VELOCITY, MODE_CYCLIC_TORQUE = 9, 10
 """Modes of operation `cyclic synchronous velocity` and `cyclic synchronous torque` (6060, 6061)."""
 
-CONTROL_VELOCITY, CONTROL_DRIVE, CONTROL_TORQUE = range(len(CONTROLS))
-"""Indices of params.CONTROLS."""
+CONTROL_VELOCITY, CONTROL_DRIVE, CONTROL_TORQUE = range(len(CONTROLS))  # indices of params.CONTROLS
 
 MAX_BLIND_S = 0.01
 """Longest time for which a drive in the mode of torque keeps its torque without a report [s]; then it stops the axis
 by itself, because only this law controls the speed."""
 
-MAX_AWAY_PERIODS = 4
-"""Number of periods after which an enabled drive that has left its state counts as lost."""
+MAX_AWAY_PERIODS = 4  # number of periods after which an enabled drive that has left its state counts as lost
 
 MAX_LEAVE_S = 0.5
 """Time in which a drive with a closing brake may still hold its motor after the axes are disabled [s]."""

@@ -15,8 +15,7 @@ from pedestal_common.wire.records import NO_STAMP
 from pedestal_hardware import cia402, errors, pdo, servo_drives
 from pedestal_hardware.params import CONTROLS
 
-DRIVE_LABELS = tuple(f'{axis} motor {i}' for axis in topics.AXES for i in (1, 2))
-"""Names of the four drives in texts."""
+DRIVE_LABELS = tuple(f'{axis} motor {i}' for axis in topics.AXES for i in (1, 2))  # names of the four drives in texts
 
 
 class Memory(typing.NamedTuple):

@@ -10,11 +10,8 @@ import numpy as np
 from pedestal_common.geometry import pointing_report
 from pedestal_common.graph import nodes
 
-POINTING_TOPIC = 'acu/pointing'
-"""Topic with the report of the pointing model in force."""
-
-MAX_MESSAGE_AGE_S = 2.5
-"""Age after which the last message is stale [s]."""
+POINTING_TOPIC = 'acu/pointing'  # topic with the report of the pointing model in force
+MAX_MESSAGE_AGE_S = 2.5  # age after which the last message is stale [s]
 
 
 class Antenna(abc.ABC):

@@ -23,8 +23,7 @@ KEY_HOLD_S = 0.35
 A held key is repeated about 30 times a second after a pause.
 """
 
-JOG_RATES_DEG_S = (0.1, 0.5, 1.0, 2.0, 5.0)
-"""Selectable jog rates [deg/s]."""
+JOG_RATES_DEG_S = (0.1, 0.5, 1.0, 2.0, 5.0)  # selectable jog rates [deg/s]
 
 KEY_COMMANDS = {'s': ('stop', 'stop'), 'b': ('standby', 'standby'), 'w': ('stow', 'stow'), 'p': ('preset', 'preset'),
              'g': ('program', 'program'), 'a': ('autotrack', 'autotrack'), 't': ('take', 'take control'),
@@ -34,20 +33,11 @@ KEY_COMMANDS = {'s': ('stop', 'stop'), 'b': ('standby', 'standby'), 'w': ('stow'
 ARROW_DIRECTIONS = {'\x1b[A': (0, 1), '\x1b[B': (0, -1), '\x1b[C': (1, 0), '\x1b[D': (-1, 0)}
 """{escape sequence of an arrow: direction (azimuth, elevation)}."""
 
-QUIT_KEYS = ('q', '\x03', '\x04')
-"""Keys that end the console: q, Ctrl-C and Ctrl-D."""
-
-ESCAPE_SEQUENCE_CHARS = 3
-"""Length of the escape sequence of an arrow [characters]."""
-
-LEVEL_STYLES = {'': '', 'warn': 'yellow', 'bad': 'bold red'}
-"""{level of a state.Shown: style on the terminal}."""
-
-MAX_WRAPPED_LINES = 2
-"""Largest number of lines of a reply, and of the recommended action of an alarm."""
-
-VALUE_COLUMN_CHARS = 14
-"""Width of a column of values [characters]."""
+QUIT_KEYS = ('q', '\x03', '\x04')  # keys that end the console: q, Ctrl-C and Ctrl-D
+ESCAPE_SEQUENCE_CHARS = 3  # length of the escape sequence of an arrow [characters]
+LEVEL_STYLES = {'': '', 'warn': 'yellow', 'bad': 'bold red'}  # {level of a state.Shown: style on the terminal}
+MAX_WRAPPED_LINES = 2  # largest number of lines of a reply, and of the recommended action of an alarm
+VALUE_COLUMN_CHARS = 14  # width of a column of values [characters]
 
 
 @contextlib.contextmanager

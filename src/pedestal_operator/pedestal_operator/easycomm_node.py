@@ -18,8 +18,7 @@ from pedestal_operator.rotator.line_server import Client
 from pedestal_operator.rotator.outcomes import OUTCOME_DONE, OUTCOME_REFUSED, Refused
 from pedestal_operator.rotator.server_node import ServerNode, ServerParameters, tcp_port
 
-SERVER_VERSION = 'pedestal'
-"""Text in the answer to VE."""
+SERVER_VERSION = 'pedestal'  # text in the answer to VE
 
 
 @dataclasses.dataclass(frozen=True)

@@ -17,11 +17,8 @@ from pedestal_common.wire import messages
 from pedestal_operator.viewers import frames
 from pedestal_operator.viewers.frame_source import FrameSource
 
-FRAME_PERIOD_S = 1.0 / 30.0
-"""Period of the messages on tf [s]."""
-
-TF_QUEUE_DEPTH = 100
-"""Queue depth of tf, equal to that of tf2 [messages]."""
+FRAME_PERIOD_S = 1.0 / 30.0  # period of the messages on tf [s]
+TF_QUEUE_DEPTH = 100  # queue depth of tf, equal to that of tf2 [messages]
 
 
 class FramesNode(shell.Shell):

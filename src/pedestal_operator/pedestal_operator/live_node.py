@@ -19,11 +19,8 @@ from pedestal_operator.viewers import frames
 from pedestal_operator.viewers.frame_source import FrameSource
 from pedestal_operator.viewers.on_demand import OnDemand
 
-POLL_PERIOD_S = 0.05
-"""Period of the check for viewers of topics [s]."""
-
-FRAME_PERIOD_S = 1.0 / 30.0
-"""Period of the messages of the frames [s]."""
+POLL_PERIOD_S = 0.05  # period of the check for viewers of topics [s]
+FRAME_PERIOD_S = 1.0 / 30.0  # period of the messages of the frames [s]
 
 TRANSFORMS_CHANNEL, DESCRIPTION_CHANNEL = '/transforms', '/robot_description'
 """Channels in addition to the topics of the graph: frames, and model of the pedestal."""

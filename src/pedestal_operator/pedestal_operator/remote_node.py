@@ -23,11 +23,8 @@ from pedestal_operator.requests import JOG_REPEAT_PERIOD_S, Requests
 NUMBER_TOPICS = ('joint_states', 'acu/reference', 'tracking_receiver/angle_error')
 """Topics of numbers that every client receives."""
 
-TEXT_TOPICS = ('acu/mode', 'adu/state', 'acu/keyhole', POINTING_TOPIC)
-"""Topics of text that every client receives."""
-
-REPLY_TIMEOUT_S = 5.0
-"""Longest wait for the reply to a command [s]."""
+TEXT_TOPICS = ('acu/mode', 'adu/state', 'acu/keyhole', POINTING_TOPIC)  # topics of text that every client receives
+REPLY_TIMEOUT_S = 5.0  # longest wait for the reply to a command [s]
 
 DISCOVERY_MARGIN_S = 0.05
 """Time for the discovery of this node by the commanded node [s], after its own discovery of that node."""

@@ -8,8 +8,7 @@ from pedestal_common.wire.commands import Command
 JOG_REPEAT_PERIOD_S = 0.2
 """Period at which a jog is repeated [s], less than half of the jog timeout of the control unit."""
 
-MAX_KEPT_REQUESTS = 1000
-"""Largest number of requests kept, because some replies are never read."""
+MAX_KEPT_REQUESTS = 1000  # largest number of requests kept, because some replies are never read
 
 
 class Requests:

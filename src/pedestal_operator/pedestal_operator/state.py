@@ -20,8 +20,7 @@ OPERATOR_COMMANDS = (*BUTTON_MODES, 'rate', 'take', 'release', 'reset', 'fallbac
 FREE_COMMANDS = ('standby', 'take')
 """Commands among OPERATOR_COMMANDS that the control unit accepts from a client without control."""
 
-REFUSAL_PREFIX = 'refused '
-"""Start of a key in the diagnostics of the control unit, before the name of a mode."""
+REFUSAL_PREFIX = 'refused '  # start of a key in the diagnostics of the control unit, before the name of a mode
 
 ACU_STATUS_KEYS = ('mode', 'reason', 'fallback', 'control', 'drive', 'faults', 'locked', 'coasting', 'keyhole',
                    'pointing_model')
@@ -30,11 +29,8 @@ ACU_STATUS_KEYS = ('mode', 'reason', 'fallback', 'control', 'drive', 'faults', '
 GRAPH_NODES = ('acu', 'adu', 'tracking_receiver', 'ins', 'ship_motion')
 """Nodes of an antenna whose silence the operator must see."""
 
-LIMIT_WARNING_S = 20.0
-"""Time to a limit below which the axis has a warning [s]."""
-
-REST_RATE_DEG_S = 0.002
-"""Rate below which an axis counts as stopped [deg/s]."""
+LIMIT_WARNING_S = 20.0  # time to a limit below which the axis has a warning [s]
+REST_RATE_DEG_S = 0.002  # rate below which an axis counts as stopped [deg/s]
 
 UNACKNOWLEDGED_STATES = ('unacknowledged', 'returned unacknowledged', 'latched unacknowledged')
 """States of an alarm that waits for an acknowledgement."""

@@ -25,20 +25,14 @@ from pedestal_recording import columns, mcap_file
 from pedestal_recording.mcap_file import MESSAGE_HEAD, ZSTD_MAGIC, BagError, McapFile
 from pedestal_recording.readable import Readable
 
-MAX_CACHE_BYTES = 64_000_000
-"""Largest size of the cache of unpacked chunks [bytes]."""
+MAX_CACHE_BYTES = 64_000_000  # largest size of the cache of unpacked chunks [bytes]
 
 MAX_SEARCHED_DIAGNOSTICS = 100
 """Number of messages at the end of a bag in which the last diagnostics of a node are searched."""
 
-MAX_CHANNELS = 2000
-"""Largest number of channels of a file; a channel is the record of a topic in an MCAP file."""
-
-MAX_SHOWN_FOREIGN_MESSAGES = 3
-"""Largest number of foreign messages of a topic whose time and size are shown."""
-
-INDEX_BLOCK_ROWS = 65_536
-"""Largest number of rows that are added to the index, or taken from it, at once."""
+MAX_CHANNELS = 2000  # largest number of channels of a file; a channel is the record of a topic in an MCAP file
+MAX_SHOWN_FOREIGN_MESSAGES = 3  # largest number of foreign messages of a topic whose time and size are shown
+INDEX_BLOCK_ROWS = 65_536  # largest number of rows that are added to the index, or taken from it, at once
 
 INDEX_FIELDS = [(name, 'i8') for name in ('channel', 'sequence', 'log', 'publish', 'stamp', 'foreign', 'chunk',
                                               'start', 'stop')]
@@ -47,13 +41,9 @@ _UNREADABLE, _OTHER_PUBLISHER = 1, 2
 """Values of the field `foreign` for a foreign message: its reason. The value 0 means a message of the graph."""
 _DECLARED = (Opcode.HEADER, Opcode.SCHEMA, Opcode.CHANNEL, Opcode.STATISTICS, Opcode.METADATA)
 """Kinds of records outside chunks that hold no messages and are read."""
-Content = typing.TypeVar('Content')
-"""Type of the values in a dictionary {topic or node: value}."""
-MetadataRecords = Mapping[str, Mapping[str, str]]
-"""Metadata records of a bag, {name: {text: text}}."""
-
-_NUMBERED = re.compile(r'(.+)_(\d+)\.mcap')
-"""Pattern of the file name NAME_0.mcap, NAME_1.mcap and so on of a bag."""
+Content = typing.TypeVar('Content')  # type of the values in a dictionary {topic or node: value}
+MetadataRecords = Mapping[str, Mapping[str, str]]  # metadata records of a bag, {name: {text: text}}
+_NUMBERED = re.compile(r'(.+)_(\d+)\.mcap')  # pattern of the file name NAME_0.mcap, NAME_1.mcap and so on of a bag
 
 
 def read(path: str | pathlib.Path, beam: str | None = None) -> 'Bag':

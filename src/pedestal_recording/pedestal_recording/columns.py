@@ -20,8 +20,7 @@ CELL_LIMITS = 4_000_000, 4
 This avoids a huge table from a file whose messages each name other columns.
 """
 
-STATUS_TEXTS = ('name', 'hardware_id', 'message')
-"""Fields of a DiagnosticStatus that are texts."""
+STATUS_TEXTS = ('name', 'hardware_id', 'message')  # fields of a DiagnosticStatus that are texts
 
 
 def stamps(data, type_name, log):

@@ -16,8 +16,7 @@ VERSIONED_PACKAGES = ('pedestal_common', 'ship_motion_sim', 'tracking_receiver_s
                       'pedestal_hardware', 'pedestal_bringup', 'numpy', 'numba', 'rclpy')
 """Packages whose versions are recorded."""
 
-GIT_TIMEOUT_S = 5.0
-"""Longest duration of a git command [s]."""
+GIT_TIMEOUT_S = 5.0  # longest duration of a git command [s]
 
 OMITTED_PARAMETERS = ('bag', 'scenario_yaml', 'parameters_yaml')
 """Parameters of the recorder that the recorded configuration omits: the destination, and the configuration itself."""

@@ -22,8 +22,7 @@ from mcap.writer import MCAP0_MAGIC as MAGIC
 
 from pedestal_common.text_files import files
 
-MAX_CHUNK_BYTES = 32_000_000
-"""Largest size of a chunk, compressed or unpacked [bytes]."""
+MAX_CHUNK_BYTES = 32_000_000  # largest size of a chunk, compressed or unpacked [bytes]
 
 UNPACKED_LIMITS = 32_000_000, 200
 """Largest size of all unpacked chunks of a file [bytes]: a base, and an addition for each byte of the file."""
@@ -36,8 +35,7 @@ MESSAGE_HEAD = struct.Struct('<xQHIQQ')
 and publish time [ns]. The CDR bytes of the message follow."""
 
 SQLITE_MAGIC = b'SQLite format 3'
-ZSTD_MAGIC = b'\x28\xb5\x2f\xfd'
-"""First bytes of an SQLite file, and of data in the compression zstd."""
+ZSTD_MAGIC = b'\x28\xb5\x2f\xfd'  # first bytes of an SQLite file, and of data in the compression zstd
 
 COMPRESSED_MAGIC = {
     ZSTD_MAGIC: ('zstd', 'zstd -dc'), b'\x1f\x8b': ('gzip', 'gunzip -c'), b'\xfd7zXZ': ('xz', 'xz -dc'),

@@ -12,11 +12,8 @@ import numpy as np
 from pedestal_common.graph import layouts, nodes, topics
 from pedestal_common.wire import cdr, messages
 
-MAX_SHAPED_BYTES = 4000
-"""Largest size of a message whose bytes are compared [bytes]; a larger message is deserialized."""
-
-MAX_SHAPES = 20
-"""Largest number of readable messages of one length with which others are compared."""
+MAX_SHAPED_BYTES = 4000  # largest size of a message whose bytes are compared [bytes]; a larger message is deserialized
+MAX_SHAPES = 20  # largest number of readable messages of one length with which others are compared
 
 
 class Readable:

@@ -34,8 +34,7 @@ from pedestal_recording.recorder_params import RecorderParameters
 from pedestal_recording.step_order import OrderError, StepOrder
 from pedestal_recording.writer import Writer
 
-QUIET_TIME_S = 0.5
-"""Time without a message after which the recorder ends, once the run has ended [s]."""
+QUIET_TIME_S = 0.5  # time without a message after which the recorder ends, once the run has ended [s]
 
 MAX_DRAIN_S = 4.0
 """Longest wait for late messages after the end of the run [s].
@@ -53,8 +52,7 @@ subscribes to it last, no message waits when the executor starts. The executor w
 order than that of their arrival.
 """
 
-MAX_STAMP_DISTANCE_NS = 3600 * NS_PER_SECOND
-"""Largest plausible distance of a stamp from the time of the drive [ns]."""
+MAX_STAMP_DISTANCE_NS = 3600 * NS_PER_SECOND  # largest plausible distance of a stamp from the time of the drive [ns]
 
 
 class TopicPublishers:

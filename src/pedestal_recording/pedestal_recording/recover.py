@@ -34,8 +34,7 @@ from pedestal_recording.writer import BagFile
 
 _COPIED_OPCODES = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.METADATA, Opcode.CHUNK)
 """Kinds of records that are copied to the new bag."""
-_END_OPCODES = (Opcode.DATA_END, Opcode.FOOTER)
-"""Kinds of records that end the messages of a file."""
+_END_OPCODES = (Opcode.DATA_END, Opcode.FOOTER)  # kinds of records that end the messages of a file
 _COMPRESSION = re.compile(rb'\x04\x00\x00\x00zstd|\x03\x00\x00\x00lz4')
 """Length and name of the compression in a chunk record. The search for intact chunks looks for these bytes."""
 _BEFORE_COMPRESSION = 9 + 8 + 8 + 8 + 4
@@ -44,13 +43,9 @@ _BEFORE_COMPRESSION = 9 + 8 + 8 + 8 + 4
 It consists of opcode and length, first and last log time, unpacked size, checksum, and length of the name.
 """
 
-_UNUSABLE = 0
-"""Value in place of an opcode, for bytes that are no readable record."""
-
-_LENGTH = struct.Struct('<Q')
-"""Length of the compressed data in a chunk record [bytes]."""
-_FOOTER = 9 + 20 + len(MAGIC)
-"""Length of the footer record and the last bytes of a whole file [bytes]."""
+_UNUSABLE = 0  # value in place of an opcode, for bytes that are no readable record
+_LENGTH = struct.Struct('<Q')  # length of the compressed data in a chunk record [bytes]
+_FOOTER = 9 + 20 + len(MAGIC)  # length of the footer record and the last bytes of a whole file [bytes]
 
 
 @dataclasses.dataclass

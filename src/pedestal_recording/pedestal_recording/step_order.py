@@ -8,8 +8,7 @@ import heapq
 from pedestal_common.graph.steps import NS_PER_SECOND
 from pedestal_common.graph.topics import EVENT_RATES
 
-MAX_WAITING_STEPS = 10_000
-"""Largest number of steps whose messages wait because an earlier step is incomplete."""
+MAX_WAITING_STEPS = 10_000  # largest number of steps whose messages wait because an earlier step is incomplete
 
 
 class OrderError(ValueError):

@@ -23,8 +23,7 @@ MAX_LATENCY_NS = 1_000_000_000
 The missing messages of this time are no problem: they were still in transit at the end of the recording.
 """
 
-MAX_SHOWN_GAPS = 10
-"""Largest number of gaps of a topic that the report lists."""
+MAX_SHOWN_GAPS = 10  # largest number of gaps of a topic that the report lists
 
 
 @dataclasses.dataclass

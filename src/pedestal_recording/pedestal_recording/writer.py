@@ -37,8 +37,7 @@ from pedestal_recording.mcap_file import BagError, McapFile, parsed, reason
 
 TARGET_CHUNK_BYTES = 1_000_000
 TARGET_CHUNK_SPAN_NS = 1_000_000_000
-TARGET_CHUNK_MESSAGES = 100_000
-"""Size [bytes], span of log times [ns] and number of messages after which a chunk ends."""
+TARGET_CHUNK_MESSAGES = 100_000  # size [bytes], span of log times [ns] and number of messages after which a chunk ends
 
 COMMON_METADATA_KEYS = ('scenario', 'pacing', 'seed', 'planned_end_ns')
 """Keys of the metadata with equal values in all files of a bag."""

@@ -12,8 +12,7 @@ import ast
 import importlib
 import pathlib
 
-STUDY_FOLDERS = 'papers', 'system'
-"""Folders that hold one study in each module."""
+STUDY_FOLDERS = 'papers', 'system'  # folders that hold one study in each module
 _STUDY_FILES = {file.stem.replace('_', '-'): file for folder in STUDY_FOLDERS
                 for file in pathlib.Path(__file__).with_name(folder).glob('[a-z]*.py')}
 STUDY_NAMES = tuple(sorted(_STUDY_FILES))

@@ -32,8 +32,7 @@ RUN_DURATION_S, START_ANGLES_RAD, SETTLING_BAND, SINE_PERIODS = 10.0, (0.0, 0.6)
 """Duration of the step and gust runs [s]; initial angles of azimuth and elevation [rad]. Half-width of the band of the
 settling time over the size of the step [-]; periods of the sine, of which the first is not evaluated."""
 
-GUST_START_S, STANDSTILL_START_S = 4.0, 5.0
-"""Start of the gust; start of the evaluated standstill after the step [s]."""
+GUST_START_S, STANDSTILL_START_S = 4.0, 5.0  # start of the gust; start of the evaluated standstill after the step [s]
 
 BIAS_PARAMETERS = {'': {}, '/bias-off': {f'adu.{name}.bias.schedule': 'off' for name in AXES}}
 """{suffix of a case: parameters}: with the bias torque of the scenario, and without bias torque."""

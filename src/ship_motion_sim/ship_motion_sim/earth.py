@@ -4,8 +4,7 @@ import math
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry.geodesy import EARTH_FLATTENING, EARTH_RATE
 
-WGS84_EARTH_RATE_RAD_S = round(EARTH_RATE, 11)
-"""Rotation rate of the earth with the printed digits of WGS-84 [rad/s]."""
+WGS84_EARTH_RATE_RAD_S = round(EARTH_RATE, 11)  # rotation rate of the earth with the printed digits of WGS-84 [rad/s]
 EQUATOR_GRAVITY_M_S2, POLE_GRAVITY_M_S2 = 9.7803253359, 9.8321849378
 """Normal gravity at the equator and at the poles [m/s2]."""
 ECCENTRICITY_SQUARED = EARTH_FLATTENING * (2.0 - EARTH_FLATTENING)

@@ -16,8 +16,7 @@ from ship_motion_sim import earth
 from ship_motion_sim.params import ShipMotionParameters
 from ship_motion_sim.sea import motion
 
-IMU_NORMALS_PER_STEP = 6
-"""Number of standard normals of a step: three gyros, three accelerometers."""
+IMU_NORMALS_PER_STEP = 6  # number of standard normals of a step: three gyros, three accelerometers
 FIRST_GYRO_NORMAL, FIRST_ACCELEROMETER_NORMAL = 0, 3
 """Indices of the normals of the first gyro and of the first accelerometer."""
 IMU_STATUS_TEXTS = ('ok', 'step is not positive', 'truth is not valid')

@@ -14,8 +14,7 @@ from ship_motion_sim.sea import motion
 
 SHIP_TRUTH_TOPIC, IMU_RAW_TOPIC = 'ship/truth', 'ship/imu/data_raw'
 
-NOMINAL_PERIOD_S = 5e-3
-"""Assumed length of the first IMU sample [s]."""
+NOMINAL_PERIOD_S = 5e-3  # assumed length of the first IMU sample [s]
 
 RECORD_DTYPE = np.dtype([('ship', motion.CONSTANTS_DTYPE), ('truth', motion.OUTPUTS_DTYPE),
                          ('imu_state', imu.STATE_DTYPE), ('imu', imu.CONSTANTS_DTYPE),

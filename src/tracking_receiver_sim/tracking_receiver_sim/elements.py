@@ -18,20 +18,16 @@ from pedestal_common.text_files import content, csv_table
 from tracking_receiver_sim.ephemeris import lines
 from tracking_receiver_sim.params import LeoPassParameters
 
-FORMAT_PROBE_BYTES = 4096
-"""Number of bytes at the beginning of a file that decide its format."""
-MAX_SATELLITES = 300_000
-"""Largest number of satellites in a file, several times the number of catalogued ones."""
+FORMAT_PROBE_BYTES = 4096  # number of bytes at the beginning of a file that decide its format
+MAX_SATELLITES = 300_000  # largest number of satellites in a file, several times the number of catalogued ones
 MAX_COMPARED_NAMES = 40_000
 """Largest number of names that an error compares with an unknown name: more than the catalogued satellites."""
 MAX_XML_DEPTH, MAX_VALUE_CHARS = 100, 200
 """Largest depth of nested XML elements, and the number of characters to which a value is cut."""
-PARSE_CHUNK_BYTES = 1 << 20
-"""Number of bytes of XML that are parsed at once."""
+PARSE_CHUNK_BYTES = 1 << 20  # number of bytes of XML that are parsed at once
 FIRST_SATELLITE_YEAR = 57
 """Smallest two-digit year of a TLE that lies in the 20th century: the first satellite flew in 1957."""
-TLE_EPOCH_COLUMNS = slice(18, 32)
-"""Columns of the epoch in line 1 of a TLE."""
+TLE_EPOCH_COLUMNS = slice(18, 32)  # columns of the epoch in line 1 of a TLE
 
 
 class Elements(typing.NamedTuple):

@@ -10,8 +10,7 @@ from pedestal_common.wire.records import NO_STAMP
 MESSAGE_FAULT_CODES = message_faults.codes('tracking_receiver')
 Fault = codes([fault.name for fault in table.INJECTED_FAULTS['tracking_receiver']])
 
-SLOPE_BOTH, SLOPE_CROSS_ELEVATION, SLOPE_ELEVATION = range(3)
-"""Choices of the fault wrong_slope."""
+SLOPE_BOTH, SLOPE_CROSS_ELEVATION, SLOPE_ELEVATION = range(3)  # choices of the fault wrong_slope
 
 INJECTED_DTYPE = np.dtype([('power', 'f8'), ('cos_phi', 'f8'), ('sin_phi', 'f8'), ('latency_ns', 'i8'),
                            ('clock_ns', 'i8'), ('bias', 'f8', (2,)),

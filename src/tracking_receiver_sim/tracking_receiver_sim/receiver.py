@@ -39,16 +39,14 @@ Status = codes(STATUS_TEXTS)
 
 NORMALS_PER_SAMPLE = 6
 """Standard normals of a sample: real and imaginary noise of the sum and of the two difference channels."""
-RESULT_RING_SIZE = 512
-"""Largest number of results that wait for the latency to pass."""
+RESULT_RING_SIZE = 512  # largest number of results that wait for the latency to pass
 Result = namedtuple('Result', 'error cn0_dbhz rates range')
 """Published result of one step: error and rates (cross-elevation, elevation) [rad, rad/s], C/N0 [dB-Hz], range [m];
 NaN while not locked or if not measured."""
 Incidence = namedtuple('Incidence', 'dX dE amplitude image hidden rates range')
 """Signal of a step as it arrives: error (cross-elevation, elevation) [rad] at the stamp, sum voltage on axis [-],
 multipath.Image, True if hidden; measured rates and range as in Result."""
-NOT_MEASURED = (math.nan, math.nan)
-"""Pair of numbers that the receiver did not measure."""
+NOT_MEASURED = (math.nan, math.nan)  # pair of numbers that the receiver did not measure
 
 STATE_DTYPE = np.dtype([
     ('stamp_ns', 'i8'), ('error_known', 'i8'), ('cross_elevation', 'f8'), ('elevation', 'f8'), ('direction', 'f8', 3),

@@ -15,8 +15,7 @@ from pedestal_common.compiled import compiled
 SMOOTHING_KINDS = ('none', 'recursion', 'moving_average')
 SMOOTHING_NONE, SMOOTHING_RECURSION, SMOOTHING_MOVING_AVERAGE = range(len(SMOOTHING_KINDS))
 
-MAX_WINDOW_SAMPLES = 256
-"""Length of the longest moving average [samples]."""
+MAX_WINDOW_SAMPLES = 256  # length of the longest moving average [samples]
 
 SMOOTHER_DTYPE = np.dtype([('low_pass', 'f8'), ('sum', 'f8'), ('samples', 'f8', (MAX_WINDOW_SAMPLES,)),
                            ('count', 'i8')], align=True)

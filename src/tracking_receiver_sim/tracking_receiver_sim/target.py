@@ -36,22 +36,18 @@ from pedestal_common.parameters import record, record_type
 from pedestal_common.sky import bodies
 from tracking_receiver_sim.params import TARGET_KINDS, TARGET_RAMP, TARGET_SINE, TARGET_STEP, AngleParameters
 
-SGP4_KNOT_SPACING_S = 1.0
-"""Time between two SGP4 knots [s]."""
-BODY_KNOT_SPACING_S = 10.0
-"""Time between two knots of the sun or the moon [s]; the pieces are within 1e-9 rad."""
+SGP4_KNOT_SPACING_S = 1.0  # time between two SGP4 knots [s]
+BODY_KNOT_SPACING_S = 10.0  # time between two knots of the sun or the moon [s]; the pieces are within 1e-9 rad
 PASS_SEARCH_STEP_S = 20.0
 """Step of the pass finder [s]; a pass of a satellite in a low earth orbit (LEO) lasts minutes."""
-PEAK_SEARCH_POINTS = 41
-"""Number of points of each refinement in the search for the peak of a pass."""
+PEAK_SEARCH_POINTS = 41  # number of points of each refinement in the search for the peak of a pass
 RUN_MARGIN_S = 5.0
 """Time before and after the run [s] that a target covers, for a program track.
 
 A track_file covers this time only as far as the file goes.
 """
 
-MAX_HORIZON_POINTS = 10_000
-"""Largest number of points at which a target is compared with the horizon."""
+MAX_HORIZON_POINTS = 10_000  # largest number of points at which a target is compared with the horizon
 
 TargetState = namedtuple('TargetState', 'valid position velocity')
 """State of a target. valid: 0 or 1; position: ENU of the station [m]; velocity [m/s]; three floats each, NaN if not

@@ -10,8 +10,7 @@ from pedestal_common.text_files import content, csv_table
 from tracking_receiver_sim.ephemeris import course, directions, lines, oem, stk
 from tracking_receiver_sim.track import fixes, flight, gpx, nmea, place, tables
 
-FORMAT_PROBE_BYTES = 65536
-"""Number of bytes at the beginning of a file that decide its format."""
+FORMAT_PROBE_BYTES = 65536  # number of bytes at the beginning of a file that decide its format
 
 
 class FileKind(typing.NamedTuple):

@@ -36,17 +36,13 @@ burst     stamp at which the last burst of alarms began [s]
 revision  number of changes of the published list
 """
 
-NO_ALARM = -1
-"""Index that stands for no alarm."""
-
-FIRST_OUT_WINDOW_S = 1.0
-"""Time after the first alarm of a burst within which other alarms belong to the burst [s]."""
+NO_ALARM = -1  # index that stands for no alarm
+FIRST_OUT_WINDOW_S = 1.0  # time after the first alarm of a burst within which other alarms belong to the burst [s]
 
 CAUSE_WINDOW_S = 5.0
 """Longest time between two alarms, in either order, in which the one counts as the consequence of the other [s]."""
 
-MAX_SHELVING_TIME_S = 86400.0
-"""Longest time for which an alarm may be shelved [s]: a day."""
+MAX_SHELVING_TIME_S = 86400.0  # longest time for which an alarm may be shelved [s]: a day
 
 
 def initialise(s):

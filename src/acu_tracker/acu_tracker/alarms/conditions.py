@@ -56,8 +56,7 @@ unasked_rate     excess over the commanded rates that counts as uncommanded moti
 beamwidth        beamwidth of the receiver [rad]
 """
 
-DRIVE_SILENCE_GAP_S = 0.3
-"""Gap between two steps above which the drive was silent [s]."""
+DRIVE_SILENCE_GAP_S = 0.3  # gap between two steps above which the drive was silent [s]
 
 
 def initialise(s):

@@ -42,17 +42,13 @@ MAX_STEP_MISMATCH_RAD = 3e-3
 Wind-up and lash of a gear cause less than 1 mrad.
 """
 
-STUCK_TEST_TRAVEL_RAD = 3e-3
-"""Travel of the motors in which the encoder must move as well [rad]; longer than the lash."""
+STUCK_TEST_TRAVEL_RAD = 3e-3  # travel of the motors in which the encoder must move as well [rad]; longer than the lash
 
 STUCK_TRAVEL_SHARE, FREE_TRAVEL_SHARE = 0.1, 0.5
 """Shares of STUCK_TEST_TRAVEL_RAD below which the encoder is stuck, and above which a stuck encoder moves again."""
 
-MIN_COMMANDED_RATE_RAD_S = 5e-3
-"""Rate command above which an axis must move [rad/s]."""
-
-IMMOBILE_RATE_SHARE = 0.1
-"""Share of the commanded rate below which an axis is immobile."""
+MIN_COMMANDED_RATE_RAD_S = 5e-3  # rate command above which an axis must move [rad/s]
+IMMOBILE_RATE_SHARE = 0.1  # share of the commanded rate below which an axis is immobile
 
 EXCESS_TORQUE_RATIO = 50.0
 """Ratio of torque to Coulomb friction above which the torque is excessive [-].
@@ -68,8 +64,7 @@ The torque is five sixths of what the brakes hold. Below this torque dragging br
 head wind, because both take work from the motors.
 """
 
-MIN_DRAG_RATE_RAD_S = 2e-4
-"""Rate above which the motors of an axis move it [rad/s]: twice the resolution of the rate."""
+MIN_DRAG_RATE_RAD_S = 2e-4  # rate above which the motors of an axis move it [rad/s]: twice the resolution of the rate
 
 MIN_RESISTED_TIME_S = 0.2
 """Time for which a brake must have resisted the motors with excess torque before it is reported [s]."""
@@ -93,8 +88,7 @@ The mean is that of the absolute value, because the torque of an axis with dragg
 changes its direction.
 """
 
-MAX_ACCELERATION_RATIO = 2.0
-"""Ratio of the largest acceleration of an axis to the largest commanded acceleration [-]."""
+MAX_ACCELERATION_RATIO = 2.0  # ratio of the largest acceleration of an axis to the largest commanded acceleration [-]
 
 MAX_MISMATCH_RAD = 1e-2
 """Largest sum of the differences between encoder and motors [rad]: five times lash and wind-up of a gear."""
@@ -102,11 +96,8 @@ MAX_MISMATCH_RAD = 1e-2
 MISMATCH_TIME_CONSTANT_S = 2.0
 """Time constant with which the sum of the differences between encoder and motors decays [s]."""
 
-STANDSTILL_RATE_RAD_S = 2e-3
-"""Rate above which an axis moves [rad/s]."""
-
-FOLLOWING_ERROR_BEAMWIDTHS = 0.25
-"""Following error that is too large [beamwidths]."""
+STANDSTILL_RATE_RAD_S = 2e-3  # rate above which an axis moves [rad/s]
+FOLLOWING_ERROR_BEAMWIDTHS = 0.25  # following error that is too large [beamwidths]
 
 MIN_HALF_WAVE_AREA = 1e-4
 """Smallest area of a half wave of the following error that counts [rad s].
@@ -114,8 +105,7 @@ MIN_HALF_WAVE_AREA = 1e-4
 The area is 2 a / w for an amplitude a of 1 mrad and a frequency w / (2 pi) of 3 Hz.
 """
 
-OSCILLATION_WINDOW_S = 5.0
-"""Time constant with which the count of half waves decays [s]."""
+OSCILLATION_WINDOW_S = 5.0  # time constant with which the count of half waves decays [s]
 
 OSCILLATION_HALF_WAVES = 10.0
 """Count of half waves within OSCILLATION_WINDOW_S above which the error oscillates [-]: a frequency above 1 Hz."""

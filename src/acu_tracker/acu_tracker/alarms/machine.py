@@ -21,8 +21,7 @@ suppress, release  the alarm has no meaning in this mode, or has a meaning again
 others             commands of the operator
 """
 
-EVENT_REFUSED = -1
-"""Code in the place of the next state, for an event that a state does not accept."""
+EVENT_REFUSED = -1  # code in the place of the next state, for an event that a state does not accept
 
 # The states in the order of ALARM_STATES, and x for an event that is refused.
 _N, _U, _A, _R, _LU, _LA, _SH, _SU, _x = (*range(len(ALARM_STATES)), EVENT_REFUSED)
@@ -47,14 +46,12 @@ acknowledged, and is suppressed then.
 IS_ANNUNCIATED = (False, True, True, True, True, True, False, False)
 """States in which an alarm is in the published list and is not shelved."""
 
-IS_LISTED = (False, True, True, True, True, True, True, False)
-"""States in which an alarm is in the published list."""
+IS_LISTED = (False, True, True, True, True, True, True, False)  # states in which an alarm is in the published list
 
 AWAITS_ACKNOWLEDGEMENT = (False, True, False, True, True, False, False, False)
 """States in which an alarm waits for an acknowledgement."""
 
-IS_LATCHED = (False, False, False, False, True, True, False, False)
-"""States that end only by a reset."""
+IS_LATCHED = (False, False, False, False, True, True, False, False)  # states that end only by a reset
 
 
 @compiled

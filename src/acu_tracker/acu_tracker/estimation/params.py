@@ -7,10 +7,8 @@ from acu_tracker.estimation.filters.motion_models import MAX_RUNG_COUNT
 from pedestal_common.parameters import ParameterError, Parameters, choice, flag, group, parameter, text
 
 _DEG = math.pi / 180.0
-MAX_WHITE_JERK = 1e3
-"""Largest root density of a white jerk [rad/s3/sqrt(Hz)]."""
-MIN_DETERMINANT = 0.01
-"""Least size of the determinant of the matrix of the receiver's errors [-]."""
+MAX_WHITE_JERK = 1e3  # largest root density of a white jerk [rad/s3/sqrt(Hz)]
+MIN_DETERMINANT = 0.01  # least size of the determinant of the matrix of the receiver's errors [-]
 _ALPHA = '1/s', 'manoeuvre frequency: reciprocal of the duration of an acceleration'
 
 

@@ -14,8 +14,7 @@ message  cross-elevation error, elevation error [rad] and C/N0 [dB-Hz]
 at       deck angles (azimuth, elevation) of the beam when these numbers came for the first time [rad]
 """
 
-REPETITION_TRAVEL_RAD = 3e-3
-"""Travel of the beam within which the message must change [rad]."""
+REPETITION_TRAVEL_RAD = 3e-3  # travel of the beam within which the message must change [rad]
 
 
 @compiled

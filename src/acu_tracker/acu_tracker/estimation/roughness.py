@@ -19,8 +19,7 @@ from pedestal_common.compiled import compiled
 ROUGHNESS_DTYPE = np.dtype([('nu', 'f8', (2,)), ('q', 'f8')], align=True)
 """nu: innovations of the previous error, of azimuth and elevation [rad], NaN without one; q: the mean [-]."""
 
-ROUGHNESS_ERROR_COUNT = 10
-"""Number of errors in the mean q."""
+ROUGHNESS_ERROR_COUNT = 10  # number of errors in the mean q
 
 MAX_COUNTED_DIFFERENCE = 100.0
 """Largest contribution of one difference to q [-].

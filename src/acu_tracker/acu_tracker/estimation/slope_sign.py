@@ -60,8 +60,7 @@ MIN_ERROR_COUNT = 60
 The means of fewer errors have no useful ratio.
 """
 
-MAX_ERROR_BEAMWIDTHS = 0.5
-"""Largest error that is used [beamwidths]."""
+MAX_ERROR_BEAMWIDTHS = 0.5  # largest error that is used [beamwidths]
 
 REVERSED_SLOPE_RATIO, REVERSED_SLOPE_MARGIN, CROSS_AXIS_LEAKAGE = 5.0, 0.5, 0.1
 """Limits of a reversed slope [-]: J+ > REVERSED_SLOPE_RATIO J- and J+ > J- + REVERSED_SLOPE_MARGIN +

@@ -36,8 +36,7 @@ RATE_COLUMN, ACCELERATION_COLUMN = 4, 7
 MIN_TURN_RATE_RAD_S = 1e-6
 """Rate of the deck [rad/s] above which its attitude must change from one measurement to the next."""
 
-UNKNOWN_VECTOR = Vector(math.nan, math.nan, math.nan)
-"""Vector without a value."""
+UNKNOWN_VECTOR = Vector(math.nan, math.nan, math.nan)  # vector without a value
 
 SAMPLE_INVALID, SAMPLE_REPEATED, SAMPLE_NEW = range(3)
 """Outcomes of `take`: the sample is unusable, has the stamp of the last sample, or is kept."""

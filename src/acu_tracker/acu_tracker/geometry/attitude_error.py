@@ -15,8 +15,7 @@ noise      variance of the white noise of a sample, of (tilt, heading) [rad2]
 walk       growth of the variance by the random walk of the error, of (tilt, heading) [rad2/s]
 """
 
-MAX_ATTITUDE_NOISE = 0.5
-"""Largest accepted 1-sigma of the noise [rad] and of the random walk [rad/sqrt(s)]."""
+MAX_ATTITUDE_NOISE = 0.5  # largest accepted 1-sigma of the noise [rad] and of the random walk [rad/sqrt(s)]
 
 
 @compiled

@@ -23,8 +23,7 @@ MAX_FRAME_ELEVATION_RAD = math.radians(20.0)
 """Largest angle [rad] of the target off the equator. At this angle the acceleration of a great circle reaches 0.36 of
 the squared rate. A smaller limit lays the frame more often on the way of a target that turns."""
 
-FRAME_DTYPE = np.dtype([('mat', 'f8', (3, 3))], align=True)
-"""mat: rotation matrix frame -> earth."""
+FRAME_DTYPE = np.dtype([('mat', 'f8', (3, 3))], align=True)  # mat: rotation matrix frame -> earth
 
 
 @compiled

@@ -3,8 +3,7 @@ import numpy as np
 
 from pedestal_common.compiled import compiled
 
-HISTORY_LENGTH = 64
-"""Number of samples in a history."""
+HISTORY_LENGTH = 64  # number of samples in a history
 
 MAX_DELAY_STEPS = HISTORY_LENGTH - 4
 """Longest delay for which a history holds the sample [steps]. Four steps are a margin for stamps between the steps and

@@ -23,8 +23,7 @@ from pedestal_common.geometry.line_of_sight import earth_angles, earth_direction
 LEVER_ARM_DTYPE = np.dtype([('arm', 'f8', (3,)), ('range', 'f8')], align=True)
 """arm: r / R, FLU [-], zero without a range; range: smoothed R [m], 0 if the filter started without a range."""
 
-RANGE_SMOOTHING_SHARE = 0.05
-"""Share of each new measurement in the smoothed range [-]."""
+RANGE_SMOOTHING_SHARE = 0.05  # share of each new measurement in the smoothed range [-]
 
 
 @compiled

@@ -13,8 +13,7 @@ from pedestal_common.compiled import compiled
 AxisMotion = namedtuple('AxisMotion', 'angle rate acceleration')
 """Angle [rad], rate [rad/s] and acceleration [rad/s2] of one axis."""
 
-Motion = namedtuple('Motion', 'azimuth elevation')
-"""Motion of both axes; motion[0] is azimuth, motion[1] elevation."""
+Motion = namedtuple('Motion', 'azimuth elevation')  # motion of both axes; motion[0] is azimuth, motion[1] elevation
 
 LineOfSight = namedtuple('LineOfSight', 'u du ddu')
 """Unit vector u [-] towards the target, its first [1/s] and second [1/s2] derivative."""

@@ -10,8 +10,7 @@ from pedestal_common.geometry import line_of_sight
 Vector = namedtuple('Vector', 'x y z')
 """Components of a vector along the axes of a frame. The docstring of the function that uses it names the frame."""
 
-Rotation = namedtuple('Rotation', 'x y z')
-"""Matrix of a rotation: its rows, each a Vector."""
+Rotation = namedtuple('Rotation', 'x y z')  # matrix of a rotation: its rows, each a Vector
 
 
 @compiled

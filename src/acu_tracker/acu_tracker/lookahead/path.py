@@ -13,8 +13,7 @@ from pedestal_common.compiled import compiled
 from pedestal_common.geometry import pointing_model
 from pedestal_common.geometry.line_of_sight import angles, direction, wrap
 
-PATH_ROW_COUNT, PATH_COLUMN_COUNT = 1025, 6
-"""Largest number of rows of a path, and number of its columns."""
+PATH_ROW_COUNT, PATH_COLUMN_COUNT = 1025, 6  # largest number of rows of a path, and number of its columns
 
 UP_COLUMN, AZIMUTH_COLUMN, LEAST_AZIMUTH_COLUMN, LARGEST_AZIMUTH_COLUMN = range(2, PATH_COLUMN_COUNT)
 """Columns of a path.

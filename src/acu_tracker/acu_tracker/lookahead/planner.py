@@ -21,8 +21,7 @@ from pedestal_common.compiled import assign, compiled
 from pedestal_common.geometry import blockage
 from pedestal_common.geometry.line_of_sight import angles, rotation
 
-LOOK_AHEAD_PERIOD_S = 1.0
-"""Time between two look-aheads [s]. For this time before a slew begins, its plan is final."""
+LOOK_AHEAD_PERIOD_S = 1.0  # time between two look-aheads [s]. For this time before a slew begins, its plan is final.
 MAX_UNANNOUNCED_TIME_S, MAX_UNANNOUNCED_LOSS_S = 0.5, 0.1
 """Largest changes of a plan that are not announced: of begin or end of its slew, and of the expected loss [s]."""
 
@@ -60,8 +59,7 @@ CONSTANTS_DTYPE = np.dtype([('horizon', 'f8'), ('notice', 'f8'), ('limits', keyh
 """horizon, notice: parameters of KeyholeParameters [s]; limits: limits of a slew; sectors: hidden sectors of the deck,
 as in pedestal_common.geometry.blockage."""
 
-MIN_PATH_ROW_COUNT = 3
-"""Least number of rows of a path: the acceleration of the azimuth follows from three rows."""
+MIN_PATH_ROW_COUNT = 3  # least number of rows of a path: the acceleration of the azimuth follows from three rows
 
 
 def constants(params) -> np.ndarray:

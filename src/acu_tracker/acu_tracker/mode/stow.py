@@ -35,8 +35,7 @@ state of the elevation pin."""
 BOTH_PINS_OUT, BOTH_PINS_IN = _PIN_OUT * _PIN_STATE_COUNT + _PIN_OUT, _PIN_IN * _PIN_STATE_COUNT + _PIN_IN
 """Codes of adu/stow_pins, on which the drive reports the states of both pins."""
 
-MAX_REST_RATE_RAD_S = 1e-3
-"""Rate below which an axis is at rest [rad/s]."""
+MAX_REST_RATE_RAD_S = 1e-3  # rate below which an axis is at rest [rad/s]
 
 MIN_REST_TIME_S = 0.5
 """Time for which both axes must be at rest at the stow angles before the pins are commanded in [s]."""

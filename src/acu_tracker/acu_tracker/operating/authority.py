@@ -5,8 +5,7 @@ antenna. While control is free, every client may send any command.
 """
 from pedestal_common.wire.commands import HELD_REFUSAL, Reply
 
-CONTROL_ROLES = ('operator', 'supervisor')
-"""Roles of a client; a supervisor may take control from another client."""
+CONTROL_ROLES = ('operator', 'supervisor')  # roles of a client; a supervisor may take control from another client
 
 UNRESTRICTED_COMMANDS = ('standby', 'stop', 'acu/standby', 'acu/stop')
 """Commands and services that are open to every client at any time."""

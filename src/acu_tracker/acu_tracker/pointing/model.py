@@ -38,11 +38,8 @@ report         number of the report on acu/pointing: 0 of the model at the start
 MAX_CHANGE_RATE_RAD_S = math.radians(0.1)
 """Largest rate at which a new model moves the encoder angles [rad/s], near the zenith in cross-elevation."""
 
-MIN_CHANGE_TIME_S = 1.0
-"""Least time in which a new model takes effect [s]."""
-
-SMOOTHSTEP_PEAK = 1.5
-"""Largest slope of the curve of put_between [-]."""
+MIN_CHANGE_TIME_S = 1.0  # least time in which a new model takes effect [s]
+SMOOTHSTEP_PEAK = 1.5  # largest slope of the curve of put_between [-]
 
 
 def initialise(s, terms, named):

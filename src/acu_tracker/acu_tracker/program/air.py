@@ -18,20 +18,14 @@ from acu_tracker.program.program_track import ProgramTrack
 from pedestal_common.geometry import refraction
 from pedestal_common.parameters import Parameters, choice, parameter
 
-CHANGE_TIME_S = 60.0
-"""Duration of the ramp from one weather to the next [s]."""
+CHANGE_TIME_S = 60.0  # duration of the ramp from one weather to the next [s]
 
 MIN_CHANGE_N = 0.1
 """Change of the refractivity from which on a new weather is used [N]. It moves a target at 5 deg by 6e-5 deg."""
 
-MAX_DELAY_S = 3600.0
-"""Longest delay of a weather in a table with rare rows [s]."""
-
-MAX_KNOTS = 400
-"""Number of kept begins and ends of ramps; those of more than MAX_DELAY_S."""
-
-MAX_LEAD_S = 1.0
-"""Largest accepted lead of the stamp of a reading over the present step [s]."""
+MAX_DELAY_S = 3600.0  # longest delay of a weather in a table with rare rows [s]
+MAX_KNOTS = 400  # number of kept begins and ends of ramps; those of more than MAX_DELAY_S
+MAX_LEAD_S = 1.0  # largest accepted lead of the stamp of a reading over the present step [s]
 
 
 class Quantity(typing.NamedTuple):

@@ -30,23 +30,12 @@ from pedestal_common.parameters import ParameterError, Parameters, flag, group, 
 from pedestal_common.reproducible import arctan2
 from pedestal_common.sky import bodies
 
-TABLE_ROW_COUNT = 2400
-"""Number of rows of a table."""
-
-TABLE_LEAD_TIME_S = 10.0
-"""Time before the present at which a table begins [s]."""
-
-ROWS_PER_ORBIT = 5400
-"""Number of rows for one revolution of a satellite; a row every second of a low satellite."""
-
-SUN_ROW_INTERVAL_S = 30.0
-"""Time between two rows of the table of the sun [s]. In this time the sun moves by 0.13 deg."""
-
-RISE_SEARCH_SPAN_S = 2.0 * SECONDS_PER_DAY
-"""Time ahead in which the next rise is searched [s]."""
-
-RISE_SEARCH_STEP_S = 20.0
-"""Time step in the search of the next rise [s]."""
+TABLE_ROW_COUNT = 2400  # number of rows of a table
+TABLE_LEAD_TIME_S = 10.0  # time before the present at which a table begins [s]
+ROWS_PER_ORBIT = 5400  # number of rows for one revolution of a satellite; a row every second of a low satellite
+SUN_ROW_INTERVAL_S = 30.0  # time between two rows of the table of the sun [s]. In this time the sun moves by 0.13 deg.
+RISE_SEARCH_SPAN_S = 2.0 * SECONDS_PER_DAY  # time ahead in which the next rise is searched [s]
+RISE_SEARCH_STEP_S = 20.0  # time step in the search of the next rise [s]
 
 
 @dataclasses.dataclass(frozen=True)

@@ -16,8 +16,7 @@ from pedestal_common.compiled import compiled, separate
 from pedestal_common.geometry.interval import interval
 from pedestal_common.geometry.line_of_sight import earth_direction, wrap
 
-MAX_PROGRAM_ROWS = 100_000
-"""Largest number of rows of a program."""
+MAX_PROGRAM_ROWS = 100_000  # largest number of rows of a program
 STEEP_ELEVATION_RAD = math.radians(80.0)
 """Elevation above which the unit vector is interpolated instead of the angles [rad]."""
 
@@ -32,8 +31,7 @@ class ProgramTrack(typing.NamedTuple):
     angles: np.ndarray
 
 
-NO_TRACK = ProgramTrack(np.zeros(0), np.zeros((0, 2)))
-"""ProgramTrack without a row."""
+NO_TRACK = ProgramTrack(np.zeros(0), np.zeros((0, 2)))  # ProgramTrack without a row
 
 
 class ProgramTrackError(ValueError):

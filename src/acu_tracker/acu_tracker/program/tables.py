@@ -17,8 +17,7 @@ TABLE_MODES = tuple(row for row in modes.MODE_ROWS if row.table)
 Tables = collections.namedtuple('Tables', [row.name for row in TABLE_MODES])  # type: ignore[misc]  # a field per row
 """One ProgramTrack for each mode that follows a table, the program first."""
 
-NO_TABLES = Tables(*(NO_TRACK for _ in TABLE_MODES))
-"""Tables without a row."""
+NO_TABLES = Tables(*(NO_TRACK for _ in TABLE_MODES))  # tables without a row
 
 TABLE_INDEX = tuple(TABLE_MODES.index(row) if row.table else 0 for row in modes.MODE_ROWS)
 """Index in Tables of the table of each mode; 0, the program, for a mode that follows none."""

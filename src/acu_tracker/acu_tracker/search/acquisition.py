@@ -51,31 +51,22 @@ wrong_slope_count   number of slope checks with a wrong slope
 fair                last time at which the level was not suspected to be that of a side lobe [s]
 """
 
-LEVEL_SETTLING_LAGS = 4.0
-"""Number of time constants of the level after which it is that of a new place."""
-
-PEAK_DROP_DB = 1.0
-"""Drop of the level below its peak at which search ends and the beam returns to the peak [dB]."""
-
-MAX_RISE_TIME_S = 1.0
-"""Time for which the level may stay above its threshold before search ends without a drop [s]."""
+LEVEL_SETTLING_LAGS = 4.0  # number of time constants of the level after which it is that of a new place
+PEAK_DROP_DB = 1.0  # drop of the level below its peak at which search ends and the beam returns to the peak [dB]
+MAX_RISE_TIME_S = 1.0  # time for which the level may stay above its threshold before search ends without a drop [s]
 
 CIRCLE_RADIUS_BEAMWIDTHS, CIRCLE_PERIOD_S, CIRCLE_TURN_COUNT = 0.1, 0.5, 2.0
 """Circle of the slope check: radius [beamwidths], time of a turn [s], number of turns. The radius grows during the
 first turn."""
 
-MIN_CHECK_ERROR_COUNT = 50
-"""Least number of errors in a slope check."""
-
-MAX_LOOK_AROUND_COUNT = 4
-"""Number of phases `look around` after which acquire continues with the present place."""
+MIN_CHECK_ERROR_COUNT = 50  # least number of errors in a slope check
+MAX_LOOK_AROUND_COUNT = 4  # number of phases `look around` after which acquire continues with the present place
 
 PEAK_STEP_BEAMWIDTHS, MAX_PEAK_MOVE_BEAMWIDTHS = 0.3, 0.7
 """Phase `peak`: step to either side of the centre, and longest move of the centre [beamwidths]. After a move beyond
 the length of the step the phase is repeated."""
 
-MAX_PEAK_COUNT = 3
-"""Largest number of phases `peak` before a slope check."""
+MAX_PEAK_COUNT = 3  # largest number of phases `peak` before a slope check
 
 PEAK_OFFSETS_BEAMWIDTHS = ((0.0, 0.0), (PEAK_STEP_BEAMWIDTHS, 0.0), (-PEAK_STEP_BEAMWIDTHS, 0.0),
                            (0.0, PEAK_STEP_BEAMWIDTHS), (0.0, -PEAK_STEP_BEAMWIDTHS))

@@ -40,14 +40,9 @@ above_detect, above_track, below_loss  time for which the level has been above o
 present          1 if there is a target
 """
 
-Thresholds = namedtuple('Thresholds', 'detect track loss')
-"""Thresholds of the level [dB-Hz]."""
-
-DETECTION_SIGMAS = 4.0
-"""Height of the detection threshold above the mean noise, in standard deviations of the noise."""
-
-MIN_LOSS_SIGMAS = 2.0
-"""Least height of the loss threshold above the mean noise, in standard deviations of the noise."""
+Thresholds = namedtuple('Thresholds', 'detect track loss')  # thresholds of the level [dB-Hz]
+DETECTION_SIGMAS = 4.0  # height of the detection threshold above the mean noise, in standard deviations of the noise
+MIN_LOSS_SIGMAS = 2.0  # least height of the loss threshold above the mean noise, in standard deviations of the noise
 
 TRACK_MARGIN_DB, LOSS_MARGIN_DB = 1.0, -2.0
 """Heights of the thresholds track and loss relative to the threshold detect [dB]."""

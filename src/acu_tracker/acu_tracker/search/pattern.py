@@ -31,8 +31,7 @@ PATTERN_SPIRAL, PATTERN_RASTER, PATTERN_SQUARE, PATTERN_SECTOR = range(len(SEARC
     sector      lines from one edge of the area to the other
 """
 
-SPEED_RISE_TIME_S = 0.2
-"""Time in which the beam reaches its speed, and in which it stops [s]."""
+SPEED_RISE_TIME_S = 0.2  # time in which the beam reaches its speed, and in which it stops [s]
 
 Area = namedtuple('Area', 'pattern radius across pitch speed')
 """Area and pattern of a search.

@@ -22,11 +22,8 @@ from pedestal_common.geometry import line_of_sight
 PLACE_DTYPE = np.dtype([('u', 'f8', (3,)), ('du', 'f8', (3,)), ('stamp', 'f8')], align=True)
 """Last known place: ENU unit vector u [-] towards the target at the stamp [s], and its rate du [1/s]."""
 
-ZERO_VECTOR = Vector(0.0, 0.0, 0.0)
-"""Vector of length 0."""
-
-RATE_FADE_TIME_S = 10.0
-"""Time constant with which the expected rate fades [s]."""
+ZERO_VECTOR = Vector(0.0, 0.0, 0.0)  # vector of length 0
+RATE_FADE_TIME_S = 10.0  # time constant with which the expected rate fades [s]
 
 
 @compiled

@@ -11,16 +11,10 @@ import math
 
 from pedestal_common.compiled import compiled
 
-SIDE_LOBE_MARGIN_DB = 10.0
-"""Distance below the expected level at which a signal counts as one in a side lobe [dB]."""
-
-LOOK_AROUND_PLACES = 6
-"""Number of places of a look-around."""
-LOOK_AROUND_BEAMWIDTHS = 1.2
-"""Distance of the places of a look-around [beamwidths]."""
-
-MIN_IMPROVEMENT_DB = 2.0
-"""Least increase of the level for which the beam moves to another place [dB]."""
+SIDE_LOBE_MARGIN_DB = 10.0  # distance below the expected level at which a signal counts as one in a side lobe [dB]
+LOOK_AROUND_PLACES = 6  # number of places of a look-around
+LOOK_AROUND_BEAMWIDTHS = 1.2  # distance of the places of a look-around [beamwidths]
+MIN_IMPROVEMENT_DB = 2.0  # least increase of the level for which the beam moves to another place [dB]
 
 
 @compiled

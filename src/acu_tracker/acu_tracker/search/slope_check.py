@@ -28,8 +28,7 @@ MIN_SLOPE = 0.5
 Axes that are turned by 60 deg have this slope. Such a turn uses up the phase margin of the loop.
 """
 
-VERDICT_UNKNOWN, VERDICT_RIGHT, VERDICT_WRONG = range(3)
-"""Verdicts of the check."""
+VERDICT_UNKNOWN, VERDICT_RIGHT, VERDICT_WRONG = range(3)  # verdicts of the check
 
 
 @compiled

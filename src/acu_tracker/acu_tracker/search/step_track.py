@@ -35,8 +35,7 @@ STEP_PHASES = ('cross-elevation plus', 'cross-elevation minus', 'elevation plus'
 REST_PHASE = len(STEP_PHASES) - 1
 """Phases of a cycle, in their order. An even index is the plus side; two phases belong to each axis."""
 
-STEP_SETTLING_LAGS = 5.0
-"""Number of time constants of the level after which it is that of a new place."""
+STEP_SETTLING_LAGS = 5.0  # number of time constants of the level after which it is that of a new place
 
 
 @compiled

@@ -14,16 +14,12 @@ from acu_tracker.servo.ends import Ends, braking_distance
 from pedestal_common.compiled import compiled
 from pedestal_common.parameters import ParameterError
 
-MAX_FLOOR_POINTS = 64
-"""Largest number of points of a floor."""
+MAX_FLOOR_POINTS = 64  # largest number of points of a floor
 FLOOR_DOC = ("floor of the elevation over the azimuth, at most 64 points: 'azimuth elevation; ...' [rad] on the deck, "
              'clockwise within a turn, straight lines between; empty: elevation.limits.low')
 
-CELL_COUNT = 720
-"""Number of cells of a turn in which the floor is looked up: half a degree each."""
-
-CELL_WIDTH_RAD = 2.0 * math.pi / CELL_COUNT
-"""Width of a cell [rad]."""
+CELL_COUNT = 720  # number of cells of a turn in which the floor is looked up: half a degree each
+CELL_WIDTH_RAD = 2.0 * math.pi / CELL_COUNT  # width of a cell [rad]
 
 FLOOR_DTYPE = np.dtype([('given', 'i8'), ('highest', 'f8', (CELL_COUNT,))], align=True)
 """given: 1 if there is a floor; highest: highest value of the floor in each cell [rad].

@@ -11,8 +11,7 @@ from acu_tracker.geometry.motion import AxisMotion
 from pedestal_common.compiled import compiled
 from pedestal_common.fhan import fhan
 
-SUB_STEP_COUNT = 4
-"""Number of sub-steps in which the shaper computes a step of the drive."""
+SUB_STEP_COUNT = 4  # number of sub-steps in which the shaper computes a step of the drive
 
 
 @compiled

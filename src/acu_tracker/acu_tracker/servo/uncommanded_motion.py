@@ -37,11 +37,8 @@ ENVELOPE_TIME_CONSTANT_S = 0.2
 A drive that receives no command ramps to rest faster than the envelope shrinks.
 """
 
-ENVELOPE_OVERSHOOT_SHARE = 0.25
-"""Share of the width of the envelope by which a rate may be outside it [-]."""
-
-RESTART_SETTLING_TIME_S = 0.3
-"""Time without a test after a silence, or after the drive became ready [s]."""
+ENVELOPE_OVERSHOOT_SHARE = 0.25  # share of the width of the envelope by which a rate may be outside it [-]
+RESTART_SETTLING_TIME_S = 0.3  # time without a test after a silence, or after the drive became ready [s]
 
 MIN_EXCESS_TIME_S = 0.014
 """Shortest excess that counts [s]: three steps of 5 ms, less a margin of 1 ms.

@@ -10,11 +10,8 @@ from pedestal_common.compiled import compiled
 from pedestal_common.parameters import ParameterError
 from pedestal_common.wire.records import NO_STAMP
 
-BEAM_RING_SIZE = 512
-"""Largest number of commands within the delay."""
-
-MAX_COMMAND_ANGLE_RAD = 1e3
-"""Largest valid angle of a command [rad]; a command beyond it, infinite or NaN is ignored."""
+BEAM_RING_SIZE = 512  # largest number of commands within the delay
+MAX_COMMAND_ANGLE_RAD = 1e3  # largest valid angle of a command [rad]; a command beyond it, infinite or NaN is ignored
 
 CONSTANTS_DTYPE = np.dtype([('delay_ns', 'i8'), ('timeout_ns', 'i8')], align=True)
 

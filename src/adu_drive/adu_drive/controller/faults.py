@@ -52,8 +52,7 @@ def names(bits):
     return tuple(fault.name for i, fault in enumerate(AXIS_FAULTS) if int(bits) >> i & 1)
 
 
-MIN_OUTWARD_RATE_RAD_S = 1e-3
-"""Smallest rate of an axis that counts as outward motion beyond its end [rad/s]."""
+MIN_OUTWARD_RATE_RAD_S = 1e-3  # smallest rate of an axis that counts as outward motion beyond its end [rad/s]
 
 
 @inlined

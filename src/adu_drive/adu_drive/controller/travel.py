@@ -3,8 +3,7 @@ import math
 
 from pedestal_common.compiled import inlined
 
-MAX_RETURN_RATE_RAD_S = 0.1
-"""Largest rate of the return from beyond an end of travel [rad/s]."""
+MAX_RETURN_RATE_RAD_S = 0.1  # largest rate of the return from beyond an end of travel [rad/s]
 
 
 @inlined

@@ -8,8 +8,7 @@ follows the true torque of the motor, a trip by x represents a sensor in the win
 """
 from pedestal_common.compiled import inlined
 
-COPPER_COEFFICIENT_PER_K = 0.00393
-"""Temperature coefficient of copper at 20 degrees C [1/K] (IEC 60028)."""
+COPPER_COEFFICIENT_PER_K = 0.00393  # temperature coefficient of copper at 20 degrees C [1/K] (IEC 60028)
 
 WARNING_THERMAL_LOAD = 0.8
 """Thermal load of a motor above which the drive reports a warning, and below which overtemperature ends."""

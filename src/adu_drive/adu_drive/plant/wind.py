@@ -14,8 +14,7 @@ import numpy as np
 from pedestal_common.compiled import compiled
 from pedestal_common.reproducible import geomspace, power
 
-SPECTRAL_LINE_COUNT = 128
-"""Number of cosines of a spectral gust."""
+SPECTRAL_LINE_COUNT = 128  # number of cosines of a spectral gust
 
 MIN_GUST_FREQUENCY_HZ, MAX_GUST_FREQUENCY_HZ = 1e-4, 20.0
 """Lowest and highest frequency of the spectra [Hz]; gusts above 20 Hz are far smaller than an antenna."""

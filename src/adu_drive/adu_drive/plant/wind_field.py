@@ -32,8 +32,7 @@ from pedestal_common.compiled import compiled
 from pedestal_common.geometry.line_of_sight import cross, direction
 from pedestal_common.reproducible import geomspace, power
 
-TURBULENCE_SIGMA_RATIOS = (1.0, 0.78, 0.55)
-"""Standard deviations of u, v, w divided by that of u."""
+TURBULENCE_SIGMA_RATIOS = (1.0, 0.78, 0.55)  # standard deviations of u, v, w divided by that of u
 
 
 def constants(p):

@@ -18,10 +18,8 @@ from pedestal_analysis.calibration.predicted import PredictionError
 from pedestal_analysis.results import tracking
 from pedestal_common.geometry.line_of_sight import wrap
 
-WINDOW_S = 8.0
-"""Length of the part of a recording whose mean is one offset [s]."""
-DEFAULT_POINTS = 10
-"""Default number of offsets from one recording."""
+WINDOW_S = 8.0  # length of the part of a recording whose mean is one offset [s]
+DEFAULT_POINTS = 10  # default number of offsets from one recording
 MAX_MEAN_ERROR_BEAMWIDTHS = 0.25
 """Largest mean receiver error of a point [beamwidths]; beyond it the receiver is not linear."""
 

@@ -6,12 +6,9 @@ from pedestal_analysis.calibration.terms import FULL_TURN_TERMS
 
 MIN_POINTS, GOOD_POINTS = 10, 20
 """Smallest number of points for a fit, and number below which a sentence recommends more of them."""
-EXTRA_POINTS = 3
-"""Smallest number of points above the number of terms."""
-MIN_ELEVATION_SPAN_DEG = 20.0
-"""Smallest range of the elevations [deg]."""
-MAX_AZIMUTH_GAP_DEG = 160.0
-"""Largest range of azimuths without a point [deg]."""
+EXTRA_POINTS = 3  # smallest number of points above the number of terms
+MIN_ELEVATION_SPAN_DEG = 20.0  # smallest range of the elevations [deg]
+MAX_AZIMUTH_GAP_DEG = 160.0  # largest range of azimuths without a point [deg]
 
 _ELEVATION_TERMS = {'P1', 'P3', 'P4'}, {'P7', 'P8', 'P9', 'P11', 'P19', 'P20'}
 """Sets of terms that differ by the elevation only."""

@@ -22,10 +22,8 @@ from pedestal_analysis.results.intervals import CONFIDENCE_LEVEL
 
 SMALLEST_SINGULAR_VALUE = 1e-8
 """Ratio to the largest singular value below which terms have the same effect at all points [-]."""
-SHARED_PART = 0.1
-"""Part of a term in a direction that the data do not determine, from which the term is named [-]."""
-STRONG_CORRELATION = 0.95
-"""Correlation of two terms from which their values must not be trusted, only their sum [-]."""
+SHARED_PART = 0.1  # part of a term in a direction that the data do not determine, from which the term is named [-]
+STRONG_CORRELATION = 0.95  # correlation of two terms from which their values must not be trusted, only their sum [-]
 OUTLIER_SIGMAS = 4.5
 """Size of a residual above which a point is an outlier [standard deviations]; 1 of 25 000 points without a fault."""
 MEDIAN_RAYLEIGH = math.sqrt(math.log(4.0))

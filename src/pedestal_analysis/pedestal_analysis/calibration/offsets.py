@@ -26,10 +26,8 @@ MAX_OFFSET_DEG, MIN_SIGMA_DEG = 5.0, 1e-9
 AZIMUTH_RANGE_DEG, ELEVATION_RANGE_DEG = (-360.0, 540.0), (-5.0, 90.0)
 """Accepted directions [deg]. An azimuth may be in any turn of the wrap."""
 OFFSET_RANGE_DEG, SIGMA_RANGE_DEG = (-MAX_OFFSET_DEG, MAX_OFFSET_DEG), (MIN_SIGMA_DEG, MAX_OFFSET_DEG)
-MIN_COSINE = 1e-3
-"""Smallest cosine of the elevation by which an offset of the azimuth axis is converted."""
-MIN_RADIAN_POINTS = 5
-"""Number of points from which values that all look like radians are refused."""
+MIN_COSINE = 1e-3  # smallest cosine of the elevation by which an offset of the azimuth axis is converted
+MIN_RADIAN_POINTS = 5  # number of points from which values that all look like radians are refused
 
 _SKY = (columns.Quantity('az_deg', {'az': 'deg', 'azimuth': ''}, 'deg'),
         columns.Quantity('el_deg', {'el': 'deg'}, 'deg'))

@@ -7,14 +7,11 @@ from pedestal_analysis.calibration import distribution, fit, terms
 from pedestal_bringup.scenario import scenario
 from pedestal_common.graph.topics import AXES
 
-MAX_POINTS = 500
-"""Largest number of directions of a plan."""
-TRAVEL_RANGE_DEG = (-270.0, 270.0)
-"""Travel of the azimuth axis without a scenario [deg]."""
+MAX_POINTS = 500  # largest number of directions of a plan
+TRAVEL_RANGE_DEG = (-270.0, 270.0)  # travel of the azimuth axis without a scenario [deg]
 PLAN_ELEVATION_RANGE_DEG = (10.0, 80.0)
 """Elevations of a plan [deg]. Below, the refraction changes from day to day; above, the azimuth has little effect."""
-EDGE_DEG = 2.0
-"""Distance of the directions from the ends of the travel [deg]."""
+EDGE_DEG = 2.0  # distance of the directions from the ends of the travel [deg]
 
 _GOLDEN_RATIO = 0.5 * (1.0 + 5.0**0.5)
 

@@ -23,16 +23,11 @@ from pedestal_analysis.results.tracking import rms
 from pedestal_common.geometry.pointing_report import residual_text
 from pedestal_recording import bag as bags
 
-CASE_NAME = 'pointing'
-"""Case of the rows."""
-FORMS = {'linear': fit.linear, 'exact': exact.exact}
-"""{form of the model: its fit}."""
-EXACT_GAIN = 0.95
-"""Ratio of the leave-one-out rms of both forms below which the exact form is chosen [-]."""
-MAX_POINTS = 1000
-"""Largest number of points from one recording."""
-TERM_DECIMALS = 9
-"""Decimals of the terms in a parameter file."""
+CASE_NAME = 'pointing'  # case of the rows
+FORMS = {'linear': fit.linear, 'exact': exact.exact}  # {form of the model: its fit}
+EXACT_GAIN = 0.95  # ratio of the leave-one-out rms of both forms below which the exact form is chosen [-]
+MAX_POINTS = 1000  # largest number of points from one recording
+TERM_DECIMALS = 9  # decimals of the terms in a parameter file
 
 
 @dataclasses.dataclass(frozen=True)

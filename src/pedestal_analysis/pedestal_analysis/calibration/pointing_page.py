@@ -7,8 +7,7 @@ from pedestal_analysis.calibration import terms
 from pedestal_analysis.report import elements
 from pedestal_analysis.report.figures import FILTERED_COLOUR, INK_COLOUR, RAW_COLOUR, TRUTH_COLOUR, Spec, new_panels
 
-ARROW_LENGTH_DEG = 12.0
-"""Length on the plot of the arrow whose residual is stated as its scale [deg of elevation]."""
+ARROW_LENGTH_DEG = 12.0  # length on the plot of the arrow whose residual is stated as its scale [deg of elevation]
 
 
 def _sky(axes):

@@ -16,8 +16,7 @@ from pedestal_common.parameters import ParameterError
 from pedestal_common.wire import messages
 
 PROGRAM_TOPIC, S_PER_NS = 'acu/program_track', 1e-9
-TABLE_MODES = tuple(row.name for row in MODE_ROWS if row.table)
-"""Modes that follow a table."""
+TABLE_MODES = tuple(row.name for row in MODE_ROWS if row.table)  # modes that follow a table
 
 
 class PredictionError(ValueError):

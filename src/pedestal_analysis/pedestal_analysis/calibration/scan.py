@@ -22,18 +22,12 @@ from pedestal_analysis.calibration.predicted import PredictionError
 from pedestal_analysis.results import tracking
 from pedestal_common.geometry.line_of_sight import wrap
 
-MIN_LEVELS = 5
-"""Smallest number of levels of a scan."""
-MIN_LEVEL_SHARE = 0.2
-"""Smallest level that is fitted, as a share of the highest; further out a beam is no Gaussian."""
-MAX_DWELL_S, MIN_DWELL_S = 60.0, 0.5
-"""Longest and shortest time between two commands of a scan [s]."""
-DWELL_SHARE = 0.4
-"""Share of a dwell, at its end, over which its level is averaged."""
-MAX_MOTION_BEAMWIDTHS = 0.1
-"""Largest motion of the antenna against the source in this part of a dwell [beamwidths]."""
-MAX_SIGMA_BEAMWIDTHS = 0.1
-"""Largest standard deviation of the offset of a scan [beamwidths]."""
+MIN_LEVELS = 5  # smallest number of levels of a scan
+MIN_LEVEL_SHARE = 0.2  # smallest level that is fitted, as a share of the highest; further out a beam is no Gaussian
+MAX_DWELL_S, MIN_DWELL_S = 60.0, 0.5  # longest and shortest time between two commands of a scan [s]
+DWELL_SHARE = 0.4  # share of a dwell, at its end, over which its level is averaged
+MAX_MOTION_BEAMWIDTHS = 0.1  # largest motion of the antenna against the source in this part of a dwell [beamwidths]
+MAX_SIGMA_BEAMWIDTHS = 0.1  # largest standard deviation of the offset of a scan [beamwidths]
 
 
 class ScanError(ValueError):

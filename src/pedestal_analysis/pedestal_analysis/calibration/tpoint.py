@@ -18,12 +18,9 @@ import re
 from pedestal_common.text_files import csv_table
 from pedestal_common.text_files.csv_table import TableError
 
-AXIS_RANGE_DEG = (-540.0, 720.0)
-"""Accepted azimuths [deg]."""
-MOUNT_ELEVATION_RANGE_DEG = (-10.0, 95.0)
-"""Accepted elevations of the mount [deg]; those on the sky are at most 90."""
-MAX_DIFFERENCE_DEG = 5.0
-"""Largest accepted offset on the sky [deg]."""
+AXIS_RANGE_DEG = (-540.0, 720.0)  # accepted azimuths [deg]
+MOUNT_ELEVATION_RANGE_DEG = (-10.0, 95.0)  # accepted elevations of the mount [deg]; those on the sky are at most 90
+MAX_DIFFERENCE_DEG = 5.0  # largest accepted offset on the sky [deg]
 
 _ALTAZ_OPTIONS = ('ALTAZ', 'AZALT')
 _MIN_DATE_NUMBERS = 6

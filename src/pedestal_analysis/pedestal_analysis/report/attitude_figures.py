@@ -11,8 +11,7 @@ from pedestal_analysis.report.figures import (
     outside_legend,
 )
 
-MIN_DRAWN_ERROR_DEG = 1e-4
-"""Smallest error drawn on the logarithmic scale [deg]."""
+MIN_DRAWN_ERROR_DEG = 1e-4  # smallest error drawn on the logarithmic scale [deg]
 
 
 def attitude(data):

@@ -15,11 +15,8 @@ from pedestal_operator.page.page_log import Log
 STATE_TOPICS = ('adu/state', 'adu/stow_pins', 'ins/state', 'acu/blockage')
 """Topics whose texts state the condition of the equipment."""
 
-RAISED_STATES = ('unacknowledged', 'acknowledged')
-"""States of an alarm whose condition holds."""
-
-MAX_LISTED_EVENTS = 300
-"""Largest number of events of a kind, from the beginning."""
+RAISED_STATES = ('unacknowledged', 'acknowledged')  # states of an alarm whose condition holds
+MAX_LISTED_EVENTS = 300  # largest number of events of a kind, from the beginning
 
 
 class Event(typing.NamedTuple):

@@ -17,8 +17,7 @@ INK_COLOUR = '#20242a'
 RAW_COLOUR, FILTERED_COLOUR, TRUTH_COLOUR = '#8d949e', '#1f6fd1', '#e57a00'
 MOTOR_1_COLOUR, MOTOR_2_COLOUR = '#0b8f8c', '#a04fc4'
 """Colours of texts and marks, of measured, filtered and true values, and of both motors."""
-FIGURE_WIDTH_INCH = 7.4
-"""Width of a figure [inch]."""
+FIGURE_WIDTH_INCH = 7.4  # width of a figure [inch]
 
 MATPLOTLIB_STYLE = {
     'font.size': 9.0, 'axes.titlesize': 9.5, 'axes.titlelocation': 'left', 'legend.fontsize': 8.5,
@@ -153,8 +152,7 @@ LINE_DASHES = {TRUTH_COLOUR: (0, (6.0, 1.5)), MOTOR_1_COLOUR: (0, (3.0, 1.0, 1.0
 """{colour: dashes} by which the lines differ in a print without colour. Lines of all other colours are solid."""
 
 
-MIN_WIDE_LINE_PT = 2.0
-"""Width above which a line needs no dashes, because its width distinguishes it [pt]."""
+MIN_WIDE_LINE_PT = 2.0  # width above which a line needs no dashes, because its width distinguishes it [pt]
 
 
 def tidy(figure):

@@ -21,8 +21,7 @@ MODEL_COLOURS = {'cv': '#2f9e5b', 'ca': '#1f6fd1', 'singer': '#8364c8', 'current
                  'ca_2': '#0b8f8c', 'ca_3': '#7fb069', 'ca_4': '#e0b400', 'ca_5': '#e57a00', 'ca_6': '#d1495b',
                  'ca_7': '#8d1f3d', 'ca_8': '#4a1025'}
 """{name of topics.MOTION_MODELS, in their order: colour}."""
-NIS_SPAN_S = 1.0
-"""Span over which the figure averages the NIS (normalised innovation squared) [s]."""
+NIS_SPAN_S = 1.0  # span over which the figure averages the NIS (normalised innovation squared) [s]
 
 
 def estimate(data):

@@ -24,8 +24,7 @@ from pedestal_common.text_files.files import sha256
 from pedestal_recording import bag as bags
 from pedestal_recording.verify import verify
 
-MAX_DIAGNOSTICS_ROWS = 200
-"""Largest number of rows of the table of diagnostics."""
+MAX_DIAGNOSTICS_ROWS = 200  # largest number of rows of the table of diagnostics
 
 
 PAPER_SCENARIOS = ('uav_flyby',)

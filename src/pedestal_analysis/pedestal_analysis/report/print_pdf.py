@@ -12,8 +12,7 @@ import tempfile
 BROWSERS = 'chromium', 'chromium-browser', 'google-chrome', 'google-chrome-stable'
 """Programs that can print, in the order of the search."""
 
-MAX_PRINT_TIME_S = 300.0
-"""Longest time for the print of a page [s]."""
+MAX_PRINT_TIME_S = 300.0  # longest time for the print of a page [s]
 
 
 def browser() -> str:

@@ -33,10 +33,8 @@ MODE_COLOURS = dict(zip(modes.MODES, itertools.cycle((
 LEVEL_COLOURS = (('OK', '#a5d8b5'), ('WARN', '#f2772b'), ('ERROR', '#c81e1e'), ('STALE', '#9aa0a6'))
 """(name, colour) of each level of the diagnostics, 0 to 3."""
 LOCKED_COLOUR = '#5f93c4'
-ZOOM_SPAN_S = 2.0
-"""Span of a zoomed figure [s]."""
-SKY_POINTS = 3000
-"""Largest number of points of a path in the sky plot."""
+ZOOM_SPAN_S = 2.0  # span of a zoomed figure [s]
+SKY_POINTS = 3000  # largest number of points of a path in the sky plot
 
 
 def _continuous(angle, beside=None):

@@ -22,12 +22,10 @@ TARGET_DESCRIPTIONS = {
 }
 """{kind of target: function of TargetParameters that returns a description}."""
 
-STATION_TARGET_KINDS = ('leo_pass', 'track_file')
-"""Kinds of target that depend on the position of the station."""
+STATION_TARGET_KINDS = ('leo_pass', 'track_file')  # kinds of target that depend on the position of the station
 
 
-MAX_VALUE_CHARACTERS = 80
-"""Length of a shown parameter value, above which its middle is left out [characters]."""
+MAX_VALUE_CHARACTERS = 80  # length of a shown parameter value, above which its middle is left out [characters]
 
 
 def date(bag):

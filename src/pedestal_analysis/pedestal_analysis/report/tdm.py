@@ -20,14 +20,9 @@ from pedestal_recording import columns
 from pedestal_recording.export import atomic_file
 from tracking_receiver_sim.track import instant
 
-RATE_LIMITS_HZ = 1e-3, 1000.0
-"""Smallest and largest allowed rate of records [Hz]."""
-
-SEGMENT_STEPS = 10_000
-"""Largest number of steps in a segment of the message, all of which are in memory at once."""
-
-DEFAULT_STATION_NAME = 'PEDESTAL'
-"""Default name of the station."""
+RATE_LIMITS_HZ = 1e-3, 1000.0  # smallest and largest allowed rate of records [Hz]
+SEGMENT_STEPS = 10_000  # largest number of steps in a segment of the message, all of which are in memory at once
+DEFAULT_STATION_NAME = 'PEDESTAL'  # default name of the station
 
 PARTICIPANT_PATTERN = re.compile(r'[ -~]{1,80}')
 """Pattern of the name of a participant (station or target): printable ASCII characters."""
@@ -35,8 +30,7 @@ PARTICIPANT_PATTERN = re.compile(r'[ -~]{1,80}')
 TLE_DESIGNATOR_PATTERN = re.compile(r'(\d\d)(\d{3})([A-Z]{1,3}) *')
 """Pattern of the international designator in a TLE (two-line elements): year, number of the launch, piece."""
 
-TLE_DESIGNATOR_COLUMNS = slice(9, 17)
-"""Columns of the international designator in line 1 of a TLE."""
+TLE_DESIGNATOR_COLUMNS = slice(9, 17)  # columns of the international designator in line 1 of a TLE
 
 TOPIC_COLUMNS = {'joint_states': ('azimuth.position', 'elevation.position'),
                  'tracking_receiver/angle_error': ('x', 'y', 'z'),

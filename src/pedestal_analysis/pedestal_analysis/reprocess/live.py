@@ -28,10 +28,8 @@ from pedestal_common.wire import commands, messages, records
 
 NODE_START_TIMEOUT_S = 300.0
 """Time allowed for the start of the node [s]. The node may have to compile its laws first."""
-ANSWER_TIMEOUT_S = 20.0
-"""Time allowed for the answer of the node to a step [s]."""
-STOP_TIMEOUT_S = 10.0
-"""Grace period between SIGINT and SIGKILL [s]."""
+ANSWER_TIMEOUT_S = 20.0  # time allowed for the answer of the node to a step [s]
+STOP_TIMEOUT_S = 10.0  # grace period between SIGINT and SIGKILL [s]
 NODE_DISCOVERY_TIME_S = 0.5
 """Wait after the Feeder has discovered the node, so that the node can discover the Feeder too [s]."""
 

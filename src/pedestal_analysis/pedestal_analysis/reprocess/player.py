@@ -48,8 +48,7 @@ A subscriber that ends by itself disappears at once. Of a killed subscriber, Fas
 and then drops its messages.
 """
 
-MAX_SPIN_PAUSE_S = 0.01
-"""Largest time between two spins of the player, in which it receives answers [s]."""
+MAX_SPIN_PAUSE_S = 0.01  # largest time between two spins of the player, in which it receives answers [s]
 
 ANSWER_QUIET_S, STOPPED_ARRIVAL_TIMEOUT_S = 0.5, 1.0
 """ANSWER_QUIET_S: time without an answer after which the wait for the last answers ends [s].

@@ -34,8 +34,7 @@ SUBSTITUTE_TOPICS = {'adu/truth': 'joint_states'}
 AFTER_LAST_STAMP = 2**63 - 1
 """Stamp [ns] in place of the step of a message that its publisher sent after its last answer to a step."""
 
-RECOMPUTABLE_NODES = tuple(node.name for node in nodes.NODES if node.unit)
-"""Names of the nodes that can be recomputed."""
+RECOMPUTABLE_NODES = tuple(node.name for node in nodes.NODES if node.unit)  # names of the nodes that can be recomputed
 
 
 def row_of(recording, node) -> nodes.Node:

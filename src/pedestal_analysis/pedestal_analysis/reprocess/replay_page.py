@@ -24,22 +24,15 @@ from pedestal_recording import bag as bags
 PAGE_FRAME_PERIOD_S, SLOW_FRAME_PERIOD_S = 0.1, 1.0
 """Period of the states that are sent to the pages [s]; period of the sections that change slowly [s]."""
 
-MIN_REPLAY_RATE, MAX_REPLAY_RATE = 0.05, 50.0
-"""Limits of the speed of the replay [multiples of real time]."""
-
-MAX_PAGES = 32
-"""Largest number of pages that show the recording at a time."""
+MIN_REPLAY_RATE, MAX_REPLAY_RATE = 0.05, 50.0  # limits of the speed of the replay [multiples of real time]
+MAX_PAGES = 32  # largest number of pages that show the recording at a time
 
 MAX_EVENT_MESSAGES = 5000
 """Largest number of messages of a topic that fill the event log, from the beginning of the recording."""
 
-DIAGNOSTICS_LOOKBACK = 60
-"""Number of the last diagnostics messages in which the last status of each node is searched."""
-
-NUMBER_TOPICS = (*remote_node.NUMBER_TOPICS, *page_state.EXTRA_NUMBER_TOPICS)
-"""Topics whose numbers the page shows."""
-TEXT_TOPICS = (*remote_node.TEXT_TOPICS, 'ins/state', 'acu/blockage')
-"""Topics whose texts the page shows."""
+DIAGNOSTICS_LOOKBACK = 60  # number of the last diagnostics messages in which the last status of each node is searched
+NUMBER_TOPICS = (*remote_node.NUMBER_TOPICS, *page_state.EXTRA_NUMBER_TOPICS)  # topics whose numbers the page shows
+TEXT_TOPICS = (*remote_node.TEXT_TOPICS, 'ins/state', 'acu/blockage')  # topics whose texts the page shows
 LIST_TOPICS = ('acu/alarms', 'acu/program_track', 'diagnostics', 'acu/command_result')
 """Topics of other kinds that the page shows."""
 

@@ -12,8 +12,7 @@ from pedestal_common import parameters
 from pedestal_common.text_files import files
 from pedestal_recording import bag as bags
 
-MAX_SHOWN_FIELDS = 4
-"""Largest number of fields that are shown of the first message that differs on a topic."""
+MAX_SHOWN_FIELDS = 4  # largest number of fields that are shown of the first message that differs on a topic
 
 
 @dataclasses.dataclass

@@ -13,10 +13,8 @@ import sys
 import termios
 import tty
 
-_KEY = re.compile(rb'\x1b[\[O][A-D]|.', re.DOTALL)
-"""Bytes of one key: an arrow key, or a single byte."""
-RIGHT_ARROW_CODES = (b'\x1b[C', b'\x1bOC')
-"""Bytes of the right arrow key, in both modes of a terminal."""
+_KEY = re.compile(rb'\x1b[\[O][A-D]|.', re.DOTALL)  # bytes of one key: an arrow key, or a single byte
+RIGHT_ARROW_CODES = (b'\x1b[C', b'\x1bOC')  # bytes of the right arrow key, in both modes of a terminal
 
 
 def _in_foreground():

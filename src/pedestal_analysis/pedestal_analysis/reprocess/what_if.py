@@ -16,8 +16,7 @@ from pedestal_analysis.results.results import Result
 from pedestal_analysis.results.tracking import DEG_PER_RAD, known_rms, largest
 from pedestal_common.graph.topics import AXES
 
-RIPPLE_WINDOW_S = 0.25
-"""Length of the moving mean of a rate [s]. The rate minus this mean counts as noise."""
+RIPPLE_WINDOW_S = 0.25  # length of the moving mean of a rate [s]. The rate minus this mean counts as noise.
 
 COMPARISON_NOTE = ('the recorded antenna does not move with the recomputed command, so the table compares the '
                    'estimate with the recorded truth, and the noise of estimate and command; for the pointing, run '

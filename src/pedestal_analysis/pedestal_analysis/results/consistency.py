@@ -25,10 +25,8 @@ from pedestal_common.compiled import compiled
 from pedestal_common.geometry import line_of_sight
 from pedestal_common.graph import topics
 
-NEES_FREEDOMS = 2
-"""Degrees of freedom of the NEES: angle and rate."""
-BAND_PROBABILITY = 0.95
-"""Probability that the mean NIS or NEES of a consistent filter lies inside its band [-]."""
+NEES_FREEDOMS = 2  # degrees of freedom of the NEES: angle and rate
+BAND_PROBABILITY = 0.95  # probability that the mean NIS or NEES of a consistent filter lies inside its band [-]
 
 NOTABLE_DEVIATION = 0.1
 """Smallest relative deviation of a mean NIS or NEES from its expectation that a table marks [-].

@@ -27,19 +27,16 @@ from pedestal_common.parameters import record
 
 SINE_FREQUENCIES_HZ = np.array([0.25, 0.5, 1.0, 1.5, 2.0, 2.5])
 """Frequencies of the sines [Hz]. Each has a whole number of periods in COMMON_PERIOD_S."""
-COMMON_PERIOD_S = 4.0
-"""Period of the sum of all sines [s]."""
+COMMON_PERIOD_S = 4.0  # period of the sum of all sines [s]
 SETTLING_PERIODS, MEASURED_PERIODS = 1, 2
 """Number of common periods before the measurement, and number of measured common periods."""
-SERIES_TERMS = 4
-"""Number of terms of the series of 1 / W."""
+SERIES_TERMS = 4  # number of terms of the series of 1 / W
 IDENTIFICATION_RATES_RAD_S = (0.1, 0.06)
 """Constant rates of azimuth and elevation [rad/s].
 
 They are larger than the sum of the sines, so the axis never turns back. A whole test stays inside the travel.
 """
-SINE_PEAK_RAD_S = 0.004
-"""Amplitude of each sine [rad/s]."""
+SINE_PEAK_RAD_S = 0.004  # amplitude of each sine [rad/s]
 
 
 @dataclasses.dataclass(frozen=True)

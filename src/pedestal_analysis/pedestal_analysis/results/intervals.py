@@ -7,8 +7,7 @@ import math
 import numpy as np
 from scipy.special import stdtrit
 
-CONFIDENCE_LEVEL = 0.95
-"""Confidence level of the interval of a mean [-]."""
+CONFIDENCE_LEVEL = 0.95  # confidence level of the interval of a mean [-]
 
 
 def interval(values):

@@ -32,8 +32,7 @@ from pedestal_analysis.results import tracking
 
 SMOOTHING_HALF_WIDTH_HZ = 0.02
 """Half the width over which the power spectrum of the remainder of the fit is averaged [Hz]."""
-MIN_TRACKED_TIME_S = 20.0
-"""Shortest evaluated time for an isolation: a few periods of the ship [s]."""
+MIN_TRACKED_TIME_S = 20.0  # shortest evaluated time for an isolation: a few periods of the ship [s]
 
 
 @dataclasses.dataclass(frozen=True)

@@ -26,12 +26,9 @@ from pedestal_common.wire import commands, messages
 FOLLOWED_DIRECTIONS = {'program': 'true target', 'tle': 'true target', 'preset': 'requested angles',
                        'steptrack': 'true target', 'slave': 'commanded direction', 'sun': 'direction of the sun'}
 """{mode with results of its own, and with a row of _PARTS: the direction that it follows}."""
-SETTLING_TIME_S = 0.5
-"""Time for which the error must be still before a mode counts as settled [s]."""
-MAX_DRIFT = 0.25
-"""Largest motion of a still error [beamwidths/s]."""
-MAX_REFERENCE_STEP_RAD = 1e-5
-"""Largest motion within SETTLING_TIME_S of a reference that counts as standing [rad]."""
+SETTLING_TIME_S = 0.5  # time for which the error must be still before a mode counts as settled [s]
+MAX_DRIFT = 0.25  # largest motion of a still error [beamwidths/s]
+MAX_REFERENCE_STEP_RAD = 1e-5  # largest motion within SETTLING_TIME_S of a reference that counts as standing [rad]
 
 
 def read(bag, run) -> dict:

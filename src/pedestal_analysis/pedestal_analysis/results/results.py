@@ -54,8 +54,7 @@ class Result(typing.NamedTuple):
     brief: bool = False
 
 
-BRIEF_COUNT = 8
-"""Number of results that a run prints by default."""
+BRIEF_COUNT = 8  # number of results that a run prints by default
 
 MARK_MEANINGS = {'too sure': 'the errors are larger than it states',
                  'too careful': 'the errors are smaller than it states'}

@@ -17,13 +17,11 @@ from pedestal_common.graph.steps import NS_PER_SECOND
 from pedestal_common.wire import commands
 
 TRIPPED, REFUSED, NOT_LOCKED, NOT_TRACKED = 'tripped', 'refused', 'never locked', 'never tracked'
-TRACKED, ON_THE_WAY, NO_TARGET = 'tracked', 'ended on the way', 'no target'
-"""Words of the verdicts."""
+TRACKED, ON_THE_WAY, NO_TARGET = 'tracked', 'ended on the way', 'no target'  # words of the verdicts
 FAILURE_WORDS = TRIPPED, REFUSED, NOT_LOCKED, NOT_TRACKED
 """Words of a verdict on a failed run. The other words belong to runs that did what was commanded."""
 
-TRACKING_MODES = 'autotrack', 'steptrack'
-"""Modes in which the antenna tracks by the receiver."""
+TRACKING_MODES = 'autotrack', 'steptrack'  # modes in which the antenna tracks by the receiver
 
 DRIVE_STATE_TOPIC, EMERGENCY_STOP = 'adu/state', 'emergency stop'
 REPLY_TOPICS = tuple(node.replies for node in nodes.NODES if node.replies)

@@ -25,8 +25,7 @@ PACKAGES = ('pedestal_common', 'ship_motion_sim', 'tracking_receiver_sim', 'acu_
             'pedestal_hardware', 'pedestal_bringup', 'pedestal_analysis', 'pedestal_studies')
 """Packages with laws, or with code that calls laws in trials and studies."""
 
-SCHEDULER_TIMEOUT_S = 10.0
-"""Longest wait for the Dask scheduler, and for its first worker [s]."""
+SCHEDULER_TIMEOUT_S = 10.0  # longest wait for the Dask scheduler, and for its first worker [s]
 
 
 def batches(runs, size):

@@ -23,10 +23,8 @@ from pedestal_analysis.trials import plan as plans
 from pedestal_bringup.scenario import scenario
 from pedestal_common.graph import nodes
 
-DEFAULT_RUNS = 12
-"""Number of trials at each value, unless the user gives another."""
-GRID_COUNT, MAX_BISECTIONS = 9, 12
-"""Number of values that fill the range; largest number of bisections."""
+DEFAULT_RUNS = 12  # number of trials at each value, unless the user gives another
+GRID_COUNT, MAX_BISECTIONS = 9, 12  # number of values that fill the range; largest number of bisections
 BRACKET_TOLERANCE = 0.01
 """Distance of two neighbouring values, divided by the larger absolute value, below which the search ends [-]."""
 MAX_LINEAR_RATIO = 20.0

@@ -32,8 +32,7 @@ from pedestal_analysis.results import intervals, results, verdict
 from pedestal_common.graph import nodes
 from pedestal_common.parameters import did_you_mean
 
-PERCENTILES = (1, 5, 25, 50, 75, 95, 99)
-"""Reported percentiles [%]."""
+PERCENTILES = (1, 5, 25, 50, 75, 95, 99)  # reported percentiles [%]
 Z = float(stats.norm.ppf(0.5 + 0.5 * intervals.CONFIDENCE_LEVEL))
 """Standard normal quantile of the two-sided confidence level: 1.96 for 95 % [-]."""
 

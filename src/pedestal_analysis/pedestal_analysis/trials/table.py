@@ -14,8 +14,7 @@ import pathlib
 
 import numpy as np
 
-LEADING_COLUMNS = ('trial', 'seed')
-"""Columns before the varied parameters and the results."""
+LEADING_COLUMNS = ('trial', 'seed')  # columns before the varied parameters and the results
 
 
 class TableError(ValueError):

@@ -36,11 +36,8 @@ BACK_EMF_SHARE, RESISTANCE_VOLTAGE_SHARE, INDUCTANCE_VOLTAGE_SHARE = 0.85, 0.033
 They are the back-EMF at rated speed, and the voltages over resistance and inductance at rated torque.
 """
 
-KNOWN_MIRROR_M = 2.4
-"""Diameter of the mirror for which the C/N0 of the scenarios holds [m] (AntennaParameters)."""
-
-RATE_SHARE = 0.9
-"""Share of the rate that an axis reaches, which replaces an unreachable rate of the data sheet [-]."""
+KNOWN_MIRROR_M = 2.4  # diameter of the mirror for which the C/N0 of the scenarios holds [m] (AntennaParameters)
+RATE_SHARE = 0.9  # share of the rate that an axis reaches, which replaces an unreachable rate of the data sheet [-]
 
 
 def motor(sheet, known):

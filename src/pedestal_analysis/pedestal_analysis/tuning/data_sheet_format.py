@@ -4,11 +4,8 @@ import math
 
 from pedestal_common.parameters import ParameterError, Parameters, choice, parameter
 
-LIGHT_SPEED_M_GHZ = 0.299792458
-"""Speed of light [m GHz]."""
-
-MIN_MODE_HZ, MAX_MODE_HZ = 1.0, 200.0
-"""Smallest and largest structural frequency that the simulated plant allows [Hz]."""
+LIGHT_SPEED_M_GHZ = 0.299792458  # speed of light [m GHz]
+MIN_MODE_HZ, MAX_MODE_HZ = 1.0, 200.0  # smallest and largest structural frequency that the simulated plant allows [Hz]
 
 TEMPLATE_SCENARIOS = ('leo_pass', 'geo_station', 'uav_flyby', 'ship_pass', 'ship_uav')
 """Scenarios from which a new scenario takes its target and its site."""

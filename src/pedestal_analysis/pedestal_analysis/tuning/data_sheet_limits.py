@@ -17,8 +17,7 @@ GRID_COUNT, BISECTIONS, MAX_OPTIONS = 8, 10, 3
 """Number of tried values on each side of the refused value; number of bisections of an edge; largest number of options
 in the refusal."""
 
-NO_CAUSE = ('encoder_bits', 'cn0', 'lash')
-"""Fields of the data sheet that contradict no other field."""
+NO_CAUSE = ('encoder_bits', 'cn0', 'lash')  # fields of the data sheet that contradict no other field
 
 
 class SheetError(ValueError):

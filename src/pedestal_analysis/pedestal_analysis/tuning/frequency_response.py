@@ -30,10 +30,8 @@ from pedestal_bringup.loop import closed_loop
 from pedestal_common.compiled import compiled
 from pedestal_common.graph.topics import AXES
 
-MOTOR_FIELDS = ('motor_1', 'motor_2')
-"""Names of both motors in the state of an axis."""
-SWEEP_START_ANGLES_RAD = (-2.0, 0.15)
-"""Angles of azimuth and elevation at the beginning of a measurement [rad]."""
+MOTOR_FIELDS = ('motor_1', 'motor_2')  # names of both motors in the state of an axis
+SWEEP_START_ANGLES_RAD = (-2.0, 0.15)  # angles of azimuth and elevation at the beginning of a measurement [rad]
 
 SWEEP_RATES_RAD_S = (0.1, 0.03)
 """Constant rates of azimuth and elevation during a measurement [rad/s].
@@ -48,8 +46,7 @@ RATE_SHARE, PEAK_SHARE = 1.0 / 3.0, 0.5
 PEAK_SHARE: largest ratio of the peak of the multisine to the rate of the measurement [-].
 """
 
-SUB_STEP_COUNT = 10
-"""Number of plant steps in a current period while the current and the speed loop are measured."""
+SUB_STEP_COUNT = 10  # number of plant steps in a current period while the current and the speed loop are measured
 
 
 @dataclasses.dataclass(frozen=True)

@@ -87,8 +87,7 @@ PLANT_CORNERS = tuple((inertia, mode) for inertia in (0.7, 1.3) for mode in (0.8
 WORST_SUFFIX = ', worst'
 """Suffix of the name of a loop in the row of the table with its smallest margins in all PLANT_CORNERS."""
 
-NEAR_SHARE = 0.95
-"""Share of a required crossover from which on a loop counts as fast enough [-]."""
+NEAR_SHARE = 0.95  # share of a required crossover from which on a loop counts as fast enough [-]
 
 SLOWDOWN_FACTOR, MAX_SLOWDOWNS = 0.85, 12
 """Factor of the crossover from one try to the next, slower one [-]; largest number of tried crossovers."""
@@ -256,8 +255,7 @@ def control_gains(plant, w_s, w_p):
             'limits.rate': plant.axis.limits.rate, 'limits.acceleration': rate_slope(plant)}
 
 
-_AXIS_FIELDS = dict(parameters.flatten(AxisParameters))
-"""{key of adu.AXIS: dataclass field}."""
+_AXIS_FIELDS = dict(parameters.flatten(AxisParameters))  # {key of adu.AXIS: dataclass field}
 
 
 def _allowed(key, value):

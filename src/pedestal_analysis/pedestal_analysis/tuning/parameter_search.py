@@ -16,8 +16,7 @@ from acu_tracker.estimation.filters.kinds import named_models
 from acu_tracker.estimation.params import FilterParameters
 from pedestal_common import parameters
 
-LOG_TOLERANCE = 0.02
-"""Difference between the logarithms of the parameters at which the simplex ends [-]."""
+LOG_TOLERANCE = 0.02  # difference between the logarithms of the parameters at which the simplex ends [-]
 
 FAILED_COST = 1e300
 """Cost in place of a criterion that is not finite. Because the simplex subtracts costs, this cost is finite."""

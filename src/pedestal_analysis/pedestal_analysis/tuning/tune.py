@@ -41,14 +41,11 @@ from pedestal_common.text_files import parameter_file
 from pedestal_common.wire import records
 from pedestal_recording import configuration
 
-HUBER_LIMIT_SIGMAS = 4.0
-"""Size above which an innovation is an outlier [standard deviations]."""
+HUBER_LIMIT_SIGMAS = 4.0  # size above which an innovation is an outlier [standard deviations]
 CONVERGENCE_TIME_S, PIECE_LENGTH_S = 1.0, 0.5
 """Time for the filter to converge after the first receiver error [s]; length of the pieces of a recording [s]."""
-AXES = topics.AXES
-"""Names of the axes."""
-DEFAULT_SEED_COUNT = 2
-"""Default number of seeds with which a scenario runs for each tried set of parameters."""
+AXES = topics.AXES  # names of the axes
+DEFAULT_SEED_COUNT = 2  # default number of seeds with which a scenario runs for each tried set of parameters
 ESTIMATE_ERRORS = ('estimate_error_cross_elevation_rms_deg', 'estimate_error_elevation_rms_deg')
 """Results that the table states for a recording."""
 TUNED_UKF_PARAMETERS = ('cv_noise', 'ca_noise', 'dwell')

@@ -27,8 +27,7 @@ import threading
 import time
 import traceback
 
-PR_SET_PDEATHSIG, PR_SET_NAME, PR_SET_MM, PR_SET_MM_MAP = 1, 15, 35, 14
-"""Operations of prctl(2)."""
+PR_SET_PDEATHSIG, PR_SET_NAME, PR_SET_MM, PR_SET_MM_MAP = 1, 15, 35, 14  # operations of prctl(2)
 
 PRCTL_MM_MAP = struct.Struct('=12QIi')
 """struct prctl_mm_map of <linux/prctl.h>: 12 addresses, the size of the auxiliary vector, a file descriptor.

@@ -11,8 +11,7 @@ ACCUSATION_TIME_S = 0.5
 """Time between a failure and the error message [s]. In this time the other nodes end, and name (accuse) the node for
 which they waited."""
 
-SELF_ENDING_NODES = (nodes.DRIVE_NODE, 'recorder')
-"""Nodes that end by themselves at the end of the run."""
+SELF_ENDING_NODES = (nodes.DRIVE_NODE, 'recorder')  # nodes that end by themselves at the end of the run
 
 
 def watch(graph, operator, tracks, progress):

@@ -10,11 +10,8 @@ from pedestal_common.graph import domain, nodes
 from pedestal_common.node.shell import Shell
 from pedestal_common.wire import messages
 
-DISCOVERY_TIME_S = 0.5
-"""Time for which a run looks for another graph on its domain before it starts its own [s]."""
-
-SERVICE_TIMEOUT_S = 2.0
-"""Time in which a node must answer a parameter service, before it counts as stuck [s]."""
+DISCOVERY_TIME_S = 0.5  # time for which a run looks for another graph on its domain before it starts its own [s]
+SERVICE_TIMEOUT_S = 2.0  # time in which a node must answer a parameter service, before it counts as stuck [s]
 
 
 class Operator(Shell):

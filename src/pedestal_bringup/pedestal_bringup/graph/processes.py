@@ -15,22 +15,18 @@ import typing
 from pedestal_bringup.graph.child import Child
 from pedestal_common.graph import nodes
 
-SHOWN_LOG_LINES = 8
-"""Largest number of log lines in an error."""
-NODE_STOP_TIMEOUT_S = 20.0
-"""Grace period of a node from SIGTERM to SIGKILL [s]."""
+SHOWN_LOG_LINES = 8  # largest number of log lines in an error
+NODE_STOP_TIMEOUT_S = 20.0  # grace period of a node from SIGTERM to SIGKILL [s]
 
 RESERVED_LOG_BYTES = 64 * 1024
 """Disk space that a log reserves in advance [bytes]. A node can then log the cause of its end even on a full disk."""
 
-FALLOC_FL_KEEP_SIZE = 1
-"""Flag of fallocate(2): the reserved space does not count in the size of the file."""
+FALLOC_FL_KEEP_SIZE = 1  # flag of fallocate(2): the reserved space does not count in the size of the file
 
 SERVER_START_TIMEOUT_S = 60.0
 """Longest time from the start of a server to its announcement, the lines that state its address [s]."""
 
-SERVER_POLL_PERIOD_S = 0.02
-"""Period of the check for announcements at the start of a run [s]."""
+SERVER_POLL_PERIOD_S = 0.02  # period of the check for announcements at the start of a run [s]
 
 SERVER_LOG_MODE = 0o600
 """File mode of the log of a server: only its user may read it, because the announcement of the page holds the access

@@ -15,8 +15,7 @@ import signal
 import sys
 import time
 
-GRACE_PERIOD_S = 20.0
-"""Time from the end of `pedestal run` in which the nodes must end by themselves [s]."""
+GRACE_PERIOD_S = 20.0  # time from the end of `pedestal run` in which the nodes must end by themselves [s]
 
 
 def main():

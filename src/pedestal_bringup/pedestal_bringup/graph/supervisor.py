@@ -15,11 +15,8 @@ from pedestal_common.graph import nodes
 from pedestal_common.graph.steps import NS_PER_SECOND
 from pedestal_recording.verify import count
 
-RESTART_CUTOFF_S = 0.5
-"""Time before the end of a run within which a dead node is not started again [s]."""
-
-SHUTDOWN_GRACE_S = 20.0
-"""Grace period of the drive after the end of the run [s]."""
+RESTART_CUTOFF_S = 0.5  # time before the end of a run within which a dead node is not started again [s]
+SHUTDOWN_GRACE_S = 20.0  # grace period of the drive after the end of the run [s]
 
 MAX_SILENCE_S = 5.0
 """Time without diagnostics after which a node is reported as silent [s]. A node publishes diagnostics every second."""

@@ -33,8 +33,7 @@ COMPILED_LOOPS = (('leo_pass', side_by_side.MIN_PARALLEL_LOOPS), ('ship_pass', 1
 """(scenario, number of parallel loops): closed loops that together use the laws on lanes, on a ship and ashore, those
 with the longest compilation first."""
 
-COMPILE_RUN_S = 0.1
-"""Duration of the scenario that is run to compile a closed loop [s]."""
+COMPILE_RUN_S = 0.1  # duration of the scenario that is run to compile a closed loop [s]
 
 
 def _unit_of_scenario(name, node, *changes):

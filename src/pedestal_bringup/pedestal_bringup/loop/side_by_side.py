@@ -22,14 +22,12 @@ from tracking_receiver_sim import unit as receiver_unit
 LANE_UNIT_TYPES = {'adu': drive_unit.Adu, 'tracking_receiver': receiver_unit.TrackingReceiver, 'acu': acu_unit.Acu}
 """{node: class of its unit} of the loops that can run side by side: ashore, with motors."""
 
-MIN_PARALLEL_LOOPS = 8
-"""Smallest number of loops that run side by side; with fewer, most lanes would be idle."""
+MIN_PARALLEL_LOOPS = 8  # smallest number of loops that run side by side; with fewer, most lanes would be idle
 
 MAX_STEPS_PER_CALL = 200
 """Largest number of steps of one compiled call. The noise of all its steps is drawn before the call."""
 
-MAX_MEMORY_BYTES = 2**30
-"""Largest memory for the records of parallel trials [bytes]."""
+MAX_MEMORY_BYTES = 2**30  # largest memory for the records of parallel trials [bytes]
 
 
 @compiled

@@ -30,8 +30,7 @@ if typing.TYPE_CHECKING:
 
     from pedestal_common.node.unit import Unit
 
-Sections = dict[str, dict[str, typing.Any]]
-"""Values of each node and of `scenario`: {section: {dotted name: value}}."""
+Sections = dict[str, dict[str, typing.Any]]  # values of each node and of `scenario`: {section: {dotted name: value}}
 
 
 _P = typing.TypeVar('_P', bound=parameters.Parameters)
@@ -128,11 +127,8 @@ class ScenarioParameters(parameters.Parameters):
         return self.beams if self.beam else 0
 
 
-SECTION_NODES = tuple(node.name for node in nodes.NODES if node.module)
-"""Nodes that can have a section in a scenario."""
-
-OPTIONAL_NODES = tuple(node.name for node in nodes.NODES if node.optional)
-"""Nodes that take part only on a ship."""
+SECTION_NODES = tuple(node.name for node in nodes.NODES if node.module)  # nodes that can have a section in a scenario
+OPTIONAL_NODES = tuple(node.name for node in nodes.NODES if node.optional)  # nodes that take part only on a ship
 
 BEAM_NODES = tuple(node.name for node in nodes.NODES if node.of_beam)
 """Nodes of which each beam of an array has its own."""
@@ -163,14 +159,12 @@ MEASUREMENT_FLAGS = tuple((node.name, topic.measured, topic.flag) for node in no
 `flag` stand for the names of two parameters. Both parameters are true if the topic exists (topics.Topic)."""
 
 
-SCANS_BEFORE_COAST = 2.5
-"""Number of errors of a feed with one output that must be missing before autotrack coasts."""
+SCANS_BEFORE_COAST = 2.5  # number of errors of a feed with one output that must be missing before autotrack coasts
 
 SIMULATED_BUS = {'bus.interface': 'socketcand', 'bus.host': '127.0.0.1'}
 """{parameter of drive_node: its only value with simulated drives}, because their bus is a server on this machine."""
 
-IQ_LATENCY_STEPS = 2
-"""Latency of a receiver of I/Q samples for the control unit, in steps of the drive."""
+IQ_LATENCY_STEPS = 2  # latency of a receiver of I/Q samples for the control unit, in steps of the drive
 
 
 class ScenarioError(ValueError):

@@ -7,8 +7,7 @@ import numpy as np
 from pedestal_common.compiled import compiled
 from pedestal_common.parameters import ParameterError
 
-MAX_SECTORS = 8
-"""Largest number of hidden sectors."""
+MAX_SECTORS = 8  # largest number of hidden sectors
 
 BLOCKAGE_DOC = ("sectors hidden by the superstructure, at most 8: 'azimuth_low azimuth_high elevation_high; ...' "
                 '[rad] on the deck, clockwise from low to high; empty: none')

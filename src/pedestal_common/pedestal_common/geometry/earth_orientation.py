@@ -17,27 +17,20 @@ import numpy as np
 from pedestal_common.parameters import ParameterError, Parameters, parameter, text
 from pedestal_common.text_files import files
 
-MAX_FINALS_BYTES = 16_000_000
-"""Largest size of a file [bytes]; the file of all days since 1973 has 4 million."""
-
-MJD_ZERO_JULIAN_DATE = 2400000.5
-"""Julian date at which the modified Julian date (MJD) is 0 [d]."""
-
-MJD_ZERO_ORDINAL = 678576
-"""Number of the day with MJD 0 in Python's dates."""
+MAX_FINALS_BYTES = 16_000_000  # largest size of a file [bytes]; the file of all days since 1973 has 4 million
+MJD_ZERO_JULIAN_DATE = 2400000.5  # julian date at which the modified Julian date (MJD) is 0 [d]
+MJD_ZERO_ORDINAL = 678576  # number of the day with MJD 0 in Python's dates
 
 MJD_COLUMNS, MEASURED_COLUMN = (7, 15), 57
 """Columns of the MJD, counted from 0, and the column with I for a measured, P for a predicted UT1 - UTC."""
 
-MJD_RANGE = 41000.0, 100000.0
-"""First and last accepted MJD: 1971 to 2132."""
+MJD_RANGE = 41000.0, 100000.0  # first and last accepted MJD: 1971 to 2132
 
 VALUE_COLUMNS = {'polar motion x': ((18, 27), 2.0, 'arcsec'), 'polar motion y': ((37, 46), 2.0, 'arcsec'),
                  'UT1 - UTC': ((58, 68), 1.0, 's')}
 """{value: (its columns, counted from 0; largest accepted absolute value; unit)}."""
 
-ARCSECOND_RAD = math.radians(1.0 / 3600.0)
-"""One second of arc [rad]."""
+ARCSECOND_RAD = math.radians(1.0 / 3600.0)  # one second of arc [rad]
 
 
 @dataclasses.dataclass(frozen=True)

@@ -19,8 +19,7 @@ SIDEREAL_RATE = 1.00273790935 * 2.0 * math.pi / 86400.0
 """Rate of the sidereal time of `gstime`, per second of UT1 [rad/s]. It exceeds EARTH_RATE by the precession of the
 equinox, 3.5e-5 deg a day."""
 
-SPEED_OF_LIGHT_M_S = 299792458.0
-"""Speed of light [m/s]."""
+SPEED_OF_LIGHT_M_S = 299792458.0  # speed of light [m/s]
 
 
 @dataclasses.dataclass(frozen=True)

@@ -17,21 +17,17 @@ NUMBER_LIMITS = {'MEAN_MOTION': (0.05, 18.0), 'ECCENTRICITY': (0.0, 0.9999999), 
 """{keyword: (lowest, highest)}. Angles are in deg, BSTAR in 1/earth radii, MEAN_MOTION in rev/day; MEAN_MOTION_DOT is
 half of its derivative [rev/day^2], MEAN_MOTION_DDOT a sixth of its second derivative [rev/day^3]."""
 ANGLE_KEYWORDS = ('RA_OF_ASC_NODE', 'ARG_OF_PERICENTER', 'MEAN_ANOMALY')
-MAX_CATALOGUE_NUMBER = 999_999_999
-"""Largest catalogue number."""
-DEFAULT_FIELDS = {'MEAN_MOTION_DOT': '0', 'MEAN_MOTION_DDOT': '0'}
-"""{keyword that an OMM may omit: default value}."""
+MAX_CATALOGUE_NUMBER = 999_999_999  # largest catalogue number
+DEFAULT_FIELDS = {'MEAN_MOTION_DOT': '0', 'MEAN_MOTION_DDOT': '0'}  # {keyword that an OMM may omit: default value}
 ALLOWED_VALUES = {'CENTER_NAME': ('EARTH',), 'REF_FRAME': ('TEME',), 'TIME_SYSTEM': ('UTC',),
                   'MEAN_ELEMENT_THEORY': ('SGP4', 'SGP/SGP4')}
 """{keyword: allowed values}; the first one is the default."""
 BSTAR_OPTIONAL_THEORIES = ALLOWED_VALUES['MEAN_ELEMENT_THEORY']
 """Theories that an OMM must name in order to omit BSTAR, which is then 0."""
-SGP4_TYPES = ('', '0', '2')
-"""Ephemeris types that mean elements of SGP4; '': no type is given."""
+SGP4_TYPES = ('', '0', '2')  # ephemeris types that mean elements of SGP4; '': no type is given
 OTHER_TYPES = {'1': 'SGP', '3': 'PPT3', '4': 'SGP4-XP', '6': 'numerical propagation'}
 """{ephemeris type: theory of its elements}."""
-OTHER_KEYWORDS = ('BTERM', 'AGOM')
-"""Keywords that only elements of SGP4-XP have."""
+OTHER_KEYWORDS = ('BTERM', 'AGOM')  # keywords that only elements of SGP4-XP have
 KEYWORDS = ('OBJECT_NAME', 'OBJECT_ID', 'EPOCH', 'EPHEMERIS_TYPE', 'NORAD_CAT_ID', *ALLOWED_VALUES, *NUMBER_LIMITS,
             *OTHER_KEYWORDS)
 """Keywords that are read."""

@@ -22,16 +22,14 @@ TLE_NUMBER_COLUMNS = (
      'mean anomaly': (43, 51), 'mean motion': (52, 63)})
 """For each TLE line, {number: (its first column, the column behind it)}, counted from 0."""
 
-TLE_TYPE_COLUMN = 62
-"""Column of the ephemeris type in line 1, counted from 0."""
+TLE_TYPE_COLUMN = 62  # column of the ephemeris type in line 1, counted from 0
 
 ORDINAL_ZERO_JULIAN_DATE = 1721424.5
 """Julian date of day 0 of datetime, the midnight at which the day before 0001-01-01 begins."""
 
 LEAP_SECOND_PATTERN = re.compile(r'(T\d\d:59:)60\b')
 
-MAX_TLE_AGE_DAYS = 30.0
-"""Largest time from the TLE epoch at which SGP4 is used [days]."""
+MAX_TLE_AGE_DAYS = 30.0  # largest time from the TLE epoch at which SGP4 is used [days]
 
 
 class TargetError(ValueError):

@@ -16,18 +16,14 @@ from pedestal_common.geometry import orbit
 from pedestal_common.geometry.orbit import TargetError
 from pedestal_common.graph.steps import SECONDS_PER_DAY
 
-SEARCH_STEP_S = 20.0
-"""Time between two elevations [s]."""
+SEARCH_STEP_S = 20.0  # time between two elevations [s]
 MIN_CULMINATION_DEG = 10.0
 """Culmination below which a pass is left out [deg]: a lower pass stays in the region of refraction and buildings."""
-SEARCH_DAYS = 5.0
-"""Time that is searched [days]."""
+SEARCH_DAYS = 5.0  # time that is searched [days]
 MAX_PASS_DAYS = 30.0
 """Longest time before and after the search in which the rise and the set of a pass under way are searched [days]."""
-PASS_CHUNK_STEPS = 540
-"""Number of steps computed at once on the way to a rise or set: three hours."""
-MAX_RUN_S = float(SECONDS_PER_DAY)
-"""Largest duration of a run [s]."""
+PASS_CHUNK_STEPS = 540  # number of steps computed at once on the way to a rise or set: three hours
+MAX_RUN_S = float(SECONDS_PER_DAY)  # largest duration of a run [s]
 
 
 class Pass(typing.NamedTuple):

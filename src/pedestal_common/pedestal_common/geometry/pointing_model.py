@@ -49,8 +49,7 @@ TERMS = ('p1', 'p3', 'p4', 'p5', 'p6', 'p7', 'p8', 'p9', 'p11', 'p12', 'p13', 'p
          'p20', 'p21', 'p22')
 """Names of the terms."""
 
-FACTORS = ('p9', 'p12')
-"""Terms that are factors [-]; the others are angles [rad]."""
+FACTORS = ('p9', 'p12')  # terms that are factors [-]; the others are angles [rad]
 
 MODEL_DTYPE = np.dtype([('terms', 'f8', (len(TERMS),)), ('exact', 'i8'), ('periodic', 'i8'),
                         ('p', np.dtype([(name, 'f8') for name in TERMS])),
@@ -66,11 +65,8 @@ tilt      rotation (3, 3) from the frame of the azimuth axis to the deck, FLU
 sin_lean, cos_lean, sin_off, cos_off  of P3 and of P4
 """
 
-MIN_ZENITH_DISTANCE_RAD = 1e-6
-"""Distance from the azimuth axis below which the rates of the azimuth are limited [rad]."""
-
-MAX_CONE_ROUNDING = 1e-12
-"""Excess of a sine over 1 that is rounding, not a direction that the beam cannot reach."""
+MIN_ZENITH_DISTANCE_RAD = 1e-6  # distance from the azimuth axis below which the rates of the azimuth are limited [rad]
+MAX_CONE_ROUNDING = 1e-12  # excess of a sine over 1 that is rounding, not a direction that the beam cannot reach
 
 NEWTON_STEPS = 6
 """Steps of Newton's method that invert the periodic terms; each step doubles the number of correct digits."""

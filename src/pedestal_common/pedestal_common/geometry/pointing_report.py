@@ -14,8 +14,7 @@ from pedestal_common.compiled import compiled
 from pedestal_common.geometry import pointing_model
 from pedestal_common.geometry.pointing_model import FACTORS, TERMS
 
-MAX_RESIDUALS = 40
-"""Largest number of residuals of a model, whose text then fits into an argument of a command."""
+MAX_RESIDUALS = 40  # largest number of residuals of a model, whose text then fits into an argument of a command
 
 RESIDUAL_RANGES = (-360.0, 540.0), (-5.0, 90.0), (-5000.0, 5000.0), (-5000.0, 5000.0)
 """Accepted azimuth and elevation [deg], and residuals in cross-elevation and elevation [mdeg]."""

@@ -23,11 +23,8 @@ MIN_ERFA_ELEVATION_RAD, MAX_ITU_ELEVATION_RAD = math.radians(5.0), math.radians(
 """True elevation from which on the refraction is that of ERFA alone, and up to which it is that of ITU-R P.834 alone
 [rad]."""
 
-MIN_ELEVATION_RAD = math.radians(-1.0)
-"""True elevation below which the refraction is constant [rad]."""
-
-ITU_REFRACTIVITY = 315.0
-"""Refractivity at sea level of the atmosphere for which ITU-R P.834 gives its formula [N]."""
+MIN_ELEVATION_RAD = math.radians(-1.0)  # true elevation below which the refraction is constant [rad]
+ITU_REFRACTIVITY = 315.0  # refractivity at sea level of the atmosphere for which ITU-R P.834 gives its formula [N]
 
 PRESSURE_RANGE_HPA, TEMPERATURE_RANGE_CELSIUS, HUMIDITY_RANGE = (300.0, 1100.0), (-90.0, 60.0), (0.0, 1.0)
 """Lowest and highest accepted value of each number of the weather."""

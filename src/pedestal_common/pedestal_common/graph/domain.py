@@ -16,8 +16,7 @@ DEFAULT_DOMAIN = 0
 MAX_CHOSEN_DOMAIN = 101
 """Largest domain that a run chooses by itself. Up to this domain, the ports lie below the ephemeral ports of Linux."""
 
-MAX_DOMAIN = 232
-"""Largest domain of DDS."""
+MAX_DOMAIN = 232  # largest domain of DDS
 
 _SOCKET_NAME = 'pedestal-domain-'
 

@@ -12,14 +12,9 @@ from collections.abc import Collection, Iterable
 
 from pedestal_common.graph.topics import REALTIME_RATES, TOPIC_BY_NAME, TOPICS
 
-MAX_BEAMS = 16
-"""Largest number of beams of an electronic array."""
-
-REPLAY_NODE = 'replay'
-"""Name of the node that replays a recording to the other nodes."""
-
-DRIVE_NODE = 'adu'
-"""Name of the node that owns the time."""
+MAX_BEAMS = 16  # largest number of beams of an electronic array
+REPLAY_NODE = 'replay'  # name of the node that replays a recording to the other nodes
+DRIVE_NODE = 'adu'  # name of the node that owns the time
 
 
 class Node(typing.NamedTuple):
@@ -206,8 +201,7 @@ SIMULATED_PARTS = {SIMULATED_DRIVES.name: DRIVE_NODE, SIMULATED_IQ.name: MONOPUL
 """{name of a node that simulates a part of the equipment: node that commands or receives this part}."""
 
 NODE_NAMES = tuple(node.name for node in NODES)
-UNIT_NODES = (*(node for node in NODES if node.unit), ARRAY_DRIVE)
-"""Nodes that run a unit."""
+UNIT_NODES = (*(node for node in NODES if node.unit), ARRAY_DRIVE)  # nodes that run a unit
 
 BEAM_TOPICS = frozenset(('joint_states', 'adu/truth', 'acu/program_track',
                          *(topic for node in NODES if node.of_beam

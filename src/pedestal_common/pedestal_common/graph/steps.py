@@ -13,14 +13,9 @@ import collections
 import typing
 from collections.abc import Callable, Collection, Iterable, Mapping
 
-NS_PER_SECOND = 1_000_000_000
-"""Nanoseconds in a second [ns]."""
-
-SECONDS_PER_DAY = 86_400
-"""Seconds in a day [s]."""
-
-RECENT_INTERVALS = 8
-"""Number of intervals between the messages of a follower of which the shortest counts."""
+NS_PER_SECOND = 1_000_000_000  # nanoseconds in a second [ns]
+SECONDS_PER_DAY = 86_400  # seconds in a day [s]
+RECENT_INTERVALS = 8  # number of intervals between the messages of a follower of which the shortest counts
 
 
 class GraphError(RuntimeError):

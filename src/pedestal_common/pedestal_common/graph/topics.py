@@ -31,8 +31,7 @@ PIN_STATE_TEXTS = ('out', 'moving', 'in', 'failed')
 """States of a stow pin: it releases its axis, is in motion, locks its axis, or did not reach the commanded
 position."""
 
-NO_TEXT_CODE = -1
-"""Code, in records, of a text or a list that was never published."""
+NO_TEXT_CODE = -1  # code, in records, of a text or a list that was never published
 
 
 class Qos(typing.NamedTuple):
@@ -66,8 +65,7 @@ QOS_BY_RATE = {'step': Qos(latched=False, lockstep=0, written=1000, read=8, reli
                'second': Qos(latched=False, lockstep=10, written=10, read=100, reliable=True, recorded=1000),
                'sample': Qos(latched=False, lockstep=10, written=10, read=10, reliable=False, recorded=1000)}
 
-UNSTEPPED_RATES = 'once', 'sample'
-"""Rates of messages that belong to no step, and that a unit takes by `decode`."""
+UNSTEPPED_RATES = 'once', 'sample'  # rates of messages that belong to no step, and that a unit takes by `decode`
 
 REALTIME_RATES = 'command', 'sample'
 """Rates of messages that any client may publish, and that are recorded in realtime only."""

@@ -11,8 +11,7 @@ import numpy as np
 from pedestal_common.compiled import compiled
 from pedestal_common.injection import table
 
-MAX_HELD_NUMBERS = 32
-"""Largest number of values that a node freezes: the size of `held`."""
+MAX_HELD_NUMBERS = 32  # largest number of values that a node freezes: the size of `held`
 
 MESSAGE_FAULT_DTYPE = np.dtype([('drop', 'i8'), ('freeze', 'i8'), ('nan', 'i8'), ('holds', 'i8'),
                                 ('held', 'f8', (MAX_HELD_NUMBERS,)),

@@ -15,8 +15,7 @@ from pedestal_common.graph.steps import NS_PER_SECOND
 from pedestal_common.injection import table
 from pedestal_common.wire.records import NO_STAMP
 
-MAX_ACTIVE_FAULTS = 16
-"""Largest number of faults in force in a node at a time."""
+MAX_ACTIVE_FAULTS = 16  # largest number of faults in force in a node at a time
 
 FAULT_DTYPE = np.dtype([('used', 'i8'), ('fault', 'i8'), ('end', 'i8'), ('duration', 'i8'),
                         ('values', 'f8', (table.MAX_FAULT_VALUES,))], align=True)

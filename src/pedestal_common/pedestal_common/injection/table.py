@@ -24,8 +24,7 @@ class Fault(typing.NamedTuple):
     lockstep: bool = True
 
 
-MAX_FAULT_DURATION_S = 86400.0
-"""Longest duration of a fault [s]; it also stands for a fault without an end."""
+MAX_FAULT_DURATION_S = 86400.0  # longest duration of a fault [s]; it also stands for a fault without an end
 
 _DURATION = Argument('duration', 'duration; left out: to the end of the run', 1e-3, MAX_FAULT_DURATION_S, 's',
                      default=MAX_FAULT_DURATION_S)

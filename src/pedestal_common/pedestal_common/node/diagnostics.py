@@ -9,20 +9,17 @@ from pedestal_common.graph.steps import NS_PER_SECOND
 from pedestal_common.node.unit import LEVEL_OK, LEVEL_WARN, Diagnosis
 from pedestal_common.wire import messages
 
-DIAGNOSTICS_PERIOD_S = 1.0
-"""Time between two diagnostics in realtime [s]."""
+DIAGNOSTICS_PERIOD_S = 1.0  # time between two diagnostics in realtime [s]
 
 DIAGNOSTICS_DEADLINE_S = 2.5
 """Time without its diagnostics after which a node counts as silent, published as `deadline_s` [s]."""
 
-STALL_LIMIT_NS = 1_500_000_000
-"""Gap between two diagnostics above which the node reports a stall [ns]."""
+STALL_LIMIT_NS = 1_500_000_000  # gap between two diagnostics above which the node reports a stall [ns]
 
 MIN_URGENT_PERIOD_NS = 100_000_000
 """Shortest time from the last diagnostics to diagnostics that are published early, because of a change [ns]."""
 
-CLOCK_STEP_REPORT_NS = 60 * NS_PER_SECOND
-"""Time for which the diagnostics report a step of the system's clock [ns]."""
+CLOCK_STEP_REPORT_NS = 60 * NS_PER_SECOND  # time for which the diagnostics report a step of the system's clock [ns]
 
 
 class Diagnostics:

@@ -44,11 +44,8 @@ from pedestal_common.wire import messages
 START_DEADLINE_S = 300.0
 """Longest time that a node waits for its graph, whose other nodes may compile their laws for the first time [s]."""
 
-ACKNOWLEDGE_TIMEOUT_S = 1.0
-"""Longest time that a node waits at its end for the acknowledgement of its messages [s]."""
-
-EXIT_DELAY_S = 0.1
-"""Time for which a process stays after its publishers and subscribers have left the graph [s]."""
+ACKNOWLEDGE_TIMEOUT_S = 1.0  # longest time that a node waits at its end for the acknowledgement of its messages [s]
+EXIT_DELAY_S = 0.1  # time for which a process stays after its publishers and subscribers have left the graph [s]
 
 
 class Stopped(BaseException):  # noqa: N818  not an error: a signal stops the node
@@ -60,11 +57,8 @@ EXPECTED_ERRORS = (parameters.ParameterError, GraphError, ValueError, OSError, I
                    InvalidParameterValueException, Stopped)
 """Errors that end a node with one line; any other error is a defect and shows its traceback."""
 
-_stop: list[bool] = []
-"""Not empty after SIGINT or SIGTERM."""
-
-_compiling: list[bool] = []
-"""Not empty while the process compiles, which a signal may interrupt."""
+_stop: list[bool] = []  # not empty after SIGINT or SIGTERM
+_compiling: list[bool] = []  # not empty while the process compiles, which a signal may interrupt
 
 STOP_SIGNALS = signal.SIGINT, signal.SIGTERM, signal.SIGALRM
 """Signals that stop a node; the last is sent only by the node itself, see ignored_stop."""

@@ -14,21 +14,15 @@ from pedestal_common.node.unit import LEVEL_ERROR, LEVEL_WARN
 from pedestal_common.realtime import publisher_gate
 from pedestal_common.wire.commands import MAX_COMMAND_AGE_NS
 
-DROP_REPORT_NS = 2_000_000_000
-"""Time for which the diagnostics report a dropped message [ns]."""
-
-UNDISCOVERED_NODE_NAME = '_NODE_NAME_UNKNOWN_'
-"""Name that rmw gives to a node before its discovery."""
+DROP_REPORT_NS = 2_000_000_000  # time for which the diagnostics report a dropped message [ns]
+UNDISCOVERED_NODE_NAME = '_NODE_NAME_UNKNOWN_'  # name that rmw gives to a node before its discovery
 
 MAX_DISCOVERY_NS = 10_000_000_000
 """Longest time that a text is held until the graph names every publisher of its topic [ns]. A text is published once,
 often before DDS discovers its publisher."""
 
-DISCOVERY_POLL_S = 0.02
-"""Time between two checks of the publishers of a text [s]."""
-
-MAX_HELD_TEXTS = 1000
-"""Largest number of held texts."""
+DISCOVERY_POLL_S = 0.02  # time between two checks of the publishers of a text [s]
+MAX_HELD_TEXTS = 1000  # largest number of held texts
 
 MAX_RECENT_MESSAGES = 100
 """Number of messages that a topic with two subscriptions remembers, to drop the copy from its second subscription."""

@@ -17,8 +17,7 @@ from pedestal_common.wire.commands import Reply
 
 LEVEL_OK, LEVEL_WARN, LEVEL_ERROR = 0, 1, 2
 
-NEVER_DUE_NS = 2**63 - 1
-"""Time of the next command of a unit without further commands [ns]."""
+NEVER_DUE_NS = 2**63 - 1  # time of the next command of a unit without further commands [ns]
 
 MAX_BLOCK_STEPS = 2000
 """Largest number of steps in one call of a law; a unit with noise generates the noise of so many steps in advance."""

@@ -19,14 +19,12 @@ from pedestal_common.node.unit import LEVEL_ERROR, LEVEL_WARN
 from pedestal_common.realtime import priority
 from pedestal_common.wire import commands, messages, records
 
-REPLAY_POLL_S = 0.2
-"""Time between two checks whether another replay publishes the inputs [s]."""
+REPLAY_POLL_S = 0.2  # time between two checks whether another replay publishes the inputs [s]
 
 LOCKSTEP_POLL_S, TRIGGER_POLL_S = 0.2, 0.05
 """Time between two checks for a step that waits too long in lockstep, and for a silent trigger in realtime [s]."""
 
-SETTLING_POLL_S = 0.001
-"""Time after which the messages queued at start-up count as processed [s]."""
+SETTLING_POLL_S = 0.001  # time after which the messages queued at start-up count as processed [s]
 
 
 @dataclasses.dataclass

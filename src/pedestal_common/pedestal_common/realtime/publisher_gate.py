@@ -35,8 +35,7 @@ DROP_UNDECODABLE, DROP_STALE, DROP_FUTURE, DROP_OTHER_PUBLISHER, DROP_UNCLEAR_PU
     'undecodable', 'stale', 'future', 'another publisher', 'publishers unclear')
 """Reasons to drop a message."""
 
-WARNING_DROP_REASONS = DROP_OTHER_PUBLISHER, DROP_UNCLEAR_PUBLISHER
-"""Reasons that need the attention of the operator."""
+WARNING_DROP_REASONS = DROP_OTHER_PUBLISHER, DROP_UNCLEAR_PUBLISHER  # reasons that need the attention of the operator
 
 
 class PublisherGate:

@@ -7,11 +7,8 @@ their pace, the time per number, if the paces differ. Otherwise both stay unclea
 """
 import collections
 
-DEFAULT_INTERVAL_NS = 5_000_000
-"""Assumed time between two messages of a stream with only one message [ns]."""
-
-NUMBER_SLACK = 4
-"""Numbers by which a stream may grow in addition to its backlog and to twice the numbers of its pace."""
+DEFAULT_INTERVAL_NS = 5_000_000  # assumed time between two messages of a stream with only one message [ns]
+NUMBER_SLACK = 4  # numbers by which a stream may grow in addition to its backlog and to twice the numbers of its pace
 
 MAX_BACKLOG_NS = 1_000_000_000
 """Largest backlog of a stream, as time at its mean interval [ns]. The backlog is the number of messages by which the
@@ -20,8 +17,7 @@ stream is behind its pace. A publisher that stalled sends its backlog in a burst
 MAX_PAUSE_INTERVALS = 4.0
 """Longest time between two messages that counts for the mean interval of their stream [intervals]."""
 
-CLOSE_NUMBER_GAP = 20
-"""Difference of the numbers of two active streams up to which both streams are unclear."""
+CLOSE_NUMBER_GAP = 20  # difference of the numbers of two active streams up to which both streams are unclear
 
 PACE_WINDOW_MESSAGES, PACE_STRIDE_MESSAGES = 40, 8
 """Number of last messages that give the pace of a stream, and distance between the two messages of a pair. The pace is
@@ -40,8 +36,7 @@ RECENT_LIMIT_NS = 1_000_000_000
 """Silence up to which a stream takes part in the first comparison with a message [ns]. An inactive stream takes part
 only if the number is at most CLOSE_NUMBER_GAP ahead. All other streams are compared if no stream fits."""
 
-EXPIRY_LIMIT_NS = 30_000_000_000
-"""Silence after which a stream is deleted [ns]."""
+EXPIRY_LIMIT_NS = 30_000_000_000  # silence after which a stream is deleted [ns]
 
 
 class Stream:

@@ -10,8 +10,7 @@ A change beyond MIN_CLOCK_STEP_NS is a step of the system's clock and is reporte
 set to the system's clock. After a step back, t runs slower than the system's clock, because otherwise a stamp would
 occur twice. Meanwhile t is ahead of the time of nodes that start later, by `ahead`; a restart of this node ends this.
 """
-MAX_SLEW_RATE = 500e-6
-"""Largest rate of change of the offset, equal to that of adjtime(3) [s/s]."""
+MAX_SLEW_RATE = 500e-6  # largest rate of change of the offset, equal to that of adjtime(3) [s/s]
 
 MIN_CLOCK_STEP_NS = 10_000_000
 """Change of the system's clock against the steady clock, from one reading to the next, that counts as a step [ns]. At

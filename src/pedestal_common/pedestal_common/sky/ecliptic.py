@@ -14,8 +14,7 @@ from pedestal_common.geometry.earth_orientation import ARCSECOND_RAD
 from pedestal_common.graph.steps import SECONDS_PER_DAY
 from pedestal_common.reproducible import cos, sin
 
-J2000 = 2451545.0
-"""Julian date of the epoch J2000 [d]."""
+J2000 = 2451545.0  # julian date of the epoch J2000 [d]
 
 TT_MINUS_UTC_S = 69.184
 """TT - UTC [s] since the leap second of 2017-01-01. Each leap second less or more moves the sun by 1e-5 deg."""

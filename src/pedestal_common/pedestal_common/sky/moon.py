@@ -13,8 +13,7 @@ import numpy as np
 from pedestal_common.reproducible import cos, sin
 from pedestal_common.sky import ecliptic
 
-MEAN_DISTANCE_M = 385000.56e3
-"""Mean of the terms of the distance [m]."""
+MEAN_DISTANCE_M = 385000.56e3  # mean of the terms of the distance [m]
 
 MEAN_ARGUMENTS = (
     (297.8501921, 445267.1114034, -0.0018819, 1.0 / 545868.0), (357.5291092, 35999.0502909, -0.0001536, 1.0 / 24.49e6),

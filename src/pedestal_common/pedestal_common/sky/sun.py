@@ -15,14 +15,12 @@ from pedestal_common.reproducible import cos
 from pedestal_common.sky import ecliptic
 from pedestal_common.sky.sun_series import DISTANCE_TERMS, LATITUDE_TERMS, LONGITUDE_TERMS
 
-AU = 149_597_870_700.0
-"""Astronomical unit [m]."""
+AU = 149_597_870_700.0  # astronomical unit [m]
 
 FK5_LONGITUDE_RAD = -0.09033 * ARCSECOND_RAD
 """Correction of the longitude of VSOP87 to the equinox of the sidereal time [rad]."""
 
-ABERRATION_RAD = 20.4955 * ARCSECOND_RAD
-"""Aberration of the sun at a distance of 1 AU [rad]."""
+ABERRATION_RAD = 20.4955 * ARCSECOND_RAD  # aberration of the sun at a distance of 1 AU [rad]
 
 
 def _sum(rows, t):

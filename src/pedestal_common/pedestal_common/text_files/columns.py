@@ -11,8 +11,7 @@ import typing
 
 from pedestal_common.graph.steps import SECONDS_PER_DAY
 
-METRES_PER_FOOT = 0.3048
-"""Length of the international foot [m]."""
+METRES_PER_FOOT = 0.3048  # length of the international foot [m]
 
 UTC, JULIAN_DATE, MODIFIED_JULIAN_DATE = 'UTC', 'JD', 'MJD'
 """Units of a time with a date: a calendar date (or seconds since 1970), a Julian date, a modified Julian date."""
@@ -43,15 +42,13 @@ _UNIT_SIZES = {'s': 1.0, 'ms': 1e-3, 'us': 1e-6, 'ns': 1e-9, 'min': 60.0, 'h': 3
 """Size of each unit, in the first unit of its row in _UNIT_NAMES: s, deg, m, dB, Hz or m2/Hz."""
 _UTC_PATTERN = re.compile(r'(ut|utc|utcg|gmt|z|zulu|utciso8601|iso8601|iso)?(hrmn(ss|sc)?(fff)?)?')
 """Words behind the name of a time in UTC; HR:MN:SS.fff is of JPL Horizons, UTCG of STK."""
-_APPARENT_NAMES = ('aapp', 'aappr', 'rapp')
-"""Words that JPL Horizons writes behind an apparent angle in degrees."""
+_APPARENT_NAMES = ('aapp', 'aappr', 'rapp')  # words that JPL Horizons writes behind an apparent angle in degrees
 _BETWEEN_PATTERN = re.compile(r'[\s_\[\](){}<>|,:;.\-"\']+')
 _CAMEL_CASE_PATTERN = re.compile(r'(?<=[a-z])(?=[A-Z])')
 _DERIVED_WORDS = ('rate', 'vel', 'speed', 'acc', 'err', 'sigma', 'std', 'qual', 'valid')
 """If the word behind a quantity begins with one of these, the column holds something else, such as the rate or the
 error of the quantity."""
-MAX_LISTED_NAMES = 20
-"""Number of names of columns that an error lists."""
+MAX_LISTED_NAMES = 20  # number of names of columns that an error lists
 
 
 class ColumnError(ValueError):

@@ -22,8 +22,7 @@ PACKED_FORMATS = (
     (b'7z\xbc\xaf\x27\x1c', 'a 7z archive: unpack it with 7z x'),
     (b'\xd0\xcf\x11\xe0', 'an Excel workbook (.xls): export it as CSV'))
 """(first bytes, name of the format and remedy) of files that are no plain text but may contain a table."""
-MAX_MARK_BYTES = 6
-"""Largest number of bytes that name a format."""
+MAX_MARK_BYTES = 6  # largest number of bytes that name a format
 
 
 def packed(beginning):

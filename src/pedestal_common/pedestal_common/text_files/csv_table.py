@@ -18,23 +18,16 @@ import numpy as np
 from pedestal_common.text_files import columns as _columns
 from pedestal_common.text_files import content, files
 
-MAX_CSV_BYTES = 64_000_000
-"""Largest size of a file [bytes]."""
-
-MAX_CSV_ROWS = 1_000_000
-"""Largest number of rows of a file."""
+MAX_CSV_BYTES = 64_000_000  # largest size of a file [bytes]
+MAX_CSV_ROWS = 1_000_000  # largest number of rows of a file
 
 SEPARATORS = ('\t;|', ',')
 """Characters that may separate cells; the comma comes last, because it may be a decimal comma."""
-DEFAULT_SEPARATORS = ', '
-"""Separators of a line in which no separator is found."""
+DEFAULT_SEPARATORS = ', '  # separators of a line in which no separator is found
 COMMENT_MARKS = ('#', '%', '//')
-HORIZONS_MARKS = '$$SOE', '$$EOE'
-"""Lines before the first and after the last row in a file of JPL Horizons."""
-MAX_HEAD_LINES = 2000
-"""Largest number of lines before the first row."""
-SNIFFED_LINES = 10
-"""Number of lines by which the separator is found."""
+HORIZONS_MARKS = '$$SOE', '$$EOE'  # lines before the first and after the last row in a file of JPL Horizons
+MAX_HEAD_LINES = 2000  # largest number of lines before the first row
+SNIFFED_LINES = 10  # number of lines by which the separator is found
 
 REPEATED_ROW = 'row that repeats the row before'
 """Name of the rows that are skipped because they repeat the row before them."""
@@ -121,8 +114,7 @@ def text(path):
                          '(latin-1)') from None
 
 
-READ_ERRORS = (TableError, csv.Error)
-"""Errors that mean that a text is no table."""
+READ_ERRORS = (TableError, csv.Error)  # errors that mean that a text is no table
 
 
 @contextlib.contextmanager

@@ -13,8 +13,7 @@ from pedestal_common.text_files import files, plain_yaml
 
 ANY_NAMESPACE = '/**/'
 
-EVERY_NODE = '*'
-"""Result of `node_of` for a section that is for every node of a namespace, such as /**."""
+EVERY_NODE = '*'  # result of `node_of` for a section that is for every node of a namespace, such as /**
 
 
 class ParameterFileError(ValueError):

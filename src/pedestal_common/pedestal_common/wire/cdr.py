@@ -20,11 +20,8 @@ STAMPED_TYPES.update(name for name, (_, fields) in ROS_TYPESTORE.fielddefs.items
                      if fields and fields[0] == ('header', (Nodetype.NAME, 'std_msgs/msg/Header')))
 """Message types that begin with their stamp."""
 
-MAX_MESSAGE_NUMBERS = 400_000
-"""Largest number of numbers in one message; a program track of a whole day has 350,000."""
-
-PADDING_LIMIT_BYTES = 4
-"""The padding that DDS adds behind a message is always less than this [bytes]."""
+MAX_MESSAGE_NUMBERS = 400_000  # largest number of numbers in one message; a program track of a whole day has 350,000
+PADDING_LIMIT_BYTES = 4  # the padding that DDS adds behind a message is always less than this [bytes]
 
 
 class Places:

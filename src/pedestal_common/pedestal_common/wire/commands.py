@@ -15,8 +15,7 @@ from pedestal_common.wire import messages
 SERVICE_CLIENT, SCHEDULE_CLIENT = 'service', 'scenario'
 """Clients of a command by service, whose caller is unknown, and of a command by schedule."""
 
-RESERVED_KEYS = ('granted', 'reply')
-"""Keys of a reply in addition to the arguments of its command."""
+RESERVED_KEYS = ('granted', 'reply')  # keys of a reply in addition to the arguments of its command
 
 HELD_REFUSAL, LIMITS_REFUSAL, RANGE_REFUSAL = 'control is held by', 'outside limits', 'must be'
 """Parts of the texts of refusals by which a program distinguishes them: another client has control; the angles are
@@ -25,8 +24,7 @@ outside the limits; an argument is outside its range."""
 MAX_TEXT_CHARACTERS = 1000
 """Largest length of a name or value [characters]. The largest known value, an OMM in JSON, has half of it."""
 
-MAX_ARGUMENTS = 30
-"""Largest number of arguments of a command."""
+MAX_ARGUMENTS = 30  # largest number of arguments of a command
 
 MAX_COMMAND_AGE_NS = 1_000_000_000
 """Time from the sending of a command to its reception, after which a node drops the command [ns]."""

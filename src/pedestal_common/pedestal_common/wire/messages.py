@@ -19,8 +19,7 @@ _STAMP = struct.Struct('<iI')
 CDR_HEADER_BYTES = 4
 """Length of the header of a CDR message [bytes]; the first field, in most types header.stamp, begins after it."""
 
-MAX_CDR_BYTES = 8_000_000
-"""Largest size of a message [bytes]; a program track of a whole day has 7 million."""
+MAX_CDR_BYTES = 8_000_000  # largest size of a message [bytes]; a program track of a whole day has 7 million
 
 Clock = _TYPES['rosgraph_msgs/msg/Clock']
 DiagnosticArray = _TYPES['diagnostic_msgs/msg/DiagnosticArray']

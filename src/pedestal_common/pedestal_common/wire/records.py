@@ -17,11 +17,8 @@ import numpy as np
 from pedestal_common.graph import layouts, topics
 from pedestal_common.wire import cdr, messages
 
-NO_STAMP = -2**63
-"""Stamp [ns] of a message that did not arrive."""
-
-TEXT_TYPES = ('std_msgs/msg/String', 'diagnostic_msgs/msg/DiagnosticArray')
-"""Types of a text and of a list of texts."""
+NO_STAMP = -2**63  # stamp [ns] of a message that did not arrive
+TEXT_TYPES = ('std_msgs/msg/String', 'diagnostic_msgs/msg/DiagnosticArray')  # types of a text and of a list of texts
 
 _STAMP = struct.Struct('<iI')
 _FORMATS = {'f8': 'd', 'f4': 'f'}

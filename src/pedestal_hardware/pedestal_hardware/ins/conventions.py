@@ -9,8 +9,7 @@ from pedestal_hardware.ins.frames import BODY_MATRICES, EARTH_MATRICES
 MIN_FIT = 0.9
 """Smallest slope of all axes together of a convention that fits, relative to the convention that fits best."""
 
-MIN_UPRIGHT = 0.5
-"""Smallest cosine of the tilt of a deck; a ship is never further from the horizontal."""
+MIN_UPRIGHT = 0.5  # smallest cosine of the tilt of a deck; a ship is never further from the horizontal
 
 
 def fitting(check, declared, case, q):

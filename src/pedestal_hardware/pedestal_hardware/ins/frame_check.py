@@ -20,26 +20,16 @@ import numpy as np
 from pedestal_common.compiled import compiled
 from pedestal_hardware.ins.frames import rotation_vector
 
-BLOCK_TIME_S = 0.2
-"""Length of a block [s]; noise of the attitude matters little over this time."""
-
-MEMORY_TIME_S = 5.0
-"""Time constant with which old blocks fade [s]."""
-
-MIN_CHECK_TIME_S = 3.0
-"""Time with motion after which a verdict is given [s]."""
-
-MIN_RATE_RAD_S = math.radians(0.5)
-"""Rms of the rates of an axis from which it is compared [rad/s]."""
+BLOCK_TIME_S = 0.2  # length of a block [s]; noise of the attitude matters little over this time
+MEMORY_TIME_S = 5.0  # time constant with which old blocks fade [s]
+MIN_CHECK_TIME_S = 3.0  # time with motion after which a verdict is given [s]
+MIN_RATE_RAD_S = math.radians(0.5)  # rms of the rates of an axis from which it is compared [rad/s]
 
 MIN_ATTITUDE_RATE_RAD_S = math.radians(2.0)
 """Rms rate of change of the attitude from which an axis is compared although its rates are small [rad/s]."""
 
-SLOPE_RANGE = 0.3, 3.0
-"""Slopes of an axis that agrees."""
-
-MIN_TURN_CORRELATION = -0.5
-"""Smallest correlation of a heading that agrees with a rate of turn."""
+SLOPE_RANGE = 0.3, 3.0  # slopes of an axis that agrees
+MIN_TURN_CORRELATION = -0.5  # smallest correlation of a heading that agrees with a rate of turn
 
 JUMP_RAD = math.radians(0.5)
 """Rotation [rad] of the attitude in a block that is a jump of the attitude if the rates explain less than a fifth of
@@ -51,11 +41,8 @@ JUMP_REST_BLOCKS = 10
 GRAVITY_M_S2 = 5.0
 """Mean specific force [m/s2] from which its direction is compared; less means that gravity was removed."""
 
-ALL_AXES, TURN_AXIS = 0b111, 0b100
-"""Bit masks of the axes whose rates are known."""
-
-MAX_FORCE_M_S2 = 1000.0
-"""Specific force [m/s2] that no ship has; more is not used."""
+ALL_AXES, TURN_AXIS = 0b111, 0b100  # bit masks of the axes whose rates are known
+MAX_FORCE_M_S2 = 1000.0  # specific force [m/s2] that no ship has; more is not used
 
 FRAME_UNKNOWN, FRAME_RIGHT, FRAME_WRONG = range(3)
 """Verdicts: not enough motion so far, all axes with motion agree, an axis disagrees."""

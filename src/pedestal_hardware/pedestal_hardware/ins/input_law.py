@@ -27,11 +27,8 @@ OUTPUTS_DTYPE = np.dtype([('q', 'f8', (4,)), ('w', 'f8', (3,)), ('force', 'f8', 
 RECORD_DTYPE = np.dtype([('constants', CONSTANTS_DTYPE), ('state', STATE_DTYPE), ('inputs', INPUTS_DTYPE),
                          ('outputs', OUTPUTS_DTYPE)], align=True)
 
-MAX_NORM_ERROR = 0.01
-"""Largest difference of the length of a quaternion from 1."""
-
-MAX_RATE_RAD_S = 2.0
-"""Largest rate of a deck [rad/s]."""
+MAX_NORM_ERROR = 0.01  # largest difference of the length of a quaternion from 1
+MAX_RATE_RAD_S = 2.0  # largest rate of a deck [rad/s]
 
 OUTCOMES = ('published', 'no_attitude', 'not_newer', 'tilted', 'too_fast', 'wrong_frame', 'settling')
 """Outcomes of a sample, in the order of their codes."""

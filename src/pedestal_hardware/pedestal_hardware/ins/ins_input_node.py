@@ -19,8 +19,7 @@ from pedestal_hardware.lines.line_node import LineNode
 
 ATTITUDE_TOPIC, STATE_TOPIC, IMU_TYPE = 'ship/imu/data', 'ins/state', 'sensor_msgs/msg/Imu'
 
-DRIVER_QUEUE_DEPTH = 10
-"""Number of messages of a driver that wait while the node is busy."""
+DRIVER_QUEUE_DEPTH = 10  # number of messages of a driver that wait while the node is busy
 
 
 class InsInputNode(LineNode):

@@ -23,8 +23,7 @@ MAX_JUMP_RAD_S, MAX_JUMPS = 1.0, 3
 """Largest deviation of a sample from its prediction, per time since the last sample [rad/s], and number of consecutive
 samples beyond it from which the attitude is a new one. A single wrong sample would disturb the rates for a second."""
 
-SETTLING_TIME_CONSTANTS = 3.0
-"""Time after the first sample, in 1 / bandwidth, from which the rate is used."""
+SETTLING_TIME_CONSTANTS = 3.0  # time after the first sample, in 1 / bandwidth, from which the rate is used
 
 
 @compiled

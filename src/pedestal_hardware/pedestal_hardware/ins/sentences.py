@@ -14,14 +14,9 @@ import typing
 
 from pedestal_common.graph.steps import NS_PER_SECOND, SECONDS_PER_DAY
 
-KINDS = ('pashr', 'prdid', 'hdt')
-"""Sentences that give an attitude. hdt gives only the heading."""
-
-MAX_LEVEL_DEG = 90.0
-"""Largest roll and pitch [deg]."""
-
-MAX_TURN_DEG_MIN = 3600.0
-"""Largest rate of turn [deg/min]."""
+KINDS = ('pashr', 'prdid', 'hdt')  # sentences that give an attitude. hdt gives only the heading.
+MAX_LEVEL_DEG = 90.0  # largest roll and pitch [deg]
+MAX_TURN_DEG_MIN = 3600.0  # largest rate of turn [deg/min]
 
 
 class SentenceError(ValueError):

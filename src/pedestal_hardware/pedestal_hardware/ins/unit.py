@@ -11,11 +11,8 @@ from pedestal_common.wire import messages
 from pedestal_hardware.ins import conventions, frame_check, frames, input_law, sentences
 from pedestal_hardware.ins.input_law import Outcome
 
-REPORT_NS = 2_000_000_000
-"""Time for which the diagnosis reports a dropped sample [ns]."""
-
-TURN_AGE_NS = 1_000_000_000
-"""Age from which a rate of turn is not compared any more [ns]."""
+REPORT_NS = 2_000_000_000  # time for which the diagnosis reports a dropped sample [ns]
+TURN_AGE_NS = 1_000_000_000  # age from which a rate of turn is not compared any more [ns]
 
 DROP_KINDS = ('bad_checksum', 'unreadable', 'out_of_range', 'no_heading', 'no_time', 'no_orientation', 'stale',
               'future', *input_law.OUTCOMES[1:])
@@ -30,8 +27,7 @@ OUTCOME_TEXTS = {Outcome.NO_ATTITUDE: 'the orientation must have the length 1, a
 
 AXIS_NAMES = ('roll', 'pitch', 'yaw')
 
-VERDICT_TEXTS = ('not enough motion so far', 'agrees', 'wrong')
-"""Texts of the verdicts of frame_check."""
+VERDICT_TEXTS = ('not enough motion so far', 'agrees', 'wrong')  # texts of the verdicts of frame_check
 
 
 class Sample(typing.NamedTuple):

@@ -17,11 +17,8 @@ FIELD_PATTERNS = {('level', ''): r'(?P<level>[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]
                   ('level', 'x'): r'(?P<level>[+-]?[0-9a-fA-F]{1,15})', ('skip', ''): r'[^,;\s]*'}
 """{(name, form) of a field: its regular expression}."""
 
-FIELDS_TEXT = '{level}, {level:x} or {skip}'
-"""The fields, for texts."""
-
-SEPARATORS = ',; '
-"""Characters of which one follows {skip}. The match is therefore never ambiguous and never slow."""
+FIELDS_TEXT = '{level}, {level:x} or {skip}'  # the fields, for texts
+SEPARATORS = ',; '  # characters of which one follows {skip}. The match is therefore never ambiguous and never slow.
 
 
 class LineFormat:

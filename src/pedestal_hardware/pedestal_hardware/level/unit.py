@@ -5,8 +5,7 @@ import typing
 from pedestal_common.node.unit import LEVEL_OK, LEVEL_WARN, Diagnosis
 from pedestal_hardware.level.line_format import LineFormat
 
-REPORT_NS = 2_000_000_000
-"""Time for which the diagnosis reports a dropped line [ns]."""
+REPORT_NS = 2_000_000_000  # time for which the diagnosis reports a dropped line [ns]
 
 
 class Level(typing.NamedTuple):

@@ -10,14 +10,9 @@ import time
 
 from pedestal_hardware.lines import sources
 
-MAX_LINE_BYTES = 256
-"""Largest length of a line; NMEA 0183 allows 82 bytes."""
-
-LINE_TIMEOUT_S = 0.5
-"""Longest pause within a line [s]."""
-
-RETRY_PERIOD_S = 1.0
-"""Time between two attempts to open a connection [s]."""
+MAX_LINE_BYTES = 256  # largest length of a line; NMEA 0183 allows 82 bytes
+LINE_TIMEOUT_S = 0.5  # longest pause within a line [s]
+RETRY_PERIOD_S = 1.0  # time between two attempts to open a connection [s]
 
 TCP_SILENCE_S = 10.0
 """Time without bytes after which a TCP connection is opened again [s]. A device that lost its supply never closes

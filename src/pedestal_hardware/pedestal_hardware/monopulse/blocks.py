@@ -29,11 +29,8 @@ LATE_TOLERANCE_S = 0.004
 """Largest delay of the earliest arrivals of two intervals before samples count as lost [s]. A clock that drifts by
 200 ppm makes the arrivals as late in twice ARRIVAL_WINDOW_S."""
 
-RATE_WINDOW_S = 2.0
-"""Time over which the sample rate of a source without times is measured [s]."""
-
-CAUSE_TOLERANCE = 0.05
-"""Largest relative deviation of a wrong sample rate from that of a possible cause."""
+RATE_WINDOW_S = 2.0  # time over which the sample rate of a source without times is measured [s]
+CAUSE_TOLERANCE = 0.05  # largest relative deviation of a wrong sample rate from that of a possible cause
 
 RATE_TOLERANCE, STALL_TIME_S = 0.01, 0.1
 """Largest relative deviation of the measured sample rate, and the delay of one arrival that is no deviation [s]."""

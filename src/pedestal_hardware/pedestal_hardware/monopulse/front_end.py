@@ -66,14 +66,9 @@ OUTPUTS_DTYPE = np.dtype([('cross_elevation', 'f8'), ('elevation', 'f8'), ('cn0_
 """Outputs of a block: errors [rad], NaN while not locked; C/N0 [dB-Hz]; 1 while locked; index of
 STATUS_TEXT_BY_CODE."""
 
-RATIO_TIME_S = 1.0
-"""Time constant of the ratios of difference and sum [s]."""
-
-ERROR_TIME_S = 0.05
-"""Time constant of the smoothed frequency error [s]."""
-
-SMALLEST_POWER = 1e-30
-"""Smallest noise power of a sample, in place of 0 in a stream of zeros."""
+RATIO_TIME_S = 1.0  # time constant of the ratios of difference and sum [s]
+ERROR_TIME_S = 0.05  # time constant of the smoothed frequency error [s]
+SMALLEST_POWER = 1e-30  # smallest noise power of a sample, in place of 0 in a stream of zeros
 
 
 def constants(p) -> np.ndarray:

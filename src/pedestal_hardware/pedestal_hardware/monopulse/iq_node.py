@@ -14,11 +14,8 @@ from pedestal_hardware.monopulse import sinks
 from pedestal_hardware.monopulse.blocks import NS_PER_SECOND
 from pedestal_hardware.params import START_KEY
 
-NOISE_PERIOD_S = 0.02
-"""Time between two transmissions of noise before the first step [s]."""
-
-MAX_SPAN_S = 0.2
-"""Longest time for which samples are made at once [s]. After a longer one the samples have a gap."""
+NOISE_PERIOD_S = 0.02  # time between two transmissions of noise before the first step [s]
+MAX_SPAN_S = 0.2  # longest time for which samples are made at once [s]. After a longer one the samples have a gap.
 
 
 class IqNode(unit_node.UnitNode):

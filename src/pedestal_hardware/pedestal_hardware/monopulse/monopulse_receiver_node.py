@@ -14,14 +14,9 @@ from pedestal_common.node import shell, unit_node
 from pedestal_hardware.monopulse import blocks, sigmf, sources
 from pedestal_hardware.params import START_KEY, time_0_after
 
-READ_TIMEOUT_S = 0.1
-"""Longest wait for samples before the node looks whether it ends [s]."""
-
-MAX_SATURATED_SHARE = 0.01
-"""Largest share of the samples of a block at full scale [-]."""
-
-FAULT_TIME_S = 2.0
-"""Time for which a fault of the stream is reported after its last occurrence [s]."""
+READ_TIMEOUT_S = 0.1  # longest wait for samples before the node looks whether it ends [s]
+MAX_SATURATED_SHARE = 0.01  # largest share of the samples of a block at full scale [-]
+FAULT_TIME_S = 2.0  # time for which a fault of the stream is reported after its last occurrence [s]
 
 
 class MonopulseReceiverNode(unit_node.UnitNode):

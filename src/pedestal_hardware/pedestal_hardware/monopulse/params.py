@@ -25,8 +25,7 @@ DEFAULT_ADDRESSES = {'vita49': 'udp://127.0.0.1:4991', 'zmq_sub': 'tcp://127.0.0
                      'zmq_pull': 'tcp://127.0.0.1:5555'}
 """{kind of a source: address without another one}."""
 
-MAX_BLOCK_SAMPLES = 1_000_000
-"""Largest number of samples of a channel in one step."""
+MAX_BLOCK_SAMPLES = 1_000_000  # largest number of samples of a channel in one step
 
 
 @dataclasses.dataclass(frozen=True)

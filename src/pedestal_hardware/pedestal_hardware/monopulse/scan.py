@@ -36,8 +36,7 @@ MAX_RATE_SHARE, MAX_MEAN, MAX_REVERSALS = 0.2, 0.25, 0.5
 """Largest deviation of the rate of the scan over the rate of the parameters, largest mean of the reference over its
 amplitude, largest number of turns by more than 110 deg in a scan [-]."""
 
-REVERSAL_COSINE = -0.34
-"""Cosine of the turn of the reference, 110 deg, above which the turn counts as a reversal."""
+REVERSAL_COSINE = -0.34  # cosine of the turn of the reference, 110 deg, above which the turn counts as a reversal
 
 WINDOW_DTYPE = np.dtype([
     ('blocks', 'i8'), ('parts', 'f8'), ('sum', 'f8', 3), ('square', 'f8', 3), ('product', 'f8', 2),

@@ -16,17 +16,10 @@ import numpy as np
 from pedestal_hardware.monopulse.blocks import NS_PER_SECOND, TIME_TOLERANCE_NS, Chunk, StreamError
 from pedestal_hardware.monopulse.vita49 import INTEGER_FULL_SCALE
 
-MAX_META_BYTES = 50_000_000
-"""Largest size of a .sigmf-meta file [bytes]."""
-
-MAX_CAPTURES = 50_000
-"""Largest number of captures of a recording, whose .sigmf-meta file then has 6 MB."""
-
-META_PERIOD_S = 1.0
-"""Shortest time of recorded samples between two writes of the .sigmf-meta file [s]."""
-
-CHUNK_SAMPLES = 65536
-"""Number of samples that are read at once."""
+MAX_META_BYTES = 50_000_000  # largest size of a .sigmf-meta file [bytes]
+MAX_CAPTURES = 50_000  # largest number of captures of a recording, whose .sigmf-meta file then has 6 MB
+META_PERIOD_S = 1.0  # shortest time of recorded samples between two writes of the .sigmf-meta file [s]
+CHUNK_SAMPLES = 65536  # number of samples that are read at once
 
 FORMATS = {'cf32_le': np.dtype('<c8'), 'ci16_le': np.dtype(('<i2', 2))}
 META_SUFFIX, DATA_SUFFIX = '.sigmf-meta', '.sigmf-data'

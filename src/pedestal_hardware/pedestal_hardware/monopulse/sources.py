@@ -19,17 +19,10 @@ TAG_MAGIC, TAG_VERSION = 0x5FF0, 1
 TAG_HEADER = struct.Struct('<HBQQ')
 """Header of a ZMQ sink of GNU Radio with tags: magic number, version, number of the first item, number of tags."""
 
-RECEIVE_BUFFER_BYTES = 8_000_000
-"""Requested size of the receive buffer [bytes]; the kernel may give less."""
-
-MAX_QUEUED_MESSAGES = 1000
-"""Largest number of ZMQ messages that wait for this node."""
-
-FULL_SCALE = (INTEGER_FULL_SCALE - 1.0) / INTEGER_FULL_SCALE
-"""Largest real or imaginary part of a sample of integers."""
-
-MAX_MESSAGE_BYTES = 64_000_000
-"""Largest ZMQ message [bytes]."""
+RECEIVE_BUFFER_BYTES = 8_000_000  # requested size of the receive buffer [bytes]; the kernel may give less
+MAX_QUEUED_MESSAGES = 1000  # largest number of ZMQ messages that wait for this node
+FULL_SCALE = (INTEGER_FULL_SCALE - 1.0) / INTEGER_FULL_SCALE  # largest real or imaginary part of a sample of integers
+MAX_MESSAGE_BYTES = 64_000_000  # largest ZMQ message [bytes]
 
 
 class VitaSource:

@@ -15,22 +15,14 @@ import numpy as np
 from pedestal_hardware.monopulse.blocks import NS_PER_SECOND, RATE_TOLERANCE, Chunk, StreamError
 
 DATA_TYPE, TSI_UTC, TSF_PICOSECONDS = 1, 1, 2
-OTHER_TYPES = frozenset((4, 5, 6, 7))
-"""Types of packets that describe a stream or command it. They are ignored."""
-
-MAX_PACKET_BYTES = 65507
-"""Largest UDP datagram [bytes]."""
+OTHER_TYPES = frozenset((4, 5, 6, 7))  # types of packets that describe a stream or command it. They are ignored.
+MAX_PACKET_BYTES = 65507  # largest UDP datagram [bytes]
 
 WORD_BYTES, TRAILER_BYTES, CLASS_BYTES = 4, 4, 8
 PICOSECONDS_PER_NS = 1000
-INTEGER_FULL_SCALE = 32768.0
-"""Number of the payload ci16 that stands for the amplitude 1."""
-
-MAX_OPEN_PACKETS = 64
-"""Largest number of times at which packets of some channels wait for the packets of the others."""
-
-PACKET_COUNTS = 16
-"""Number of values of the packet counter."""
+INTEGER_FULL_SCALE = 32768.0  # number of the payload ci16 that stands for the amplitude 1
+MAX_OPEN_PACKETS = 64  # largest number of times at which packets of some channels wait for the packets of the others
+PACKET_COUNTS = 16  # number of values of the packet counter
 
 
 class Packet(typing.NamedTuple):

@@ -12,14 +12,9 @@ import serial
 
 from pedestal_hardware.rotator.protocols import Accepted, Position, Refusal
 
-RETRY_PERIOD_S = 1.0
-"""Time between two attempts to open the connection [s]."""
-
-READ_TIMEOUT_S = 0.02
-"""Longest wait for the next byte [s]."""
-
-MAX_READ_BYTES = 4096
-"""Number of bytes that are read at once."""
+RETRY_PERIOD_S = 1.0  # time between two attempts to open the connection [s]
+READ_TIMEOUT_S = 0.02  # longest wait for the next byte [s]
+MAX_READ_BYTES = 4096  # number of bytes that are read at once
 
 
 class Measurement(typing.NamedTuple):

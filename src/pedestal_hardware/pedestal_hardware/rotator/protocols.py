@@ -7,11 +7,8 @@ answer, so each connection needs its own object.
 import re
 import typing
 
-MAX_ANSWER_BYTES = 512
-"""Number of bytes without a complete answer after which the bytes are refused."""
-
-MAX_ANGLE_DEG = 1000.0
-"""Largest angle that a device may report [deg]."""
+MAX_ANSWER_BYTES = 512  # number of bytes without a complete answer after which the bytes are refused
+MAX_ANGLE_DEG = 1000.0  # largest angle that a device may report [deg]
 
 
 class Position(typing.NamedTuple):

@@ -13,8 +13,7 @@ import numpy as np
 from pedestal_common.compiled import compiled
 from pedestal_common.wire.records import NO_STAMP
 
-MAX_REFERENCE_RAD = 1e3
-"""Largest valid angle of a reference [rad]; a reference beyond it, infinite or NaN is ignored."""
+MAX_REFERENCE_RAD = 1e3  # largest valid angle of a reference [rad]; a reference beyond it, infinite or NaN is ignored
 
 MAX_START_DISTANCE_RAD = 0.05
 """Largest distance of the measured angles from the reference at which a mode with commanded rates may begin [rad].

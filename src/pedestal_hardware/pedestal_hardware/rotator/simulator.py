@@ -16,8 +16,7 @@ from pedestal_hardware.rotator.protocols import Rot2prog
 
 PULSES_PER_DEG = Rot2prog.PULSES_PER_DEG
 
-ANGLE = re.compile(rb'(AZ|EL)(-?[0-9]+(?:\.[0-9]*)?)')
-"""Set-point of an axis in EasyComm."""
+ANGLE = re.compile(rb'(AZ|EL)(-?[0-9]+(?:\.[0-9]*)?)')  # set-point of an axis in EasyComm
 
 
 class Axes:

@@ -17,19 +17,16 @@ from pedestal_hardware.rotator import set_point
 
 MODE_TOPIC, JOINT_STATES_TOPIC, CLOCK_TOPIC = 'acu/mode', 'joint_states', 'clock'
 
-MODE_COUNT = len(MODES)
-"""Number of the modes of the control unit; as a code an unknown mode."""
+MODE_COUNT = len(MODES)  # number of the modes of the control unit; as a code an unknown mode
 
 FAULT_TEXT = 'fault: rotator silent'
-STATE_TEXTS = ENABLED_TEXT, 'disabled', EMERGENCY_STOP_TEXT, FAULT_TEXT
-"""Texts of adu/state of a rotator."""
+STATE_TEXTS = ENABLED_TEXT, 'disabled', EMERGENCY_STOP_TEXT, FAULT_TEXT  # texts of adu/state of a rotator
 STATE_CODE_ENABLED, STATE_CODE_DISABLED, STATE_CODE_EMERGENCY_STOP, STATE_CODE_FAULT = range(len(STATE_TEXTS))
 
 MODE_CODE_STANDBY, MODE_CODE_STOP, MODE_CODE_RATE = (MODES.index(mode) for mode in ('standby', 'stop', 'rate'))
 """Codes of modes of the control unit. In standby and stop the rotator stands still."""
 
-STUCK_TIME_S = 5.0
-"""Time without motion, away from the set-point, after which the rotator is reported as stuck [s]."""
+STUCK_TIME_S = 5.0  # time without motion, away from the set-point, after which the rotator is reported as stuck [s]
 
 DEVICE_DTYPE = np.dtype([('angle', 'f8', (2,)), ('rate', 'f8', (2,)), ('came', 'i8'), ('silent', 'i8')],
                         align=True)

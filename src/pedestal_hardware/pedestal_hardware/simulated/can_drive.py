@@ -31,8 +31,7 @@ FIELD_OF_OBJECT = {(0x6060, 0): 'mode', (0x60FF, 0): 'target', (0x60B1, 0): 'vel
 COMMUNICATION_OBJECTS = range(0x1000, 0x1C00)
 """Indices of the objects that a reset of the communication sets to their defaults."""
 
-CONNECTION_LOST_FAULT = 1
-"""Value of 6007 with which a lost connection is a fault of the drive."""
+CONNECTION_LOST_FAULT = 1  # value of 6007 with which a lost connection is a fault of the drive
 
 CONNECTION_LOST_COMMANDS = {2: cia402.COMMAND_DISABLE_VOLTAGE, 3: cia402.COMMAND_QUICK_STOP}
 """{value of 6007: controlword that the drive then obeys by itself}. With 0 it ignores a lost connection."""

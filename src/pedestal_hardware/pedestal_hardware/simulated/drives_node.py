@@ -17,8 +17,7 @@ from pedestal_hardware.params import START_KEY
 from pedestal_hardware.simulated import law
 from pedestal_hardware.unit import DRIVE_LABELS
 
-POLL_S = 0.002
-"""Longest time between two steps of the plant [s]."""
+POLL_S = 0.002  # longest time between two steps of the plant [s]
 
 
 class DrivesNode(unit_node.UnitNode):

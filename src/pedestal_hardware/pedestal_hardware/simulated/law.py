@@ -20,29 +20,14 @@ from pedestal_common.wire.records import NO_STAMP
 from pedestal_hardware import cia402, pdo, servo_drives
 from pedestal_hardware.cia402 import State
 
-TICK_NS = round(SPEED_LOOP_PERIOD_S * 1e9)
-"""Period of the speed loop of a drive [ns]."""
-
-MAX_CATCH_UP_TICKS = 4000
-"""Largest number of periods that the drives make up after a stall of the machine; 2 s."""
-
-ENCODER_TURNS = 1
-"""Turns of the motor in which its encoder counts its resolution (608F)."""
-
-STANDSTILL_RAD_S = 0.05
-"""Speed of a motor below which it stands [rad/s]."""
-
-MAX_STOP_S = 2.0
-"""Longest ramp to standstill; then the drive removes the torque [s]."""
-
-HOLD_INTEGRAL_PER_S = 30.0
-"""Ratio of integral and proportional gain while a drive ramps to standstill by itself [1/s]."""
-
-STAY = -1
-"""Value of `leaving` of a drive that does not leave its state."""
-
-ERROR_SUPPLY_LOW = 0x5113
-"""Error of a drive with the injected fault `motor_loss`."""
+TICK_NS = round(SPEED_LOOP_PERIOD_S * 1e9)  # period of the speed loop of a drive [ns]
+MAX_CATCH_UP_TICKS = 4000  # largest number of periods that the drives make up after a stall of the machine; 2 s
+ENCODER_TURNS = 1  # turns of the motor in which its encoder counts its resolution (608F)
+STANDSTILL_RAD_S = 0.05  # speed of a motor below which it stands [rad/s]
+MAX_STOP_S = 2.0  # longest ramp to standstill; then the drive removes the torque [s]
+HOLD_INTEGRAL_PER_S = 30.0  # ratio of integral and proportional gain while a drive ramps to standstill by itself [1/s]
+STAY = -1  # value of `leaving` of a drive that does not leave its state
+ERROR_SUPPLY_LOW = 0x5113  # error of a drive with the injected fault `motor_loss`
 
 DRIVE_DTYPE = np.dtype([
     *((name, 'i8') for name in ('state', 'control', 'mode', 'target', 'velocity_offset', 'torque_offset',

@@ -15,11 +15,8 @@ HOLD_TIME_S = 0.05
 """Time after the beginning of a client's raw mode in which it gets no frames [s]. python-can takes the reply `< ok >`
 only if no frame follows at once."""
 
-MAX_LINE_BYTES = 4096
-"""Largest number of bytes of a client without the end of a command; more close the connection."""
-
-SEND_TIMEOUT_S = 0.2
-"""Time after which a client that reads nothing is disconnected [s]."""
+MAX_LINE_BYTES = 4096  # largest number of bytes of a client without the end of a command; more close the connection
+SEND_TIMEOUT_S = 0.2  # time after which a client that reads nothing is disconnected [s]
 
 
 def _text(cob, data):

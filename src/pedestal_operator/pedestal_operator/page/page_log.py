@@ -1,8 +1,7 @@
 """Event log of the page: commands with their senders and replies, changed states and alarms. No ROS here."""
 import collections
 
-MAX_LOG_LINES = 200
-"""Largest number of lines, and of names whose last jog is kept."""
+MAX_LOG_LINES = 200  # largest number of lines, and of names whose last jog is kept
 
 JOG_VERB, NEW_JOG_PAUSE_S = 'rate', 2.0
 """Command of a jog, which is repeated, and the pause after which a jog is a new line [s]."""

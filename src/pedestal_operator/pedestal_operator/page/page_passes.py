@@ -11,14 +11,12 @@ from pedestal_common.geometry.geodesy import StationParameters
 from pedestal_common.graph.steps import SECONDS_PER_DAY
 from pedestal_operator.page import page_state
 
-MAX_PASSES = 4
-"""Largest number of passes shown."""
+MAX_PASSES = 4  # largest number of passes shown
 
 SEARCH_SPAN_DAYS, SEARCH_VALIDITY_DAYS = 2.0, 1.0
 """Time searched ahead, and the time after which the search is repeated [days]."""
 
-MIN_UTC_S = 1e8
-"""Smallest time that is UTC [s]; a smaller time counts from the start of a run."""
+MIN_UTC_S = 1e8  # smallest time that is UTC [s]; a smaller time counts from the start of a run
 
 
 class PassQuery(typing.NamedTuple):

@@ -12,20 +12,11 @@ from pedestal_common.wire import commands
 from pedestal_common.wire.commands import Reply
 from pedestal_operator.page import page_security
 
-MAX_STATE_AGE_S = 0.5
-"""Largest age of the last state that a page received, for a jog of the page [s]."""
-
-JOG_TIMEOUT_S = 0.4
-"""Time after the last jog of a page at which the axes are stopped [s]."""
-
-PAGE_REPLY_TIMEOUT_S = 2.0
-"""Longest wait for a reply of the control unit [s]."""
-
-MAX_JOG_RATE_DEG_S = 10.0
-"""Largest rate of a jog [deg/s]."""
-
-MAX_ARGUMENTS = 20
-"""Largest number of arguments of a command."""
+MAX_STATE_AGE_S = 0.5  # largest age of the last state that a page received, for a jog of the page [s]
+JOG_TIMEOUT_S = 0.4  # time after the last jog of a page at which the axes are stopped [s]
+PAGE_REPLY_TIMEOUT_S = 2.0  # longest wait for a reply of the control unit [s]
+MAX_JOG_RATE_DEG_S = 10.0  # largest rate of a jog [deg/s]
+MAX_ARGUMENTS = 20  # largest number of arguments of a command
 
 
 class PageRequests:

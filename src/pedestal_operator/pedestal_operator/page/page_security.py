@@ -20,18 +20,14 @@ from pedestal_operator import state
 PAGE_ROLES = ('operator', 'monitor', 'supervisor')
 """Roles: an operator sends commands; a monitor may send `stop` only; a supervisor may take control from others."""
 
-UNRESTRICTED_VERBS = ('stop',)
-"""Commands that every role may send."""
-
-SUPERVISOR_REQUESTS = (('take', 'role', 'supervisor'),)
-"""(command, argument, value) for supervisors only."""
+UNRESTRICTED_VERBS = ('stop',)  # commands that every role may send
+SUPERVISOR_REQUESTS = (('take', 'role', 'supervisor'),)  # (command, argument, value) for supervisors only
 
 
 HOST = re.compile(r'(\[[0-9a-f:.]+\]|[^\[\]:]+)(?::(\d{1,5}))?')
 """Pattern of a `Host` in small letters: group 1 is the name, group 2 the port."""
 
-MAX_SHOWN_CHARACTERS = 100
-"""Longest part of a request in a refusal [characters]."""
+MAX_SHOWN_CHARACTERS = 100  # longest part of a request in a refusal [characters]
 
 
 class Refused(Exception):  # noqa: N818  no error of the server

@@ -32,14 +32,9 @@ from pedestal_operator.page.page_security import Refused
 
 STATIC_FOLDER = pathlib.Path(__file__).parents[1] / 'static'
 
-MAX_UNSEEN_MESSAGES = 4
-"""Largest number of unacknowledged messages to a page."""
-
-PAGE_TIMEOUT_S = 5.0
-"""Time without an acknowledgement after which a page is dropped [s]."""
-
-MAX_MESSAGE_BYTES = 4096
-"""Largest message from a page [bytes]."""
+MAX_UNSEEN_MESSAGES = 4  # largest number of unacknowledged messages to a page
+PAGE_TIMEOUT_S = 5.0  # time without an acknowledgement after which a page is dropped [s]
+MAX_MESSAGE_BYTES = 4096  # largest message from a page [bytes]
 
 MAX_QUEUED_REQUESTS, MAX_QUEUED_REPLIES = 200, 50
 """Largest number of waiting commands of all pages, and of waiting replies to a page."""
@@ -47,8 +42,7 @@ MAX_QUEUED_REQUESTS, MAX_QUEUED_REPLIES = 200, 50
 REQUEST_BURST_LIMIT, REQUEST_BURST_PERIOD_S = 40, 1.0
 """Largest number of messages from a page in a period, and the period [s]; a jog needs five in 1 s."""
 
-SHUTDOWN_TIMEOUT_S = 1.0
-"""Grace period of the pages when the server ends [s]."""
+SHUTDOWN_TIMEOUT_S = 1.0  # grace period of the pages when the server ends [s]
 
 
 class PageMessage(typing.NamedTuple):

@@ -9,11 +9,8 @@ from pedestal_common.geometry import line_of_sight
 from pedestal_common.graph import topics
 from pedestal_common.wire import messages
 
-HORIZON_STEP_DEG = 5.0
-"""Difference in azimuth between two points of a line around the horizon [deg]."""
-
-MAX_PATH_POINTS = 240
-"""Largest number of points of a path."""
+HORIZON_STEP_DEG = 5.0  # difference in azimuth between two points of a line around the horizon [deg]
+MAX_PATH_POINTS = 240  # largest number of points of a path
 
 MIN_HISTORY_STEP_DEG = 0.3
 """Smallest distance between two points of the beam history, less than the width of a line [deg]."""

@@ -19,8 +19,7 @@ ATTITUDE_TOPIC = 'ship/imu/data'
 EXTRA_NUMBER_TOPICS = (MOTOR_STATES_TOPIC, ATTITUDE_TOPIC)
 """Topics of numbers that the page receives in addition to those of every client."""
 
-TEXT_TOPIC_BY_NAME = {'keyhole': 'acu/keyhole', 'blockage': 'acu/blockage'}
-"""{name on the page: topic of the text}."""
+TEXT_TOPIC_BY_NAME = {'keyhole': 'acu/keyhole', 'blockage': 'acu/blockage'}  # {name on the page: topic of the text}
 
 STATION_PARAMETERS, ELEMENT_PARAMETERS = ('latitude_deg', 'longitude_deg', 'height'), (
     'line_1', 'line_2', 'omm')
@@ -34,8 +33,7 @@ SHOWN_PARAMETERS = {'acu': ('graph.start', 'tracker.receiver.beamwidth', 'blocka
                                           *(f'target.leo_pass.{name}' for name in ELEMENT_PARAMETERS))}
 """{node: parameters that the page reads}."""
 
-CHART_SPAN_S, CHART_PERIOD_S = 600.0, 0.5
-"""Time span of the strip charts, and time between two points [s]."""
+CHART_SPAN_S, CHART_PERIOD_S = 600.0, 0.5  # time span of the strip charts, and time between two points [s]
 
 HISTORY_COLUMNS = ('t', 'cross_elevation', 'elevation', 'azimuth_error', 'elevation_error', 'azimuth_rate',
                    'elevation_rate', *topics.MOTOR_NAMES, 'level')

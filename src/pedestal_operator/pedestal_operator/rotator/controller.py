@@ -19,11 +19,8 @@ from pedestal_operator.rotator.outcomes import (
 )
 from pedestal_operator.rotator.pointing import Pointing
 
-CLIENT_REPLY_TIMEOUT_S = 1.5
-"""Longest wait for a reply of the control unit [s]; clients of Hamlib wait for 2 s."""
-
-CONTROL_TIMEOUT_S = 10.0
-"""Time without a command of a client after which its control is released [s]."""
+CLIENT_REPLY_TIMEOUT_S = 1.5  # longest wait for a reply of the control unit [s]; clients of Hamlib wait for 2 s
+CONTROL_TIMEOUT_S = 10.0  # time without a command of a client after which its control is released [s]
 
 
 class PendingRequest:

@@ -9,11 +9,8 @@ import typing
 
 from pedestal_operator.rotator.numerals import number
 
-MAX_LINE_BYTES = 256
-"""Largest length of a line [bytes]."""
-
-QUERY_WORDS = 'AZ', 'EL', 'GS', 'GE', 'VE'
-"""Words that are answered: azimuth, elevation, status, errors, version."""
+MAX_LINE_BYTES = 256  # largest length of a line [bytes]
+QUERY_WORDS = 'AZ', 'EL', 'GS', 'GE', 'VE'  # words that are answered: azimuth, elevation, status, errors, version
 
 VERB_BY_WORD = {'SA': 'stop', 'SE': 'stop', 'RESET': 'acu/reset_faults', 'PARK': 'stow'}
 """{word: command of the control unit}."""
@@ -28,11 +25,8 @@ IGNORED_WORDS = 'UP', 'DN', 'UM', 'DM', 'UR', 'DR', 'AO', 'LO', 'OP', 'IP', 'AN'
 The word after one of them may be the mode of a radio.
 """
 
-RADIO_MODE_PATTERN = '[A-Z]{1,6}(-[A-Z]{1,3})?'
-"""Pattern of the mode of a radio: FM, USB, FM-N, or XXX from Hamlib."""
-
-STATUS_IDLE, STATUS_MOVING, STATUS_POINTING, STATUS_ERROR = 1, 2, 4, 8
-"""Status numbers in the answer to GS."""
+RADIO_MODE_PATTERN = '[A-Z]{1,6}(-[A-Z]{1,3})?'  # pattern of the mode of a radio: FM, USB, FM-N, or XXX from Hamlib
+STATUS_IDLE, STATUS_MOVING, STATUS_POINTING, STATUS_ERROR = 1, 2, 4, 8  # status numbers in the answer to GS
 
 
 class LineRequest(typing.NamedTuple):

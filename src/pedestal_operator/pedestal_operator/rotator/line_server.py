@@ -8,17 +8,13 @@ import tty
 
 from pedestal_operator import tcp_port
 
-MAX_UNREAD_BYTES = 65_536
-"""Largest size of unread answers of a client [bytes]; further answers are dropped."""
-
-MAX_WAITING_LINES = 100
-"""Largest number of waiting lines of a client; further input is left unread."""
+MAX_UNREAD_BYTES = 65_536  # largest size of unread answers of a client [bytes]; further answers are dropped
+MAX_WAITING_LINES = 100  # largest number of waiting lines of a client; further input is left unread
 
 LINE_END_TIMEOUT_S = 0.05
 """Time without a byte after which a complete command of a program without line ends counts as a line [s]."""
 
-READ_CHUNK_BYTES = 65_536
-"""Largest size of one read [bytes]."""
+READ_CHUNK_BYTES = 65_536  # largest size of one read [bytes]
 
 
 def address_of(name):

@@ -31,8 +31,7 @@ MAX_AZIMUTH_DEG, MAX_SHIP_ELEVATION_DEG = 720.0, 180.0
 On a ship a set-point is an earth direction, to which the limits of the axes, which are deck angles, do not apply.
 """
 
-ATTITUDE_TOPIC = 'ship/imu/data'
-"""Topic of the attitude, which exists on a ship only."""
+ATTITUDE_TOPIC = 'ship/imu/data'  # topic of the attitude, which exists on a ship only
 
 LIMIT_PARAMETERS = tuple(f'{axis}.limits.{end}' for axis in topics.AXES for end in ('low', 'high'))
 """Parameters of the control unit with the limits of the axes."""

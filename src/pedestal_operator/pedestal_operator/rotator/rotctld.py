@@ -8,8 +8,7 @@ import typing
 
 from pedestal_operator.rotator.numerals import number
 
-MAX_LINE_BYTES = 256
-"""Largest length of a line [bytes]."""
+MAX_LINE_BYTES = 256  # largest length of a line [bytes]
 
 (RESULT_OK, RESULT_INVALID, RESULT_NOT_IMPLEMENTED, RESULT_TIMEOUT, RESULT_IO_ERROR, RESULT_REJECTED,
  RESULT_NOT_AVAILABLE, RESULT_BUSY) = (0, -1, -4, -5, -6, -9, -11, -14)
@@ -35,8 +34,7 @@ COMMANDS = (Row('p', 'get_pos'), Row('P', 'set_pos', 2, True), Row('S', 'stop', 
 COMMAND_LIST_LINES = tuple(('', f'{row.letter}: {row.name}' if row.letter else f'\\{row.name}') for row in COMMANDS)
 """Lines of the answer to `?`: the commands."""
 
-SET_COMMANDS = tuple(row.name for row in COMMANDS if row.sets)
-"""Commands that are answered by RPRT only."""
+SET_COMMANDS = tuple(row.name for row in COMMANDS if row.sets)  # commands that are answered by RPRT only
 
 UNAVAILABLE_COMMANDS = (*'wCUuXx3LlDdEeBAaVv', 'send_cmd', 'set_conf', 'set_func', 'get_func', 'set_parm', 'get_parm',
                         'dump_conf', 'lonlat2loc', 'loc2lonlat', 'dms2dec', 'dec2dms', 'dmmm2dec', 'dec2dmmm', 'qrb',

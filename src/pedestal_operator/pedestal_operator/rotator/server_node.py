@@ -7,8 +7,7 @@ from pedestal_operator.remote_node import Remote
 from pedestal_operator.rotator.controller import Controller
 from pedestal_operator.rotator.line_server import LineServer
 
-POLL_PERIOD_S = 0.005
-"""Period at which the node reads from and answers its clients [s]."""
+POLL_PERIOD_S = 0.005  # period at which the node reads from and answers its clients [s]
 
 
 @dataclasses.dataclass(frozen=True)

@@ -17,20 +17,11 @@ direction of motion, C stays at its place.
 """
 import numpy as np
 
-MAX_SET_POINT_GAP_S = 3.0
-"""Largest time between two set-points of one motion [s]."""
-
-MAX_SET_POINT_RATE_DEG_S = 5.0
-"""Rate between two set-points above which the second is a new target [deg/s]."""
-
-PERIOD_TOLERANCE_RATIO = 0.3
-"""Largest change of T from one set-point to the next at a regular pace, as part of T [-]."""
-
-G, H = 0.5, 0.5
-"""Gains of the g-h filter [-]."""
-
-MOTION_DURATION_RATIO = 1.5
-"""Time for which C moves after a set-point, divided by T [-]; then C stops."""
+MAX_SET_POINT_GAP_S = 3.0  # largest time between two set-points of one motion [s]
+MAX_SET_POINT_RATE_DEG_S = 5.0  # rate between two set-points above which the second is a new target [deg/s]
+PERIOD_TOLERANCE_RATIO = 0.3  # largest change of T from one set-point to the next at a regular pace, as part of T [-]
+G, H = 0.5, 0.5  # gains of the g-h filter [-]
+MOTION_DURATION_RATIO = 1.5  # time for which C moves after a set-point, divided by T [-]; then C stops
 
 
 class SetPointFilter:

@@ -3,5 +3,4 @@
 Each benchmark is a module. Its function run() prints a table and returns the rows of the table.
 """
 
-BENCH_MODULES = {'graph': 'lockstep', 'core': 'core', 'bag': 'recording'}
-"""{name on the command line: module}."""
+BENCH_MODULES = {'graph': 'lockstep', 'core': 'core', 'bag': 'recording'}  # {name on the command line: module}

@@ -15,12 +15,10 @@ from rclpy.node import Node
 from pedestal_common.graph import layouts, nodes, topics
 from pedestal_common.node import middleware, shell
 
-RING_NODES = ('tracking_receiver', 'acu', 'adu', 'recorder')
-"""Names of the nodes of the ring."""
+RING_NODES = ('tracking_receiver', 'acu', 'adu', 'recorder')  # names of the nodes of the ring
 TRIGGER_TOPICS = {'tracking_receiver': 'adu/truth', 'acu': 'tracking_receiver/angle_error', 'adu': 'acu/rate_command'}
 """{node: topic whose message triggers a lap of the node}."""
-WARM_UP_LAPS = 300
-"""Number of laps before the measurement of the time starts."""
+WARM_UP_LAPS = 300  # number of laps before the measurement of the time starts
 
 
 def _filled(topic):

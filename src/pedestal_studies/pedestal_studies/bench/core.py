@@ -27,12 +27,10 @@ from pedestal_common.parameters import build
 from pedestal_studies.bench import solve_ivp_axis
 from pedestal_studies.bench.table import best_of, show
 
-CORE_DURATION_S, TRIAL_DURATION_S = 20.0, 10.0
-"""Simulated durations of the closed loop and of a trial [s]."""
+CORE_DURATION_S, TRIAL_DURATION_S = 20.0, 10.0  # simulated durations of the closed loop and of a trial [s]
 SHORT_RUN_STEPS, SHORT_RUN_COUNT = 40, 100
 """Drive steps of a run that is short enough to be rarely interrupted by other processes; number of these runs."""
-SUBSTEPS_PER_STEP = 2 * 100
-"""Sub-steps of the plant in one drive step of 5 ms: 100 of each axis."""
+SUBSTEPS_PER_STEP = 2 * 100  # sub-steps of the plant in one drive step of 5 ms: 100 of each axis
 SOLVE_IVP_TICKS, SUBSTEPS_PER_TICK = 100, 2
 """Periods of the current loop that scipy computes; sub-steps of the plant in one period."""
 

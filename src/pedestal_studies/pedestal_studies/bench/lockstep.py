@@ -22,10 +22,8 @@ from pedestal_recording import bag
 from pedestal_studies.bench import bare_ring
 from pedestal_studies.bench.table import show
 
-ROUND_COUNT = 3
-"""Number of rounds; a round is a run of the bare ring and a run of the graph."""
-RING_STEPS = 3000
-"""Measured laps of the bare ring in a round, as many as steps of 5 ms in RUN_DURATION_S."""
+ROUND_COUNT = 3  # number of rounds; a round is a run of the bare ring and a run of the graph
+RING_STEPS = 3000  # measured laps of the bare ring in a round, as many as steps of 5 ms in RUN_DURATION_S
 RUN_DURATION_S, LATENCY_DURATION_S = 15.0, 10.0
 """Simulated durations of a run of the graph in lockstep and in realtime [s]."""
 

@@ -19,14 +19,10 @@ from pedestal_recording.verify import verify
 from pedestal_studies.bench.lockstep import graph_run
 from pedestal_studies.bench.table import best_of, show
 
-ROUND_COUNT = 3
-"""Number of measurements of recompute, of which the median counts."""
-BAG_DURATION_S = 30.0
-"""Simulated duration of the run whose bag is used [s]."""
-TRAFFIC_FACTOR = 5.0
-"""Speed at which the bag of the run is replayed to the recorder, as a multiple of real time."""
-DISK_TEST_BYTES = 200_000_000
-"""Size of the file that is written for the rate of the disk [bytes]."""
+ROUND_COUNT = 3  # number of measurements of recompute, of which the median counts
+BAG_DURATION_S = 30.0  # simulated duration of the run whose bag is used [s]
+TRAFFIC_FACTOR = 5.0  # speed at which the bag of the run is replayed to the recorder, as a multiple of real time
+DISK_TEST_BYTES = 200_000_000  # size of the file that is written for the rate of the disk [bytes]
 
 
 def measure_recorder(path, again, rate):

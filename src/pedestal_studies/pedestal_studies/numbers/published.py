@@ -32,8 +32,7 @@ from pedestal_studies.rigs.feedforward_loop import REVERSAL_S_BY_AXIS
 from pedestal_studies.rigs.profiles import PROFILES
 from pedestal_studies.system import acquisition, budget, filter_families, filters
 
-ROWS_FILE = 'docs/rows.json'
-"""File of the rows in a checkout."""
+ROWS_FILE = 'docs/rows.json'  # file of the rows in a checkout
 
 SCENARIO_RESULTS = (
     ('`leo_pass`: pointing error against truth, per axis, rms', 'leo_pass', 'pointing_rms_deg'),

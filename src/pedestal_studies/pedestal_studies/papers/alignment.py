@@ -57,22 +57,19 @@ DEFAULT_RUNS = 400
 With 50 runs an rms is known only to 10 %, which is more than the difference between the best methods.
 """
 
-BATCH_RUNS = 5
-"""Runs that one worker makes at a time."""
+BATCH_RUNS = 5  # runs that one worker makes at a time
 
 BASE_SEED, QUADRANT_SEED, SWELL_SEED = 1, 2, 3
 IMU_PERIOD_S, LAW_STEP_S, EVALUATION_PERIOD_S = 0.01, 0.02, 1.0
 """Periods of the IMU samples, of the alignment laws and of the evaluated errors [s]."""
 
-RUN_DURATION_S, SHORT_RUN_DURATION_S = 600.0, 300.0
-"""Duration of a run, and of a run in a quadrant or on swell [s]."""
+RUN_DURATION_S, SHORT_RUN_DURATION_S = 600.0, 300.0  # duration of a run, and of a run in a quadrant or on swell [s]
 
 ARCMIN_RAD = math.radians(1.0 / 60.0)
 HOUR_S = 3600.0
 GYRO_BIAS_RAD_S, GYRO_NOISE_DENSITY = math.radians(0.01) / HOUR_S, math.radians(0.005) / 60.0
 """Bias [rad/s] and noise [rad/sqrt(s)] of the gyros, from paper 001, section 5."""
-G = 9.80665
-"""Acceleration [m/s2] in whose unit the paper states errors of accelerometers."""
+G = 9.80665  # acceleration [m/s2] in whose unit the paper states errors of accelerometers
 ACCELEROMETER_BIAS_M_S2, ACCELEROMETER_NOISE_DENSITY = 3e-5 * G, 6e-6 * G
 """Bias [m/s2] and noise [m/s/sqrt(s)] of the accelerometers, from paper 001, section 5."""
 
@@ -82,8 +79,7 @@ SHIP_PARAMETERS = ShipParameters(motion='plain', speed=0.0, latitude_deg=34.0, p
 """Ship with the sway of paper 001, table 1. In the paper x points to starboard and y to the bow, so that a rotation
 about x is our pitch."""
 
-MISALIGNMENT_RAD = np.radians((3.0, 3.0, 180.0))
-"""Misalignment a_x, a_y, a_z about east, north, up [rad]."""
+MISALIGNMENT_RAD = np.radians((3.0, 3.0, 180.0))  # misalignment a_x, a_y, a_z about east, north, up [rad]
 
 VELOCITY_NOISE_M_S, SWELL_VELOCITY_M_S, SWELL_FREQUENCY_HZ = 0.05, 0.5, 0.1
 """1 sigma of the white velocity [m/s]; velocity amplitude [m/s] and frequency [Hz] of the swell."""
@@ -104,12 +100,9 @@ CASE_MEANINGS = {
     'limit': 'information limit: 1 sigma of the Riccati filter and of the error by the bias of an east gyro'}
 """{case: description} of the methods and of the limit, for the table of the documentation."""
 CASE_COLOURS = dict(zip(CASE_METHODS, (RAW_COLOUR, TRUTH_COLOUR, MOTOR_1_COLOUR, FILTERED_COLOUR, MOTOR_2_COLOUR)))
-SETTLED_AZIMUTH_ARCMIN = 12.0
-"""Rms over the runs below which the azimuth counts as settled [arcmin]."""
-EVALUATION_TIMES_S = (100, 250, 300, 600)
-"""Instants of the rows of the azimuth's rms [s]."""
-SWELL_EVALUATION_TIME_S = 200
-"""Instant of the rows of the azimuth on swell [s]."""
+SETTLED_AZIMUTH_ARCMIN = 12.0  # rms over the runs below which the azimuth counts as settled [arcmin]
+EVALUATION_TIMES_S = (100, 250, 300, 600)  # instants of the rows of the azimuth's rms [s]
+SWELL_EVALUATION_TIME_S = 200  # instant of the rows of the azimuth on swell [s]
 
 ALIGNMENT_ESTIMATE = np.dtype([('quaternion', 'f8', (4,)), ('azimuth_sigma', 'f8'), ('level_sigma', 'f8')])
 """Attitude deck -> earth (x, y, z, w) of a navigator, and the 1 sigmas of azimuth and level that it states [rad]."""

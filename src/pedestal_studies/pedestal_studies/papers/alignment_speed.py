@@ -25,11 +25,8 @@ from pedestal_studies.papers.alignment import EVALUATION_PERIOD_S, INS_PARAMETER
 from pedestal_studies.rigs import drawing, metrics
 from pedestal_studies.rigs.rows import Result
 
-DEFAULT_RUNS = 100
-"""Runs of each case."""
-
-SPEEDS = (0.5, 1.0, 2.0, 4.0)
-"""Factors K by which the times of the method are divided [-]; 1: the default parameters."""
+DEFAULT_RUNS = 100  # runs of each case
+SPEEDS = (0.5, 1.0, 2.0, 4.0)  # factors K by which the times of the method are divided [-]; 1: the default parameters
 
 SETTLED_LEVEL_ARCMIN = 30.0
 """Rms over the runs below which the level counts as settled [arcmin], a sixth of the initial tilt of 3 deg."""
@@ -42,8 +39,7 @@ def faster(speed):
         adrc, observer=speed * adrc.observer, control=speed * adrc.control, start=adrc.start / speed))
 
 
-CASES = {f'adrc/{speed:g}': ('adrc', faster(speed)) for speed in SPEEDS}
-"""{case: (method, AlignmentParameters)}."""
+CASES = {f'adrc/{speed:g}': ('adrc', faster(speed)) for speed in SPEEDS}  # {case: (method, AlignmentParameters)}
 
 
 def level_over_runs(accuracy):

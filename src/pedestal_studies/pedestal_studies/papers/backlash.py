@@ -28,11 +28,8 @@ from pedestal_studies.papers import servo
 from pedestal_studies.rigs import drawing, metrics
 from pedestal_studies.rigs.rows import Result
 
-STANDSTILL_START_S = 2.0
-"""Time after a step from which the standstill is evaluated [s]."""
-
-REVERSAL_AMPLITUDE_RAD = 0.05
-"""Amplitude of the sine of the reversals [rad]."""
+STANDSTILL_START_S = 2.0  # time after a step from which the standstill is evaluated [s]
+REVERSAL_AMPLITUDE_RAD = 0.05  # amplitude of the sine of the reversals [rad]
 
 REVERSAL_FREQUENCIES_RAD_S = {'reversal': 0.2, 'fast_reversal': 4.0}
 """Angular frequencies of the sine of the reversals [rad/s].
@@ -88,8 +85,7 @@ def reversal_case(kind, name):
 FAST_STEP_PARAMETERS = {**servo.FULL_TORQUE_PARAMETERS, 'acu.azimuth.shaper.acceleration': 40.0}
 """Controller of a step at 40 rad/s2, which needs the full torque."""
 
-MOVE_DURATION_S = 0.5
-"""Time at which the step of the cases SPEED_LOOP_STRUCTURES is over [s]."""
+MOVE_DURATION_S = 0.5  # time at which the step of the cases SPEED_LOOP_STRUCTURES is over [s]
 
 
 def standstill(record):

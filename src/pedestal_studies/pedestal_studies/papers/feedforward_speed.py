@@ -29,14 +29,12 @@ from pedestal_studies.rigs.feedforward_loop import METRIC_UNITS, MISS_DELAY_STEP
 from pedestal_studies.rigs.profiles import S_MOTION_RATE_RAD_S
 from pedestal_studies.rigs.rows import Result
 
-DEFAULT_RUNS, BATCH_RUNS = 50, 10
-"""Runs of each case, with independent noise; runs that one worker makes at a time."""
+DEFAULT_RUNS, BATCH_RUNS = 50, 10  # runs of each case, with independent noise; runs that one worker makes at a time
 
 RATES_RAD_S = {f'{speed}m_s': S_MOTION_RATE_RAD_S * speed / 30.0 for speed in (30, 50)}
 """{speed of the target at 500 m: its rate between the reversals [rad/s]}. The paper rounds 30 m/s to 3.5 deg/s."""
 
-DRIVE_SPEED = '50m_s'
-"""Speed of the cases drive-...; the study imm-feedforward has these cases at 30 m/s."""
+DRIVE_SPEED = '50m_s'  # speed of the cases drive-...; the study imm-feedforward has these cases at 30 m/s
 
 DIFFERENCE_STEPS = (1, 15)
 """Distances of the differenced angles [steps of 10 ms]: one step, and the distance of the least rate error."""
@@ -58,14 +56,12 @@ DRIVE_CASES = {f'{axis}/{DRIVE_SPEED}/drive-{name}': imm_feedforward.drive_case(
     for axis in REVERSAL_S_BY_AXIS for name in ('kalman-cv', 'imm')}
 """{case: Case} of the whole chain."""
 
-UNITS = {**METRIC_UNITS, 'rate_rms_deg_s': 'deg/s', 'acceleration_rms_deg_s2': 'deg/s2'}
-"""{metric of a run: unit}."""
+UNITS = {**METRIC_UNITS, 'rate_rms_deg_s': 'deg/s', 'acceleration_rms_deg_s2': 'deg/s2'}  # {metric of a run: unit}
 
 COMPARED_METRICS = ('miss_rms_deg', 'rate_rms_deg_s', 'acceleration_rms_deg_s2')
 """Metrics that the rows ..._ratio_to_imm compare."""
 
-IMM_RATIO_TARGET = '>= 3'
-"""Required ratio: miss of kalman-cv divided by miss of imm [-]."""
+IMM_RATIO_TARGET = '>= 3'  # required ratio: miss of kalman-cv divided by miss of imm [-]
 
 
 def estimate_errors(axis, steps, rate):

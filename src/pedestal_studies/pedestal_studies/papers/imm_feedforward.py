@@ -55,15 +55,13 @@ from pedestal_studies.rigs.feedforward_loop import (
 )
 from pedestal_studies.rigs.rows import Result
 
-DEFAULT_RUNS = 50
-"""Runs of each case, with independent noise."""
+DEFAULT_RUNS = 50  # runs of each case, with independent noise
 
 DRIVE_DURATION_S, DRIVE_EVALUATION_START_S, DRIVE_ELEVATION_RAD = 36.0, 6.0, 0.5
 """Duration of a run of the whole chain from receiver to gears [s], start of its evaluation in autotrack [s], and
 elevation of the target [rad]."""
 
-CV_NOISES = (0.1, 0.2, 0.3, 0.5, 4.0)
-"""Process noises of the conventional filter [deg/s2/sqrt(Hz)]."""
+CV_NOISES = (0.1, 0.2, 0.3, 0.5, 4.0)  # process noises of the conventional filter [deg/s2/sqrt(Hz)]
 
 PAPER_CV_NOISES = {'azimuth': 0.1, 'elevation': 0.3}
 """Process noise of `kalman-cv` [deg/s2/sqrt(Hz)] that comes nearest to the paper's results; the paper prints none."""

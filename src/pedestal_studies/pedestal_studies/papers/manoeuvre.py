@@ -23,11 +23,8 @@ from pedestal_analysis.trials import monte_carlo
 from pedestal_studies.rigs import drawing, ensemble, feedforward_loop, profiles
 from pedestal_studies.rigs.rows import Result
 
-DEFAULT_RUNS = 200
-"""Runs of the motion; the paper has 50."""
-
-BATCH_RUNS, NOISE_SEED = 25, 1
-"""Runs of one batch; seed of their noise."""
+DEFAULT_RUNS = 200  # runs of the motion; the paper has 50
+BATCH_RUNS, NOISE_SEED = 25, 1  # runs of one batch; seed of their noise
 
 REVERSAL_DURATIONS_S = (4.0, 2.0, 1.0, 0.5, 0.35)
 """Durations of the reversals [s]; their peak accelerations are 2.7 to 31 deg/s2."""
@@ -36,8 +33,7 @@ LEAD_TIME_S = 5.0
 """Time at which the target is in the middle of its stroke before the first reversal [s]; its motion is uniform until
 then."""
 
-MEASUREMENT_NOISE = ensemble.Noise(feedforward_loop.MISS_SIGMA_RAD)
-"""Noise of the measured angle."""
+MEASUREMENT_NOISE = ensemble.Noise(feedforward_loop.MISS_SIGMA_RAD)  # noise of the measured angle
 
 FILTERS = {'cv': feedforward_loop.cv(0.1).filter, 'ca': feedforward_loop.ca(10.0).filter,
            'imm-a': feedforward_loop.imm(q_ca=40.0, predicted=False).filter,
@@ -47,11 +43,8 @@ deg/s3/sqrt(Hz)."""
 
 FILTER_COLOURS = {'cv': TRUTH_COLOUR, 'ca': RAW_COLOUR, 'imm-a': MOTOR_1_COLOUR, 'imm-b': FILTERED_COLOUR}
 
-ACCELERATION_ROW = 1
-"""Row of the acceleration in the rms of `measured`; row 0 is the rate."""
-
-RATE_RATIO_TARGET = '>= 3'
-"""Required ratio: rate error of cv divided by rate error of imm-b [-]."""
+ACCELERATION_ROW = 1  # row of the acceleration in the rms of `measured`; row 0 is the rate
+RATE_RATIO_TARGET = '>= 3'  # required ratio: rate error of cv divided by rate error of imm-b [-]
 
 
 def motion():

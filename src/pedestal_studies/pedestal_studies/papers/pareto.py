@@ -29,17 +29,13 @@ from pedestal_studies.rigs import drawing, feedforward_loop
 from pedestal_studies.rigs.feedforward_loop import Source
 from pedestal_studies.rigs.rows import Result
 
-DEFAULT_RUNS = 50
-"""Runs of each tuning, as many as in the paper."""
-
-LOOP_AXIS = 'azimuth'
-"""Axis of all runs."""
+DEFAULT_RUNS = 50  # runs of each tuning, as many as in the paper
+LOOP_AXIS = 'azimuth'  # axis of all runs
 
 REFERENCE_SOURCE = feedforward_loop.imm(q_ca=40.0, predicted=True)
 """Case imm-predicted of the study imm-feedforward, with which the curves are compared."""
 
-REFERENCE_POINT = ('reference', 0.0)
-"""Key of REFERENCE_SOURCE beside the keys (filter, value) of the tunings."""
+REFERENCE_POINT = ('reference', 0.0)  # key of REFERENCE_SOURCE beside the keys (filter, value) of the tunings
 
 
 def _current_statistical(a_max):

@@ -38,41 +38,32 @@ from pedestal_studies.rigs.rows import Result
 from tracking_receiver_sim import receiver
 from tracking_receiver_sim.params import ReceiverParameters
 
-DEFAULT_RUNS, FIRST_SEED = 40, 1
-"""Runs of each case with noise; seed of the first run."""
+DEFAULT_RUNS, FIRST_SEED = 40, 1  # runs of each case with noise; seed of the first run
 
 STEP_SIZE_RAD = math.radians(1.0)
 ALPHA_GAINS, LOOP_PERIODS_MS, LOOP_DELAYS_MS = (0.05, 0.1, 0.2, 0.3), (10, 5), (0, 20, 50, 80)
 """Gains alpha [-], periods and delays of the loop [ms] in figures 3 to 5 and in the limits of stability."""
-SLOPE_RATIOS = 0.5, 0.7, 1.0, 1.5, 2.0
-"""True slope over assumed slope of the receiver [-]."""
+SLOPE_RATIOS = 0.5, 0.7, 1.0, 1.5, 2.0  # true slope over assumed slope of the receiver [-]
 STEEP_SLOPE_RATIO = 2.0
 """Slope ratio of the cases that show the lag behind the ramp and the sine with a steeper slope [-]."""
-RAMP_RATES_DEG_S = (10, 20, 30, 40)
-"""Rates of figure 6 [deg/s]."""
-
-SINE_RATE_DEG_S, SINE_ACCELERATION_DEG_S2 = 30.0, 10.0
-"""Largest rate [deg/s] and acceleration [deg/s2] of figure 7."""
+RAMP_RATES_DEG_S = (10, 20, 30, 40)  # rates of figure 6 [deg/s]
+SINE_RATE_DEG_S, SINE_ACCELERATION_DEG_S2 = 30.0, 10.0  # largest rate [deg/s] and acceleration [deg/s2] of figure 7
 
 SWAY_AMPLITUDE_RAD, SWAY_PERIOD_S = math.radians(10.0), 8.0
 """Amplitude [rad] and period [s] of the ship's sway in figure 9."""
 
-RATE_COMPENSATIONS = (0.0, 0.85, 1.0)
-"""Shares delta of the ship's rate that the loop compensates [-]."""
-LOOP_DELAY_MS = 20
-"""Delay of figure 7 and of all loops of COMPARED_LOOPS [ms]."""
+RATE_COMPENSATIONS = (0.0, 0.85, 1.0)  # shares delta of the ship's rate that the loop compensates [-]
+LOOP_DELAY_MS = 20  # delay of figure 7 and of all loops of COMPARED_LOOPS [ms]
 
 RECEIVER_NOISE_RAD, INS_ANGLE_NOISE_RAD, INS_RATE_NOISE_RAD_S = map(math.radians, (0.05, 0.005, 0.01))
 """1-sigma noise of one sample of 1 ms: error of the receiver [rad], attitude [rad] and rate [rad/s] of the INS."""
 
-INS_STAMP_ERROR_MS = 5
-"""Error of the INS's stamps [ms]."""
+INS_STAMP_ERROR_MS = 5  # error of the INS's stamps [ms]
 
 RECORD_DURATION_S, EVALUATION_START_S = 60.0, 30.0
 """Duration of a record of a moving target, and start of its evaluation [s]."""
 
-BEAMWIDTH_RAD = math.radians(1.0)
-"""Beamwidth of the array in the cases loss/... [rad]."""
+BEAMWIDTH_RAD = math.radians(1.0)  # beamwidth of the array in the cases loss/... [rad].
 
 
 def jerk(q):
@@ -447,10 +438,8 @@ def graph_case(case, quiet=False):
                                                   'acu.tracker.receiver.sigma_floor': sigma})
 
 
-ELEVATION_COLUMN = 1
-"""Column of the elevation in an error of GRAPH_CASES; column 0 is the cross-elevation."""
-GRAPH_EVALUATION_START_S = 10.0
-"""Start of the evaluation of the runs of GRAPH_CASES [s]."""
+ELEVATION_COLUMN = 1  # column of the elevation in an error of GRAPH_CASES; column 0 is the cross-elevation
+GRAPH_EVALUATION_START_S = 10.0  # start of the evaluation of the runs of GRAPH_CASES [s]
 
 
 def graph_error(case, quiet=False, seed=None):

@@ -41,32 +41,18 @@ from pedestal_studies.rigs import drawing, ensemble, profiles
 from pedestal_studies.rigs.ensemble import MEASUREMENT_PERIOD_S as T
 from pedestal_studies.rigs.rows import Result
 
-DEFAULT_RUNS = 40
-"""Number of flybys."""
-
-ANGLE_SIGMA_RAD = math.radians(0.03)
-"""Noise of a measured angle [rad]."""
-
-ALPHA = 0.5
-"""Reciprocal of the time for which the filter expects an acceleration to last [1/s]."""
-
-ACCELERATION_SIGMAS_DEG_S2 = (0.05, 0.5, 3.0)
-"""Values of sigma_a [deg/s2]."""
+DEFAULT_RUNS = 40  # number of flybys
+ANGLE_SIGMA_RAD = math.radians(0.03)  # noise of a measured angle [rad]
+ALPHA = 0.5  # reciprocal of the time for which the filter expects an acceleration to last [1/s]
+ACCELERATION_SIGMAS_DEG_S2 = (0.05, 0.5, 3.0)  # values of sigma_a [deg/s2]
 
 RATE_SIGMAS_DEG_S = {'position': math.nan, 'position-rate': 0.1, 'position-rate-0.02': 0.02}
 """{case: noise of a measured rate [deg/s]}, NaN without a measured rate."""
 
-MAIN_SIGMA_DEG_S2 = 0.5
-"""sigma_a of the cases whose name does not state it [deg/s2]."""
-
-DYNAMIC_ERROR_FREQUENCY_HZ = 0.2
-"""Frequency of the dynamic error [Hz]."""
-
-RESPONSE_FREQUENCIES_HZ = np.geomspace(0.01, 0.5 / T, 2000)
-"""Frequencies of the responses [Hz]."""
-
-SETTLING_STEPS = 20000
-"""Steps after which the gains are constant, also with the smallest sigma_a."""
+MAIN_SIGMA_DEG_S2 = 0.5  # sigma_a of the cases whose name does not state it [deg/s2]
+DYNAMIC_ERROR_FREQUENCY_HZ = 0.2  # frequency of the dynamic error [Hz]
+RESPONSE_FREQUENCIES_HZ = np.geomspace(0.01, 0.5 / T, 2000)  # frequencies of the responses [Hz]
+SETTLING_STEPS = 20000  # steps after which the gains are constant, also with the smallest sigma_a
 
 FLYBY_PROFILE = 'flyby-60m'
 
@@ -74,8 +60,7 @@ MAX_ACCELERATION_RATIO, MIN_SIGMA_RATIO = 1.2, 0.3
 """Parameters of the filter of a flight: its a_max over the largest acceleration of the flight [-], and the least
 sigma_a over a_max [-]."""
 
-SETTLING_TIME_S = 5.0
-"""Time of the flyby from which the errors are evaluated [s]."""
+SETTLING_TIME_S = 5.0  # time of the flyby from which the errors are evaluated [s]
 
 DIFFERENCED_RATES = {'differenced-1': 1, 'differenced-20': 20}
 """{case: steps of T over which the measured angles are differenced to a rate}."""
@@ -95,8 +80,7 @@ class FlybyRecord(typing.NamedTuple):
     estimate: np.ndarray
 
 
-BATCH_RUNS, NOISE_SEED = 25, 1
-"""Flybys of one batch; seed of their noise."""
+BATCH_RUNS, NOISE_SEED = 25, 1  # flybys of one batch; seed of their noise
 
 
 def filter_of(a_max, floor):

@@ -34,26 +34,13 @@ from pedestal_analysis.trials.cases import Case
 from pedestal_studies.rigs import drawing, metrics
 from pedestal_studies.rigs.rows import Result
 
-STEP_SIZE_RAD = 0.174
-"""Step of figure 5 [rad]."""
-
-SINE_AMPLITUDE_RAD = 0.87
-"""Amplitude of figure 6 [rad]."""
-
-SINE_FREQUENCIES_RAD_S = {'0p4hz': 0.8 * math.pi, '0p4rads': 0.4}
-"""Two readings of the paper's sine [rad/s]."""
-
-SINE_READINGS = {'0p4hz': '0.4 Hz', '0p4rads': '0.4 rad/s'}
-"""{reading of the paper's sine: label in a figure}."""
-
-SINE_PERIODS = 4
-"""Periods of each sine, of which the first belongs to the transient."""
-
-GUST_TORQUE_NM, GUST_START_S = 1000.0, 0.2
-"""Step of wind torque on the azimuth [Nm] and its start [s]."""
-
-SETTLING_BAND = 0.02
-"""Half-width of the band of the settling time, divided by the step."""
+STEP_SIZE_RAD = 0.174  # step of figure 5 [rad]
+SINE_AMPLITUDE_RAD = 0.87  # amplitude of figure 6 [rad]
+SINE_FREQUENCIES_RAD_S = {'0p4hz': 0.8 * math.pi, '0p4rads': 0.4}  # two readings of the paper's sine [rad/s]
+SINE_READINGS = {'0p4hz': '0.4 Hz', '0p4rads': '0.4 rad/s'}  # {reading of the paper's sine: label in a figure}
+SINE_PERIODS = 4  # periods of each sine, of which the first belongs to the transient
+GUST_TORQUE_NM, GUST_START_S = 1000.0, 0.2  # step of wind torque on the azimuth [Nm] and its start [s]
+SETTLING_BAND = 0.02  # half-width of the band of the settling time, divided by the step
 
 PAPER_R1_PARAMETERS: dict[str, float] = {}
 """No changes: the scenarios servo_step and servo_sine have the gains for the reading 0.4 Hz."""
@@ -129,8 +116,7 @@ METRIC_TARGETS = {
 PAPER_VALUES = {'step_overshoot_percent': 12.0, 'step_settling_2percent_s': 0.2, 'max_error_rad': 0.04,
                 'rms_error_rad': 0.0281, 'amplitude_rad': 0.869, 'peak_error_percent': 0.12, 'max_error_percent': 4.6}
 """{metric without the prefix of the sine: number that the paper prints}."""
-SUFFIX_UNITS = {'percent': '%', 's': 's', 'rad': 'rad', 'crossings': ''}
-"""{last word of a metric: unit}."""
+SUFFIX_UNITS = {'percent': '%', 's': 's', 'rad': 'rad', 'crossings': ''}  # {last word of a metric: unit}
 
 
 def step_case(name):

@@ -36,29 +36,20 @@ from pedestal_studies.rigs import drawing, ensemble
 from pedestal_studies.rigs.ensemble import MEASUREMENT_PERIOD_S
 from pedestal_studies.rigs.rows import Result
 
-DEFAULT_RUNS, NOISE_SEED = 40, 1
-"""Number of flights; seed of their noise."""
-
-BATCH_RUNS = 5
-"""Flights that one worker makes at a time."""
+DEFAULT_RUNS, NOISE_SEED = 40, 1  # number of flights; seed of their noise
+BATCH_RUNS = 5  # flights that one worker makes at a time
 
 TARGET_SPEED_M_S, MIN_GROUND_DISTANCE_M, TARGET_HEIGHT_M, CULMINATION_TIME_S = 300.0, 3000.0, 2500.0, 42.0
 """Speed [m/s], least distance over ground [m] and height [m] of the target; time of its least distance [s]."""
 
-FLIGHT_START_S, FLIGHT_END_S = 20.0, 100.0
-"""Times of the paper's figures [s]; the filter begins at the first."""
-
-SETTLING_TIME_S = 5.0
-"""Time after FLIGHT_START_S from which the rows are evaluated [s]."""
+FLIGHT_START_S, FLIGHT_END_S = 20.0, 100.0  # times of the paper's figures [s]; the filter begins at the first
+SETTLING_TIME_S = 5.0  # time after FLIGHT_START_S from which the rows are evaluated [s]
 
 ZOOM_WINDOWS_S = {'azimuth': (39.0, 43.5), 'elevation': (41.5, 45.0)}
 """{axis: (begin, end) [s] of the time that figure 2 or 6 shows}."""
 
-RATE_SIGMA_RAD_S = math.radians(0.1)
-"""Noise of a measured rate [rad/s]."""
-
-DIFFERENCE_STEPS = 20
-"""Steps over which the measured rate is differenced."""
+RATE_SIGMA_RAD_S = math.radians(0.1)  # noise of a measured rate [rad/s]
+DIFFERENCE_STEPS = 20  # steps over which the measured rate is differenced
 
 QUANTITY_UNITS = {'angle': 'deg', 'rate': 'deg/s', 'acceleration': 'deg/s2'}
 

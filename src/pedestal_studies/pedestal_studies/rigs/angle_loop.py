@@ -31,8 +31,7 @@ from pedestal_common.compiled import compiled
 from tracking_receiver_sim import monopulse, smoothing
 from tracking_receiver_sim.params import AntennaParameters, ReceiverParameters
 
-GRID_STEP_S = 1e-3
-"""Step of the grid [s]."""
+GRID_STEP_S = 1e-3  # step of the grid [s]
 GRID_STEP_NS = round(GRID_STEP_S * 1e9)
 
 SMOOTHING_CODES = {'S0': smoothing.SMOOTHING_NONE, 'S1': smoothing.SMOOTHING_RECURSION,
@@ -40,8 +39,7 @@ SMOOTHING_CODES = {'S0': smoothing.SMOOTHING_NONE, 'S1': smoothing.SMOOTHING_REC
 """{smoothing of the receiver: its code}. S0: no smoothing, the last sample; S1: the recursion of paper 002, eq. (1);
 S2: the moving average. The paper calls eq. (1) a moving average, so S1 and S2 are two readings of it."""
 
-SMOOTHING_SAMPLES = 20
-"""Number n of samples in the smoothing S1 and S2, as in the paper's example."""
+SMOOTHING_SAMPLES = 20  # number n of samples in the smoothing S1 and S2, as in the paper's example
 
 FULL_SCALE_BEAMWIDTHS, K_M = ReceiverParameters().full_scale, AntennaParameters().slope
 """Full scale of the receiver [beamwidths], and slope of the difference pattern of its antenna [1/beamwidth]."""

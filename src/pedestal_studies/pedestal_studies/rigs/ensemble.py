@@ -17,8 +17,7 @@ from acu_tracker.estimation.params import TrackerParameters
 from acu_tracker.geometry.motion import AxisMotion, Motion
 from pedestal_common.compiled import compiled
 
-MEASUREMENT_PERIOD_S = 0.01
-"""Time between measurements in all studies of filters [s]."""
+MEASUREMENT_PERIOD_S = 0.01  # time between measurements in all studies of filters [s]
 
 INITIAL_RATE_SIGMA_RAD_S = TrackerParameters().initial_rate
 """Standard deviation of the rate that a filter assumes at its start [rad/s]."""

@@ -19,15 +19,13 @@ import typing
 
 from pedestal_common.graph.modes import MODE_ROWS
 
-TENTH_BEAMWIDTH_DEG, HALF_BEAMWIDTH_DEG = 0.1, 0.5
-"""Tenth and half of the beamwidth of the antenna in the study [deg]."""
+TENTH_BEAMWIDTH_DEG, HALF_BEAMWIDTH_DEG = 0.1, 0.5  # tenth and half of the beamwidth of the antenna in the study [deg]
 
 HALF_PITCH_DEG = 1.32
 """Half of a tooth pitch on the axis [deg], the play at a missing tooth of a pinion with 17 teeth and gear ratio 8:
 pi / (17 * 8) rad."""
 
-SAME_MODE, STANDBY_MODE = (), ('standby',)
-"""Values of `Expectation.end`: the mode at the onset; standby."""
+SAME_MODE, STANDBY_MODE = (), ('standby',)  # values of `Expectation.end`: the mode at the onset; standby
 
 
 class Expectation(typing.NamedTuple):
@@ -58,14 +56,12 @@ EXPECT_NO_EFFECT = Expectation(None, SAME_MODE, TENTH_BEAMWIDTH_DEG)
 EXPECT_IN_BEAM = Expectation(None, SAME_MODE, HALF_BEAMWIDTH_DEG)
 EXPECT_TRIP = Expectation(4, STANDBY_MODE, HALF_BEAMWIDTH_DEG)
 
-MOVING_MODES = ('rate',)
-"""Mode that moves the axes on the deck."""
+MOVING_MODES = ('rate',)  # mode that moves the axes on the deck
 FOLLOWING_MODES = tuple(row.name for row in MODE_ROWS if row.follows and not row.by_level)
 """Modes that follow a direction in earth angles, for which the attitude is needed."""
 STILL_MODES = tuple(row.name for row in MODE_ROWS if not row.follows and row.name not in MOVING_MODES)
 """Modes in which the axes end at rest on the deck."""
-LEVEL_INDEPENDENT_MODES = (*STILL_MODES, *MOVING_MODES, *FOLLOWING_MODES)
-"""Modes that do not use the signal level."""
+LEVEL_INDEPENDENT_MODES = (*STILL_MODES, *MOVING_MODES, *FOLLOWING_MODES)  # modes that do not use the signal level
 
 
 def _in_every_mode(expected):

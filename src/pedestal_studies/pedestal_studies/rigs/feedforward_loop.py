@@ -33,29 +33,17 @@ from pedestal_studies.rigs import ensemble, metrics, profiles
 from pedestal_studies.rigs.ensemble import MEASUREMENT_PERIOD_S as T
 from pedestal_studies.rigs.profiles import S_MOTION_RATE_RAD_S, S_MOTION_STROKE_RAD
 
-MISS_DELAY_STEPS = 4
-"""Delay d of a miss, in T."""
-
-MISS_SIGMA_RAD = math.radians(0.02)
-"""Noise of a miss [rad]."""
-
-K_P = 5.0
-"""Gain of the miss [1/s]."""
-
-RATE_LOOP_CONSTANTS = (2.0 * math.pi * 8.0, 0.7)
-"""Bandwidth w [rad/s] and damping zeta of the rate loop."""
+MISS_DELAY_STEPS = 4  # delay d of a miss, in T
+MISS_SIGMA_RAD = math.radians(0.02)  # noise of a miss [rad]
+K_P = 5.0  # gain of the miss [1/s]
+RATE_LOOP_CONSTANTS = (2.0 * math.pi * 8.0, 0.7)  # bandwidth w [rad/s] and damping zeta of the rate loop
 
 REVERSAL_S_BY_AXIS = {'azimuth': 1.0, 'elevation': 1.6}
 """{axis: duration of a reversal [s]}. The paper does not print it. The peak accelerations are 11 and 6.9 deg/s2."""
 
-EVALUATED_PERIODS = 2
-"""Periods of the motion that are evaluated, after half a period to settle."""
-
-UNIFORM_RATE_DELAY_S = 2.0
-"""Time after a reversal from which the rate of the target counts as uniform [s]."""
-
-BATCH_RUNS, NOISE_SEED = 25, 1
-"""Runs of one batch; seed of their noise."""
+EVALUATED_PERIODS = 2  # periods of the motion that are evaluated, after half a period to settle
+UNIFORM_RATE_DELAY_S = 2.0  # time after a reversal from which the rate of the target counts as uniform [s]
+BATCH_RUNS, NOISE_SEED = 25, 1  # runs of one batch; seed of their noise
 
 
 def feedforward_gains(w, zeta):
@@ -77,8 +65,7 @@ def rate_loop_step(w, zeta):
     return expm(A * T)[:3]
 
 
-K_V, K_A = feedforward_gains(*RATE_LOOP_CONSTANTS)
-"""Gains k_v [-] and k_a [s] of the feed-forward."""
+K_V, K_A = feedforward_gains(*RATE_LOOP_CONSTANTS)  # gains k_v [-] and k_a [s] of the feed-forward
 
 STEP_RECORD = np.dtype([('miss', 'f8'), ('rate', 'f8'), ('acceleration', 'f8'), ('mu', 'f8', axis_filter.BANK_SIZE)],
                        align=True)

@@ -10,10 +10,8 @@ import numpy as np
 
 from pedestal_studies.rigs import profiles
 
-G_M_S2 = 9.81
-"""Acceleration of gravity [m/s2]."""
-STEP_RATE_HZ = 100.0
-"""Rate of the rows of a table."""
+G_M_S2 = 9.81  # acceleration of gravity [m/s2]
+STEP_RATE_HZ = 100.0  # rate of the rows of a table
 
 
 def _seen(east, north, up):

@@ -8,17 +8,10 @@ import math
 
 import numpy as np
 
-PROFILES = ('flyby-500m', 'flyby-60m', 's-turn-500m', 's-20deg')
-"""Names of the motions."""
-
-RECORD_DURATION_S = 60.0
-"""Duration of a record [s]."""
-
-FLYBY_SPEED_M_S = 15.0
-"""Speed of the flybys [m/s]."""
-
-MIN_FLYBY_DISTANCES_M = {'flyby-500m': 500.0, 'flyby-60m': 60.0}
-"""Least distance of the flybys [m]."""
+PROFILES = ('flyby-500m', 'flyby-60m', 's-turn-500m', 's-20deg')  # names of the motions
+RECORD_DURATION_S = 60.0  # duration of a record [s]
+FLYBY_SPEED_M_S = 15.0  # speed of the flybys [m/s]
+MIN_FLYBY_DISTANCES_M = {'flyby-500m': 500.0, 'flyby-60m': 60.0}  # least distance of the flybys [m]
 
 TURN_ACCELERATION_M_S2, TURN_DISTANCE_M = 3.0, 500.0
 """Acceleration [m/s2] and distance [m] of the S-turn; an aircraft has this acceleration at a bank angle of 17 deg."""

@@ -23,21 +23,16 @@ from pedestal_analysis.trials import monte_carlo
 from pedestal_analysis.trials.cases import Case
 from pedestal_studies.rigs.rows import Result
 
-DEFAULT_RUNS, FIRST_SEED = 100, 1
-"""Runs of each case; seed of the first run."""
-
-BATCH_RUNS = 5
-"""Runs that one worker makes at a time."""
+DEFAULT_RUNS, FIRST_SEED = 100, 1  # runs of each case; seed of the first run
+BATCH_RUNS = 5  # runs that one worker makes at a time
 
 ERROR_TOPIC, MODE_TOPIC = 'tracking_receiver/angle_error', 'acu/mode'
 
-POWER_UP_CASES = ('late_tle', 'sidelobe')
-"""Cases whose tracked_after_s is measured from the start."""
+POWER_UP_CASES = ('late_tle', 'sidelobe')  # cases whose tracked_after_s is measured from the start
 SIGNAL_LOSS_CASES = ('fade', 'blockage', 'manoeuvre_in_coast')
 """Cases whose tracked_after_s is measured from the loss of the signal; `pedestal scenarios` describes each."""
 
-TARGET_ELEVATION_RAD = 0.6
-"""Elevation of the target of the search cases [rad]."""
+TARGET_ELEVATION_RAD = 0.6  # elevation of the target of the search cases [rad]
 
 SEARCH_PARAMETERS = {'acu.commands': '3 search', 'acu.search.rounds': 1, 'acu.acquisition.expected_dbhz': 0.0,
                      'tracking_receiver.receiver.cn0_dbhz': 46.4}
@@ -46,21 +41,18 @@ SEARCH_PARAMETERS = {'acu.commands': '3 search', 'acu.search.rounds': 1, 'acu.ac
 SEARCH_DURATIONS_S = {'spiral': 85.0, 'raster': 55.0, 'square': 115.0, 'sector': 55.0}
 """{pattern: duration of a run with one round and the acquisition after it [s]}."""
 
-FOUND_PERCENT_TARGET = '>= 99'
-"""Target of found_percent."""
+FOUND_PERCENT_TARGET = '>= 99'  # target of found_percent
 
 CASE_NAMES = (*POWER_UP_CASES, *SIGNAL_LOSS_CASES, 'steptrack_geo', *(f'search-{name}' for name in SEARCH_PATTERNS))
 """Names of all cases."""
 
-MAX_FOUND_ERROR_BEAMWIDTHS = 0.2
-"""Largest true pointing error at which the target counts as in the beam [beamwidths]."""
+MAX_FOUND_ERROR_BEAMWIDTHS = 0.2  # largest true pointing error at which the target counts as in the beam [beamwidths]
 
 MAIN_LOBE_LOSS_DB = 12.0
 """Level lost at one beamwidth off the axis of a parabolic main lobe [dB]. The loss grows with the square of the error,
 so it is 3 dB at half a beamwidth."""
 
-STEPTRACK_SETTLING_TIME_S = 90.0
-"""Time after which step track is on its target [s]."""
+STEPTRACK_SETTLING_TIME_S = 90.0  # time after which step track is on its target [s]
 
 
 def case_of(name, seed):

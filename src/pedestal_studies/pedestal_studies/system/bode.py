@@ -39,8 +39,7 @@ def controller(name):
     return frequency.case(name, 'leo_pass', {f'acu.{axis}.controller': name for axis in AXES})
 
 
-FAST_LOOP_PARAMETERS = {'acu.azimuth.feedforward.bandwidth': 40.0}
-"""Position loop of higher bandwidth."""
+FAST_LOOP_PARAMETERS = {'acu.azimuth.feedforward.bandwidth': 40.0}  # position loop of higher bandwidth
 STRUCTURE_PARAMETERS = {**FAST_LOOP_PARAMETERS, 'adu.azimuth.structure.inertia_share': 0.5,
                         'adu.azimuth.structure.frequency': 8.0}
 """Position loop of higher bandwidth with a flexible load, of which one half swings on the other."""

@@ -27,22 +27,15 @@ from pedestal_common.graph import topics
 from pedestal_common.parameters import defaults
 from pedestal_studies.rigs.rows import Result
 
-SCENARIO_NAME = 'station_real'
-"""Scenario of all runs, in which all terms are on."""
-DEFAULT_RUNS, FIRST_SEED = 30, 1
-"""Runs of the random terms; seed of the first run."""
+SCENARIO_NAME = 'station_real'  # scenario of all runs, in which all terms are on
+DEFAULT_RUNS, FIRST_SEED = 30, 1  # runs of the random terms; seed of the first run
 
 BATCH_RUNS, RANDOM_SHARE = 3, 0.8
 """Runs that one worker makes at a time; part of the progress bar for the runs of the random terms [-]."""
 
-EVALUATION_START_S, EVALUATION_PERIOD_S = 15.0, 0.1
-"""Start and period of the evaluation of the error [s]."""
-
-TABLE_TIMES_S = (30, 90, 150, 210, 270)
-"""Times of the pass at which contributions are shown with their signs [s]."""
-
-ERROR_COLUMNS = ('cross_elevation', 'elevation')
-"""Names of the two columns of an error."""
+EVALUATION_START_S, EVALUATION_PERIOD_S = 15.0, 0.1  # start and period of the evaluation of the error [s]
+TABLE_TIMES_S = (30, 90, 150, 210, 270)  # times of the pass at which contributions are shown with their signs [s]
+ERROR_COLUMNS = ('cross_elevation', 'elevation')  # names of the two columns of an error
 
 MODE_OVERRIDES = {'program': ('acu.tracker.handover=false',), 'autotrack': ()}
 """{mode: overrides (texts node.key=value) with which the antenna points in this mode}."""
@@ -91,8 +84,7 @@ ERROR_TERMS = (
     Term('polarisation', ('tracking_receiver.target.polarisation.axial_ratio_db',
                           'tracking_receiver.antenna.polarisation.axial_ratio_db'), False,
          'level lost by polarisation mismatch'))
-NO_TERMS, ALL_TERMS = 'none', 'whole'
-"""Values of `on` in place of the name of a term: no term, every term."""
+NO_TERMS, ALL_TERMS = 'none', 'whole'  # values of `on` in place of the name of a term: no term, every term
 
 RECEIVER_TERMS = ('boresight', 'multipath', 'scintillation', 'polarisation')
 """Terms of the receiver, which do not affect program track."""

@@ -34,14 +34,11 @@ from pedestal_bringup.scenario import scenario
 from pedestal_bringup.scenario.program import Plan
 from pedestal_studies.rigs.rows import Result
 
-SCENARIO_NAME, SCAN_SCENARIO_NAME = 'station_new', 'station_sun'
-"""Scenario of the passes, and of the scans of the sun."""
-DEFAULT_RUNS, FIRST_SEED = 30, 1
-"""Number of runs; seed of the first run."""
+SCENARIO_NAME, SCAN_SCENARIO_NAME = 'station_new', 'station_sun'  # scenario of the passes, and of the scans of the sun
+DEFAULT_RUNS, FIRST_SEED = 30, 1  # number of runs; seed of the first run
 TERMS = (*DEFAULT_TERMS, 'P11', 'P13', 'P14')
 """Terms of the model: the default terms and the eccentricity of both encoders."""
-POINTS_PER_PASS = 9
-"""Number of offsets from a pass."""
+POINTS_PER_PASS = 9  # number of offsets from a pass
 
 CALIBRATION_PASSES = ('2019-12-09T16:38:33Z', '2019-12-10T17:26:30Z', '2019-12-11T16:38:10Z', '2019-12-10T12:35:55Z')
 """UTC of the begin of the passes from which the offsets are taken: the culminations are 69, 20, 31 and 54 deg."""
@@ -50,17 +47,14 @@ CALM_OVERRIDES = 'adu.wind.field.speed=2', 'scenario.program.refractivity=330'
 SCANS = '2019-12-09T09:00:00Z', '2019-12-10T10:20:00Z', '2019-12-10T12:00:00Z', '2019-12-11T13:20:00Z'
 """UTC of the begin of the scans of the sun; azimuth and elevation are (148, 13), (166, 19), (190, 19), (208, 14) deg.
 """
-SCAN_OVERRIDES = ('adu.wind.field.speed=2',)
-"""Overrides of the scans: the wind of the calibration passes."""
-SEEDS_PER_RUN = len(CALIBRATION_PASSES) + len(SCANS) + 1
-"""Number of passes and scans of a run, and thus of its seeds."""
+SCAN_OVERRIDES = ('adu.wind.field.speed=2',)  # overrides of the scans: the wind of the calibration passes
+SEEDS_PER_RUN = len(CALIBRATION_PASSES) + len(SCANS) + 1  # number of passes and scans of a run, and thus of its seeds
 PROGRAM_OVERRIDES = 'acu.initial_mode=program', 'acu.tracker.handover=false'
 """Overrides with which the antenna follows the program track alone."""
 TEST_PASS = '2019-12-12T15:49:47Z'
 """UTC of the begin of the pass on which the model is tested; the culmination is 48 deg."""
 
-EVALUATION_START_S, EVALUATION_PERIOD_S = 15.0, 0.1
-"""Start and period of the evaluation of the error [s]."""
+EVALUATION_START_S, EVALUATION_PERIOD_S = 15.0, 0.1  # start and period of the evaluation of the error [s]
 
 
 def of_pass(begin, seed, changes=(), duration=None, name=SCENARIO_NAME, low=-np.pi):

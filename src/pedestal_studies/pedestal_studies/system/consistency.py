@@ -19,25 +19,17 @@ from pedestal_common.graph.topics import AXES
 from pedestal_studies.rigs import drawing
 from pedestal_studies.rigs.rows import Result
 
-DEFAULT_RUNS, FIRST_SEED = 100, 1
-"""Runs of each case; seed of the first run."""
-BATCH_RUNS = 5
-"""Runs that one worker makes at a time."""
-
-TIMES_S = (5.0, 10.0, 30.0, 60.0, 120.0)
-"""Times after the first estimate [s]."""
+DEFAULT_RUNS, FIRST_SEED = 100, 1  # runs of each case; seed of the first run
+BATCH_RUNS = 5  # runs that one worker makes at a time
+TIMES_S = (5.0, 10.0, 30.0, 60.0, 120.0)  # times after the first estimate [s]
 DURATION_S = 125.0
-WINDOW_S = 1.0
-"""Span of a mean [s]."""
+WINDOW_S = 1.0  # span of a mean [s]
 
 SCENARIOS = ('blockage', 'fade', 'late_tle', 'leo_pass', 'leo_station_7m', 'manoeuvre_in_coast', 'phased_array_sway',
              'ship_overhead', 'ship_pass', 'ship_pass_ss6', 'ship_terminal_1m2', 'sidelobe', 'station_real',
              'uav_flyby', 'uav_tracker_3m')
-CASES = {name: Case(name, name, duration=DURATION_S) for name in SCENARIOS}
-"""{name: Case}."""
-
-MAX_NEES = 2.4
-"""Largest NEES of a filter that is not too sure: 2 plus 20 %."""
+CASES = {name: Case(name, name, duration=DURATION_S) for name in SCENARIOS}  # {name: Case}
+MAX_NEES = 2.4  # largest NEES of a filter that is not too sure: 2 plus 20 %
 
 
 def nees(case):

@@ -74,8 +74,7 @@ time of tle gives the pass of the other modes. At the start time of sun the sun 
 MODE_PARAMETERS = {mode: _SPECIAL_MODE_PARAMETERS.get(mode, [f'acu.initial_mode={mode}']) for mode in MODES}
 """{mode: overrides with which a run is in this mode at the onset of the fault}."""
 
-ALARM_SOURCE = 'alarm'
-"""Source of a report that is an alarm, in place of the name of a node."""
+ALARM_SOURCE = 'alarm'  # source of a report that is an alarm, in place of the name of a node
 
 ON_TARGET_MODES = ('program', 'tle', 'autotrack')
 """Modes that follow the target; a change between them does not count as leaving the mode."""

@@ -29,14 +29,9 @@ from pedestal_studies.rigs import ensemble, profiles, window_filter
 from pedestal_studies.rigs.rows import Result
 from pedestal_studies.system import filters
 
-DEFAULT_RUNS, BATCH_RUNS = 100, 25
-"""Runs of each case; runs that one worker makes at a time."""
-
-NOISE = filters.NOISE_CASES[filters.SHOWN_NOISE]
-"""Noise of the measured angle."""
-
-WINDOW_STEPS = 600
-"""Window of the Wiener filter and longest window of least squares [measurements]."""
+DEFAULT_RUNS, BATCH_RUNS = 100, 25  # runs of each case; runs that one worker makes at a time
+NOISE = filters.NOISE_CASES[filters.SHOWN_NOISE]  # noise of the measured angle
+WINDOW_STEPS = 600  # window of the Wiener filter and longest window of least squares [measurements]
 
 LEAST_SQUARES_WINDOWS = tuple(sorted({round(n) for n in np.geomspace(5, WINDOW_STEPS, 40)}))
 """Windows that the tuning of least squares tries [measurements]."""
@@ -54,8 +49,7 @@ KALMAN_KINDS = {'kalman': 'current_statistical', 'alpha_beta': 'alpha_beta', 'al
 has the same autocorrelation."""
 
 TUNINGS = ('own-tuning', 'one-tuning')
-MEAN_MOTION = 'all'
-"""MOTION of the geometric mean over all motions."""
+MEAN_MOTION = 'all'  # MOTION of the geometric mean over all motions
 
 UNITS = {'angle': 'deg', 'rate': 'deg/s'}
 

@@ -34,17 +34,13 @@ from pedestal_studies.rigs import drawing, ensemble, profiles
 from pedestal_studies.rigs.ensemble import Noise
 from pedestal_studies.rigs.rows import Result
 
-DEFAULT_RUNS = 200
-"""Runs of each case."""
-
-BATCH_RUNS = 25
-"""Runs that one worker makes at a time."""
+DEFAULT_RUNS = 200  # runs of each case
+BATCH_RUNS = 25  # runs that one worker makes at a time
 
 NOISE_SEED, TUNING_SEED, TUNING_RUNS = 1, 2, 4
 """Seeds of the noise and of the noise for the tuning; records of a tuning."""
 
-SETTLING_TIME_S = 3.0
-"""Start of the evaluation [s]."""
+SETTLING_TIME_S = 3.0  # start of the evaluation [s]
 
 NOISE_CASES = {f'{colour}-{sigma}': Noise(math.radians(sigma), bandwidth)
                for sigma in (0.03, 0.1) for colour, bandwidth in (('white', None), ('coloured', 5.0))}
@@ -58,8 +54,7 @@ MANOEUVRE_PARAMETERS = {'imm.models': 'cv ca current_statistical', 'imm.rungs': 
                         'imm.cv.noise': math.radians(0.003), 'imm.ca.noise': math.radians(0.1)}
 """Parameters of the filter imm-manoeuvre."""
 
-NOISE_AWARE_FILTERS = ('ca-expecting', 'imm-expecting')
-"""Filters that know the bandwidth of the noise."""
+NOISE_AWARE_FILTERS = ('ca-expecting', 'imm-expecting')  # filters that know the bandwidth of the noise
 
 FILTERS = {**{kind: FilterParameters(kind=kind) for kind in FILTER_KINDS if kind != 'imm_ukf'},
            'imm-manoeuvre': build(FilterParameters, {'kind': 'imm', **MANOEUVRE_PARAMETERS}),
@@ -67,18 +62,14 @@ FILTERS = {**{kind: FilterParameters(kind=kind) for kind in FILTER_KINDS if kind
               for name in (*RATE_SIGMAS_RAD_S, *NOISE_AWARE_FILTERS)}}
 """{filter: FilterParameters}."""
 
-UNTUNED_FILTERS = ('imm', 'imm-manoeuvre', 'imm-expecting', 'imm_ukf')
-"""Filters that are not tuned."""
+UNTUNED_FILTERS = ('imm', 'imm-manoeuvre', 'imm-expecting', 'imm_ukf')  # filters that are not tuned
 
 RANGED_PROFILE, RANGE_SIGMA_M = 'flyby-60m', 1.0
 """Profile on which imm_ukf is shown, and standard deviation of its measured range [m]. The other profiles are motions
 in one angle without a distance, which this Cartesian filter needs."""
 
-SHOWN_FILTERS = (*FILTERS, 'imm_ukf')
-"""Filters of the figures and tables."""
-
-SHOWN_NOISE = 'white-0.03'
-"""Noise of the figures and of the printed table."""
+SHOWN_FILTERS = (*FILTERS, 'imm_ukf')  # filters of the figures and tables
+SHOWN_NOISE = 'white-0.03'  # noise of the figures and of the printed table
 
 METRIC_TARGETS = {
     ('flyby-500m', 'current_statistical', 'reduction'): '>= 6.5',
@@ -144,8 +135,7 @@ def tune(item):
     return parameter_search.tuned(FILTERS[name], angle_rms)[0]
 
 
-THINNING_STEPS = 10
-"""Steps between two measurements that the figures show."""
+THINNING_STEPS = 10  # steps between two measurements that the figures show
 
 
 def batch(item):

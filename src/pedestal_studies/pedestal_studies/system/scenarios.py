@@ -18,11 +18,8 @@ from pedestal_bringup.loop.memory_recording import MemoryRecording
 from pedestal_studies.rigs import drawing
 from pedestal_studies.rigs.rows import Result
 
-DEFAULT_RUNS, FIRST_SEED = 40, 1
-"""Runs of each case; seed of the first run."""
-
-BATCH_RUNS = 5
-"""Runs that one worker makes at a time."""
+DEFAULT_RUNS, FIRST_SEED = 40, 1  # runs of each case; seed of the first run
+BATCH_RUNS = 5  # runs that one worker makes at a time
 
 NEAR_FLYBY_PARAMETERS = {'tracking_receiver.target.flyby.closest_distance': 60.0,
                          'tracking_receiver.target.flyby.height': 20.0}

@@ -29,14 +29,9 @@ from pedestal_studies.rigs.hard_targets import HARD_TARGETS
 from pedestal_studies.rigs.rows import Result
 from pedestal_studies.system.filters import MANOEUVRE_PARAMETERS
 
-DEFAULT_RUNS, FIRST_SEED = 30, 1
-"""Runs of each case; seed of the first run."""
-
-BATCH_RUNS = 5
-"""Runs that one worker makes at a time."""
-
-SHIP_SUFFIX = '-ship'
-"""Part of the name of a target seen from a ship."""
+DEFAULT_RUNS, FIRST_SEED = 30, 1  # runs of each case; seed of the first run
+BATCH_RUNS = 5  # runs that one worker makes at a time
+SHIP_SUFFIX = '-ship'  # part of the name of a target seen from a ship
 
 FLYBY_PREFIX, ANGLE_PREFIX = 'tracking_receiver.target.flyby', 'tracking_receiver.target.angle'
 FIXED_TARGET_PARAMETERS = {'tracking_receiver.target.kind': 'step', f'{ANGLE_PREFIX}.azimuth_amplitude': 0.0,

@@ -15,8 +15,7 @@ import numpy as np
 from pedestal_common.compiled import compiled
 from ship_motion_sim.alignment import extended_observer, levelling
 
-BANDWIDTH_TIME_PRODUCT = 6.0
-"""Product of observer bandwidth and time, w_o t [-]."""
+BANDWIDTH_TIME_PRODUCT = 6.0  # product of observer bandwidth and time, w_o t [-]
 MAX_OBSERVER_BANDWIDTH_RAD_S, MIN_CONTROL_BANDWIDTH_RAD_S = 1.0, 0.1
 """Limits of the bandwidth of observer and of level control [rad/s]."""
 

@@ -25,5 +25,4 @@ def conditions(p, latitude) -> np.ndarray:
     return record
 
 
-UNKNOWN_AZIMUTH_SIGMA_RAD = math.pi
-"""Standard deviation of an unknown azimuth [rad]."""
+UNKNOWN_AZIMUTH_SIGMA_RAD = math.pi  # standard deviation of an unknown azimuth [rad]

@@ -28,10 +28,8 @@ STATE_DTYPE = np.dtype([
     ('innovation_ratio', 'f8'),         # running mean of innovation^2 over its expected variance
 ], align=True)
 
-INNOVATION_TIME_CONSTANT_S = 30.0
-"""Time constant of the running mean of innovation_ratio [s]."""
-EXPECTED_INNOVATION_RATIO = 1.2
-"""Innovation ratio on a sea as expected, with the noise of the running mean [-]."""
+INNOVATION_TIME_CONSTANT_S = 30.0  # time constant of the running mean of innovation_ratio [s]
+EXPECTED_INNOVATION_RATIO = 1.2  # innovation ratio on a sea as expected, with the noise of the running mean [-]
 MIN_SWELL_FREQUENCY_RAD_S = 2.0 * math.pi / 16.0
 """Frequency of the slowest swell on which a stated 1 sigma is valid [rad/s]: 16 s, the longest expected period."""
 

@@ -15,12 +15,9 @@ high.
 from pedestal_common.compiled import compiled
 from pedestal_common.fhan import fhan
 
-DAMPING_COEFFICIENT = 0.8
-"""Damping coefficient c1 [-]."""
-FHAN_LIMIT_M_S3 = 1e3
-"""Limit r1 of the function fhan [m/s3], which is linear for errors within r1 / w_c^2."""
-MAX_LEVELLING_RATE_RAD_S = 0.5
-"""Limit of a level command [rad/s]."""
+DAMPING_COEFFICIENT = 0.8  # damping coefficient c1 [-]
+FHAN_LIMIT_M_S3 = 1e3  # limit r1 of the function fhan [m/s3], which is linear for errors within r1 / w_c^2
+MAX_LEVELLING_RATE_RAD_S = 0.5  # limit of a level command [rad/s]
 
 
 @compiled

@@ -23,8 +23,7 @@ from pedestal_common.geometry.quaternion import product
 from ship_motion_sim import strapdown
 from ship_motion_sim.alignment import extended_observer, riccati_eso
 
-MAX_JACOBI_SWEEPS = 12
-"""Largest number of sweeps of Jacobi rotations; 4 to 6 are enough."""
+MAX_JACOBI_SWEEPS = 12  # largest number of sweeps of Jacobi rotations; 4 to 6 are enough
 
 STATE_DTYPE = np.dtype([
     ('t', 'f8'),                                        # time since power-up [s]

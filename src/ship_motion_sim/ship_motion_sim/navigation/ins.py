@@ -28,10 +28,8 @@ STATUS_TEXTS = dict(
 INS_STATUS_TEXTS = tuple(STATUS_TEXTS.values())
 Status = codes(STATUS_TEXTS)
 
-LATENCY_RING_SIZE = 256
-"""Largest number of samples that wait for the latency to pass: the largest latency at 1 kHz."""
-NO_STAMP = -2 ** 63
-"""Stamp before the first message."""
+LATENCY_RING_SIZE = 256  # largest number of samples that wait for the latency to pass: the largest latency at 1 kHz
+NO_STAMP = -2 ** 63  # stamp before the first message
 
 CONSTANTS_DTYPE = np.dtype([
     ('ship', motion.CONSTANTS_DTYPE),
@@ -84,8 +82,7 @@ OUTPUTS_DTYPE = np.dtype([
     ('velocity', 'f8', (3,)),               # present velocity of an INS that navigates, ENU [m/s]
 ], align=True)
 
-NO_STAGE = -1
-"""Stage of a result of method `model`."""
+NO_STAGE = -1  # stage of a result of method `model`
 
 
 def constants(params: InsParameters) -> np.ndarray:

@@ -29,12 +29,9 @@ MIN_ROWS, MAX_ROWS = 4, 16384
 
 The largest number limits the constants of the law, whose arrays have a fixed length (sea.motion).
 """
-MAX_PIECES = MAX_ROWS + 1
-"""Largest number of pieces, those before and after the record included."""
-COEFFICIENTS_PER_PIECE = 6
-"""Number of coefficients of a piece, highest power first."""
-COME_TO_REST_TIME_S = 5.0
-"""Time in which the ship comes to rest before and after the record [s]."""
+MAX_PIECES = MAX_ROWS + 1  # largest number of pieces, those before and after the record included
+COEFFICIENTS_PER_PIECE = 6  # number of coefficients of a piece, highest power first
+COME_TO_REST_TIME_S = 5.0  # time in which the ship comes to rest before and after the record [s]
 
 COLUMN_RANGES = {'time_s': (-1e12, 1e12), 'roll_deg': (-80.0, 80.0), 'pitch_deg': (-80.0, 80.0),
                  'heading_deg': (-360.0, 360.0)}

@@ -14,18 +14,15 @@ from pedestal_common.text_files import csv_table
 from ship_motion_sim import earth
 from ship_motion_sim.params import HullParameters, ShipParameters
 
-WAVE_COMPONENT_COUNT = 80
-"""Number of sine waves of a seaway."""
+WAVE_COMPONENT_COUNT = 80  # number of sine waves of a seaway
 SURGE, SWAY, HEAVE, ROLL, PITCH, YAW = range(6)
 FREEDOM_COUNT = 6
-SEA_STATES = {3: (0.88, 7.5), 4: (1.88, 8.8), 5: (3.25, 9.7), 6: (5.0, 12.4)}
-"""{sea state: (Hs [m], Tp [s])}."""
+SEA_STATES = {3: (0.88, 7.5), 4: (1.88, 8.8), 5: (3.25, 9.7), 6: (5.0, 12.4)}  # {sea state: (Hs [m], Tp [s])}
 
 SPECTRUM_COLUMN_RANGES = {'frequency_hz': (1e-3, 10.0), 'density_m2_per_hz': (0.0, 1e4)}
 """{column of a measured spectrum: (lowest, highest)}."""
 
-_GRID_STEPS_PER_COMPONENT = 100
-"""Grid steps per component in the integration of the spectrum."""
+_GRID_STEPS_PER_COMPONENT = 100  # grid steps per component in the integration of the spectrum
 
 
 class Waves(typing.NamedTuple):

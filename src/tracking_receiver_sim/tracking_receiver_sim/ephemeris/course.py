@@ -16,10 +16,8 @@ from tracking_receiver_sim.ephemeris import horizon
 from tracking_receiver_sim.track import instant
 from tracking_receiver_sim.track.flight import Flight
 
-MAX_KNOT_SPACING_S = 10.0
-"""Largest time between two knots of the spline of an orbit [s]."""
-MAX_DURATION_S = 86400.0
-"""Largest duration of a run [s]."""
+MAX_KNOT_SPACING_S = 10.0  # largest time between two knots of the spline of an orbit [s]
+MAX_DURATION_S = 86400.0  # largest duration of a run [s]
 
 
 def flight_of_orbit(ephemeris, target, duration, margin) -> Flight:

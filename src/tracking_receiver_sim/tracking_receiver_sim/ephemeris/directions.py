@@ -18,16 +18,11 @@ AZIMUTH = columns.Quantity('azimuth', dict.fromkeys(('azimuth', 'azi', 'az'), 'd
 ELEVATION = columns.Quantity('elevation', dict.fromkeys(('elevation', 'elev', 'el'), 'deg'), 'deg')
 ELEVATION_LENGTH = columns.Quantity('elevation', {'elevation': ''}, 'm')
 """Columns of a direction, and of an elevation that is a height."""
-BARE_NAMES = 'time', 'azimuth', 'elevation'
-"""Names of the columns of a table without names."""
-ANGLE_LIMITS_DEG = {'azimuth': (-720.0, 720.0), 'elevation': (-90.0, 90.0)}
-"""{angle: (lowest, highest)} [deg]."""
-NUMBERS_PER_ROW = 4
-"""Numbers that a reader collects from a row: line, time, azimuth, elevation."""
-MIN_ROWS = 4
-"""Least number of rows of a table."""
-MAX_STEP_DEG = 20.0
-"""Largest angle between two rows [deg], because the path between distant rows is not known."""
+BARE_NAMES = 'time', 'azimuth', 'elevation'  # names of the columns of a table without names
+ANGLE_LIMITS_DEG = {'azimuth': (-720.0, 720.0), 'elevation': (-90.0, 90.0)}  # {angle: (lowest, highest)} [deg]
+NUMBERS_PER_ROW = 4  # numbers that a reader collects from a row: line, time, azimuth, elevation
+MIN_ROWS = 4  # least number of rows of a table
+MAX_STEP_DEG = 20.0  # largest angle between two rows [deg], because the path between distant rows is not known
 
 
 class Directions(typing.NamedTuple):

@@ -21,8 +21,7 @@ TIME_SYSTEM_OFFSETS_S = {'UTC': None, 'TAI': 0.0, 'TT': 32.184, 'TDB': 32.184, '
 """{time system: time system minus TAI [s]}; None for UTC, whose offset varies.
 TDB differs from TT by up to 2 ms, see instants."""
 
-NUTATION_BATCH_SIZE = 2000
-"""Number of instants whose nutation is computed at once: each takes 30 kB."""
+NUTATION_BATCH_SIZE = 2000  # number of instants whose nutation is computed at once: each takes 30 kB
 
 
 def known(frame):

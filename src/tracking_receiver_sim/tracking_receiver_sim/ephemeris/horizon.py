@@ -11,14 +11,11 @@ from pedestal_common.text_files import csv_table
 from tracking_receiver_sim.ephemeris import frames, interpolation, states
 from tracking_receiver_sim.track import instant
 
-PASS_SEARCH_STEP_S = 20.0
-"""Step of the search for a pass [s]; a shorter pass may be missed."""
-PASS_SEARCH_BATCH_SIZE = 500
-"""Number of steps computed at once; the search ends with the batch of the pass."""
+PASS_SEARCH_STEP_S = 20.0  # step of the search for a pass [s]; a shorter pass may be missed
+PASS_SEARCH_BATCH_SIZE = 500  # number of steps computed at once; the search ends with the batch of the pass
 MIN_CULMINATION_DEG = 10.0
 """Least culmination of a chosen pass [deg]: a lower pass stays in the region of refraction and buildings."""
-SEGMENT_GAP_TOLERANCE_S = 1e-3
-"""Largest time between two segments [s] that does not count as a gap."""
+SEGMENT_GAP_TOLERANCE_S = 1e-3  # largest time between two segments [s] that does not count as a gap
 
 
 def enu(ephemeris, station, t):

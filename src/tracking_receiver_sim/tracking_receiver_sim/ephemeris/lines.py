@@ -11,14 +11,12 @@ import re
 from pedestal_common.text_files import csv_table
 from tracking_receiver_sim.track import instant as instants
 
-MAX_LINE_CHARS = 1024
-"""Largest number of characters of a line; the CCSDS books allow 254."""
+MAX_LINE_CHARS = 1024  # largest number of characters of a line; the CCSDS books allow 254
 
 WORD_PATTERN = re.compile(r'\S+')
 NUMBER_PATTERN = re.compile(r'[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?', re.ASCII)
 CCSDS_TIME_PATTERN = re.compile(r'(\d{4}-(?:\d\d-\d\d|\d{3}))[T ](\d\d):(\d\d):(\d\d)(?:\.(\d{1,18}))?Z?', re.ASCII)
-YEAR_LIMITS = 1957, 2199
-"""Range of the years of a time."""
+YEAR_LIMITS = 1957, 2199  # range of the years of a time
 
 
 def begins_with(beginning, signature):

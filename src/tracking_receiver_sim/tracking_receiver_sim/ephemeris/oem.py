@@ -17,8 +17,7 @@ LINE_COLUMN, DAY_COLUMN, SECOND_COLUMN, FIRST_NUMBER_COLUMN = range(4)
 COLUMN_COUNT = FIRST_NUMBER_COLUMN + len(STATE_LIMITS)
 REPEATED_STATE = 'state that repeats the one above'
 """Name, in the description of a file, of the states that repeat epoch and numbers of the state above."""
-MAX_SEGMENTS = 1000
-"""Largest number of segments of a file."""
+MAX_SEGMENTS = 1000  # largest number of segments of a file
 REQUIRED_KEYWORDS = ('OBJECT_NAME', 'OBJECT_ID', 'CENTER_NAME', 'REF_FRAME', 'TIME_SYSTEM')
 
 

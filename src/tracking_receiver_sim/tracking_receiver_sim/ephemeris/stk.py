@@ -18,21 +18,18 @@ from tracking_receiver_sim.track import dates, instant
 FILE_SIGNATURE_PATTERN = re.compile(r'stk\.v\.\d+', re.IGNORECASE)
 FRAME_NAMES = {'fixed': 'ITRF', 'j2000': 'EME2000', 'icrf': 'ICRF', 'temeofdate': 'TEME', 'trueofdate': 'TOD'}
 """{CoordinateSystem: frame of frames.earth_fixed}."""
-METRES_PER_UNIT = {'meters': 1.0, 'kilometers': 1000.0}
-"""{DistanceUnit: its length [m]}."""
+METRES_PER_UNIT = {'meters': 1.0, 'kilometers': 1000.0}  # {DistanceUnit: its length [m]}
 METHOD_NAMES = {'lagrange': 'LAGRANGE', 'hermite': 'HERMITE'}
 """{InterpolationMethod: method of states.Segment}; LagrangeVOP, which interpolates the difference to a Kepler orbit,
 is refused."""
 STATE_KEYWORDS = {'ephemeristimepos': False, 'ephemeristimeposvel': True, 'ephemeristimeposvelacc': True}
 """{keyword before the states: True if the states have velocities}."""
-GEODETIC_MARK = 'lla'
-"""Part of the keyword before states in latitude, longitude and height."""
+GEODETIC_MARK = 'lla'  # part of the keyword before states in latitude, longitude and height
 READ_KEYWORDS = ('numberofephemerispoints', 'scenarioepoch', 'interpolationmethod', 'interpolationsamplesm1',
                  'interpolationorder', 'centralbody', 'coordinatesystem', 'distanceunit')
 IGNORED_KEYWORDS = ('blockingfactor', 'coordinatesystemepoch', 'messagelevel', 'timeformat')
 """Keywords of the header, in lower case: those that the reader uses, and those without effect."""
-MAX_SEGMENTS = 1000
-"""Largest number of segments of a file."""
+MAX_SEGMENTS = 1000  # largest number of segments of a file
 EPOCH_PATTERN = re.compile(r'(\d{1,2}) ([a-z]{3})[a-z]* (\d{4}) (\d{1,2}):(\d\d):(\d\d(?:\.\d*)?)', re.ASCII)
 
 

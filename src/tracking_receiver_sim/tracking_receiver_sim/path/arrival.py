@@ -15,8 +15,7 @@ import numpy as np
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry.geodesy import SPEED_OF_LIGHT_M_S
 
-MIN_ELEVATION_RAD = math.radians(1.0)
-"""Elevation [rad] below which the refraction stays constant."""
+MIN_ELEVATION_RAD = math.radians(1.0)  # elevation [rad] below which the refraction stays constant
 
 PATH_DTYPE = np.dtype([('refractivity', 'f8'), ('light_time', 'i8')], align=True)
 """Constants of the path. refractivity: N, 0: no refraction; light_time: 1 to include the travel time of

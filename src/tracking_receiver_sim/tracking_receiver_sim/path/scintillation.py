@@ -16,8 +16,7 @@ import numpy as np
 
 from pedestal_common.compiled import compiled
 
-NORMALS_PER_STEP = 3
-"""Number of standard normals of a step: level, two axes."""
+NORMALS_PER_STEP = 3  # number of standard normals of a step: level, two axes
 
 MIN_SIN_ELEVATION = math.sin(math.radians(4.0))
 """Sine of the elevation (4 deg, the limit of P.618) below which the scintillation stays constant."""

@@ -12,14 +12,9 @@ import numpy as np
 from pedestal_common.text_files import csv_table
 from tracking_receiver_sim.track import instant
 
-MAX_LISTED_AIRCRAFT = 12
-"""Number of aircraft that an error lists for a file with several."""
-
-MAX_AIRCRAFT = 10_000
-"""Largest number of aircraft in a file."""
-
-MIN_FIXES = 4
-"""Least number of fixes of a track."""
+MAX_LISTED_AIRCRAFT = 12  # number of aircraft that an error lists for a file with several
+MAX_AIRCRAFT = 10_000  # largest number of aircraft in a file
+MIN_FIXES = 4  # least number of fixes of a track
 
 
 FIX_COLUMNS = ('line', 'aircraft', 'time', 'latitude', 'longitude', 'altitude')

@@ -23,13 +23,11 @@ from pedestal_common.reproducible import arctan2, turned
 from pedestal_common.text_files import csv_table
 from tracking_receiver_sim.track import instant
 
-SAMPLES_PER_PIECE = 4
-"""Number of samples of a piece of the spline, for peak speed and range."""
+SAMPLES_PER_PIECE = 4  # number of samples of a piece of the spline, for peak speed and range
 
 ALTITUDE_STEPS_M = (('100 ft', 30.48), ('25 ft', 7.62))
 """Names and sizes [m] of the steps in which aircraft broadcast their altitude."""
-ALTITUDE_TOLERANCE_M = 0.06
-"""Largest distance from a multiple of a step [m]: logs are rounded to 0.1 m."""
+ALTITUDE_TOLERANCE_M = 0.06  # largest distance from a multiple of a step [m]: logs are rounded to 0.1 m
 
 
 class Flight(typing.NamedTuple):

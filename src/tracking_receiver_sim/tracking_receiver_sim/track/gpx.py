@@ -19,10 +19,8 @@ MAX_XML_DEPTH, MAX_TEXT_CHARS = 100, 200
 
 OEM_XML_HINT = '; an OEM must be in the notation KEYWORD = value, not XML'
 
-OTHER_POINTS = ('rtept', 'wpt')
-"""Points of a planned route and marks, which are no recorded track."""
-TEXT_ELEMENTS = ('ele', 'time', 'geoidheight', 'name')
-"""Elements whose text the reader takes."""
+OTHER_POINTS = ('rtept', 'wpt')  # points of a planned route and marks, which are no recorded track
+TEXT_ELEMENTS = ('ele', 'time', 'geoidheight', 'name')  # elements whose text the reader takes
 
 
 def rows(path, log):

@@ -14,14 +14,9 @@ from pedestal_common.graph.steps import SECONDS_PER_DAY
 from pedestal_common.text_files import csv_table
 from tracking_receiver_sim.track import dates
 
-UNIX_TIME_LIMITS_S = (0.0, 4102444800.0)
-"""Range of the seconds since 1970 without leap seconds: until 2100."""
-
-TAI_OFFSET_S = 37.0
-"""TAI minus an instant [s]: TAI - UTC since 2017."""
-
-UNIX_EPOCH_JULIAN_DATE = 2_440_587.5
-"""Julian date of 1970-01-01T00:00 UTC."""
+UNIX_TIME_LIMITS_S = (0.0, 4102444800.0)  # range of the seconds since 1970 without leap seconds: until 2100
+TAI_OFFSET_S = 37.0  # TAI minus an instant [s]: TAI - UTC since 2017
+UNIX_EPOCH_JULIAN_DATE = 2_440_587.5  # julian date of 1970-01-01T00:00 UTC
 
 ISO_TIME_PATTERN = re.compile(
     r'(\d{4}-\d\d-\d\d)[T ](\d\d):(\d\d):(\d\d)(?:[.,](\d{1,9}))?(?: ?(?:Z|UTC|([+-])(\d\d):?(\d\d)))?', re.ASCII)

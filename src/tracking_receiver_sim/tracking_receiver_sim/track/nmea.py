@@ -22,12 +22,9 @@ SENTENCE_PATTERN = re.compile(r'\$[A-Z]{2}([A-Z]{3}),[^$*]*(\*[0-9A-Fa-f]{2})?',
 CUT_SENTENCE_PATTERN = re.compile(r'[^$!]*,[^$!]*\*[0-9A-Fa-f]{2}', re.ASCII)
 """The end of a sentence whose beginning is missing."""
 TIME_PATTERN = re.compile(r'(\d\d)(\d\d)(\d\d(?:\.\d*)?)', re.ASCII)
-MIN_GGA_FIELDS = 11
-"""Least number of fields of a GGA: up to the geoidal separation."""
-MAX_LISTED_TYPES = 8
-"""Number of types of sentences that an error lists."""
-MAX_LINE_CHARS = 1024
-"""Largest number of characters of a line; the standard allows 82."""
+MIN_GGA_FIELDS = 11  # least number of fields of a GGA: up to the geoidal separation
+MAX_LISTED_TYPES = 8  # number of types of sentences that an error lists
+MAX_LINE_CHARS = 1024  # largest number of characters of a line; the standard allows 82
 
 
 def rows(path, log):

@@ -18,16 +18,11 @@ from pedestal_common.geometry import geodesy
 from pedestal_common.geometry.geodesy import StationParameters
 from tracking_receiver_sim.track import flight
 
-MAX_AZIMUTH_RATE_RAD_S = 0.05
-"""Largest azimuth rate of a flight seen from the station [rad/s]."""
-MIN_RANGE_M = 100.0
-"""Lower limit of the least range over ground [m]."""
-STATION_DEPTH_RATIO = 0.1
-"""Depth of the station below the lowest fix, divided by the least range [-]."""
-MIN_STATION_HEIGHT_M, MAX_STATION_HEIGHT_M = -500.0, 3000.0
-"""Range of the height of the station [m]."""
-MIN_DURATION_S, MAX_DURATION_S = 0.1, 86400.0
-"""Range of the duration of a run [s]."""
+MAX_AZIMUTH_RATE_RAD_S = 0.05  # largest azimuth rate of a flight seen from the station [rad/s]
+MIN_RANGE_M = 100.0  # lower limit of the least range over ground [m]
+STATION_DEPTH_RATIO = 0.1  # depth of the station below the lowest fix, divided by the least range [-]
+MIN_STATION_HEIGHT_M, MAX_STATION_HEIGHT_M = -500.0, 3000.0  # range of the height of the station [m]
+MIN_DURATION_S, MAX_DURATION_S = 0.1, 86400.0  # range of the duration of a run [s]
 
 STATION_FIELDS = {f'target.station.{field.name}': field.name for field in dataclasses.fields(StationParameters)}
 """{parameter: field of StationParameters}."""

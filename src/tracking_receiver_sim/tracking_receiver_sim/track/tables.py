@@ -17,8 +17,7 @@ ALTITUDE_LIMITS_FT_IN_M = -3000.0 * columns.METRES_PER_FOOT, 500_000.0 * columns
 ALTITUDE_LIMITS_M = -1000.0, 150_000.0
 """Ranges of the altitudes of ADS-B [m]: for files in feet, and for files in metres."""
 
-EMPTY_CELL_TEXTS = ('', 'nan', 'none', 'null')
-"""Texts of a cell without a value, in lower case."""
+EMPTY_CELL_TEXTS = ('', 'nan', 'none', 'null')  # texts of a cell without a value, in lower case
 
 IDENTITY_NAMES = ('icao24', 'callsign')
 LATITUDE = columns.Quantity('latitude_deg', dict.fromkeys(('latitude', 'lat'), 'deg'), 'deg')

@@ -16,17 +16,14 @@ TIME = columns.Quantity('time', {
 DATE = columns.Quantity('date', dict.fromkeys(('date', 'utc date'), columns.UTC), 's')
 TIME_OF_DAY = columns.Quantity('time of day', dict.fromkeys(('time', 'utc', 'utc time'), columns.UTC), 's')
 """Names of the columns of the date and of the time of day, in a table with a column for each."""
-MODIFIED_JULIAN_DATE_ZERO = 2_400_000.5
-"""Julian date of the modified Julian date 0."""
-JULIAN_DATE_LIMITS = 2_400_000.5, 2_536_000.0
-"""Range of Julian dates: from 1858, the modified Julian date 0, to 2231."""
+MODIFIED_JULIAN_DATE_ZERO = 2_400_000.5  # julian date of the modified Julian date 0
+JULIAN_DATE_LIMITS = 2_400_000.5, 2_536_000.0  # range of Julian dates: from 1858, the modified Julian date 0, to 2231
 FIRST_EXPECTED_JULIAN_DATE = 2_440_000.5
 """Julian date of 1968. `check` takes no smaller number for a date.
 
 Because this date is the modified Julian date 40,000, a short file of seconds from 0 on is not refused.
 """
-MIN_UNIX_TIME_S = 1e8
-"""Least number of seconds since 1970 in a column of UTC [s]; a smaller number has another origin."""
+MIN_UNIX_TIME_S = 1e8  # least number of seconds since 1970 in a column of UTC [s]; a smaller number has another origin
 MIN_SPAN_S = 3.0
 """Least time from the first row to the last if the times may also be days of a Julian date [s].
 

@@ -24,8 +24,7 @@ from acu_tracker.estimation.filters.motion_models import COLUMN_NAMES
 from acu_tracker.geometry.motion import AxisMotion
 from pedestal_common.compiled import compiled
 
-BANK_SIZE = len(COLUMN_NAMES)
-"""Largest number of models in a bank."""
+BANK_SIZE = len(COLUMN_NAMES)  # largest number of models in a bank
 
 P11_COLUMN, P33_COLUMN = Symmetric._fields.index('p11'), Symmetric._fields.index('p33')
 """Columns of the variances of angle and acceleration in a row of `p`."""

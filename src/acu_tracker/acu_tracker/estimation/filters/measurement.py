@@ -38,12 +38,10 @@ NaN if there was no measurement or no prediction of it."""
 AxisVariances = namedtuple('AxisVariances', 'p11 p12 p22')
 """p11, p12, p22: variance of the angle [rad2], its covariance with the rate, variance of the rate [rad2/s2]."""
 
-Estimate = namedtuple('Estimate', 'motion variances')
-"""Motion of a target, and the AxisVariances of both axes."""
+Estimate = namedtuple('Estimate', 'motion variances')  # motion of a target, and the AxisVariances of both axes
 
 _NONE = AxisInnovation(math.nan, math.nan, math.nan, math.nan, math.nan)
-NO_INNOVATION = Innovation((_NONE, _NONE), math.nan, math.nan)
-"""Innovation of a measurement without a prediction."""
+NO_INNOVATION = Innovation((_NONE, _NONE), math.nan, math.nan)  # innovation of a measurement without a prediction
 
 
 @compiled

@@ -66,8 +66,7 @@ MODEL_ROWS = (
 MODEL_NAMES = tuple(row.name for row in MODEL_ROWS)
 MODEL_CV, MODEL_CA, MODEL_SINGER, MODEL_CURRENT_STATISTICAL = range(len(MODEL_NAMES))
 
-MAX_RUNG_COUNT = 8
-"""Largest number of models ca in a bank."""
+MAX_RUNG_COUNT = 8  # largest number of models ca in a bank
 COLUMN_NAMES = (*MODEL_NAMES, *(f'ca_{rung}' for rung in range(2, MAX_RUNG_COUNT + 1)))
 """Names of the models of the largest bank. ca is the first rung of a `ladder`, ca_2 its second rung."""
 
@@ -122,10 +121,8 @@ Q     process noise, a Symmetric
 """
 
 
-MAX_SERIES_ARGUMENT = 0.5
-"""Largest x = alpha T for which the power series is used [-]."""
-_TERMS = range(14)
-"""Numbers k of the terms of the power series."""
+MAX_SERIES_ARGUMENT = 0.5  # largest x = alpha T for which the power series is used [-]
+_TERMS = range(14)  # numbers k of the terms of the power series
 
 
 def _coefficients(first, count):
@@ -147,8 +144,7 @@ _Q12 = _coefficients(3, lambda n: 2**n - n - 2)
 _Q13 = _coefficients(2, lambda n: 2**n - n - 1)
 _Q22 = _coefficients(2, lambda n: 2**n - 2)
 _Q23 = _coefficients(1, lambda n: 2**n - 1)
-_Q33 = _coefficients(0, lambda n: 2**n)
-"""Coefficients of the elements of q."""
+_Q33 = _coefficients(0, lambda n: 2**n)  # coefficients of the elements of q
 
 
 @compiled

@@ -30,18 +30,14 @@ from acu_tracker.geometry.vector import Vector, dot, rotated, times
 from pedestal_common.compiled import assign, compiled
 from pedestal_common.geometry.line_of_sight import earth_angles, wrap
 
-N = 9
-"""Number of states n."""
+N = 9  # number of states n
 MODE_MODELS = motion_models.MODEL_CV, motion_models.MODEL_CA
 """Motion models of mode 0 (CV, constant velocity) and mode 1 (CA, constant acceleration)."""
-ALPHA, BETA, KAPPA = 1.0, 2.0, 3.0 - N
-"""Parameters alpha, beta, kappa of the sigma points [-]."""
-LAMBDA = ALPHA**2 * (N + KAPPA) - N
-"""Parameter lambda of the sigma points, which follows from the others [-]."""
+ALPHA, BETA, KAPPA = 1.0, 2.0, 3.0 - N  # parameters alpha, beta, kappa of the sigma points [-]
+LAMBDA = ALPHA**2 * (N + KAPPA) - N  # parameter lambda of the sigma points, which follows from the others [-]
 SIGMA_POINT_SCALE = math.sqrt(N + LAMBDA)
 """Distance of a sigma point from the centre point, as a multiple of the column L_k [-]."""
-SIGMA_POINT_WEIGHT = 0.5 / (N + LAMBDA)
-"""Weight of each of the six points that move the position [-]."""
+SIGMA_POINT_WEIGHT = 0.5 / (N + LAMBDA)  # weight of each of the six points that move the position [-]
 CENTRE_COVARIANCE_WEIGHT = 1.0 - 6.0 * SIGMA_POINT_WEIGHT + 1.0 - ALPHA**2 + BETA
 """Weight in a covariance of the centre point, together with the twelve points that have its measurement [-]."""
 

@@ -17,8 +17,7 @@ import math
 from pedestal.verbs import arguments
 from pedestal.verbs.antenna import ask
 
-MAX_HOLD_S = 600.0
-"""Largest time for which mode rate is repeated [s]."""
+MAX_HOLD_S = 600.0  # largest time for which mode rate is repeated [s]
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

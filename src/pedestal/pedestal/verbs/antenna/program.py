@@ -8,8 +8,7 @@ from pedestal.verbs import arguments
 if typing.TYPE_CHECKING:
     from pedestal_bringup.scenario.program import Plan
 
-START_FROM_FILE = 'file'
-"""Value of --start for the start time in the file of the target."""
+START_FROM_FILE = 'file'  # value of --start for the start time in the file of the target
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -56,8 +56,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 START_TIME_PARAMETER = 'tracking_receiver.target.leo_pass.start_time'
-MAX_LOST_STEP_SHARE = 0.01
-"""Largest share of lost steps of a realtime run, outside announced restarts."""
+MAX_LOST_STEP_SHARE = 0.01  # largest share of lost steps of a realtime run, outside announced restarts
 
 
 def main(options: argparse.Namespace) -> int:

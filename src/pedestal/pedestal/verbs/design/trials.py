@@ -36,11 +36,8 @@ from pedestal_analysis import console
 if typing.TYPE_CHECKING:
     from pedestal_analysis.trials.plan import Plan
 
-WORST_TRIAL_COUNT = 10
-"""Number of the worst trials whose commands are printed."""
-
-BASE_SIDE = 'base'
-"""Label of the side with the parameters of --param alone, beside labels of --side."""
+WORST_TRIAL_COUNT = 10  # number of the worst trials whose commands are printed
+BASE_SIDE = 'base'  # label of the side with the parameters of --param alone, beside labels of --side
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

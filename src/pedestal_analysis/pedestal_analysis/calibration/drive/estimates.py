@@ -16,14 +16,10 @@ PART_COUNT, BLOCK_COUNT = 10, 80
 """Numbers of parts of the jackknife, and of blocks of neighbouring steps that are distributed over the parts."""
 PLATEAU_S, PLATEAU_SETTLING_S = 0.5, 0.5
 """Length of a piece of constant rate [s], and time after its beginning that is left out [s]."""
-PLATEAU_CHANGE = 0.08
-"""Largest change of the rate within a piece of constant rate, per rate [-]."""
-MIN_PLATEAUS, MIN_RATES = 12, 3
-"""Smallest number of pieces of constant rate, and of different rates among them."""
-SLOW_RATE_RAD_S = 6e-3
-"""Rate below which the static part of the friction shows [rad/s]."""
-MIN_LASH_ROWS = 40
-"""Smallest number of steps with each sign of the torque of a motor."""
+PLATEAU_CHANGE = 0.08  # largest change of the rate within a piece of constant rate, per rate [-]
+MIN_PLATEAUS, MIN_RATES = 12, 3  # smallest number of pieces of constant rate, and of different rates among them
+SLOW_RATE_RAD_S = 6e-3  # rate below which the static part of the friction shows [rad/s]
+MIN_LASH_ROWS = 40  # smallest number of steps with each sign of the torque of a motor
 STRONG_TORQUE_SHARE, CONTACT_TIME_S = 0.15, 0.02
 """Share of the largest torque of a motor [-], and time before and after a step [s]. With this torque during this time
 the teeth are in firm contact. This avoids steps at which a motor still crosses the lash."""

@@ -21,12 +21,10 @@ from pedestal_common.parameters import as_dict, build, defaults
 from pedestal_common.text_files import parameter_file
 from pedestal_recording import bag as bags
 
-CASE_NAME, TORQUE_TARGET = 'drive', '< 10'
-"""Case of the rows, and target of the torque error of the twin [%]."""
+CASE_NAME, TORQUE_TARGET = 'drive', '< 10'  # case of the rows, and target of the torque error of the twin [%]
 VALUE_DIGITS, ERROR_DIGITS = 6, 3
 """Significant digits in a parameter file, and decimal digits of torque errors that are compared."""
-DIRECT_NAMES = 'bias', 'eccentricity_sin', 'eccentricity_cos'
-"""Estimates that the sum of the torques does not show."""
+DIRECT_NAMES = 'bias', 'eccentricity_sin', 'eccentricity_cos'  # estimates that the sum of the torques does not show
 QUANTITIES = {
     'inertia': ('kg m2', 'inertia of the load'), 'dish_inertia': ('kg m2', 'part of it that swings on the structure'),
     'frequency': ('Hz', 'first mode of the structure on a locked base'), 'damping': ('', 'damping ratio of this mode'),

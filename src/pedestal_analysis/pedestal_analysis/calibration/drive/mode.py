@@ -23,16 +23,11 @@ from pedestal_analysis.calibration.drive.estimates import PART_COUNT, friction_t
 
 FREQUENCY_RANGE_HZ, FREQUENCY_COUNT = (2.0, 30.0), 90
 """Range of the searched frequencies [Hz] and number of trial frequencies."""
-START_DAMPING, MAX_DAMPING = 0.02, 0.5
-"""First damping ratio and largest damping ratio of the search [-]."""
-MIN_GAIN = 0.25
-"""Least share of the squared residuals that a mode must explain [-]."""
-MIN_SHARE = 0.03
-"""Least inertia of the dish over the inertia without a mode [-]."""
-FREQUENCY_STEP = 0.01
-"""Relative step of the frequency for the interval of a frequency [-]."""
-MIN_RATE_RAD_S = 0.01
-"""Least rate of the steps that are used [rad/s]; at this rate the friction slides."""
+START_DAMPING, MAX_DAMPING = 0.02, 0.5  # first damping ratio and largest damping ratio of the search [-]
+MIN_GAIN = 0.25  # least share of the squared residuals that a mode must explain [-]
+MIN_SHARE = 0.03  # least inertia of the dish over the inertia without a mode [-]
+FREQUENCY_STEP = 0.01  # relative step of the frequency for the interval of a frequency [-]
+MIN_RATE_RAD_S = 0.01  # least rate of the steps that are used [rad/s]; at this rate the friction slides
 ACTIVE_SHARE, ACTIVE_TIME_S = 0.02, 0.5
 """Share of the largest acceleration above which a step is active [-], and width of the time around it [s]."""
 ROW_STEP, MIN_ROWS = 2, 200

@@ -11,10 +11,8 @@ from scipy.ndimage import gaussian_filter1d
 
 from pedestal_analysis.results import tracking
 
-SMOOTHING_S = 0.012
-"""Standard deviation of the Gaussian of the smoothing filter [s]."""
-MOVING_RATE_RAD_S = 2e-4
-"""Least rate of a moving axis [rad/s]."""
+SMOOTHING_S = 0.012  # standard deviation of the Gaussian of the smoothing filter [s]
+MOVING_RATE_RAD_S = 2e-4  # least rate of a moving axis [rad/s]
 
 
 class MotionError(ValueError):

@@ -16,30 +16,23 @@ import math
 from acu_tracker.servo import floor
 from pedestal_common.graph.topics import AXES
 
-MAX_RATE_SHARE, MARGIN_SHARE = 0.5, 0.05
-"""Shares of the shaper's rate and of the travel [-]."""
-SLOW_RATES_RAD_S = (0.5e-3, 1e-3, 2e-3, 4e-3, 8e-3, 0.02, 0.05, 0.15, 0.4)
-"""Rates below the largest one [rad/s]."""
+MAX_RATE_SHARE, MARGIN_SHARE = 0.5, 0.05  # shares of the shaper's rate and of the travel [-]
+SLOW_RATES_RAD_S = (0.5e-3, 1e-3, 2e-3, 4e-3, 8e-3, 0.02, 0.05, 0.15, 0.4)  # rates below the largest one [rad/s]
 RATE_TIME_S, SLOWEST_TRAVEL_RAD = 3.0, 4e-3
 """Time at each rate [s], and smallest angle that it covers [rad], so that the bristles of the friction slide."""
-REVERSAL_COUNT, REVERSAL_TIME_S = 8, 0.8
-"""Number of reversals and time between two of them [s]."""
+REVERSAL_COUNT, REVERSAL_TIME_S = 8, 0.8  # number of reversals and time between two of them [s]
 PULSE_COUNT, PULSE_INTERVAL_S, PULSE_TIME_S = 31, 0.35, 0.06
 """Number of pulses, time between two of them, and time of the motion of a pulse [s]."""
 PULSE_LEVELS = (0, 1, 1, 0, 1, 0, 0, 1, 0, 0, 0, 0, 1, 0, 1, 0, 1, 1, 1, 0, 1, 1, 0, 0, 0, 1, 1, 1, 1, 1, 0)
 """Levels of the pulses: the sequence of a shift register of 5 bits, whose spectrum is flat."""
 PULSES_TIME_S = 1.0 + PULSE_COUNT * PULSE_INTERVAL_S
 """Time of the constant rate under the pulses, with the part before the first pulse [s]."""
-PULSE_RATES_RAD_S = (0.1, 0.05)
-"""Constant rates of azimuth and elevation under the pulses [rad/s]."""
+PULSE_RATES_RAD_S = (0.1, 0.05)  # constant rates of azimuth and elevation under the pulses [rad/s]
 TURN_RAD, TURN_RATE_RAD_S = 1.02 * 2.0 * math.pi, 0.5
 """Angle of a turn with an overlap [rad] and its largest rate [rad/s]."""
-SETTLING_TIME_S = 0.6
-"""Time after a motion before the next [s]."""
-MIN_TRAVEL_RAD = math.radians(5.0)
-"""Smallest travel of an axis, less its margins [rad]."""
-LONG_TIME_S, MAX_TIME_S = 3600.0, 86400.0
-"""Duration that is remarked, and longest duration of a run [s]."""
+SETTLING_TIME_S = 0.6  # time after a motion before the next [s]
+MIN_TRAVEL_RAD = math.radians(5.0)  # smallest travel of an axis, less its margins [rad]
+LONG_TIME_S, MAX_TIME_S = 3600.0, 86400.0  # duration that is remarked, and longest duration of a run [s]
 
 
 @dataclasses.dataclass(frozen=True)

@@ -26,14 +26,10 @@ PARAMETER_NAMES = {
 SCALED_NAMES = ('viscous', 'coulomb', 'breakaway', 'stribeck_rate', 'lash', 'stiffness', 'frequency', 'damping')
 ADDED_NAMES = ('inertia', 'dish_inertia', 'unbalance')
 """Estimates that the twin corrects by a ratio, and by a difference."""
-MESH_NAMES = 'lash', 'stiffness'
-"""Estimates of a mesh."""
-ROUND_COUNT, MAX_RATIO = 4, 1.6
-"""Number of corrections, and largest ratio of a correction [-]."""
-PASS_COUNT = 2
-"""Number of passes of the estimates of friction and inertia."""
-MAX_SHARE = 0.85
-"""Largest share of the dish in the inertia of the load [-]."""
+MESH_NAMES = 'lash', 'stiffness'  # estimates of a mesh
+ROUND_COUNT, MAX_RATIO = 4, 1.6  # number of corrections, and largest ratio of a correction [-]
+PASS_COUNT = 2  # number of passes of the estimates of friction and inertia
+MAX_SHARE = 0.85  # largest share of the dish in the inertia of the load [-]
 RIGID = {f'{name}.structure.inertia_share': 0.0 for name in AXES}
 """Parameters of adu of a drive without a flexible structure."""
 

@@ -23,19 +23,14 @@ from scipy.special import stdtrit
 
 from pedestal_analysis.results.intervals import CONFIDENCE_LEVEL
 
-SMALLEST_OFFSET_BEAMWIDTHS = 0.05
-"""Offset below which the weight of a point does not grow further [beamwidths]."""
-MIN_SLOPE = 0.2
-"""Least root of the determinant of C [-]. Below it the receiver hardly measures the offsets."""
-WEAK_SLOPE = 0.5
-"""Root of the determinant of C below which a weak slope is named [-]: a phase error of 60 deg."""
-STEEP_SLOPE = 2.0
-"""Root of the determinant of C above which a steep slope is named [-]."""
+SMALLEST_OFFSET_BEAMWIDTHS = 0.05  # offset below which the weight of a point does not grow further [beamwidths]
+MIN_SLOPE = 0.2  # least root of the determinant of C [-]. Below it the receiver hardly measures the offsets.
+WEAK_SLOPE = 0.5  # root of the determinant of C below which a weak slope is named [-]: a phase error of 60 deg
+STEEP_SLOPE = 2.0  # root of the determinant of C above which a steep slope is named [-]
 TURN_OF_A_FAULT_RAD = math.radians(40.0)
 """Turn of the axes that is as likely as one fault of signs or channels [rad]. From 85 to 95 deg, exchanged channels
 with a reversed sign are therefore likelier than turned axes."""
-TURNED_AXES_DEG = 10.0
-"""Turn of the axes of the errors above which the turn is named [deg]."""
+TURNED_AXES_DEG = 10.0  # turn of the axes of the errors above which the turn is named [deg]
 
 
 AXIS_NAMES = 'cross-elevation', 'elevation'

@@ -19,18 +19,13 @@ from pedestal_analysis.results import beam_direction, mode_pointing, tracking
 
 CIRCLE_BEAMWIDTHS, CIRCLE_TOLERANCE_BEAMWIDTHS = 0.2, 0.03
 """Radius of the circle on which the matrix is verified, and its tolerance [beamwidths]."""
-MIN_CIRCLE_POINTS, MIN_FITTED_POINTS = 6, 6
-"""Smallest numbers of points on the circle and of points for the fit."""
-MIN_SPAN_BEAMWIDTHS = 0.15
-"""Smallest range of the offsets of the fit on each axis [beamwidths]."""
-MAX_OFFSET_BEAMWIDTHS = 0.36
-"""Largest offset of the fit [beamwidths]; beyond it the receiver is not linear."""
+MIN_CIRCLE_POINTS, MIN_FITTED_POINTS = 6, 6  # smallest numbers of points on the circle and of points for the fit
+MIN_SPAN_BEAMWIDTHS = 0.15  # smallest range of the offsets of the fit on each axis [beamwidths]
+MAX_OFFSET_BEAMWIDTHS = 0.36  # largest offset of the fit [beamwidths]; beyond it the receiver is not linear
 STILL_WINDOW_S, SETTLING_TIME_S, MIN_POINT_S = 0.25, 0.5, 1.0
 """Time within which a still beam does not move, time that is left out after a step, and shortest point [s]."""
-MAX_MOTION_BEAMWIDTHS = 0.01
-"""Largest motion of a still beam within STILL_WINDOW_S [beamwidths]."""
-MAX_MISSING_SHARE = 0.05
-"""Largest share of a point without an error of the receiver [-]."""
+MAX_MOTION_BEAMWIDTHS = 0.01  # largest motion of a still beam within STILL_WINDOW_S [beamwidths]
+MAX_MISSING_SHARE = 0.05  # largest share of a point without an error of the receiver [-]
 COLUMNS = 'azimuth.position', 'elevation.position'
 
 

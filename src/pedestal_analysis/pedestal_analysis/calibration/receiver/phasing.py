@@ -14,14 +14,10 @@ from pedestal_analysis.calibration.receiver import matrix, offsets, phasing_page
 from pedestal_analysis.results import intervals, tracking
 from pedestal_analysis.results.intervals import estimated, row
 
-CASE_NAME = 'receiver'
-"""Case of the rows."""
-ERROR_TARGET, CROSS_TALK_TARGET = '< 5', '< -20'
-"""Targets of the error on the circle [%] and of the cross-talk [dB]."""
-SLOPE_RANGE = 0.1, 10.0
-"""Range of acu.tracker.receiver.slope."""
-ELEMENT_DECIMALS = 6
-"""Decimals of the elements in a parameter file."""
+CASE_NAME = 'receiver'  # case of the rows
+ERROR_TARGET, CROSS_TALK_TARGET = '< 5', '< -20'  # targets of the error on the circle [%] and of the cross-talk [dB]
+SLOPE_RANGE = 0.1, 10.0  # range of acu.tracker.receiver.slope
+ELEMENT_DECIMALS = 6  # decimals of the elements in a parameter file
 
 
 @dataclasses.dataclass(frozen=True)

@@ -19,8 +19,7 @@ from pedestal_hardware.monopulse import sigmf
 from pedestal_hardware.monopulse.front_end import Status
 from pedestal_hardware.monopulse.params import MonopulseParameters
 
-SMALLEST_POWER_OVER_NOISE = 1e-3
-"""Smallest power of the sum of a point, over its noise power, for a ratio [-]."""
+SMALLEST_POWER_OVER_NOISE = 1e-3  # smallest power of the sum of a point, over its noise power, for a ratio [-]
 
 
 @dataclasses.dataclass(frozen=True)

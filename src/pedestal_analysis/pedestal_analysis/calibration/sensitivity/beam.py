@@ -28,16 +28,11 @@ from scipy.special import stdtrit
 from pedestal_analysis.calibration.sensitivity.levels import LevelError
 from pedestal_analysis.results.intervals import CONFIDENCE_LEVEL
 
-MIN_SHARE = 0.25
-"""Least power above P_0 that is fitted, as a share of the highest [-]."""
-MIN_LEVELS = 7
-"""Smallest number of fitted levels: two more than the unknowns."""
-OFF_BEAMWIDTHS = 3.0
-"""Distance from the edge of the source from which a level counts as off the source [beamwidths]."""
-MIN_Y_DB = 0.5
-"""Least Y factor [dB]."""
-RING_COUNT = 12
-"""Number of rings of points in the disk of the source."""
+MIN_SHARE = 0.25  # least power above P_0 that is fitted, as a share of the highest [-]
+MIN_LEVELS = 7  # smallest number of fitted levels: two more than the unknowns
+OFF_BEAMWIDTHS = 3.0  # distance from the edge of the source from which a level counts as off the source [beamwidths]
+MIN_Y_DB = 0.5  # least Y factor [dB]
+RING_COUNT = 12  # number of rings of points in the disk of the source
 BOLTZMANN_J_K, LIGHT_SPEED_M_S, FLUX_UNIT_W_M2_HZ = 1.380649e-23, 299_792_458.0, 1e-22
 """Boltzmann constant, speed of light, and solar flux unit."""
 SHAPE_NAMES = 'squint_x', 'squint_y', 'beamwidth_x', 'beamwidth_y'

@@ -16,16 +16,13 @@ from pedestal_analysis.calibration import scan
 from pedestal_analysis.results import tracking
 from pedestal_common.text_files import columns, csv_table
 
-OFFSET_RANGE_DEG, LEVEL_RANGE_DB = (-30.0, 30.0), (-300.0, 300.0)
-"""Ranges of the offsets and of the levels in a file."""
-MAX_FOLLOWING_BEAMWIDTHS = 0.1
-"""Largest following error of an antenna at rest [beamwidths]."""
+OFFSET_RANGE_DEG, LEVEL_RANGE_DB = (-30.0, 30.0), (-300.0, 300.0)  # ranges of the offsets and of the levels in a file
+MAX_FOLLOWING_BEAMWIDTHS = 0.1  # largest following error of an antenna at rest [beamwidths]
 _OFFSETS = (columns.Quantity('elevation_deg', {'elevation': '', 'el': ''}, 'deg'),
             columns.Quantity('cross_elevation_deg', {'cross elevation': '', 'xel': ''}, 'deg'),
             columns.Quantity('az_deg', {'az': '', 'azimuth': ''}, 'deg'))
 _LEVEL = columns.Quantity('level_db', {'level': ''}, 'db')
-NOISE_KINDS = 'sun', 'moon'
-"""Kinds of simulated targets that are sources of noise."""
+NOISE_KINDS = 'sun', 'moon'  # kinds of simulated targets that are sources of noise
 
 
 class LevelError(ValueError):

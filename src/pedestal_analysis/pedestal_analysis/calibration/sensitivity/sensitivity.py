@@ -9,10 +9,8 @@ from pedestal_analysis.calibration.sensitivity import beam, levels, sensitivity_
 from pedestal_analysis.results.intervals import estimated, row
 from pedestal_recording import bag as bags
 
-CASE_NAME = 'sensitivity'
-"""Case of the rows."""
-SUN_DIAMETER_DEG = 0.53
-"""Diameter of the sun at radio frequencies above 3 GHz [deg]."""
+CASE_NAME = 'sensitivity'  # case of the rows
+SUN_DIAMETER_DEG = 0.53  # diameter of the sun at radio frequencies above 3 GHz [deg]
 OPTION_RANGES = {'flux': (1.0, 1e6, 'sfu'), 'frequency': (0.1, 300.0, 'GHz'), 'diameter': (0.0, 5.0, 'deg'),
                  'bandwidth': (1e3, 1e11, 'Hz'), 'attenuation': (0.0, 20.0, 'dB'), 'elevation': (0.0, 89.0, 'deg')}
 """{option: (low, high, unit)}."""

@@ -1,0 +1,53 @@
+"""Types of numbers and arrays: what a number means, its unit or its shape. numba and Python ignore both; a reader and
+mypy do not.
+
+`Radians` is a float, `Pairs` is an array of floats of shape (n, 2). A shape such as `Vector3` also gives the size of
+an array in a record (record.Record).
+"""
+from collections.abc import Sequence
+from typing import Annotated, Any, TypeAlias, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats: TypeAlias = NDArray[np.float64]
+Ints: TypeAlias = NDArray[np.int64]
+Bools: TypeAlias = NDArray[np.bool_]
+Complexes: TypeAlias = NDArray[np.complex128]
+Texts: TypeAlias = NDArray[np.str_]
+Records: TypeAlias = NDArray[np.void]               # records of one declared type (record.Record)
+DType: TypeAlias = np.dtype[np.void]                # of a record
+AnyRecord: TypeAlias = Any                          # whose fields depend on data, as the topics of a node do
+
+Radians: TypeAlias = Annotated[float, 'rad']
+RadiansPerSecond: TypeAlias = Annotated[float, 'rad/s']
+RadiansPerSecond2: TypeAlias = Annotated[float, 'rad/s2']
+Radians2: TypeAlias = Annotated[float, 'rad2']      # a variance
+Degrees: TypeAlias = Annotated[float, 'deg']
+Seconds: TypeAlias = Annotated[float, 's']
+Nanoseconds: TypeAlias = Annotated[int, 'ns']       # since the Unix epoch or the start of a run: a stamp; or a time
+Hertz: TypeAlias = Annotated[float, 'Hz']
+RadiansPerSample: TypeAlias = Annotated[float, 'rad']
+Meters: TypeAlias = Annotated[float, 'm']
+MetersPerSecond: TypeAlias = Annotated[float, 'm/s']
+MetersPerSecond2: TypeAlias = Annotated[float, 'm/s2']
+NewtonMeters: TypeAlias = Annotated[float, 'Nm']
+KilogramMeters2: TypeAlias = Annotated[float, 'kg m2']
+Amperes: TypeAlias = Annotated[float, 'A']
+Volts: TypeAlias = Annotated[float, 'V']
+Decibels: TypeAlias = Annotated[float, 'dB']
+DecibelHertz: TypeAlias = Annotated[float, 'dB-Hz']  # C/N0
+Flag: TypeAlias = int                               # 0 or 1; a record has no bool
+
+Pair: TypeAlias = Annotated[Floats, (2,)]           # azimuth and elevation, or cross-elevation and elevation
+Vector3: TypeAlias = Annotated[Floats, (3,)]
+Quaternion: TypeAlias = Annotated[Floats, (4,)]     # x, y, z, w
+Matrix3: TypeAlias = Annotated[Floats, (3, 3)]
+Pairs: TypeAlias = Annotated[Floats, '(n, 2)']
+Vectors3: TypeAlias = Annotated[Floats, '(n, 3)']
+Quaternions: TypeAlias = Annotated[Floats, '(n, 4)']
+Times: TypeAlias = Annotated[Floats, '(n,) s']
+Stamps: TypeAlias = Annotated[Ints, '(n,) ns']
+
+_R = TypeVar('_R')
+BothAxes: TypeAlias = Annotated[Sequence[_R], (2,)]     # a record of each axis: azimuth, elevation
