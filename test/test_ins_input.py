@@ -88,7 +88,7 @@ def track(client):
 def deviations(samples, chosen, start):
     """Return (largest error of the attitude [deg], rms error of the rates [deg/s]) against the law of the ship."""
     [constants], [truth] = motion.constants(chosen.node_parameters('ship_motion').ship), np.zeros(
-        1, motion.OUTPUTS_DTYPE)
+        1, motion.Truth.dtype)
     attitudes, rates = [], []
     assert len(samples) > 100
     for sample in samples:

@@ -54,7 +54,7 @@ def isolated(name, *overrides):
     """The isolation.Isolation of a scenario."""
     chosen, run, on = track(name, *overrides)
     constants = motion.constants(chosen.node_parameters('ship_motion').ship)
-    truth = np.zeros(on.sum(), motion.OUTPUTS_DTYPE)
+    truth = np.zeros(on.sum(), motion.Truth.dtype)
     t = run.t[on]
     for k in range(t.size):
         motion.truth(constants[0], t[k], truth[k])

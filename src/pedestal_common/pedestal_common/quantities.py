@@ -1,5 +1,5 @@
 """Types of numbers and arrays: what a number means, its unit or its shape. numba and Python ignore both; a reader and
-mypy do not.
+mypy do not. Three types at the end stand for data without a declared type.
 
 `Radians` is a float, `Pairs` is an array of floats of shape (n, 2). A shape such as `Vector3` also gives the size of
 an array in a record (record.Record).
@@ -17,7 +17,6 @@ Complexes: TypeAlias = NDArray[np.complex128]
 Texts: TypeAlias = NDArray[np.str_]
 Records: TypeAlias = NDArray[np.void]               # records of one declared type (record.Record)
 DType: TypeAlias = np.dtype[np.void]                # of a record
-AnyRecord: TypeAlias = Any                          # whose fields depend on data, as the topics of a node do
 
 Radians: TypeAlias = Annotated[float, 'rad']
 RadiansPerSecond: TypeAlias = Annotated[float, 'rad/s']
@@ -51,3 +50,7 @@ Stamps: TypeAlias = Annotated[Ints, '(n,) ns']
 
 _R = TypeVar('_R')
 BothAxes: TypeAlias = Annotated[Sequence[_R], (2,)]     # a record of each axis: azimuth, elevation
+
+AnyRecord: TypeAlias = Any  # a record whose fields depend on data, as those of a node depend on its topics
+Message: TypeAlias = Any    # a ROS message, whose class is made by ROS without types
+Json: TypeAlias = Any       # what a JSON or YAML file holds; the code that takes a value from it checks the value

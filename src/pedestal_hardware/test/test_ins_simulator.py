@@ -21,7 +21,7 @@ def truths():
     """Truths of a ship at 20 Hz, for 15 s."""
     [constants], found = motion.constants(build(ShipParameters, {'heading_deg': 60.0})), []
     for k in range(300):
-        found.append(np.zeros(1, motion.OUTPUTS_DTYPE)[0])
+        found.append(np.zeros(1, motion.Truth.dtype)[0])
         motion.truth(constants, 0.05 * k, found[-1])
     return found
 

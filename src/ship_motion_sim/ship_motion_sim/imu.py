@@ -41,7 +41,7 @@ CONSTANTS_DTYPE = np.dtype([
 ], align=True)
 
 STATE_DTYPE = np.dtype([
-    ('truth', motion.OUTPUTS_DTYPE),            # at a node of the quadrature
+    ('truth', motion.Truth.dtype),            # at a node of the quadrature
     ('angle_left', 'f8', (3,)), ('force_left', 'f8', (3,)),     # remainders of the quantised increments [rad, m/s]
 ], align=True)
 
@@ -106,7 +106,7 @@ def specific_force(truth, earth_rate, gravity):
 def mean_rates(s, c, ship, t, dt, rate, force):
     """Fill rate (3,) [rad/s] and force (3,) [m/s2] with the means of the true rates over [t - dt, t] [s].
 
-    s, c: records STATE_DTYPE, CONSTANTS_DTYPE; ship: record of motion.CONSTANTS_DTYPE.
+    s, c: records STATE_DTYPE, CONSTANTS_DTYPE; ship: record of motion.Constants.dtype.
     """
     for i in range(3):
         rate[i] = force[i] = 0.0
@@ -149,7 +149,7 @@ def step(s, c, ship, u, truth, out, normals):
     """Take one sample.
 
     s, c, u, out: records STATE_DTYPE, CONSTANTS_DTYPE, INPUTS_DTYPE, OUTPUTS_DTYPE; ship, truth: records
-    motion.CONSTANTS_DTYPE, motion.OUTPUTS_DTYPE at the time of the sample; normals: (IMU_NORMALS_PER_STEP,).
+    motion.Constants.dtype, motion.Truth.dtype at the time of the sample; normals: (IMU_NORMALS_PER_STEP,).
     """
     rate, force = out.angular_velocity, out.linear_acceleration
     if truth.status != motion.MOTION_OK:

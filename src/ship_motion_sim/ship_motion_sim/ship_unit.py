@@ -16,7 +16,7 @@ SHIP_TRUTH_TOPIC, IMU_RAW_TOPIC = 'ship/truth', 'ship/imu/data_raw'
 
 NOMINAL_PERIOD_S = 5e-3  # assumed length of the first IMU sample [s]
 
-RECORD_DTYPE = np.dtype([('ship', motion.CONSTANTS_DTYPE), ('truth', motion.OUTPUTS_DTYPE),
+RECORD_DTYPE = np.dtype([('ship', motion.Constants.dtype), ('truth', motion.Truth.dtype),
                          ('imu_state', imu.STATE_DTYPE), ('imu', imu.CONSTANTS_DTYPE),
                          ('imu_inputs', imu.INPUTS_DTYPE), ('imu_outputs', imu.OUTPUTS_DTYPE),
                          ('last', 'i8'), ('row', 'i8'), ('schedule', schedule.SCHEDULE_DTYPE),

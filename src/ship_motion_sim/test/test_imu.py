@@ -21,7 +21,7 @@ constants_of = functools.cache(motion.constants)
 
 
 def truth_at(params, t):
-    truth = np.zeros(1, motion.OUTPUTS_DTYPE)
+    truth = np.zeros(1, motion.Truth.dtype)
     motion.truth(constants_of(params.ship)[0], t, truth[0])
     return truth
 

@@ -26,7 +26,7 @@ class Bench:
         self.imu = imu.constants(ShipMotionParameters(ship))
         self.constants, self.state = ins.constants(params), ins.initial_state()
         self.random = np.random.default_rng(seed)
-        self.inputs, self.truth = np.zeros(1, ins.INPUTS_DTYPE), np.zeros(1, motion.OUTPUTS_DTYPE)
+        self.inputs, self.truth = np.zeros(1, ins.INPUTS_DTYPE), np.zeros(1, motion.Truth.dtype)
 
     def step(self, stamp, spoil=None):
         dt, raw = np.zeros(1, imu.INPUTS_DTYPE), np.zeros(1, imu.OUTPUTS_DTYPE)

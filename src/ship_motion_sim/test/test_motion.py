@@ -19,7 +19,7 @@ def ship(**values):
     constants = motion.constants(ShipParameters(**values))
 
     def at(t):
-        outputs = np.zeros(1, motion.OUTPUTS_DTYPE)
+        outputs = np.zeros(1, motion.Truth.dtype)
         motion.truth(constants[0], t, outputs[0])
         return outputs[0]
     return at
@@ -153,7 +153,7 @@ def test_sine_and_cosine_to_a_million_radians():
 def test_time_that_is_not_finite_is_said_and_nothing_looks_valid(t):
     now = ship()(t)
     assert motion.MOTION_STATUS_TEXTS[now['status']] == 'time is not finite'
-    for field in motion.OUTPUTS_DTYPE.names:
+    for field in motion.Truth.dtype.names:
         if field != 'status':
             assert np.isnan(now[field]).all(), field
 
@@ -163,6 +163,6 @@ def test_compiled_callers_get_the_same_truth():
     def call(constants, t, outputs):
         motion.truth(constants[0], t, outputs[0])
 
-    outputs = np.zeros(1, motion.OUTPUTS_DTYPE)
+    outputs = np.zeros(1, motion.Truth.dtype)
     call(motion.constants(ShipParameters()), 77.7, outputs)
     assert outputs.tobytes() == ship()(77.7).tobytes()

@@ -14,7 +14,7 @@ PERIOD, LENGTH = 0.1, 60.0
 
 
 def truth(constants, t):
-    outputs = np.zeros(1, motion.OUTPUTS_DTYPE)
+    outputs = np.zeros(1, motion.Truth.dtype)
     motion.truth(constants[0], t, outputs[0])
     return outputs[0]
 

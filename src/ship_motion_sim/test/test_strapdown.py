@@ -42,12 +42,12 @@ def increments(ship, seconds):
     inputs['dt'] = DT
     angle, force = np.zeros((count, 3)), np.zeros((count, 3))
     measured(imu.initial_state(), imu.constants(params), motion.constants(ship), inputs,
-             np.zeros(1, motion.OUTPUTS_DTYPE), np.zeros(1, imu.OUTPUTS_DTYPE), count, angle, force)
+             np.zeros(1, motion.Truth.dtype), np.zeros(1, imu.OUTPUTS_DTYPE), count, angle, force)
     return angle, force
 
 
 def truth_at(ship, t):
-    truth = np.zeros(1, motion.OUTPUTS_DTYPE)
+    truth = np.zeros(1, motion.Truth.dtype)
     motion.truth(motion.constants(ship)[0], t, truth[0])
     return truth[0]
 

@@ -46,7 +46,7 @@ class SerialSink:
 
 
 def yaw_rate(truth):
-    """Return the rate of the yaw angle [rad/s] of a record of motion.OUTPUTS_DTYPE."""
+    """Return the rate of the yaw angle [rad/s] of a record of motion.Truth.dtype."""
     _, w_y, w_z = truth['angular_velocity']
     return float((w_y * math.sin(truth['roll']) + w_z * math.cos(truth['roll'])) / math.cos(truth['pitch']))
 
@@ -54,7 +54,7 @@ def yaw_rate(truth):
 def sentences(kind, truth, stamp):
     """Return the bytes of one sample: the sentence of a kind of ins.sentences.KINDS, behind HDT and ROT.
 
-    truth: record of motion.OUTPUTS_DTYPE; stamp: UTC [ns].
+    truth: record of motion.Truth.dtype; stamp: UTC [ns].
     """
     roll, pitch, yaw = float(truth['roll']), float(truth['pitch']), float(truth['yaw'])
     turn = nmea.turn(yaw_rate(truth))
@@ -71,7 +71,7 @@ def run(ship, sink, kind, rate, start):
     ship: ShipParameters; sink: UdpSink or SerialSink; kind: of ins.sentences.KINDS; rate: samples per second; start:
     UTC at which the time of the ship is 0 [ns].
     """
-    [constants], [truth] = motion.constants(ship), np.zeros(1, motion.OUTPUTS_DTYPE)
+    [constants], [truth] = motion.constants(ship), np.zeros(1, motion.Truth.dtype)
     motion.truth(constants, 0.0, truth)      # compiles the law before the first sample is due
     period = round(1e9 / rate)
     due = time.time_ns() // period * period

@@ -306,7 +306,7 @@ def simulated_run(batch, run):
                       accelerometer_scale=70e-6, output='increment'))
     ship, n = motion.constants(params.ship), round(batch.duration / IMU_PERIOD_S)
     ship['phase'][0, :4] = random.uniform(0.0, 2.0 * math.pi, 4)
-    inputs, truth = np.zeros(1, imu.INPUTS_DTYPE), np.zeros(1, motion.OUTPUTS_DTYPE)
+    inputs, truth = np.zeros(1, imu.INPUTS_DTYPE), np.zeros(1, motion.Truth.dtype)
     inputs['dt'] = IMU_PERIOD_S
     motion.truth(ship[0], 0.0, truth[0])
     start = misaligned(truth[0]['quaternion'], conditions.misalignment)

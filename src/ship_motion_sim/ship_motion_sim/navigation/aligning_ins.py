@@ -24,7 +24,7 @@ An angular acceleration of the deck of 0.1 rad/s2 causes an error of 0.5 mrad wi
 """
 
 CONSTANTS_DTYPE = np.dtype([
-    ('ship', motion.CONSTANTS_DTYPE),
+    ('ship', motion.Constants.dtype),
     ('earth_rate', 'f8', (3,)),             # ENU [rad/s]
     ('latency_ns', 'i8'),
     ('increment', 'i8'),                    # 1: mean rates of the IMU since its last sample, 0: rates at the stamp
@@ -35,7 +35,7 @@ CONSTANTS_DTYPE = np.dtype([
 
 STATE_DTYPE = np.dtype([
     ('last_stamp_ns', 'i8'),
-    ('truth', motion.OUTPUTS_DTYPE),        # true motion of the ship, for the aid
+    ('truth', motion.Truth.dtype),        # true motion of the ship, for the aid
     *LATENCY_RING_FIELDS,
     ('navigator', navigator.STATE_DTYPE),
     ('imu_stamp_ns', 'i8'),                 # of the last usable IMU message

@@ -32,7 +32,7 @@ LATENCY_RING_SIZE = 256  # largest number of samples that wait for the latency t
 NO_STAMP = -2 ** 63  # stamp before the first message
 
 CONSTANTS_DTYPE = np.dtype([
-    ('ship', motion.CONSTANTS_DTYPE),
+    ('ship', motion.Constants.dtype),
     ('earth_rate', 'f8', (3,)),             # ENU [rad/s]
     ('bias', 'f8', (3,)),                   # roll, pitch, yaw [rad]
     ('wander', 'f8', (3,)),                 # rms of the slow error of roll, pitch, yaw [rad]
@@ -59,7 +59,7 @@ LATENCY_RING_FIELDS = [
 STATE_DTYPE = np.dtype([
     ('last_stamp_ns', 'i8'),
     ('wander', 'f8', (3,)),                 # slow error of roll, pitch, yaw [rad]
-    ('truth', motion.OUTPUTS_DTYPE),        # ship at the last stamp
+    ('truth', motion.Truth.dtype),        # ship at the last stamp
     *LATENCY_RING_FIELDS,
 ], align=True)
 

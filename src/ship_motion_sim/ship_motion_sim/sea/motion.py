@@ -2,57 +2,76 @@
 
 The unit of the ship and the INS of method `model` call `truth`:
 
-    outputs = np.zeros(1, OUTPUTS_DTYPE)
+    outputs = Truth.zeros()
     truth(constants(params)[0], 12.5, outputs[0])
 """
 import math
+from typing import Annotated
 
 import numpy as np
 
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry.line_of_sight import quaternion, rotation, to_deck
-from ship_motion_sim.params import ShipParameters
+from pedestal_common.quantities import (
+    Floats,
+    Matrix3,
+    MetersPerSecond,
+    Quaternion,
+    Radians,
+    RadiansPerSecond,
+    RadiansPerSecond2,
+    Records,
+    Seconds,
+    Vector3,
+)
+from pedestal_common.record import Record
+from ship_motion_sim.params import RecordedParameters, ShipParameters
 from ship_motion_sim.sea import recording, waves
 from ship_motion_sim.sea.waves import FREEDOM_COUNT, HEAVE, PITCH, ROLL, SURGE, SWAY, WAVE_COMPONENT_COUNT, YAW
 
 MOTION_STATUS_TEXTS = ('ok', 'time is not finite')
 MOTION_OK, MOTION_BAD_TIME = range(len(MOTION_STATUS_TEXTS))
 
-CONSTANTS_DTYPE = np.dtype([
-    ('frequency', 'f8', (WAVE_COMPONENT_COUNT,)),   # w_e [rad/s]; components not in use are 0
-    ('phase', 'f8', (WAVE_COMPONENT_COUNT,)),       # [rad]
-    ('cosine', 'f8', (WAVE_COMPONENT_COUNT, FREEDOM_COUNT)),    # Re X [m, rad]
-    ('sine', 'f8', (WAVE_COMPONENT_COUNT, FREEDOM_COUNT)),      # -Im X
-    ('yaw', 'f8'), ('cos_yaw', 'f8'), ('sin_yaw', 'f8'),        # mean heading as REP 103 yaw
-    ('speed', 'f8'),                                # [m/s]
-    ('pieces', 'i8'),                               # number of pieces of a recorded motion; 0: components
-    ('breaks', 'f8', (recording.MAX_PIECES + 1,)),  # [s]
-    ('coefficients', 'f8', (recording.MAX_PIECES, FREEDOM_COUNT,
-                            recording.COEFFICIENTS_PER_PIECE)),     # [m, rad], highest power first
-], align=True)
-
-OUTPUTS_DTYPE = np.dtype([
-    ('status', 'i8'),                               # index into MOTION_STATUS_TEXTS; unless MOTION_OK, the rest is NaN
-    ('freedoms', 'f8', (3, FREEDOM_COUNT)),         # surge, sway, heave [m], roll, pitch, yaw about the mean
-                                                    # heading [rad]; rows: value, first, second derivative
-    ('position', 'f8', (3,)),                       # ENU [m]
-    ('velocity', 'f8', (3,)),                       # ENU [m/s]
-    ('acceleration', 'f8', (3,)),                   # ENU [m/s2]
-    ('velocity_deck', 'f8', (3,)),                  # FLU [m/s]
-    ('roll', 'f8'), ('pitch', 'f8'), ('yaw', 'f8'),     # REP 103 [rad]
-    ('quaternion', 'f8', (4,)),                     # x, y, z, w, deck -> earth
-    ('mat_ed', 'f8', (3, 3)),                       # deck -> earth
-    ('angular_velocity', 'f8', (3,)),               # FLU, against the earth [rad/s]
-    ('angular_acceleration', 'f8', (3,)),           # FLU [rad/s2]
-], align=True)
+class Constants(Record):
+    """Components of a seaway, or a recorded motion."""
+    frequency: Annotated[Floats, (WAVE_COMPONENT_COUNT,)]   # w_e [rad/s]; components not in use are 0
+    phase: Annotated[Floats, (WAVE_COMPONENT_COUNT,)]       # [rad]
+    cosine: Annotated[Floats, (WAVE_COMPONENT_COUNT, FREEDOM_COUNT)]    # Re X [m, rad]
+    sine: Annotated[Floats, (WAVE_COMPONENT_COUNT, FREEDOM_COUNT)]      # -Im X
+    yaw: Radians            # mean heading as REP 103 yaw
+    cos_yaw: float
+    sin_yaw: float
+    speed: MetersPerSecond
+    pieces: int             # number of pieces of a recorded motion; 0: components
+    breaks: Annotated[Floats, (recording.MAX_PIECES + 1,)]  # [s]
+    # [m, rad], highest power first
+    coefficients: Annotated[Floats, (recording.MAX_PIECES, FREEDOM_COUNT, recording.COEFFICIENTS_PER_PIECE)]
 
 
-def constants(params: ShipParameters) -> np.ndarray:
-    """Return the record (1,) of CONSTANTS_DTYPE: seaway of the seed and mean course, or a recorded motion.
+class Truth(Record):
+    """Motion of the ship at an instant; roll, pitch and yaw as in REP 103."""
+    status: int             # index into MOTION_STATUS_TEXTS; unless MOTION_OK, the rest is NaN
+    # surge, sway, heave [m], roll, pitch, yaw about the mean heading [rad]; rows: value, first, second derivative
+    freedoms: Annotated[Floats, (3, FREEDOM_COUNT)]
+    position: Vector3       # ENU [m]
+    velocity: Vector3       # ENU [m/s]
+    acceleration: Vector3   # ENU [m/s2]
+    velocity_deck: Vector3  # FLU [m/s]
+    roll: Radians
+    pitch: Radians
+    yaw: Radians
+    quaternion: Quaternion  # deck -> earth
+    mat_ed: Matrix3         # deck -> earth
+    angular_velocity: Vector3       # FLU, against the earth [rad/s]
+    angular_acceleration: Vector3   # FLU [rad/s2]
+
+
+def constants(params: ShipParameters) -> Records:
+    """Return the Constants (1,): seaway of the seed and mean course, or a recorded motion.
 
     Raises csv_table.TableError for a file that cannot be used.
     """
-    record = np.zeros(1, CONSTANTS_DTYPE)
+    record = Constants.zeros()
     if params.motion == 'recorded':
         yaw = _put_recorded(record, params.recorded)
     else:
@@ -63,10 +82,10 @@ def constants(params: ShipParameters) -> np.ndarray:
     return record
 
 
-def summary(params: ShipParameters, duration: float = math.inf) -> tuple[str, ...]:
+def summary(params: ShipParameters, duration: Seconds = math.inf) -> tuple[str, ...]:
     """Return a line on the file of the motion, with the columns that were taken; () without a file.
 
-    duration: of the run [s]; a second line states that a recorded motion ends before. Raises csv_table.TableError for
+    duration: of the run; a second line states that a recorded motion ends before. Raises csv_table.TableError for
     a file that cannot be used.
     """
     if params.motion == 'recorded':
@@ -77,8 +96,7 @@ def summary(params: ShipParameters, duration: float = math.inf) -> tuple[str, ..
     return (waves.measured(params).description,) if params.spectrum == 'file' else ()
 
 
-def _put_components(record, sines):
-    """Put the components of waves.Waves into record."""
+def _put_components(record: Records, sines: waves.Waves) -> None:
     count = len(sines.frequency)
     record['frequency'][0, :count] = sines.frequency
     record['phase'][0, :count] = sines.phase
@@ -86,8 +104,8 @@ def _put_components(record, sines):
     record['sine'][0, :count] = -sines.response.imag
 
 
-def _put_recorded(record, params):
-    """Put the recording of RecordedParameters into record. Return its mean yaw [rad]."""
+def _put_recorded(record: Records, params: RecordedParameters) -> Radians:
+    """Put the recorded motion into the record. Return its mean yaw."""
     times, freedoms, _ = recording.read(params)
     mean = float(np.mean(freedoms[:, YAW]))
     freedoms[:, YAW] -= mean
@@ -100,8 +118,8 @@ def _put_recorded(record, params):
 
 
 @compiled
-def sin_cos(angle):
-    """Return (sin, cos) of an angle [rad], with errors below 1e-15 up to 1e6 rad.
+def sin_cos(angle: Radians) -> tuple[float, float]:
+    """Return (sin, cos) of an angle, with errors below 1e-15 up to 1e6 rad.
 
     Over an array this function is four times as fast as those of libm, because the compiler vectorises it. The
     reduction of the angle and the polynomials are those of fdlibm (Sun Microsystems 1993: e_rem_pio2.c, k_sin.c,
@@ -125,8 +143,8 @@ def sin_cos(angle):
 
 
 @compiled
-def sum_components(ship, t, freedoms):
-    """Fill freedoms (3, 6) with the sum of all components at t [s] and its first and second derivative."""
+def sum_components(ship: Constants, t: Seconds, freedoms: Floats) -> None:
+    """Fill freedoms (3, 6) with the sum of all components at t and its first and second derivative."""
     # Row 0 holds the sines, row 1 the cosines. Their loop is separate, because the compiler then vectorises it.
     wave = np.empty((2, WAVE_COMPONENT_COUNT))
     for i in range(WAVE_COMPONENT_COUNT):
@@ -143,11 +161,13 @@ def sum_components(ship, t, freedoms):
 
 
 @compiled
-def body_rates(roll, pitch, roll_1, pitch_1, yaw_1, roll_2, pitch_2, yaw_2):
-    """Return the rate of the deck w [rad/s] and its derivative dw [rad/s2], FLU, three floats each.
+def body_rates(roll: Radians, pitch: Radians, roll_1: RadiansPerSecond, pitch_1: RadiansPerSecond,
+               yaw_1: RadiansPerSecond, roll_2: RadiansPerSecond2, pitch_2: RadiansPerSecond2,
+               yaw_2: RadiansPerSecond2) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
+    """Return the rate of the deck w [rad/s] and its derivative dw [rad/s2], FLU.
 
-    roll, pitch: angles about fixed axes [rad]; .._1, .._2: first and second derivatives [rad/s, rad/s2]. The result
-    follows from the derivatives of mat_ed = Rz(yaw) Ry(pitch) Rx(roll).
+    roll, pitch: angles about fixed axes; .._1, .._2: their first and second derivatives. The result follows from the
+    derivatives of mat_ed = Rz(yaw) Ry(pitch) Rx(roll).
     """
     sr, cr, sp, cp = math.sin(roll), math.cos(roll), math.sin(pitch), math.cos(pitch)
     wx = roll_1 - yaw_1 * sp
@@ -160,14 +180,14 @@ def body_rates(roll, pitch, roll_1, pitch_1, yaw_1, roll_2, pitch_2, yaw_2):
 
 
 @compiled
-def course_to_earth(ship, along, port):
+def course_to_earth(ship: Constants, along: float, port: float) -> tuple[float, float]:
     """Return (east, north) of a horizontal vector given along the mean course and to port of it, any unit."""
     return ship.cos_yaw * along - ship.sin_yaw * port, ship.sin_yaw * along + ship.cos_yaw * port
 
 
 @compiled
-def truth(ship, t, out):
-    """Fill out, a record of OUTPUTS_DTYPE, with the truth at time t [s]; ship: record of CONSTANTS_DTYPE."""
+def truth(ship: Constants, t: Seconds, out: Truth) -> None:
+    """Fill out with the truth at time t."""
     out.status = MOTION_OK if math.isfinite(t) else MOTION_BAD_TIME
     x = out.freedoms
     if ship.pieces > 0 and out.status == MOTION_OK:
