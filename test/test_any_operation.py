@@ -56,7 +56,7 @@ class Operated(RuleBasedStateMachine):
         count = round(seconds * 1e9 / self.loop.period_ns)
         for unit in self.loop.units.values():
             unit.execute_due(self.k * self.loop.period_ns)
-        steps, truth = records.empty(closed_loop.STEP_DTYPE, count), np.zeros(count, closed_loop.TRUTH_DTYPE)
+        steps, truth = records.empty(closed_loop.STEP_DTYPE, count), np.zeros(count, closed_loop.Truth.dtype)
         memories = tuple(self.loop.units[name].block(count) if name in self.loop.units else None
                          for name in closed_loop.UNIT_ORDER)
         closed_loop.loop(memories, self.k, self.loop.period_ns, self.before, np.zeros((count, 2)), steps, truth)

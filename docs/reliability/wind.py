@@ -47,7 +47,7 @@ def watched(t, enabled, rates):
 def run(loop):
     """(alarm raised, drive tripped, largest rate [rad/s]) of a run."""
     acu, adu = loop.units['acu'], loop.units['adu']
-    steps, truth = records.empty(closed_loop.STEP_DTYPE, loop.steps), np.zeros(loop.steps, closed_loop.TRUTH_DTYPE)
+    steps, truth = records.empty(closed_loop.STEP_DTYPE, loop.steps), np.zeros(loop.steps, closed_loop.Truth.dtype)
     before, injected = records.empty(closed_loop.STEP_DTYPE, 1), np.zeros((loop.steps, 2))
     quarter = round(0.25 * CYCLE * 1e9 / loop.period_ns)
     alarmed = tripped = False

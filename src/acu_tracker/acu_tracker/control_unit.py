@@ -5,7 +5,7 @@ the order of a step. Each part of the state is written by its own module; this m
 `step`, and between two steps `request`, `refusals` and `reset`.
 
 One-letter names in all functions:
-s, c, u, o   records of STATE_DTYPE, CONSTANTS_DTYPE, signals.INPUTS_DTYPE and OUTPUTS_DTYPE
+s, c, u, o   records of State, Constants, signals.Inputs.dtype and Outputs
 g, k, m      parts of s: guidance, tracking, mode
 t            s.stamp [s], also called t_k
 
@@ -21,6 +21,7 @@ lock, slope, track   of modes.Conditions: autotrack can begin, has not diverged,
 unasked      state of uncommanded_motion
 """
 import math
+from typing import Annotated
 
 import numpy as np
 
@@ -39,32 +40,43 @@ from acu_tracker.servo import axes, ends, floor, frozen, notch, position_loop, u
 from acu_tracker.servo.position_loop import Instants
 from pedestal_common.compiled import compiled, separate
 from pedestal_common.geometry import blockage
-from pedestal_common.parameters import record, record_type
+from pedestal_common.parameters import record
+from pedestal_common.quantities import BothAxes, Floats
+from pedestal_common.record import Record
 
-STATE_DTYPE = np.dtype([
-    ('stamp', 'f8'), ('mode', mode_change.MODE_DTYPE), ('resumption', resumption.RESUMPTION_DTYPE),
-    ('stow', stow.STOW_DTYPE),
-    ('tracking', tracking.TRACKING_DTYPE), ('outage', outage.OUTAGE_DTYPE), ('guidance', guidance.GUIDANCE_DTYPE),
-    ('axis', position_loop.AXIS_LOOP_DTYPE, (2,)), ('unasked', uncommanded_motion.ENVELOPE_DTYPE),
-    ('frozen', frozen.FROZEN_DTYPE),
-    ('supervision', conditions.SUPERVISION_DTYPE),
-], align=True)
 
-AXIS_CONSTANTS_DTYPE = np.dtype([('p', record_type(AxisParameters)), ('notch', 'f8', (5,)), ('reaction', 'f8'),
-                                 ('braking', 'f8')], align=True)
-CONSTANTS_DTYPE = np.dtype([('p', record_type(SharedParameters)), ('axis', AXIS_CONSTANTS_DTYPE, (2,)), ('lead', 'f8'),
-                            ('tracker', tracker.CONSTANTS_DTYPE), ('lookahead', planner.CONSTANTS_DTYPE),
-                            ('floor', floor.FLOOR_DTYPE)],
-                           align=True)
-"""Constants of the control unit, and of each axis.
+class State(Record):
+    """Record."""
+    stamp: float
+    mode: mode_change.ModeState
+    resumption: resumption.Resumption
+    stow: stow.Stow
+    tracking: tracking.Tracking
+    outage: outage.OutageRecord
+    guidance: guidance.Guidance
+    axis: BothAxes[position_loop.AxisLoop]
+    unasked: uncommanded_motion.Envelope
+    frozen: frozen.Frozen
+    supervision: conditions.Supervision
 
-p          parameters: SharedParameters, or AxisParameters of an axis
-notch      coefficients of the notch filter of an axis
-reaction   reaction time of an axis in front of a limit [s]; see AcuParameters.reaction
-braking    deceleration of an axis in front of a limit [rad/s2]
-lead       t_m - t_k [s]; t_m: middle of the interval in which the command of the step at t_k is in force
-tracker, lookahead, floor  constants of these modules
-"""
+
+class AxisConstants(Record):
+    """Record."""
+    p: AxisParameters
+    notch: Annotated[Floats, (5,)]
+    reaction: float
+    braking: float
+
+
+class Constants(Record):
+    """Constants of the control unit, and of each axis."""
+    p: SharedParameters  # parameters: SharedParameters, or AxisParameters of an axis
+    axis: BothAxes[AxisConstants]
+    lead: float  # t_m - t_k [s]; t_m: middle of the interval in which the command of the step at t_k is in force
+    tracker: tracker.Constants  # tracker, lookahead, floor: constants of these modules
+    lookahead: planner.Constants
+    floor: floor.Floor
+    # notch: coefficients of the notch filter of an axis; reaction: reaction time of an axis in front of a limit [s]; see AcuParameters.reaction; braking: deceleration of an axis in front of a limit [rad/s2]
 
 
 def axis_constants(params, period, reaction) -> np.ndarray:
@@ -72,7 +84,7 @@ def axis_constants(params, period, reaction) -> np.ndarray:
 
     params: AxisParameters; period: of the steps [s]; reaction: AcuParameters.reaction [s].
     """
-    c, n = np.zeros(1, AXIS_CONSTANTS_DTYPE), params.notch
+    c, n = AxisConstants.zeros(), params.notch
     c['p'] = record(params, AxisParameters)
     c['notch'] = notch.coefficients(n.frequency, n.width, n.depth, period)
     c['reaction'], c['braking'] = reaction, params.limits.deceleration
@@ -81,7 +93,7 @@ def axis_constants(params, period, reaction) -> np.ndarray:
 
 def constants(params) -> np.ndarray:
     """Return the constants (1,) of AcuParameters."""
-    c, axes = np.zeros(1, CONSTANTS_DTYPE), (params.azimuth, params.elevation)
+    c, axes = Constants.zeros(), (params.azimuth, params.elevation)
     c['p'] = record(params, SharedParameters)
     c['lead'] = params.command_delay + 0.5 * params.period
     c['axis'] = np.concatenate([axis_constants(position_loop.slowed(axis, params.command_delay), params.period,
@@ -97,7 +109,7 @@ def initial_state(params) -> np.ndarray:
 
     The mode is standby, and the initial mode is pending.
     """
-    s = np.zeros(1, STATE_DTYPE)
+    s = State.zeros()
     s['stamp'] = -math.inf
     mode_change.initialise(s['mode'], params)
     guidance.initialise(s['guidance'], (params.azimuth.preset, params.elevation.preset))

@@ -3,7 +3,7 @@
 Valid inputs go into the state of the control unit. For invalid inputs the functions return flags, which are bits of
 signals.INVALID_INPUTS.
 
-u, o: records of signals.INPUTS_DTYPE and of signals.OUTPUTS_DTYPE.
+u, o: records of signals.Inputs.dtype and of signals.Outputs.
 """
 import math
 
@@ -22,7 +22,7 @@ UNKNOWN_POINTING = encoders.Pointing(math.nan, math.nan, math.nan, math.nan)
 def take_encoders(s, u):
     """Take the encoder angles of this step. Return signals.Flag.ENCODER if they are invalid, else 0.
 
-    s: record of encoders.ENCODERS_DTYPE.
+    s: record of encoders.Encoders.dtype.
     """
     return 0 if u.encoder_valid and encoders.take(s, u.stamp, u.position, u.velocity) else signals.Flag.ENCODER
 
@@ -31,7 +31,7 @@ def take_encoders(s, u):
 def take_attitude(s, p, u):
     """Take the attitude of this step, and the statistics of its error that the INS publishes.
 
-    Return (flags of invalid values, True if the attitude is a new one). s: record of attitude.ATTITUDE_DTYPE; p:
+    Return (flags of invalid values, True if the attitude is a new one). s: record of attitude.DeckAttitude.dtype; p:
     record of SharedParameters.
     """
     if not u.stabilised:
@@ -119,7 +119,7 @@ def write_innovation(o, outcome, innovation):
 def take_preset(s, u):
     """Take a new preset, if one has come. Return signals.Flag.PRESET if it is not finite, else 0.
 
-    s: record of direction.DIRECTION_DTYPE.
+    s: record of direction.Direction.
     """
     if not u.preset_valid:
         return 0

@@ -3,15 +3,27 @@
 `unit` converts messages to the inputs, and the outputs to messages. Pairs of numbers are (azimuth, elevation).
 """
 import math
-
-import numpy as np
+from typing import Annotated
 
 from acu_tracker.estimation.filters.motion_models import COLUMN_NAMES
 from pedestal_common.codes import bits
 from pedestal_common.compiled import compiled
 from pedestal_common.graph import nodes, topics
 from pedestal_common.graph.modes import MODE_ROWS
-from pedestal_common.wire import inputs
+from pedestal_common.quantities import (
+    Bit,
+    DecibelHertz,
+    Floats,
+    Ints,
+    Meters,
+    Pair,
+    Quaternion,
+    Radians,
+    RadiansPerSecond,
+    Seconds,
+    Vector3,
+)
+from pedestal_common.record import Record
 
 INVALID_INPUTS = ('stamp', 'encoder', 'error', 'error_stamp', 'error_gated', 'attitude', 'program', 'preset',
                   'step_gap', 'error_noisy', 'attitude_error')
@@ -42,41 +54,72 @@ that has published no state has the code topics.NO_TEXT_CODE and counts as ready
 
 INPUT_TOPICS = nodes.row('acu').reads  # topics that the control unit reads
 
-INPUTS_DTYPE = np.dtype([
-    *inputs.fields(INPUT_TOPICS),                       # numbers of the topics, see topics.TOPICS
-    ('stamp', 'f8'), ('encoder_valid', 'i8'),           # t_k, the stamp of the step [s]; 1: angles have come
-    ('error_valid', 'i8'),                              # 1: the receiver is locked and has published an error
-    ('stabilised', 'i8'), ('attitude_valid', 'i8'),     # 1: the pedestal stands on a ship; 1: an attitude has come
-    ('aligning', 'i8'), ('drive_ready', 'i8'),          # 1: the INS is still aligning; 1: the drive follows commands
-    ('unpredicted', 'i8', (sum(row.table for row in MODE_ROWS),)),    # for each mode that follows a
-                                                        # table: Reason.NONE, or why there is no table
-    ('gap', 'i8'), ('turnaround', 'i8'),                # 1: rows of the program are missing at t_k; 1: the last
-                                                        # segment was refused, its turnaround is too fast
-    ('preset', 'f8', (2,)), ('preset_valid', 'i8'),     # new preset, deck angles [rad]; 1: it came before this step
-], align=True)
-"""Inputs of a step."""
 
-OUTPUTS_DTYPE = np.dtype([
-    ('mode', 'i8'), ('reason', 'i8'),                   # codes of modes.MODES and modes.REASONS
-    ('rate', 'f8', (2,)), ('torque', 'f8', (2,)),       # rate command [rad/s], feed-forward torque [Nm]
-    ('estimate', 'f8', (2, 3)),                         # of the target at t_k: earth angle, rate, acceleration;
-                                                        # NaN: no estimate
-    ('reference', 'f8', (2, 3)),                        # encoder angle, rate, acceleration at t_k; for a beam: the
-                                                        # command at t_m, the middle of its interval
-    ('covariance', 'f8', (2, 3)),                       # of the estimate: variance of the angle, covariance, variance
-                                                        # of the rate
-    ('probability', 'f8', (2, len(COLUMN_NAMES))),      # of the motion models COLUMN_NAMES
-    ('innovation', 'f8', (2,)), ('rate_innovation', 'f8', (2,)),    # of the angle and of the rate; NaN: no error
-    ('innovation_sigma', 'f8', (2,)),                   # predicted 1-sigma of the innovation of the angle [rad]
-    ('nis', 'f8', (2,)), ('gated', 'i8'),               # normalised innovation squared; number of gated errors so far
-    ('rates_gated', 'i8'), ('ranges_gated', 'i8'),      # numbers of gated rates and ranges so far
-    ('coasting', 'i8'), ('locked', 'i8'), ('blocked', 'i8'), ('invalid_input', 'i8'),   # flags; bits of Flag
-    ('time_to_limit', 'f8', (2,)),                      # time to the next limit at the present rates [s]; inf: never
-    ('alarms', 'i8'),                                   # number of changes of the list of alarms
-    ('pins', 'i8'), ('pins_wrong', 'i8'),               # code of acu/stow_pins; bits of the axes whose pin failed
-    ('angle_limited', 'i8', (2,)), ('rate_limited', 'i8', (2,)), ('acceleration_limited', 'i8', (2,)),
-], align=True)
-"""Outputs of a step."""
+class Inputs(Record):
+    """Inputs of a step: the numbers of INPUT_TOPICS (inputs.fields, topics.TOPICS), and what the unit adds."""
+    position: Pair
+    velocity: Pair
+    torque: Pair
+    error_came: Bit
+    error_stamp: Seconds
+    cross_elevation: Radians
+    elevation: Radians
+    cn0_dbhz: DecibelHertz
+    error_rate: Pair
+    error_rate_sigma: RadiansPerSecond
+    range: Meters
+    range_variance: float       # [m2]
+    attitude_stamp: Seconds
+    quaternion: Quaternion
+    deck_rate: Vector3
+    attitude_error_came: Bit
+    attitude_noise: Vector3
+    attitude_walk: Vector3
+    drive: int                  # code of adu/state
+    pins: int                   # code of adu/stow_pins
+    stamp: Seconds              # t_k of the step
+    encoder_valid: Bit         # 1: angles have come
+    error_valid: Bit           # 1: the receiver is locked and has published an error
+    stabilised: Bit            # 1: the pedestal stands on a ship
+    attitude_valid: Bit        # 1: an attitude has come
+    aligning: Bit              # 1: the INS is still aligning
+    drive_ready: Bit           # 1: the drive follows commands
+    # for each mode that follows a table: Reason.NONE, or why there is no table
+    unpredicted: Annotated[Ints, (sum(row.table for row in MODE_ROWS),)]
+    gap: Bit                   # 1: rows of the program are missing at t_k
+    turnaround: Bit            # 1: the last segment was refused, its turnaround is too fast
+    preset: Pair                # new preset, deck angles [rad]
+    preset_valid: Bit          # 1: it came before this step
+
+
+class Outputs(Record):
+    """Outputs of a step."""
+    mode: int
+    reason: int  # codes of modes.MODES and modes.REASONS
+    rate: Pair
+    torque: Pair  # rate command [rad/s], feed-forward torque [Nm]
+    estimate: Annotated[Floats, (2, 3)]  # of the target at t_k: earth angle, rate, acceleration;
+    reference: Annotated[Floats, (2, 3)]  # encoder angle, rate, acceleration at t_k; for a beam: the
+    covariance: Annotated[Floats, (2, 3)]  # of the estimate: variance of the angle, covariance, variance
+    probability: Annotated[Floats, (2, len(COLUMN_NAMES))]  # of the motion models COLUMN_NAMES
+    innovation: Pair
+    rate_innovation: Pair  # of the angle and of the rate; NaN: no error
+    innovation_sigma: Pair  # predicted 1-sigma of the innovation of the angle [rad]
+    nis: Pair
+    gated: int  # normalised innovation squared; number of gated errors so far
+    rates_gated: int
+    ranges_gated: int  # numbers of gated rates and ranges so far
+    coasting: int
+    locked: int
+    blocked: int
+    invalid_input: int  # flags; bits of Flag
+    time_to_limit: Pair  # time to the next limit at the present rates [s]; inf: never
+    alarms: int  # number of changes of the list of alarms
+    pins: int
+    pins_wrong: int  # code of acu/stow_pins; bits of the axes whose pin failed
+    angle_limited: Annotated[Ints, (2,)]
+    rate_limited: Annotated[Ints, (2,)]
+    acceleration_limited: Annotated[Ints, (2,)]
 
 
 @compiled

@@ -3,14 +3,12 @@
 `control_unit` and `guidance` call this module. The functions take each error of the receiver, and return the estimate
 of the target and the conditions for autotrack.
 
-k     record of TRACKING_DTYPE
-c     record of control_unit.CONSTANTS_DTYPE
-u, o  records of signals.INPUTS_DTYPE and of signals.OUTPUTS_DTYPE
+k     record of Tracking
+c     record of control_unit.Constants
+u, o  records of signals.Inputs.dtype and of signals.Outputs
 gap   outage.Outage: the time without a signal of the receiver
 """
 import math
-
-import numpy as np
 
 from acu_tracker import measurements
 from acu_tracker.estimation import divergence, repetition, slope_sign, target, tracker
@@ -22,25 +20,24 @@ from acu_tracker.pointing import model
 from acu_tracker.search import coast, place
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry import line_of_sight as pointing
+from pedestal_common.quantities import Pair
+from pedestal_common.record import Record
 
-TRACKING_DTYPE = np.dtype([
-    ('encoders', encoders.ENCODERS_DTYPE), ('pointing', model.POINTING_DTYPE), ('attitude', attitude.ATTITUDE_DTYPE),
-    ('target', target.TARGET_DTYPE),
-    ('error', 'f8', (2,)),
-    ('repetition', repetition.REPETITION_DTYPE), ('divergence', divergence.DIVERGENCE_DTYPE),
-    ('slope_sign', slope_sign.SLOPE_SIGN_DTYPE)], align=True)
-"""State of the tracking.
 
-encoders, attitude  histories of the encoder angles and of the deck
-pointing            pointing model in force, between encoder angles and directions
-target              target filter
-error               receiver error of this step, in deck angles (azimuth, elevation) [rad]; NaN: no error
-repetition, divergence, slope_sign  monitors of the errors
-"""
+class Tracking(Record):
+    """State of the tracking."""
+    encoders: encoders.Encoders  # encoders, attitude: histories of the encoder angles and of the deck
+    pointing: model.PointingRecord  # pointing model in force, between encoder angles and directions
+    attitude: attitude.DeckAttitude
+    target: target.Target  # target filter
+    error: Pair  # receiver error of this step, in deck angles (azimuth, elevation) [rad]; NaN: no error
+    repetition: repetition.Repetition  # repetition, divergence, slope_sign: monitors of the errors
+    divergence: divergence.Divergence
+    slope_sign: slope_sign.SlopeSign
 
 
 def initialise(k, pointing):
-    """Begin without an estimate; k: view of TRACKING_DTYPE; pointing: PointingParameters."""
+    """Begin without an estimate; k: view of Tracking; pointing: PointingParameters."""
     target.initialise(k['target'])
     model.initialise(k['pointing'][0], pointing.terms, pointing.named)
 

@@ -29,6 +29,7 @@ from pedestal_common.compiled import compiled
 from pedestal_common.geometry import pointing_model
 from pedestal_common.graph import nodes, topics
 from pedestal_common.node.unit import NEVER_DUE_NS, Unit, joined
+from pedestal_common.record import Record
 from pedestal_common.wire import messages
 from pedestal_common.wire.commands import Reply, schedule
 from pedestal_common.wire.inputs import taking
@@ -49,13 +50,16 @@ INS_ALIGNING = topics.TOPIC_BY_NAME[INS_STATE_TOPIC].texts.index('aligning')
 """Code of the state `aligning`; an INS that has published no state, topics.NO_TEXT_CODE, counts as aligned."""
 
 
-RECORD_DTYPE = np.dtype([('state', control_unit.STATE_DTYPE), ('constants', control_unit.CONSTANTS_DTYPE),
-                         ('inputs', signals.INPUTS_DTYPE), ('outputs', signals.OUTPUTS_DTYPE), ('invalid', 'i8')],
-                        align=True)
-"""Memory of the control unit: state, constants, inputs and outputs of the law.
+class UnitRecord(Record):
+    """Memory of the control unit: state, constants, inputs and outputs of the law.
 
-invalid: bits of signals.INVALID_INPUTS that were set since the last diagnosis.
-"""
+    invalid: bits of signals.INVALID_INPUTS that were set since the last diagnosis.
+    """
+    state: control_unit.State
+    constants: control_unit.Constants
+    inputs: signals.Inputs
+    outputs: signals.Outputs
+    invalid: int
 
 
 SILENCE_REFUSAL = f'no {JOINT_STATES_TOPIC}, the drive is silent'
@@ -72,7 +76,7 @@ MOTOR_LOST_ALARMS = tuple(table.ALARM_INDEX[f'{axis} motor lost'] for axis in to
 
 
 class Memory(typing.NamedTuple):
-    """Memory of the law: a record (1,) of RECORD_DTYPE, and the tables that the modes follow."""
+    """Memory of the law: a record (1,) of Record, and the tables that the modes follow."""
     record: np.ndarray
     tables: tables.Tables
 
@@ -84,7 +88,7 @@ _take = taking(signals.INPUT_TOPICS)
 def decode(u, stamp, inputs):
     """Convert the messages of a step into the inputs of the control unit.
 
-    u: record of signals.INPUTS_DTYPE; stamp: of the step [ns]; inputs: record of the input topics. An attitude stays
+    u: record of signals.Inputs.dtype; stamp: of the step [ns]; inputs: record of the input topics. An attitude stays
     until the next one comes. A rate or a range is used only if an error has the same stamp.
     """
     _take(u, inputs)
@@ -104,7 +108,7 @@ def decode(u, stamp, inputs):
 def encode(o, s, stamp, outputs):
     """Convert the outputs of the control unit and the counts of its reports into the records of its messages.
 
-    o, s: records of signals.OUTPUTS_DTYPE and of control_unit.STATE_DTYPE; stamp: of the step [ns]; outputs: record of
+    o, s: records of signals.Outputs and of control_unit.State; stamp: of the step [ns]; outputs: record of
     the output topics.
     """
     command, estimate, reference = outputs[RATE_COMMAND_TOPIC], outputs[ESTIMATE_TOPIC], outputs[REFERENCE_TOPIC]
@@ -150,18 +154,18 @@ def laws(memory, stamps, inputs, outputs):
 
 @compiled
 def _encoder_angles(m, azimuth, elevation):
-    """Return the encoder angles [rad] of a direction; m: record of pointing_model.MODEL_DTYPE."""
+    """Return the encoder angles [rad] of a direction; m: record of pointing_model.PointingModel.dtype."""
     A, E, _ = pointing_model.encoder_of(m, azimuth, elevation)
     return A, E
 
 
 @functools.lru_cache(1)
 def _initial(parameters):
-    """Return the RECORD_DTYPE (1,) of a control unit before its first step; parameters: AcuParameters.
+    """Return the Record (1,) of a control unit before its first step; parameters: AcuParameters.
 
     The cache saves time in successive trials with equal parameters.
     """
-    return joined(RECORD_DTYPE, state=control_unit.initial_state(parameters),
+    return joined(UnitRecord.dtype, state=control_unit.initial_state(parameters),
                   constants=control_unit.constants(parameters))
 
 
@@ -344,7 +348,7 @@ class Acu(Unit):
     def bend(self, slave):
         """Add the refraction to a direction of the mode slave, from now on and again every BEND_INTERVAL_S.
 
-        slave: the commanded direction, direction.DIRECTION_DTYPE; None: there is no direction.
+        slave: the commanded direction, direction.Direction; None: there is no direction.
         """
         self._slave, self._bend_due = slave, NEVER_DUE_NS
         if (slave is not None and math.isfinite(slave['stamp']) and self.air.on

@@ -53,7 +53,7 @@ class Rig:
         self.params, self.target, self.attitude = params, target, attitude or self.level
         self.delay, self.latency = delay, error_latency
         self.constants, self.state = control_unit.constants(params), control_unit.initial_state(params)
-        self.inputs, self.outputs = np.zeros(1, signals.INPUTS_DTYPE), np.zeros(1, signals.OUTPUTS_DTYPE)
+        self.inputs, self.outputs = signals.Inputs.zeros(), signals.Outputs.zeros()
         self.track = NO_TRACK
         self.angle, self.velocity = np.array(at, float), np.zeros(2)
         self.commands, self.passed, self.k = [(0.0, 0.0)] * (round(delay / self.T) + 1), [], 0

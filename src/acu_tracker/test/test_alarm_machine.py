@@ -1,7 +1,6 @@
 """The states of an alarm: every cell of (state, event), and the records of all alarms under any story."""
 import itertools
 
-import numpy as np
 import pytest
 from hypothesis import settings
 from hypothesis import strategies as st
@@ -50,7 +49,7 @@ class List:
     """The records of all alarms, stepped from Python."""
 
     def __init__(self):
-        self.record = np.zeros(1, annunciator.ALARM_LIST_DTYPE)
+        self.record = annunciator.AlarmList.zeros()
         annunciator.initialise(self.s)
         self.t = 0.0
         self.step()

@@ -18,7 +18,7 @@ T = 0.005
 
 
 def detector():
-    d = np.zeros(1, detectors.AXIS_DETECTORS_DTYPE)
+    d = detectors.AxisDetectors.zeros()
     return d[0]
 
 

@@ -17,7 +17,7 @@ PARAMETERS = record(AttitudeModelParameters(tilt_noise=1e-3, heading_noise=2e-3,
 
 @pytest.fixture
 def error():
-    return np.zeros(1, attitude_error.ATTITUDE_ERROR_DTYPE)[0]
+    return attitude_error.AttitudeError.zeros()[0]
 
 
 def expected(error):

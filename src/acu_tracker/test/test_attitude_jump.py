@@ -26,7 +26,7 @@ class Deck:
     """A rolling deck, told with a rotation in the earth's frame before it; `error`: of what is believed [rad]."""
 
     def __init__(self):
-        self.s, self.k = np.zeros(1, attitude.ATTITUDE_DTYPE)[0], 0
+        self.s, self.k = np.zeros(1, attitude.DeckAttitude.dtype)[0], 0
         self.s['stabilised'] = 1
 
     def take(self, turned=STILL, aligning=0, told=None):

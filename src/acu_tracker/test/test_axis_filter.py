@@ -25,7 +25,7 @@ PARAMS = {'cv.noise': 0.02, 'ca.noise': 0.03, 'singer.sigma': 0.05, 'singer.alph
 def run(t, y, rate=None, initial_rate=0.1, bandwidth=0.0, **params):
     """Estimates of the filter over angles y of SIGMA and rates of RATE_SIGMA where given; bandwidth [Hz] of the noise
     of the angles that it expects, 0: white."""
-    out, ones = np.zeros(len(t), axis_filter.ESTIMATE_DTYPE), np.ones(len(t))
+    out, ones = np.zeros(len(t), axis_filter.Estimate.dtype), np.ones(len(t))
     params = build(FilterParameters, {'rate_measurement': rate is not None, **params})
     axis_filter.estimates(axis_filter.constants(params, bandwidth), t, y, SIGMA**2 * ones,
                           math.nan * ones if rate is None else rate, RATE_SIGMA**2 * ones, initial_rate, out)
@@ -180,7 +180,7 @@ def test_steady_state_solves_the_riccati_equation(kind, with_rate):
 @pytest.mark.parametrize('kind', SOURCES)
 def test_an_angle_that_walks_solves_the_riccati_equation_with_that_noise(kind):
     c = axis_filter.constants(build(FilterParameters, {'kind': kind, **PARAMS}))[0]
-    f, walk = np.zeros(1, axis_filter.FILTER_DTYPE)[0], 3.0 * SIGMA**2
+    f, walk = axis_filter.Filter.zeros()[0], 3.0 * SIGMA**2
     axis_filter.start(f, c, 0.0, SIGMA**2, 0.1)
     f['drift_variance_rate'] = walk
     for _ in range(3000):
@@ -270,7 +270,7 @@ def test_what_is_missing_or_does_not_advance_is_not_taken(kind):
 
 def test_innovation_of_angle_and_rate_is_that_of_both_at_once():
     c = axis_filter.constants(FilterParameters(kind='ca'))[0]
-    f, rng = np.zeros(1, axis_filter.FILTER_DTYPE)[0], np.random.default_rng(1)
+    f, rng = axis_filter.Filter.zeros()[0], np.random.default_rng(1)
     for _ in range(20):
         root = rng.normal(size=(3, 3))
         P = root @ root.T
@@ -327,7 +327,7 @@ def test_quadratic_motion_is_followed_without_bias():
 def test_outlook_coasts_as_the_model_moves(kind, alpha):
     """The acceleration of singer fades, that of current_statistical has itself for its mean and stays."""
     c = axis_filter.constants(build(FilterParameters, {'kind': kind, f'{kind}.alpha': 0.5}))[0]
-    f = np.zeros(1, axis_filter.FILTER_DTYPE)[0]
+    f = axis_filter.Filter.zeros()[0]
     f['count'], f['mu'][0], f['x'][0] = 1, 1.0, (0.1, 0.2, 0.3)
     t = np.linspace(0, 3, 30001)
     a = 0.3 * np.exp(-alpha * t)
@@ -342,7 +342,7 @@ def test_outlook_and_variance_of_a_bank_are_those_of_a_draw_from_it():
     dwell, ahead = 1.5, 0.7
     c = axis_filter.constants(build(FilterParameters, {'kind': 'imm', 'imm.models': 'cv ca', 'imm.rungs': 1,
                                              'imm.cv.noise': 1e-2, 'imm.ca.noise': 3e-2, 'imm.dwell': dwell}))[0]
-    f, rng = np.zeros(1, axis_filter.FILTER_DTYPE)[0], np.random.default_rng(9)
+    f, rng = axis_filter.Filter.zeros()[0], np.random.default_rng(9)
     f['count'], f['mu'][:2] = 2, (0.3, 0.7)
     f['x'][:2] = (1.0, 0.2, 0.0), (1.002, 0.21, 0.03)
     f['p'][:2] = (1e-6, 1e-7, 0, 1e-4, 0, 0), (4e-6, 1e-6, 0, 2e-4, 1e-5, 1e-4)
@@ -366,7 +366,7 @@ def test_outlook_and_variance_of_a_bank_are_those_of_a_draw_from_it():
 @pytest.mark.parametrize('kind', FILTER_KINDS)
 def test_outlook_now_is_the_estimate_even_if_a_model_is_ruled_out(kind):
     c = axis_filter.constants(build(FilterParameters, {'kind': kind}))[0]
-    f = np.zeros(1, axis_filter.FILTER_DTYPE)[0]
+    f = axis_filter.Filter.zeros()[0]
     axis_filter.start(f, c, 0.1, SIGMA**2, 0.1)
     f['mu'] = 0.0
     f['mu'][0] = 1.0

@@ -108,7 +108,7 @@ def test_a_slope_that_is_reversed_still_diverges_after_a_turn(BeamRig):
 
 @pytest.fixture
 def turn():
-    state = np.zeros(1, azimuth_turn.TURN_DTYPE)[0]
+    state = azimuth_turn.Turn.zeros()[0]
     azimuth_turn.initialise(state)
     return state
 

@@ -263,7 +263,7 @@ def test_the_lever_arm_moves_a_near_target(Rig, ranged):
 
 def test_the_levelled_deck_is_the_mean_of_its_attitudes():
     """Roll and pitch average out, the heading stays; the spread is the mean square of the tilt."""
-    h = np.zeros(1, levelled_deck.LEVELLED_DECK_DTYPE)
+    h = levelled_deck.LevelledDeck.zeros()
     levelled_deck.initialise(h)
     times = 0.05 * np.arange(2400)
     tilts = []

@@ -75,7 +75,7 @@ def test_turned_is_the_rotation_by_a_vector():
 
 def test_every_instant_has_its_own_attitude():
     """Between two samples and ahead of them against scipy; NaN where nothing is known; ashore always the same."""
-    p, s = record(AcuParameters(), SharedParameters)[0], np.zeros(1, attitudes.ATTITUDE_DTYPE)
+    p, s = record(AcuParameters(), SharedParameters)[0], attitudes.DeckAttitude.zeros()
     s['stabilised'] = 1
     known, deck = attitudes.at(s[0], p, 0.0)
     assert not known and np.isnan(np.array(deck.mat)).all()
@@ -126,7 +126,7 @@ def test_the_end_of_a_lever_arm_sees_the_target_from_there(t):
         return u, (u - arm) / np.linalg.norm(u - arm)
     h = 1e-3
     (u0, n0), (u1, n1), (u2, n2) = (direction_at(t + d) for d in (-h, 0.0, h))
-    state = np.zeros(1, lever_arm.LEVER_ARM_DTYPE)
+    state = lever_arm.LeverArm.zeros()
     state['arm'] = arm
     sight = LineOfSight(Vector(*u1), Vector(*(u2 - u0) / (2 * h)), Vector(*(u2 - 2 * u1 + u0) / h**2))
     got = lever_arm.to_antenna(state[0], sight)

@@ -16,7 +16,7 @@ def innovation(chi_square):
 
 @pytest.fixture
 def state():
-    record = np.zeros(1, divergence.DIVERGENCE_DTYPE)[0]
+    record = divergence.Divergence.zeros()[0]
     divergence.restart(record)
     return record
 

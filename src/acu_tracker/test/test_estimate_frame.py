@@ -19,7 +19,7 @@ from acu_tracker.program.program_track import ProgramTrack
 def laid():
     """A frame on the way of a target near the zenith, and the LineOfSight of that target."""
     sight = line_of_sight(Motion(AxisMotion(0.4, 0.05, 0.0), AxisMotion(1.35, 0.01, 0.0)))
-    frame = np.zeros(1, estimate_frame.FRAME_DTYPE)
+    frame = estimate_frame.Frame.zeros()
     estimate_frame.lay(frame[0], sight.u, sight.du)
     return frame[0], sight
 
@@ -43,7 +43,7 @@ def test_there_and_back():
     motion = Motion(AxisMotion(0.3, 0.02, 0.001), AxisMotion(-0.2, 0.01, -0.002))
     np.testing.assert_allclose(estimate_frame.to_frame(frame, estimate_frame.to_earth(frame, motion)), motion,
                                atol=1e-15)
-    still = np.zeros(1, estimate_frame.FRAME_DTYPE)
+    still = estimate_frame.Frame.zeros()
     for e, n, u in ((0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.1, 0.2, 0.974)):
         estimate_frame.lay(still[0], Vector(e, n, u), ZERO_VECTOR)
         np.testing.assert_allclose(still['mat'][0] @ still['mat'][0].T, np.eye(3), atol=2e-3)
@@ -67,7 +67,7 @@ def test_variances_turn_with_the_frame():
 def test_a_filter_turns_with_its_frame():
     """The direction, its rate, and the variances in earth angles are the same in both frames, but for the part of the
     variances that a turn by 60 deg in the plane of the sky mixes; scipy turns the Cartesian covariance."""
-    before, after = laid()[0], np.zeros(1, estimate_frame.FRAME_DTYPE)[0]
+    before, after = laid()[0], estimate_frame.Frame.zeros()[0]
     motion = Motion(AxisMotion(0.2, 0.01, 0.0), AxisMotion(0.35, -0.02, 0.0))
     sight = estimate_frame.to_earth(before, motion)
     estimate_frame.lay(after, sight.u, sight.du)
@@ -76,7 +76,7 @@ def test_a_filter_turns_with_its_frame():
 
     params = FilterParameters(kind='ca')
     c = target_filter.constants(UkfParameters(), (params, params), 0.0)[0]
-    f = np.zeros(1, target_filter.FILTER_DTYPE)[0]
+    f = target_filter.Filter.zeros()[0]
     axis = [AxisMeasurement(m.angle, variance, math.nan, math.nan) for m, variance in zip(motion, (4e-8, 1e-8))]
     target_filter.start(f, c, Measurement(0.0, tuple(axis), math.nan, math.nan), 0.1)
     for i in range(2):
@@ -105,7 +105,7 @@ def test_the_bridge_is_the_program_turned_to_the_target():
     times = np.arange(0.0, 40.0)
     program = ProgramTrack(times, np.column_stack((0.5 + 0.03 * times, 0.4 + 0.01 * times)))
     estimated = np.array([math.cos(0.515) * math.sin(0.83), math.cos(0.515) * math.cos(0.83), math.sin(0.515)])
-    b = np.zeros(1, bridge.BRIDGE_DTYPE)
+    b = bridge.Bridge.zeros()
     bridge.begin(b[0], program, 10.0, Vector(*estimated))
     assert b['valid'][0] == 1
     was = np.array(program_track.direction(program, 10.0))

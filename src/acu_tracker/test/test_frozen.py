@@ -1,5 +1,4 @@
 """Whether the drive tells what its axes do."""
-import numpy as np
 import pytest
 
 from acu_tracker import signals
@@ -12,7 +11,7 @@ class Watch:
     """The law on a drive that tells what it is given, commanded at a rate on the azimuth."""
 
     def __init__(self):
-        self.s, self.u, self.k = np.zeros(1, frozen.FROZEN_DTYPE)[0], np.zeros(1, signals.INPUTS_DTYPE)[0], 0
+        self.s, self.u, self.k = frozen.Frozen.zeros()[0], signals.Inputs.zeros()[0], 0
 
     def step(self, rate, **told):
         self.k += 1

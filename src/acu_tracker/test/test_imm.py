@@ -46,7 +46,7 @@ def test_against_filterpy(with_rate):
     rate = 0.05 * np.cos(np.clip(t - 1.0, 0.0, 1.0) * math.pi)
     y = np.cumsum(rate) * T + SIGMA * rng.standard_normal(len(t))
     y_rate = rate + RATE_SIGMA * rng.standard_normal(len(t)) if with_rate else np.full(len(t), math.nan)
-    out = np.zeros(len(t), axis_filter.ESTIMATE_DTYPE)
+    out = np.zeros(len(t), axis_filter.Estimate.dtype)
     c = axis_filter.constants(build(FilterParameters, {'kind': 'imm', 'rate_measurement': True, **MODELS}))
     axis_filter.estimates(c, t, y, np.full(len(t), SIGMA**2), y_rate, np.full(len(t), RATE_SIGMA**2), 0.1, out)
     oracle = filterpys(y[0], with_rate)
@@ -78,7 +78,7 @@ def test_a_far_measurement_keeps_its_evidence(distance):
     The oracle is a ratio of densities: log mu_i - log mu_j = log(cbar_i / cbar_j) + (nu_j^2/S_j - nu_i^2/S_i)/2 + ...
     """
     c = axis_filter.constants(build(FilterParameters, {'kind': 'imm', **MODELS}))[0]
-    f = np.zeros(1, axis_filter.FILTER_DTYPE)[0]
+    f = axis_filter.Filter.zeros()[0]
     axis_filter.start(f, c, 0.0, SIGMA**2, 0.1)
     for _ in range(300):
         axis_filter.predict(f, c, T)

@@ -33,7 +33,7 @@ class Pass:
         self.rates = np.gradient(self.truth, T, axis=0)
         self.range = np.sqrt(east**2 + north**2 + up**2)
         self.params = TrackerParameters(**params)
-        self.p, self.state = record(self.params)[0], np.zeros(1, tracker.TRACKER_DTYPE)
+        self.p, self.state = record(self.params)[0], tracker.Tracker.zeros()
         self.noise = np.random.default_rng(seed).normal(size=(len(t), 3))
         self.t, self.k, self.estimates = t, 0, np.full((len(t), 6), math.nan)
         self.put(kinds)

@@ -39,8 +39,8 @@ def planned(E0, turn=0.0, low=-LIMIT, high=LIMIT, rate=RATE, start=0.0, above=0.
     path = Path(np.zeros((ROWS, 6)), start, H)
     path.rows[:, :3] = target(start + H * np.arange(ROWS), E0)
     complete(path, Travel(0.0, above))
-    limits = np.array([(rate, ACCELERATION, low, high, HIGHEST, HALF_BEAM)], keyhole.SLEW_LIMITS_DTYPE)[0]
-    slews = np.zeros(2, slew.SLEW_DTYPE)
+    limits = np.array([(rate, ACCELERATION, low, high, HIGHEST, HALF_BEAM)], keyhole.SlewLimits.dtype)[0]
+    slews = np.zeros(2, slew.Slew.dtype)
     outcome = keyhole.plan(slews, path, path.rows[0, AZIMUTH_COLUMN] + turn, limits, tilt,
                            slews[0] if previous is None else previous, previous is not None)
     return Planned(outcome, slews[0])

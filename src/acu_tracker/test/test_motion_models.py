@@ -22,7 +22,7 @@ def singer(alpha, T):
 
 
 def model(kind, **values):
-    m = np.zeros(1, motion_models.MOTION_MODEL_DTYPE)
+    m = motion_models.MotionModelRecord.zeros()
     m['kind'] = motion_models.MODEL_NAMES.index(kind)
     for name, value in values.items():
         m[name] = value

@@ -354,7 +354,7 @@ def test_residuals_that_are_none_are_refused(text):
 
 def test_a_reader_follows_the_change_of_a_model():
     """The directions are those of the terms at each time: as the law changes them."""
-    terms, state = terms_of(STATION), np.zeros(1, in_force.POINTING_DTYPE)
+    terms, state = terms_of(STATION), in_force.PointingRecord.zeros()
     in_force.initialise(state[0], terms_of({'p1': 0.1, 'p5': -0.2}), False)
     before = state[0]['model']['terms'].copy()
     duration = in_force.replace(state[0], terms, 5.0)

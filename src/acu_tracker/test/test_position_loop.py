@@ -27,7 +27,7 @@ class Axis:
     def __init__(self, target, lag=0.0, **parameters):
         self.target, self.lag, self.disturbance = target, lag, 0.0
         self.angle, self.velocity, self.k = 0.0, 0.0, 0
-        self.state, self.command, self.values = np.zeros(1, position_loop.AXIS_LOOP_DTYPE), None, {}
+        self.state, self.command, self.values = position_loop.AxisLoop.zeros(), None, {}
         self.put(**parameters)
         position_loop.initialise(self.state[0], self.c['p'], 0.0, 0.0, 0.0)
 

@@ -1,5 +1,4 @@
 """Whether the receiver says the same while the beam moves."""
-import numpy as np
 
 from acu_tracker import signals
 from acu_tracker.estimation import repetition
@@ -7,7 +6,7 @@ from acu_tracker.geometry.encoders import Pointing
 
 
 def test_the_same_numbers_count_once_the_beam_has_moved_and_until_they_change():
-    s, u = np.zeros(1, repetition.REPETITION_DTYPE)[0], np.zeros(1, signals.INPUTS_DTYPE)[0]
+    s, u = repetition.Repetition.zeros()[0], signals.Inputs.zeros()[0]
     u['cross_elevation'], u['elevation'], u['cn0_dbhz'] = 1e-4, -2e-5, 46.0
 
     def said(A, E):

@@ -20,7 +20,7 @@ def take(state, x, e):
 
 @pytest.fixture
 def state():
-    record = np.zeros(1, roughness.ROUGHNESS_DTYPE)[0]
+    record = roughness.Roughness.zeros()[0]
     roughness.restart(record)
     return record
 

@@ -26,7 +26,7 @@ class Antenna:
     def __init__(self, target, slope=1.0, lock=40.0, **parameters):
         self.p = record(AcquisitionParameters(**parameters))[0]
         self.target, self.slope, self.lock = target, slope, lock
-        s = np.zeros(1, acquisition.ACQUISITION_DTYPE)
+        s = acquisition.Acquisition.zeros()
         acquisition.initialise(s)
         self.s, self.z, self.t = s[0], dish(*target) + AXIS, 0.0
         for k in range(450):
@@ -89,7 +89,7 @@ def test_without_a_lock_or_a_signal_it_gives_up():
 
 
 def test_stages_of_a_search():
-    p, s = record(SearchParameters(rounds=2))[0], np.zeros(1, acquisition.ACQUISITION_DTYPE)[0]
+    p, s = record(SearchParameters(rounds=2))[0], acquisition.Acquisition.zeros()[0]
     acquisition.begin_search(s, p, B, 100.0, math.nan)
     small, full = (pattern.duration(acquisition.area(s, p, TAU, B, stage)) for stage in (False, True))
 
@@ -108,6 +108,6 @@ def test_stages_of_a_search():
 
 @pytest.mark.parametrize('sigma, radius', [(math.nan, 1.5), (0.5, 1.5), (1.5, 3.0), (9.0, 5.0)])
 def test_the_small_area_is_two_sigma(sigma, radius):
-    s = np.zeros(1, acquisition.ACQUISITION_DTYPE)[0]
+    s = acquisition.Acquisition.zeros()[0]
     acquisition.begin_search(s, record(SearchParameters())[0], B, 0.0, sigma * B)
     assert s['radius'] == pytest.approx(radius * B)

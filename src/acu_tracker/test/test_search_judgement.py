@@ -15,7 +15,7 @@ def checked(K, moved=0.15, noise=0.01, seed=1, n=200):
     angle = np.linspace(0.0, 2.0 * math.pi * 0.9, n)
     d = moved * B * np.column_stack((np.cos(angle), np.sin(angle)))
     e = d @ np.asarray(K, float).T + [0.3 * B, -0.2 * B] + noise * B * rng.standard_normal((n, 2))
-    s = np.zeros(1, slope_check.SLOPES_DTYPE)[0]
+    s = slope_check.Slopes.zeros()[0]
     slope_check.restart(s)
     for one, error in zip(d, e):
         slope_check.take(s, one, error)

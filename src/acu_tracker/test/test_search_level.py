@@ -15,7 +15,7 @@ P = record(AcquisitionParameters())[0]
 
 @pytest.fixture
 def state():
-    one = np.zeros(1, level.LEVEL_DTYPE)[0]
+    one = level.Level.zeros()[0]
     one['stamp'] = -math.inf
     return one
 

@@ -13,7 +13,7 @@ from pedestal_common.geometry import line_of_sight
 
 @pytest.fixture
 def remembered():
-    s = np.zeros(1, place.PLACE_DTYPE)[0]
+    s = place.Place.zeros()[0]
     u = np.array(line_of_sight.earth_direction(0.7, 0.5))
     du = 0.004 * np.cross(u, [0.0, 0.6, 0.8])
     place.remember(s, 10.0, Vector(*u), Vector(*du))

@@ -15,7 +15,7 @@ ASHORE = turn(*BOW_NORTH)
 
 @pytest.fixture
 def state():
-    record = np.zeros(1, slope_sign.SLOPE_SIGN_DTYPE)[0]
+    record = slope_sign.SlopeSign.zeros()[0]
     slope_sign.restart(record)
     return record
 
@@ -82,7 +82,7 @@ def test_of_the_first_errors_nothing_is_said_and_of_those_off_the_straight_part_
     way = 0.01 * np.exp(0.05 * np.arange(200))
     angles, errors = np.column_stack((np.zeros(200), 0.5 - way)), np.column_stack((np.zeros(200), -way))
     assert first(state, angles, errors) == slope_sign.MIN_ERROR_COUNT - 1
-    u = np.zeros(1, signals.INPUTS_DTYPE)[0]
+    u = signals.Inputs.zeros()[0]
     for x, near in ((0.0, True), (0.4, True), (-0.6, False), (math.nan, False)):
         u['cross_elevation'] = 0.02 * x
         assert slope_sign.near(u, 0.02) == near
@@ -113,7 +113,7 @@ def test_lines_are_least_squares_and_what_a_straight_line_does_is_none_of_it(sta
     k = np.arange(300)
     first(state, np.column_stack((np.zeros(300), np.full(300, 0.5))), np.column_stack((1e-5 * k, -2e-5 * k)))
     assert np.abs(state['J']).max() < 1e-12
-    restarted = np.zeros(1, slope_sign.SLOPE_SIGN_DTYPE)[0]
+    restarted = slope_sign.SlopeSign.zeros()[0]
     slope_sign.restart(restarted)
     e = np.random.default_rng(1).normal(0.0, SIGMA, (100, 2))
     first(restarted, np.zeros((100, 2)), e)

@@ -14,7 +14,7 @@ B, T, TAU = 0.0175, 0.005, 0.1
 def tracked(peak, seconds, noise=0.05, present=lambda t: True, **parameters):
     """(times, offsets of the beam (n, 2), record): the level is a Gaussian beam's about peak(t), late by TAU."""
     p = record(StepTrackParameters(**parameters))[0]
-    s = np.zeros(1, step_track.STEP_TRACK_DTYPE)[0]
+    s = step_track.StepTrack.zeros()[0]
     step_track.start(s, 0.0, 0.0, 0.0)
     rng = np.random.default_rng(3)
     z, out = 46.0 - 12.0 * (np.hypot(*peak(0.0)) / B)**2, []

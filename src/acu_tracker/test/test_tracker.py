@@ -34,7 +34,7 @@ class Target:
 
     def __init__(self, tracker_params=None, **filter_params):
         self.params = TrackerParameters(**(tracker_params or {}))
-        self.p, self.state = record(self.params)[0], np.zeros(1, tracker.TRACKER_DTYPE)
+        self.p, self.state = record(self.params)[0], tracker.Tracker.zeros()
         self.put(**filter_params)
 
     def put(self, **filter_params):
@@ -245,7 +245,7 @@ def test_receiver_law():
 def test_noise_of_the_attitude_moves_a_direction_as_rotations_do(elevation, along):
     """Oracle: scipy turns the direction by 20,000 small rotations about deck axes and the vertical; in the frame it
     moves along the axes of that. The frame is laid horizontally, or along a climb to the north-east."""
-    f = np.zeros(1, estimate_frame.FRAME_DTYPE)[0]
+    f = estimate_frame.Frame.zeros()[0]
     u = Vector(*line_of_sight.earth_direction(0.3, elevation))
     estimate_frame.lay(f, u, ZERO_VECTOR if along is None else Vector(*np.cross(u, along)))
     generator = np.random.default_rng(1)

@@ -44,7 +44,7 @@ def filtered(s, c, y, R, T, out, variances, mu):
 
 def run(y, constants, state=None):
     """(angles, rates, accelerations (n, 6), variances (n, 7), mu (n, 2), state) of measurements (n, 3)."""
-    s = np.zeros(1, unscented.STATE_DTYPE) if state is None else state
+    s = unscented.State.zeros() if state is None else state
     out, variances, mu = np.empty((len(y), 6)), np.empty((len(y), 7)), np.empty((len(y), 2))
     filtered(s, constants, y, R, T, out, variances, mu)
     return out, variances, mu, s[0]
@@ -131,7 +131,7 @@ def test_equals_filterpy(dropped):
     root = np.random.default_rng(2).normal(size=(9, 9)) * np.repeat([0.1, 0.1, 0.2], 3)[:, np.newaxis]
     P = root @ root.T + np.diag(np.repeat([0.01, 0.02, 0.3], 3))
     oracle, c = filterpy_imm(params, x, P), unscented.constants(params)
-    state = np.zeros(1, unscented.STATE_DTYPE)
+    state = unscented.State.zeros()
     state['x'], state['p'], state['mu'] = x, P, (0.4, 0.6)
     for row in y:
         _, _, mu, ours = run(row[np.newaxis], c, state)
@@ -148,7 +148,7 @@ def test_equals_filterpy(dropped):
 
 
 def test_rates_and_accelerations_are_derivatives_of_the_angles():
-    s = np.zeros(1, unscented.STATE_DTYPE)
+    s = unscented.State.zeros()
     s['x'] = [[-30.0, -52.0, 21.0, 14.0, -3.0, 2.0, 0.0, 0.0, 0.0],
               [-30.3, -52.1, 21.1, 14.4, -3.2, 2.1, 1.5, -2.0, 0.7]]
     s['mu'] = 0.3, 0.7
@@ -163,7 +163,7 @@ def test_rates_and_accelerations_are_derivatives_of_the_angles():
 
 def test_variances_are_those_of_many_targets():
     rng = np.random.default_rng(4)
-    s = np.zeros(1, unscented.STATE_DTYPE)
+    s = unscented.State.zeros()
     s['x'] = [-30.0, 50.0, 21.0, 14.0, -3.0, 2.0, 0.0, 0.0, 0.0]
     s['x'][0, 1, 6:] = 1.5, -2.0, 0.7
     s['mu'] = 0.3, 0.7
@@ -186,7 +186,7 @@ def test_variances_are_those_of_many_targets():
 
 
 def test_starts_where_the_angles_were():
-    s, c = np.zeros(1, unscented.STATE_DTYPE), unscented.constants(UkfParameters())
+    s, c = unscented.State.zeros(), unscented.constants(UkfParameters())
     before = Motion(AxisMotion(2.0, 0.11, -0.03), AxisMotion(0.7, -0.05, 0.02))
     known = AxisVariances(1e-6, 2e-7, 1e-6), AxisVariances(2e-6, -3e-7, 2e-6)
     unscented.start(s[0], c[0], Estimate(before, known), 800.0, 4.0)

@@ -12,6 +12,8 @@ from adu_drive.lanes import at, count
 from adu_drive.params import SPEED_LOOP_PERIOD_S, AduParameters, whole_speed_periods
 from adu_drive.plant import gimbal, mount, wind, wind_field
 from pedestal_common.compiled import compiled, inlined, separate
+from pedestal_common.quantities import Pair, Vector3
+from pedestal_common.record import Record
 
 COMMAND_RING_SIZE = 256
 """Number of commands in the ring of the transport delay.
@@ -25,55 +27,62 @@ INITIAL_AGE_PERIODS = 1 << 40
 
 MAX_PLAUSIBLE_INPUT = 1e6  # largest valid input [rad/s, Nm, rad/s2]. An input beyond it, infinite or NaN is invalid.
 
-_AXIS_INPUTS_DTYPE = np.dtype([('rate', 'f8'), ('torque', 'f8')], align=True)
 
-INPUTS_DTYPE = np.dtype([('azimuth', _AXIS_INPUTS_DTYPE), ('elevation', _AXIS_INPUTS_DTYPE),
-                         ('base_acceleration', 'f8', (3,)), ('enable', 'i8'), ('base_rate', 'f8', (3,)),
-                         ('pins', 'i8')], align=True)
-"""Inputs of a period.
+class _AxisInputs(Record):
+    """Record."""
+    rate: float
+    torque: float
 
-azimuth, elevation              rate command [rad/s], feed-forward torque of both motors on the load axis [Nm]
-base_acceleration, base_rate    angular acceleration [rad/s2] and rate [rad/s] of the deck, FLU
-enable                          1: follow the command; 0: controlled stop, which begins without the transport delay
-pins                            code of acu/stow_pins: command to the stow pins
-"""
 
-_AXIS_OUTPUTS_DTYPE = np.dtype([
-    ('position', 'f8'), ('velocity', 'f8'), ('torque', 'f8'),
-    ('motor_position', 'f8', (2,)), ('motor_velocity', 'f8', (2,)), ('motor_torque', 'f8', (2,)), ('bias', 'f8'),
-    ('torque_limited', 'i8'), ('voltage_limited', 'i8'), ('end_stop', 'i8'), ('stopping', 'i8'),
-    ('faults', 'i8'), ('thermal_load', 'f8', (2,)),
-    ('load_position', 'f8'), ('load_velocity', 'f8'), ('true_torque', 'f8', (2,))], align=True)
+class Inputs(Record):
+    """Inputs of a period."""
+    # azimuth, elevation: rate command [rad/s], feed-forward torque of both motors on the load axis [Nm]
+    azimuth: _AxisInputs
+    elevation: _AxisInputs
+    # base_acceleration, base_rate: angular acceleration [rad/s2] and rate [rad/s] of the deck, FLU
+    base_acceleration: Vector3
+    enable: int  # 1: follow the command; 0: controlled stop, which begins without the transport delay
+    base_rate: Vector3
+    pins: int  # code of acu/stow_pins: command to the stow pins
 
-OUTPUTS_DTYPE = np.dtype([('azimuth', _AXIS_OUTPUTS_DTYPE), ('elevation', _AXIS_OUTPUTS_DTYPE),
-                          ('invalid_command', 'i8'), ('phase', 'i8'), ('following', 'i8'), ('wanted', 'i8'),
-                          ('emergency', 'i8'), ('braked', 'i8'), ('condition', 'i8'), ('pins', 'i8')], align=True)
-"""Outputs at t_k+1, per axis:
 
-position          load encoder [rad]
-velocity          mean motor speed / N [rad/s], from the motor encoders over the last 0.5 ms
-torque            torque of both motors on the load axis, from their currents [Nm]
-motor_position, motor_velocity, motor_torque    values of motors 1 and 2 on the shaft: encoder, encoder difference,
-                  K_t times the measured current
-bias              T_b [Nm]
-torque_limited, voltage_limited                 1 if the limit was active in the period
-end_stop          1 if the end of travel reduced the rate command in the period
-stopping          1 if the axis was not enabled in the period: it ramped to standstill, or held
-faults            latched fault word, see faults.AXIS_FAULTS
-thermal_load      thermal load of motors 1 and 2; 1: steady state at rated torque
-load_position, load_velocity                    true angle [rad] and rate [rad/s] of the beam (of the dish, if the
-                  structure is flexible), unknown to the controllers
-true_torque       K_t i_q of motors 1 and 2, for tests; never published
+class _AxisOutputs(Record):
+    """Record."""
+    position: float
+    velocity: float
+    torque: float
+    motor_position: Pair
+    motor_velocity: Pair
+    motor_torque: Pair
+    bias: float
+    torque_limited: int
+    voltage_limited: int
+    end_stop: int
+    stopping: int
+    faults: int
+    thermal_load: Pair
+    load_position: float
+    load_velocity: float
+    true_torque: Pair
 
-and of the drive:
 
-invalid_command   1 if an input of this call was invalid; the command is then taken as enable 0, a disturbance as 0
-phase             index of drive_state.PHASES; following: 1 if enabled and permitted at t_k+1
-wanted            0 after a request to disable
-emergency         1 while an emergency stop is latched
-braked            1 while the brakes grip
-condition         see drive_state.condition; pins: see stow_pins.state_code
-"""
+class Outputs(Record):
+    """Outputs at t_k+1, per axis:
+
+    and of the drive:
+    """
+    azimuth: _AxisOutputs
+    elevation: _AxisOutputs
+    # 1 if an input of this call was invalid; the command is then taken as enable 0, a disturbance as 0
+    invalid_command: int
+    phase: int  # index of drive_state.PHASES; following: 1 if enabled and permitted at t_k+1
+    following: int
+    wanted: int  # 0 after a request to disable
+    emergency: int  # 1 while an emergency stop is latched
+    braked: int  # 1 while the brakes grip
+    condition: int  # see drive_state.condition; pins: see stow_pins.state_code
+    pins: int
+    # position: load encoder [rad]; velocity: mean motor speed / N [rad/s], from the motor encoders over the last 0.5 ms; torque: torque of both motors on the load axis, from their currents [Nm]; motor_position, motor_velocity, motor_torque: values of motors 1 and 2 on the shaft: encoder, encoder difference, K_t times the measured current; bias: T_b [Nm]; torque_limited, voltage_limited: 1 if the limit was active in the period; end_stop: 1 if the end of travel reduced the rate command in the period; stopping: 1 if the axis was not enabled in the period: it ramped to standstill, or held; faults: latched fault word, see faults.AXIS_FAULTS; thermal_load: thermal load of motors 1 and 2; 1: steady state at rated torque; load_position, load_velocity: true angle [rad] and rate [rad/s] of the beam (of the dish, if the structure is flexible), unknown to the controllers; true_torque: K_t i_q of motors 1 and 2, for tests; never published
 
 
 def _record(values):
@@ -114,7 +123,7 @@ def _initial_state(params):
     age, brake_age         periods since the last change of the phase and of the command to the brakes
     applied                1 while the brakes are commanded on; braked: 1 while they grip
 
-    phase, wanted, emergency, following, pins: see OUTPUTS_DTYPE and stow_pins.
+    phase, wanted, emergency, following, pins: see Outputs and stow_pins.
     """
     axes, enabled = {}, params.initially_enabled and not (params.stow_pins and params.pins.initially_in)
     of_field = wind_field.initial_torques(params.wind.field, params.initial_azimuth, params.initial_elevation)
@@ -130,8 +139,8 @@ def _initial_state(params):
                     'braked': int(not enabled), 'following': 0, 'pins': stow_pins.initial_state(params)})
 
 
-CONSTANTS_DTYPE = _constants(AduParameters(), 2).dtype
-STATE_DTYPE = _initial_state(AduParameters()).dtype
+Constants = _constants(AduParameters(), 2).dtype
+State = _initial_state(AduParameters()).dtype
 """Dtype object that all state records share.
 
 A record with an equal copy would cost 3 us in each call, because numba then compares the copy field by field.
@@ -141,12 +150,12 @@ A record with an equal copy would cost 3 us in each call, because numba then com
 def constants(params: AduParameters, substeps: int = 2, speed_period: float = SPEED_LOOP_PERIOD_S) -> np.ndarray:
     """Return the constants, record (1,). substeps: number of plant sub-steps in a current-loop period (2: 50 us);
     speed_period: period of the speed loops [s]."""
-    return _constants(params, substeps, speed_period).view(CONSTANTS_DTYPE)
+    return _constants(params, substeps, speed_period).view(Constants)
 
 
 def initial_state(params: AduParameters) -> np.ndarray:
     """Return the state at rest at the initial angles, in balance with wind (t = 0) and unbalance, record (1,)."""
-    return _initial_state(params).view(STATE_DTYPE)
+    return _initial_state(params).view(State)
 
 
 @compiled
@@ -300,7 +309,7 @@ def between_speed_periods(s, c, substeps):
 def step(s, c, u, y):
     """Advance one control period from t_k to t_k+1. s and y are written.
 
-    s, c, u, y: records STATE_DTYPE, CONSTANTS_DTYPE, INPUTS_DTYPE, OUTPUTS_DTYPE, or lanes.Lanes of them for many
+    s, c, u, y: records State, Constants, Inputs, Outputs, or lanes.Lanes of them for many
     drives at once. All lanes have the period and the number of sub-steps of the first lane.
     """
     drives = range(count(s))

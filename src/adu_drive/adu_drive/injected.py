@@ -1,13 +1,14 @@
 """Injected faults of the drive and its plant: their effects on the record and the messages of a drive.
 
-Argument m is the record of a drive (unit.RECORD_DTYPE), s the state of one axis.
+Argument m is the record of a drive (unit.Record), s the state of one axis.
 """
-import numpy as np
 
 from adu_drive import axis
 from pedestal_common.codes import codes
 from pedestal_common.compiled import compiled
 from pedestal_common.injection import message_faults, schedule, table
+from pedestal_common.quantities import Pair
+from pedestal_common.record import Record
 
 DRIVE_MESSAGE_FAULT_CODES = message_faults.codes('adu')
 Fault = codes([fault.name for fault in table.INJECTED_FAULTS['adu']])
@@ -15,14 +16,13 @@ Fault = codes([fault.name for fault in table.INJECTED_FAULTS['adu']])
 STUCK_BRAKE_CONDITIONS = axis.BRAKE_STUCK_ON, axis.BRAKE_STUCK_OFF
 """Conditions of a stuck brake, in the order of the choices of the fault `brake_stuck`."""
 
-DRIVE_INJECTED_DTYPE = np.dtype([('bias', 'f8', (2,)), ('message_fault', message_faults.MESSAGE_FAULT_DTYPE)],
-                                align=True)
-"""Active faults of messages.
 
-bias             bias of the rates in joint_states [rad/s]
-message_fault    fault of joint_states and, for a frozen drive, of adu/motor_states; its field `drop` is 1 while
-                 commands are lost
-"""
+class DriveInjected(Record):
+    """Active faults of messages."""
+    bias: Pair  # bias of the rates in joint_states [rad/s]
+    # fault of joint_states and, for a frozen drive, of adu/motor_states; its field `drop` is 1 while commands are lost
+    message_fault: message_faults.MessageFault
+
 
 JOINT_STATES_TOPIC, MOTOR_STATES_TOPIC = 'joint_states', 'adu/motor_states'
 
@@ -83,7 +83,7 @@ def apply_due_faults(m, stamp):
 
 @compiled
 def corrupt_messages(e, stamp, outputs):
-    """Apply the active message faults e (DRIVE_INJECTED_DTYPE) to the messages of a step at a stamp [ns].
+    """Apply the active message faults e (DriveInjected) to the messages of a step at a stamp [ns].
 
     A frozen drive repeats 18 stored numbers. The last argument of message_faults.numbers is the index of the first
     one.

@@ -1,7 +1,7 @@
 """Unit of the drive: its step between the messages of the graph, without ROS. `adu_node` runs it.
 
 Inputs are rate commands and the motion of the ship. Outputs are encoders, motor states, and the state with its faults.
-The functions name their arguments so: m a record RECORD_DTYPE; link, u and y its parts `link`, `inputs`, `outputs`.
+The functions name their arguments so: m a record Record; link, u and y its parts `link`, `inputs`, `outputs`.
 """
 import dataclasses
 import functools
@@ -18,6 +18,8 @@ from pedestal_common.graph import nodes, topics
 from pedestal_common.injection import schedule, table
 from pedestal_common.injection.simulated import Simulated
 from pedestal_common.node.unit import LEVEL_ERROR, LEVEL_OK, LEVEL_WARN, Diagnosis, joined
+from pedestal_common.quantities import Vector3
+from pedestal_common.record import Record
 from pedestal_common.wire.commands import Reply
 from pedestal_common.wire.records import NO_STAMP
 
@@ -26,32 +28,36 @@ JOINT_STATES_TOPIC, MOTOR_STATES_TOPIC, DRIVE_TRUTH_TOPIC = 'joint_states', 'adu
 DRIVE_STATE_TOPIC, PIN_STATES_TOPIC, PIN_COMMAND_TOPIC = 'adu/state', 'adu/stow_pins', 'acu/stow_pins'
 
 INVALID_INPUT_TOPICS = ('', RATE_COMMAND_TOPIC, SHIP_TRUTH_TOPIC)
-"""Topics that can hold an invalid input; `invalid` of LINK_DTYPE is an index of this tuple."""
+"""Topics that can hold an invalid input; `invalid` of Link is an index of this tuple."""
 INVALID_COMMAND, INVALID_TRUTH = 1, 2  # indices of these topics; index 0: no invalid input
 
-LINK_DTYPE = np.dtype([('stamp', 'i8'), ('command_stamp', 'i8'), ('truth_stamp', 'i8'), ('deck_rate', 'f8', (3,)),
-                       ('timeout', 'i8'), ('period', 'i8'), ('stale', 'i8'), ('invalid', 'i8')])
-"""State of the link to other nodes.
 
-stamp, command_stamp    stamps of the last step and of the last command [ns]
-truth_stamp, deck_rate  stamp [ns] and deck rate (FLU) [rad/s] of the last message of ship/truth with a finite rate
-timeout, period         age at which a command is stale [ns]; period T [ns]
-stale                   1 while the command is stale
-invalid                 index of INVALID_INPUT_TOPICS: topic with an invalid input since the last diagnosis
-"""
+class Link(Record, align=False):
+    """State of the link to other nodes."""
+    stamp: int  # stamp, command_stamp: stamps of the last step and of the last command [ns]
+    command_stamp: int
+    # truth_stamp, deck_rate: stamp [ns] and deck rate (FLU) [rad/s] of the last message of ship/truth with a finite
+    # rate
+    truth_stamp: int
+    deck_rate: Vector3
+    timeout: int  # timeout, period: age at which a command is stale [ns]; period T [ns]
+    period: int
+    stale: int  # 1 while the command is stale
+    invalid: int  # index of INVALID_INPUT_TOPICS: topic with an invalid input since the last diagnosis
+
 
 MAX_CATCH_UP_NS = 2_000_000_000
 """Longest time of missed steps that the drive makes later [ns]. Axes without commands stop within this time."""
 
-RECORD_DTYPE = np.dtype([('state', drive_unit.STATE_DTYPE), ('constants', drive_unit.CONSTANTS_DTYPE),
-                         ('inputs', drive_unit.INPUTS_DTYPE), ('outputs', drive_unit.OUTPUTS_DTYPE),
-                         ('link', LINK_DTYPE), ('schedule', schedule.SCHEDULE_DTYPE),
-                         ('injected', injected.DRIVE_INJECTED_DTYPE)], align=True)
+Record = np.dtype([('state', drive_unit.State), ('constants', drive_unit.Constants),
+                         ('inputs', drive_unit.Inputs.dtype), ('outputs', drive_unit.Outputs.dtype),
+                         ('link', Link.dtype), ('schedule', schedule.Schedule.dtype),
+                         ('injected', injected.DriveInjected.dtype)], align=True)
 """All data of a drive: records of drive_unit, link to other nodes, scheduled and active injected faults."""
 
 
 class Memory(typing.NamedTuple):
-    """Memory of the drive; record: (1,) of RECORD_DTYPE."""
+    """Memory of the drive; record: (1,) of Record."""
     record: np.ndarray
 
 
@@ -196,13 +202,13 @@ def laws(memory, stamps, inputs, outputs):
 
 
 LANE_FLAGS = {'uneven': 0, 'toothless': 0, 'stuck': 0, 'exact': 1}
-"""Flags of RECORD_DTYPE that a drive needs on lanes (lanes.py): its law then contains no sine.
+"""Flags of Record that a drive needs on lanes (lanes.py): its law then contains no sine.
 
 These drives have gears and motors without unevenness, whole pinions, and encoders without errors. The processor has no
 vector instruction for a sine.
 """
 
-DRIVE_LANES = lanes.view(RECORD_DTYPE, LANE_FLAGS)
+DRIVE_LANES = lanes.view(Record, LANE_FLAGS)
 """Function for compiled code that gives the drives in a flat array of lanes.to_lanes."""
 
 
@@ -226,11 +232,11 @@ def law_of_lanes(drives, stamp, inputs, outputs):
 @functools.lru_cache(1)
 def _initial(parameters):
     """Return the record (1,) of a drive before its first step, cached for trials with the same drive."""
-    link = np.zeros(1, LINK_DTYPE)
+    link = Link.zeros()
     link['stamp'] = link['command_stamp'] = link['truth_stamp'] = NO_STAMP
     link['timeout'] = round(parameters.command_timeout * parameters.period * 1e9)
     link['period'] = round(parameters.period * 1e9)
-    record = joined(RECORD_DTYPE, state=drive_unit.initial_state(parameters),
+    record = joined(Record, state=drive_unit.initial_state(parameters),
                     constants=drive_unit.constants(parameters),
                     link=link, schedule=schedule.empty())
     drive_unit.read(*(record[0][name] for name in ('state', 'constants', 'outputs')))

@@ -14,8 +14,8 @@ class Drive:
         self.params = params
         self.constants = drive_unit.constants(params, substeps)
         self.state = drive_unit.initial_state(params)
-        self.inputs = np.zeros(1, drive_unit.INPUTS_DTYPE)
-        self.outputs = np.zeros(1, drive_unit.OUTPUTS_DTYPE)
+        self.inputs = drive_unit.Inputs.zeros()
+        self.outputs = drive_unit.Outputs.zeros()
         self.inputs['enable'] = 1
         self.steps = []
 

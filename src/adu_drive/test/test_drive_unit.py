@@ -200,7 +200,7 @@ def compose(state, constants, inputs, outputs, rates, torques, enables, log):
 
 def test_runs_are_identical_from_python_and_from_compiled_code(drive):
     first, second = (commanded(drive(), COMMANDS) for _ in range(2))
-    d, log = drive(), np.zeros(len(COMMANDS), drive_unit.OUTPUTS_DTYPE)
+    d, log = drive(), np.zeros(len(COMMANDS), drive_unit.Outputs.dtype)
     rates, torques, enables = (np.array(column) for column in zip(*COMMANDS))
     compose(d.state, d.constants, d.inputs, d.outputs, rates, torques, enables, log)
     assert first.tobytes() == second.tobytes() == log.tobytes()

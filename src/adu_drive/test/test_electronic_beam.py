@@ -18,8 +18,8 @@ class Beam:
         self.period_ns, self.k = round(period * 1e9), 0
         self.constants = electronic_beam.constants(period, delay, timeout)
         self.state = electronic_beam.initial_state(0.1, 0.2)
-        (self.inputs, self.outputs) = (np.zeros(1, electronic_beam.INPUTS_DTYPE),
-                                       np.zeros(1, electronic_beam.OUTPUTS_DTYPE))
+        (self.inputs, self.outputs) = (electronic_beam.Inputs.zeros(),
+                                       electronic_beam.Outputs.zeros())
         electronic_beam.read(self.state[0], self.outputs[0])
 
     def step(self, command=None, stamp_ns=None):

@@ -130,7 +130,7 @@ def test_the_variance_the_control_unit_expects_is_the_receivers(smoothing, cn0_d
         'receiver.range_exponent': 0.0, 'receiver.cn0_dbhz': cn0_dbhz, 'receiver.smoothing': smoothing})
     built = target.build(params.target, 1000.0)
     constants, state = receiver.constants(params, 0.005, built), receiver.initial_state()
-    inputs, outputs = np.zeros(1, receiver.INPUTS_DTYPE), np.zeros(1, receiver.OUTPUTS_DTYPE)
+    inputs, outputs = receiver.Inputs.zeros(), receiver.Outputs.zeros()
     inputs['mat_ed'], inputs['valid'] = line_of_sight.ashore_matrix(), 1
     inputs['azimuth'], inputs['elevation'] = 0.3, 0.6
     normals = np.random.default_rng(2).standard_normal((40_400, receiver.normals_per_step(params)))

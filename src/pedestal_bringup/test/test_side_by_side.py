@@ -69,6 +69,6 @@ def test_the_plant_is_compiled_to_vectors():
         drives = adu_unit.DRIVE_LANES(flat)
         drive_unit.between_speed_periods(drives.state.azimuth, drives.constants.azimuth, 2)
 
-    period(lanes.to_lanes(np.zeros(1, adu_unit.RECORD_DTYPE)))
+    period(lanes.to_lanes(np.zeros(1, adu_unit.Record)))
     assembly, = period.inspect_asm().values()
     assert len(re.findall(r'vdivpd\s.*%[yz]mm', assembly)) >= 3

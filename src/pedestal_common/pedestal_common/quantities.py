@@ -36,7 +36,7 @@ Amperes: TypeAlias = Annotated[float, 'A']
 Volts: TypeAlias = Annotated[float, 'V']
 Decibels: TypeAlias = Annotated[float, 'dB']
 DecibelHertz: TypeAlias = Annotated[float, 'dB-Hz']  # C/N0
-Flag: TypeAlias = int                               # 0 or 1; a record has no bool
+Bit: TypeAlias = int                                # 0 or 1; a record has no bool
 
 Pair: TypeAlias = Annotated[Floats, (2,)]           # azimuth and elevation, or cross-elevation and elevation
 Vector3: TypeAlias = Annotated[Floats, (3,)]

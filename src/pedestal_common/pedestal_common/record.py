@@ -29,11 +29,14 @@ _SCALARS = {float: 'f8', int: 'i8', complex: 'c16'}
 class Record:
     """Base of declared records. Each has the fields of its base class, then its own, in their order.
 
-    A subclass with the argument align=False has no bytes between its fields.
+    A subclass with the argument align=False has no bytes between its fields. One with open=True has no type of its
+    own: its subclasses declare the shape of a field.
     """
     dtype: ClassVar[DType]
 
-    def __init_subclass__(cls, align: bool = True) -> None:
+    def __init_subclass__(cls, align: bool = True, open: bool = False) -> None:
+        if open:
+            return
         hints = typing.get_type_hints(cls, include_extras=True)
         cls.dtype = np.dtype([(name, *_form(cls, name, hint)) for name, hint in hints.items() if name != 'dtype'],
                              align=align)

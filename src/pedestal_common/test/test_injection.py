@@ -93,7 +93,7 @@ def test_more_faults_than_slots_are_refused_until_one_is_over():
 
 
 def test_frozen_numbers_stay_until_the_freeze_is_over_and_the_next_freeze_takes_new_ones():
-    e = np.zeros(1, message_faults.MESSAGE_FAULT_DTYPE)[0:1].view(np.recarray)[0]
+    e = message_faults.MessageFault.zeros()[0:1].view(np.recarray)[0]
     said = []
     for k, freeze in enumerate((0, 1, 1, 0, 1, 1)):
         message_faults.clear(e)
@@ -106,7 +106,7 @@ def test_frozen_numbers_stay_until_the_freeze_is_over_and_the_next_freeze_takes_
 
 
 def test_nan_leaves_no_number():
-    e = np.zeros(1, message_faults.MESSAGE_FAULT_DTYPE).view(np.recarray)[0]
+    e = message_faults.MessageFault.zeros().view(np.recarray)[0]
     e.nan = 1
     numbers = np.ones(3)
     message_faults.numbers(e, numbers, 0)
@@ -114,7 +114,7 @@ def test_nan_leaves_no_number():
 
 
 def test_noise_is_white_normal_and_the_same_for_the_same_key():
-    e = np.zeros(1, message_faults.MESSAGE_FAULT_DTYPE).view(np.recarray)[0]
+    e = message_faults.MessageFault.zeros().view(np.recarray)[0]
     e.sigma, e.seed = 2.0, 1
     drawn = np.array([[message_faults.noise(e, k * 5 * MILLISECOND, i) for i in range(3)] for k in range(20_000)])
     n = drawn.size

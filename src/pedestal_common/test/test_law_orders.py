@@ -23,7 +23,7 @@ CALLS_PER_SEQUENCE = 4
 REMOVED_EVERY = 20
 """Number of sequences after which some files of the cache are removed."""
 
-RECORD_DTYPE = np.dtype([('a', 'f8'), ('b', 'f8', 3), ('n', 'i8')])
+Record = np.dtype([('a', 'f8'), ('b', 'f8', 3), ('n', 'i8')])
 
 
 @compiled
@@ -98,7 +98,7 @@ def by_kind(x):
 
 
 def _record():
-    record = np.zeros(1, RECORD_DTYPE)
+    record = np.zeros(1, Record)
     record['a'], record['b'] = 1.5, (0.25, 2.0, 3.0)
     return record[0]
 

@@ -6,7 +6,7 @@ import pytest
 
 from pedestal_common.compiled import compiled
 from pedestal_common.parameters import Parameters, parameter, record_type
-from pedestal_common.quantities import BothAxes, Complexes, Flag, Floats, Ints, Pair, Radians, Records, Seconds
+from pedestal_common.quantities import Bit, BothAxes, Complexes, Floats, Ints, Pair, Radians, Records, Seconds
 from pedestal_common.record import Record
 
 
@@ -18,7 +18,7 @@ class Gains(Parameters):
 class Axis(Record):
     """One axis."""
     angle: Radians
-    held: Flag
+    held: Bit
 
 
 class State(Record):
@@ -34,6 +34,21 @@ class State(Record):
 class Longer(State):
     """A state with one more field."""
     short: np.int16
+
+
+class Line(Record, open=True):
+    """Numbers whose count a subclass declares."""
+    value: Floats
+    count: int
+
+
+class Three(Line):
+    """Three numbers."""
+    value: Annotated[Floats, (3,)]
+
+
+def test_a_shape_that_a_subclass_declares():
+    assert Three.dtype == np.dtype([('value', 'f8', (3,)), ('count', 'i8')], align=True)
 
 
 def test_the_type_of_a_record():

@@ -20,7 +20,7 @@ damping of its own.
 The gains in the constants of the unit are then 0; limits of rate and travel, bias schedule and faults stay here. With
 the control `torque` each drive makes the torque T that the unit demands.
 
-Arguments: m is the record of the node (RECORD_DTYPE), d its part `drives`, k its part `scales`.
+Arguments: m is the record of the node (Record), d its part `drives`, k its part `scales`.
 """
 import math
 
@@ -99,9 +99,9 @@ K_p, K_iT                     gains of the constants of each axis, for two motor
 follow_gain                   share of the way that `followed` moves in a period
 """
 
-RECORD_DTYPE = np.dtype([('state', drive_unit.STATE_DTYPE), ('constants', drive_unit.CONSTANTS_DTYPE),
-                         ('inputs', drive_unit.INPUTS_DTYPE), ('outputs', drive_unit.OUTPUTS_DTYPE),
-                         ('link', adu_unit.LINK_DTYPE), ('drives', DRIVES_DTYPE), ('scales', SCALES_DTYPE)],
+Record = np.dtype([('state', drive_unit.State), ('constants', drive_unit.Constants),
+                         ('inputs', drive_unit.Inputs.dtype), ('outputs', drive_unit.Outputs.dtype),
+                         ('link', adu_unit.Link.dtype), ('drives', DRIVES_DTYPE), ('scales', SCALES_DTYPE)],
                         align=True)
 
 
@@ -359,7 +359,7 @@ def _control_axis(s, a, c, d, k, i):
 def control(records, stamp, inputs):
     """Compute the commands of the drives from their last reports and the messages of the step before.
 
-    records: (1,) of RECORD_DTYPE. A record itself as argument would cost 90 us, because numba would examine all its
+    records: (1,) of Record. A record itself as argument would cost 90 us, because numba would examine all its
     fields in each call. stamp: time of the coming exchange [ns]; inputs: record of the topics.
     """
     m = records[0]

@@ -19,7 +19,7 @@ DRIVE_LABELS = tuple(f'{axis} motor {i}' for axis in topics.AXES for i in (1, 2)
 
 
 class Memory(typing.NamedTuple):
-    """Memory of the node; record: (1,) of servo_drives.RECORD_DTYPE."""
+    """Memory of the node; record: (1,) of servo_drives.Record."""
     record: np.ndarray
 
 
@@ -68,14 +68,14 @@ class ServoDrives(adu_unit.Adu):
         self.problems = [''] * pdo.DRIVE_COUNT
         self._commands = np.zeros(pdo.DRIVE_COUNT, pdo.COMMAND_DTYPE)
         self._reports = np.zeros(pdo.DRIVE_COUNT, pdo.REPORT_DTYPE)
-        link, drives = np.zeros(1, adu_unit.LINK_DTYPE), np.zeros(1, servo_drives.DRIVES_DTYPE)
+        link, drives = adu_unit.Link.zeros(), np.zeros(1, servo_drives.DRIVES_DTYPE)
         drives['age'] = 1     # nothing was reported yet
         link['stamp'] = link['command_stamp'] = link['truth_stamp'] = NO_STAMP
         link['timeout'] = round(parameters.command_timeout * parameters.period * 1e9)
         link['period'] = round(parameters.period * 1e9)
         at_rest = dataclasses.replace(parameters, initially_enabled=False)
         self.memory = Memory(joined(
-            servo_drives.RECORD_DTYPE, state=drive_unit.initial_state(at_rest), constants=_constants(parameters),
+            servo_drives.Record, state=drive_unit.initial_state(at_rest), constants=_constants(parameters),
             link=link, drives=drives, scales=_scales(parameters)))
         for i, axis in enumerate(topics.AXES):
             for gain in ('K_p', 'K_iT'):

@@ -73,7 +73,7 @@ def rate(t, moves=sea):
 @pytest.mark.parametrize('period, digits, limit', [(0.02, 3, 0.05), (0.1, 2, 0.15)])
 def test_the_rates_of_a_device_without_rates(period, digits, limit):
     """50 Hz in 0.001 deg, and 10 Hz in 0.01 deg: rms error [deg/s] far below that of differences (0.22 at 50 Hz)."""
-    s, t = np.zeros(1, rate_estimator.ESTIMATOR_DTYPE)[0], period * np.arange(1, round(40.0 / period))
+    s, t = rate_estimator.Estimator.zeros()[0], period * np.arange(1, round(40.0 / period))
     angles = np.round(sea(t).as_euler('ZYX', degrees=True), digits)
     found = [rate_estimator.take(s, round(at * 1e9), q, 10.0)
              for at, q in zip(t, Rotation.from_euler('ZYX', angles, degrees=True).as_quat())]
@@ -93,7 +93,7 @@ class Checked:
     def __init__(self, true, declared, moves=sea, gravity=True, noise=1.7e-4, scale=1.0):
         self.true, self.declared, self.moves, self.gravity = true, declared, moves, gravity
         self.noise, self.scale, self.rng, self.now = noise, scale, np.random.default_rng(1), 0.0
-        self.s = np.zeros(1, frame_check.CHECK_DTYPE)[0]
+        self.s = frame_check.Check.zeros()[0]
         self.c = frames.constants(*declared, (0.0, 0.0, 0.0), 0.0)[0]
 
     def run(self, seconds):
@@ -188,7 +188,7 @@ def test_a_corrected_parameter_clears_a_wrong_verdict():
 @pytest.mark.parametrize('sign, expected', [(1.0, frame_check.FRAME_RIGHT), (-1.0, frame_check.FRAME_WRONG)])
 def test_the_sign_of_a_rate_of_turn(sign, expected):
     """Smoothed over 1 s, as a compass does."""
-    s, smooth, t = np.zeros(1, frame_check.CHECK_DTYPE)[0], 0.0, 0.1 * np.arange(1, 200)
+    s, smooth, t = frame_check.Check.zeros()[0], 0.0, 0.1 * np.arange(1, 200)
     for at, q, w in zip(t, sea(t).as_quat(), rate(t)):
         smooth += 0.1 * (sign * w[2] - smooth)
         frame_check.take(s, round(at * 1e9), q, np.array((0.0, 0.0, smooth)), np.full(3, np.nan),

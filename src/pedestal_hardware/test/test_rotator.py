@@ -283,5 +283,5 @@ def test_the_graph_of_a_rotator(beams, lockstep, message):
 
 def test_the_constants_of_the_law_are_those_of_the_parameters():
     constants = Rotator(RotatorParameters(), ('clock', 'acu/reference', 'acu/mode')).parts['constants']
-    assert constants.dtype == set_point.CONSTANTS_DTYPE
+    assert constants.dtype == set_point.Constants.dtype
     assert np.degrees(constants['dead_band']) == pytest.approx(0.1)

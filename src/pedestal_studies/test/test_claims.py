@@ -103,7 +103,7 @@ def test_constant_rate_and_acceleration_leave_no_error(rate, acceleration, late,
     target = np.column_stack([v * t + 0.5 * a * t * t, v + a * t, np.full(len(t), a)])
     known = np.column_stack([v + a * (t + 0.5 * T - late), np.full(len(t), a)])
     out = np.zeros((1, len(t)), loop.STEP_RECORD)
-    loop._follow(target, known, np.zeros(1, axis_filter.FILTER_DTYPE), axis_filter.constants(FilterParameters()), 0.0,
+    loop._follow(target, known, axis_filter.Filter.zeros(), axis_filter.constants(FilterParameters()), 0.0,
                  loop.rate_loop_step(*loop.RATE_LOOP_CONSTANTS), np.zeros((1, len(t))), out)
     miss = math.degrees(out['miss'][0, -1])
     assert miss == pytest.approx(acceleration * late / loop.K_P, rel=1e-4, abs=1e-7)

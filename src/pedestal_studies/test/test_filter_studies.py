@@ -133,7 +133,7 @@ def test_moments_are_those_of_the_estimates():
     of_runs = ensemble.moments(params, t, truth, noise, measured)
     sums = ensemble.over_runs(of_runs)
     c = axis_filter.constants(dataclasses.replace(params, rate_measurement=True))
-    out = np.zeros((4, 300), axis_filter.ESTIMATE_DTYPE)
+    out = np.zeros((4, 300), axis_filter.Estimate.dtype)
     for i in range(4):
         axis_filter.estimates(c, t, measured[0][i], np.full(300, 1e-4), measured[1][i], np.full(300, 4e-4),
                               ensemble.INITIAL_RATE_SIGMA_RAD_S, out[i])
@@ -188,7 +188,7 @@ def test_the_wiener_filter_is_the_steady_kalman_filter_of_its_model():
     """Variances of angle and rate that a singer filter states after 6 s, and those of the Wiener weights."""
     alpha, sigma, noise = 1.0, math.radians(1.0), math.radians(0.03)
     params = build(FilterParameters, {'kind': 'singer', 'singer.alpha': alpha, 'singer.sigma': sigma})
-    out, t = np.zeros(600, axis_filter.ESTIMATE_DTYPE), ensemble.MEASUREMENT_PERIOD_S * np.arange(600)
+    out, t = np.zeros(600, axis_filter.Estimate.dtype), ensemble.MEASUREMENT_PERIOD_S * np.arange(600)
     axis_filter.estimates(axis_filter.constants(params), t, 0.0 * t, np.full(600, noise**2), np.full(600, math.nan),
                           0.0 * t, 1.0, out)
     covariance = sigma**2 * window_filter.displacement(600, alpha) + noise**2 * np.eye(600)

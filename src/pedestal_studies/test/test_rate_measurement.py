@@ -45,7 +45,7 @@ def test_a_sine_through_the_filter(frequency, rate_sigma):
     t = T * np.arange(12000)
     w = 2.0 * math.pi * frequency
     c = axis_filter.constants(study.filter_of(math.radians(study.MAIN_SIGMA_DEG_S2), 1.0))
-    out = np.zeros(len(t), axis_filter.ESTIMATE_DTYPE)
+    out = np.zeros(len(t), axis_filter.Estimate.dtype)
     axis_filter.estimates(c, t, np.sin(w * t), np.full(len(t), SIGMA**2),
                           w * np.cos(w * t) + (0.0 if math.isfinite(rate_sigma) else math.nan),
                           np.full(len(t), math.radians(rate_sigma)**2), 1.0, out)

@@ -12,6 +12,8 @@ import numpy as np
 
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry.line_of_sight import to_deck
+from pedestal_common.quantities import Vector3
+from pedestal_common.record import Record
 from ship_motion_sim import earth
 from ship_motion_sim.params import ShipMotionParameters
 from ship_motion_sim.sea import motion
@@ -25,42 +27,49 @@ IMU_OK, IMU_BAD_STEP, IMU_BAD_TRUTH = range(len(IMU_STATUS_TEXTS))
 _GAUSS_NODE_OFFSET = math.sqrt(0.15)
 """Distance of the outer nodes of the three-point rule from the middle, for an interval of 1."""
 
-SENSOR_ERRORS_DTYPE = np.dtype([                # errors of three gyros or three accelerometers
-    ('bias', 'f8', (3,)),                       # [rad/s] or [m/s2]
-    ('noise', 'f8'),                            # density of the white noise [rad/sqrt(s)] or [m/s/sqrt(s)]
-    ('scale', 'f8'),                            # error of the scale factor [-]
-    ('misalignment', 'f8'),                     # sensing axis x is turned towards y, y towards z, z towards x [rad]
-    ('quantum', 'f8'),                          # smallest increment [rad] or [m/s]; 0: no quantisation
-], align=True)
 
-CONSTANTS_DTYPE = np.dtype([
-    ('earth_rate', 'f8', (3,)),                 # ENU [rad/s]
-    ('gravity', 'f8'),                          # [m/s2]
-    ('increment', 'i8'),                        # 1: mean rates since the last sample, 0: rates at the stamp
-    ('gyro', SENSOR_ERRORS_DTYPE), ('accelerometer', SENSOR_ERRORS_DTYPE),
-], align=True)
+class SensorErrors(Record):
+    """Record."""
+    bias: Vector3  # [rad/s] or [m/s2]
+    noise: float  # density of the white noise [rad/sqrt(s)] or [m/s/sqrt(s)]
+    scale: float  # error of the scale factor [-]
+    misalignment: float  # sensing axis x is turned towards y, y towards z, z towards x [rad]
+    quantum: float  # smallest increment [rad] or [m/s]; 0: no quantisation
 
-STATE_DTYPE = np.dtype([
-    ('truth', motion.Truth.dtype),            # at a node of the quadrature
-    ('angle_left', 'f8', (3,)), ('force_left', 'f8', (3,)),     # remainders of the quantised increments [rad, m/s]
-], align=True)
 
-INPUTS_DTYPE = np.dtype([
-    ('t', 'f8'),                                # time of the sample [s]
-    ('dt', 'f8'),                               # time since the last sample; in the first step, the period [s]
-], align=True)
+class Constants(Record):
+    """Record."""
+    earth_rate: Vector3  # ENU [rad/s]
+    gravity: float  # [m/s2]
+    increment: int  # 1: mean rates since the last sample, 0: rates at the stamp
+    gyro: SensorErrors
+    accelerometer: SensorErrors
 
-OUTPUTS_DTYPE = np.dtype([
-    ('status', 'i8'),                           # index into IMU_STATUS_TEXTS; unless IMU_OK, the rest is NaN
-    ('angular_velocity', 'f8', (3,)),           # against inertial space, FLU [rad/s]
-    ('linear_acceleration', 'f8', (3,)),        # specific force, FLU [m/s2]: at rest +g along z
-], align=True)
+
+class State(Record):
+    """Record."""
+    truth: motion.Truth  # at a node of the quadrature
+    angle_left: Vector3
+    force_left: Vector3  # remainders of the quantised increments [rad, m/s]
+
+
+class Inputs(Record):
+    """Record."""
+    t: float  # time of the sample [s]
+    dt: float  # time since the last sample; in the first step, the period [s]
+
+
+class Outputs(Record):
+    """Record."""
+    status: int  # index into IMU_STATUS_TEXTS; unless IMU_OK, the rest is NaN
+    angular_velocity: Vector3  # against inertial space, FLU [rad/s]
+    linear_acceleration: Vector3  # specific force, FLU [m/s2]: at rest +g along z
 
 
 def constants(params: ShipMotionParameters) -> np.ndarray:
-    """Return the record (1,) of CONSTANTS_DTYPE."""
+    """Return the record (1,) of Constants."""
     imu, latitude = params.imu, math.radians(params.ship.latitude_deg)
-    record = np.zeros(1, CONSTANTS_DTYPE)
+    record = Constants.zeros()
     record['earth_rate'] = earth.rate(latitude)
     record['gravity'] = earth.gravity(latitude)
     record['increment'] = imu.output == 'increment'
@@ -73,8 +82,8 @@ def constants(params: ShipMotionParameters) -> np.ndarray:
 
 
 def initial_state() -> np.ndarray:
-    """Return the record (1,) of STATE_DTYPE before the first sample."""
-    return np.zeros(1, STATE_DTYPE)
+    """Return the record (1,) of State before the first sample."""
+    return State.zeros()
 
 
 @compiled
@@ -106,7 +115,7 @@ def specific_force(truth, earth_rate, gravity):
 def mean_rates(s, c, ship, t, dt, rate, force):
     """Fill rate (3,) [rad/s] and force (3,) [m/s2] with the means of the true rates over [t - dt, t] [s].
 
-    s, c: records STATE_DTYPE, CONSTANTS_DTYPE; ship: record of motion.Constants.dtype.
+    s, c: records State, Constants; ship: record of motion.Constants.dtype.
     """
     for i in range(3):
         rate[i] = force[i] = 0.0
@@ -127,7 +136,7 @@ def mean_rates(s, c, ship, t, dt, rate, force):
 def add_sensor_errors(errors, dt, values, normals, first, remainder):
     """Add the errors of three gyros or accelerometers to the true values (3,), measured over dt [s].
 
-    errors: record SENSOR_ERRORS_DTYPE. White noise is given as a density, so a sample has the noise density /
+    errors: record SensorErrors. White noise is given as a density, so a sample has the noise density /
     sqrt(dt). The normals are used from index `first` on. remainder (3,): part of the increment that quantisation cut
     off, kept for the next sample.
     """
@@ -148,7 +157,7 @@ def add_sensor_errors(errors, dt, values, normals, first, remainder):
 def step(s, c, ship, u, truth, out, normals):
     """Take one sample.
 
-    s, c, u, out: records STATE_DTYPE, CONSTANTS_DTYPE, INPUTS_DTYPE, OUTPUTS_DTYPE; ship, truth: records
+    s, c, u, out: records State, Constants, Inputs, Outputs; ship, truth: records
     motion.Constants.dtype, motion.Truth.dtype at the time of the sample; normals: (IMU_NORMALS_PER_STEP,).
     """
     rate, force = out.angular_velocity, out.linear_acceleration

@@ -6,6 +6,8 @@ from pedestal_common.geometry.line_of_sight import quaternion
 from pedestal_common.geometry.quaternion import product
 from pedestal_common.graph.steps import NS_PER_SECOND
 from pedestal_common.injection import message_faults, schedule, table
+from pedestal_common.quantities import Vector3
+from pedestal_common.record import Record
 from pedestal_common.wire.records import NO_STAMP
 
 IMU_MESSAGE_FAULT_CODES, INS_MESSAGE_FAULT_CODES = message_faults.codes('ship_motion'), message_faults.codes('ins')
@@ -13,27 +15,36 @@ IMU_BIAS_CODE = table.code('ship_motion', 'bias')
 INS_DELAY_CODE, INS_BIAS_CODE, INS_JUMP_CODE, INS_CLOCK_STEP_CODE = (
     table.code('ins', name) for name in ('delay', 'bias', 'ins_jump', 'clock_step'))
 
-IMU_INJECTED_DTYPE = np.dtype([('rate', 'f8', (3,)), ('force', 'f8', (3,)),
-                               ('message_fault', message_faults.MESSAGE_FAULT_DTYPE)], align=True)
-"""Faults of the IMU. rate [rad/s], force [m/s2]: offsets of its data, FLU; message_fault: faults of its messages."""
 
-INS_INJECTED_DTYPE = np.dtype([('latency_ns', 'i8'), ('clock_ns', 'i8'), ('rate', 'f8', (3,)), ('turn', 'f8', (3,)),
-                               ('message_fault', message_faults.MESSAGE_FAULT_DTYPE)], align=True)
-"""Faults of the INS.
+class ImuInjected(Record):
+    """Faults of the IMU. rate [rad/s], force [m/s2]: offsets of its data, FLU; message_fault: faults of its messages."""
+    rate: Vector3
+    force: Vector3
+    message_fault: message_faults.MessageFault
+
+
+class InsInjected(Record):
+    """Faults of the INS.
 
     latency_ns      latency without a fault
-    clock_ns        offset of the stamps
-    rate            offset of the deck rate, FLU [rad/s]
-    turn            roll, pitch and yaw added to the attitude [rad]
-    message_fault   faults of the messages
-"""
+        clock_ns        offset of the stamps
+        rate            offset of the deck rate, FLU [rad/s]
+        turn            roll, pitch and yaw added to the attitude [rad]
+        message_fault   faults of the messages
+    """
+    latency_ns: int
+    clock_ns: int
+    rate: Vector3
+    turn: Vector3
+    message_fault: message_faults.MessageFault
+
 
 IMU_RAW_TOPIC, ATTITUDE_TOPIC, INS_ERROR_TOPIC = 'ship/imu/data_raw', 'ship/imu/data', 'ins/error'
 
 
 def initial(latency_ns) -> np.ndarray:
-    """Return INS_INJECTED_DTYPE (1,) without a fault, for a latency [ns]."""
-    e = np.zeros(1, INS_INJECTED_DTYPE)
+    """Return InsInjected (1,) without a fault, for a latency [ns]."""
+    e = InsInjected.zeros()
     e['latency_ns'] = latency_ns
     return e
 
@@ -47,7 +58,7 @@ def turned(q, roll, pitch, yaw):
 
 @compiled
 def apply_due_imu_faults(m, stamp):
-    """Clear all faults of the IMU, then apply those in force at a stamp [ns]; m: record of ship_unit.RECORD_DTYPE."""
+    """Clear all faults of the IMU, then apply those in force at a stamp [ns]; m: record of ship_unit.Record."""
     e = m.injected
     for i in range(3):
         e.rate[i] = e.force[i] = 0.0
@@ -61,7 +72,7 @@ def apply_due_imu_faults(m, stamp):
 
 @compiled
 def _apply_imu_fault(e, fault, values):
-    """Add a fault to the record e of IMU_INJECTED_DTYPE; values: its arguments, in the order of injection/table.py."""
+    """Add a fault to the record e of ImuInjected; values: its arguments, in the order of injection/table.py."""
     message_faults.apply(e.message_fault, IMU_MESSAGE_FAULT_CODES, fault, values)
     if fault == IMU_BIAS_CODE:
         e.rate[int(values[0])] += values[1]
@@ -70,7 +81,7 @@ def _apply_imu_fault(e, fault, values):
 
 @compiled
 def corrupt_imu(e, stamp, outputs):
-    """Corrupt the IMU message of a step, according to the record e of IMU_INJECTED_DTYPE."""
+    """Corrupt the IMU message of a step, according to the record e of ImuInjected."""
     raw = outputs[IMU_RAW_TOPIC]
     for i in range(3):
         raw.angular_velocity[i] += e.rate[i]
@@ -102,7 +113,7 @@ def apply_due_ins_faults(m, stamp):
 
 @compiled
 def _apply_ins_fault(c, e, fault, values):
-    """Add a fault to the constants c of the INS and to the record e of INS_INJECTED_DTYPE; values: its arguments, in
+    """Add a fault to the constants c of the INS and to the record e of InsInjected; values: its arguments, in
     the order of injection/table.py."""
     message_faults.apply(e.message_fault, INS_MESSAGE_FAULT_CODES, fault, values)
     if fault == INS_DELAY_CODE:
@@ -119,7 +130,7 @@ def _apply_ins_fault(c, e, fault, values):
 
 @compiled
 def corrupt_ins(e, stamp, outputs):
-    """Corrupt the messages of the INS of a step, according to the record e of INS_INJECTED_DTYPE."""
+    """Corrupt the messages of the INS of a step, according to the record e of InsInjected."""
     data = outputs[ATTITUDE_TOPIC]
     roll, pitch, yaw = e.turn[0], e.turn[1], e.turn[2]
     if e.message_fault.sigma > 0.0:

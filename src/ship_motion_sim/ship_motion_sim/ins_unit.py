@@ -27,13 +27,13 @@ def _record_of(state, constants):
     error_published: 1 if the INS publishes ins/error; row: row of the noise `normals` for the next step; worst:
     highest status since the last diagnosis.
     """
-    return np.dtype([('state', state), ('constants', constants), ('inputs', ins.INPUTS_DTYPE),
-                     ('outputs', ins.OUTPUTS_DTYPE), ('error_published', 'i8'), ('row', 'i8'), ('worst', 'i8'),
-                     ('schedule', schedule.SCHEDULE_DTYPE), ('injected', injected.INS_INJECTED_DTYPE)], align=True)
+    return np.dtype([('state', state), ('constants', constants), ('inputs', ins.Inputs.dtype),
+                     ('outputs', ins.Outputs.dtype), ('error_published', 'i8'), ('row', 'i8'), ('worst', 'i8'),
+                     ('schedule', schedule.Schedule.dtype), ('injected', injected.InsInjected.dtype)], align=True)
 
 
-MODEL_RECORD_DTYPE = _record_of(ins.STATE_DTYPE, ins.CONSTANTS_DTYPE)
-ALIGNING_RECORD_DTYPE = _record_of(aligning_ins.STATE_DTYPE, aligning_ins.CONSTANTS_DTYPE)
+MODEL_RECORD_DTYPE = _record_of(ins.State, ins.Constants.dtype)
+ALIGNING_RECORD_DTYPE = _record_of(aligning_ins.State, aligning_ins.Constants.dtype)
 
 
 class ModelMemory(typing.NamedTuple):

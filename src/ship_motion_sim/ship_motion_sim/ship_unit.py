@@ -8,6 +8,7 @@ from pedestal_common.graph import nodes, noise
 from pedestal_common.injection import schedule, table
 from pedestal_common.injection.simulated import Simulated
 from pedestal_common.node.unit import LEVEL_ERROR, LEVEL_OK, LEVEL_WARN, Diagnosis, joined
+from pedestal_common.record import Record
 from pedestal_common.wire.records import NO_STAMP
 from ship_motion_sim import imu, injected
 from ship_motion_sim.sea import motion
@@ -16,16 +17,23 @@ SHIP_TRUTH_TOPIC, IMU_RAW_TOPIC = 'ship/truth', 'ship/imu/data_raw'
 
 NOMINAL_PERIOD_S = 5e-3  # assumed length of the first IMU sample [s]
 
-RECORD_DTYPE = np.dtype([('ship', motion.Constants.dtype), ('truth', motion.Truth.dtype),
-                         ('imu_state', imu.STATE_DTYPE), ('imu', imu.CONSTANTS_DTYPE),
-                         ('imu_inputs', imu.INPUTS_DTYPE), ('imu_outputs', imu.OUTPUTS_DTYPE),
-                         ('last', 'i8'), ('row', 'i8'), ('schedule', schedule.SCHEDULE_DTYPE),
-                         ('injected', injected.IMU_INJECTED_DTYPE)], align=True)
-"""Record of the unit. last: stamp of the last step [ns]; row: row of the noise `normals` for the next step."""
+
+class UnitRecord(Record):
+    """Record of the unit. last: stamp of the last step [ns]; row: row of the noise `normals` for the next step."""
+    ship: motion.Constants
+    truth: motion.Truth
+    imu_state: imu.State
+    imu: imu.Constants
+    imu_inputs: imu.Inputs
+    imu_outputs: imu.Outputs
+    last: int
+    row: int
+    schedule: schedule.Schedule
+    injected: injected.ImuInjected
 
 
 class Memory(typing.NamedTuple):
-    """All data of the ship. record: (1,) of RECORD_DTYPE; normals: (steps, IMU_NORMALS_PER_STEP), noise of the next
+    """All data of the ship. record: (1,) of Record; normals: (steps, IMU_NORMALS_PER_STEP), noise of the next
     steps."""
     record: np.ndarray
     normals: np.ndarray
@@ -78,7 +86,7 @@ class ShipMotion(Simulated):
     def __init__(self, parameters, reads):
         super().__init__(parameters, reads)
         self._noise = noise.generator(parameters.imu.seed, self.NODE.name)
-        record = joined(RECORD_DTYPE, ship=motion.constants(parameters.ship), imu_state=imu.initial_state(),
+        record = joined(UnitRecord.dtype, ship=motion.constants(parameters.ship), imu_state=imu.initial_state(),
                         imu=imu.constants(parameters), last=NO_STAMP, schedule=schedule.empty())
         self.memory = Memory(record, np.zeros((1, imu.IMU_NORMALS_PER_STEP)))
 

@@ -19,20 +19,22 @@ rotation axis and of the force within it. They use the previous increment, as in
 Navigation Integration Algorithm Design".
 """
 import math
-
-import numpy as np
+from typing import Annotated
 
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry.line_of_sight import cross, rotation, to_earth
 from pedestal_common.geometry.quaternion import product
+from pedestal_common.quantities import Floats, Matrix3, Vector3
+from pedestal_common.record import Record
 
-STATE_DTYPE = np.dtype([
-    ('quaternion', 'f8', (4,)),         # x, y, z, w, deck -> n'
-    ('mat', 'f8', (3, 3)),              # matrix of this rotation
-    ('velocity', 'f8', (3,)),           # in n' [m/s]
-    ('last_angle', 'f8', (3,)),         # increments of the previous interval [rad], for coning and sculling
-    ('last_force', 'f8', (3,)),         # [m/s]
-], align=True)
+
+class State(Record):
+    """Record."""
+    quaternion: Annotated[Floats, (4,)]  # x, y, z, w, deck -> n'
+    mat: Matrix3  # matrix of this rotation
+    velocity: Vector3  # in n' [m/s]
+    last_angle: Vector3  # increments of the previous interval [rad], for coning and sculling
+    last_force: Vector3  # [m/s]
 
 
 @compiled
@@ -47,7 +49,7 @@ def from_rotvec(x, y, z):
 
 @compiled
 def set_attitude(s, qx, qy, qz, qw):
-    """Set the attitude of a STATE_DTYPE record s to the quaternion (qx, qy, qz, qw), scaled to length 1."""
+    """Set the attitude of a State record s to the quaternion (qx, qy, qz, qw), scaled to length 1."""
     scale = 1.0 / math.sqrt(qx * qx + qy * qy + qz * qz + qw * qw)
     q = s.quaternion
     q[0], q[1], q[2], q[3] = scale * qx, scale * qy, scale * qz, scale * qw
@@ -79,7 +81,7 @@ def sculling(a, f, last_a, last_f):
 
 @compiled
 def step(s, angle, force, dt, earth_rate, command, gravity):
-    """Integrate one IMU interval of dt [s]; s: record of STATE_DTYPE.
+    """Integrate one IMU interval of dt [s]; s: record of State.
 
     angle, force (3,): integrals of w_ib and f over the interval, FLU [rad, m/s]; earth_rate, command (3,): w_ie, w_c
     in n' [rad/s]; gravity: g [m/s2].

@@ -39,7 +39,7 @@ def test_riccati_limit_is_the_posterior_of_all_measurements_at_once():
     n, r, h = 20, 0.05**2, 0.2
     q = (float(K['gravity']) * float(K['gyro_noise']))**2 * h
     F = np.array([[1.0, h, 0.5 * h * h], [0.0, 1.0, h], [0.0, 0.0, 1.0]])
-    state = np.zeros(1, extended_observer.STATE_DTYPE)
+    state = extended_observer.State.zeros()
     extended_observer.start(state[0], K, math.radians(5.0), 2.0)
     p = state[0]['p']
     P0 = np.diag([p[0], p[3], p[5]])
@@ -64,7 +64,7 @@ def test_the_scheduled_covariance_is_what_its_gains_leave():
     """Monte Carlo of the observer's error with the gains of adrc_scheduled."""
     runs, seconds = 4000, 20.0
     random = np.random.default_rng(1)
-    state = np.zeros(1, extended_observer.STATE_DTYPE)
+    state = extended_observer.State.zeros()
     extended_observer.start(state[0], K, math.radians(5.0), 2.0)
     p, r = state[0]['p'], float(K['velocity_density']) / H
     e = random.standard_normal((3, runs)) * np.sqrt([[p[0]], [p[3]], [p[5]]])
@@ -97,7 +97,7 @@ def test_steady_covariance_against_scipy():
 
 def test_both_channels_push_their_tilt_out():
     """The paper's equation (11) as printed makes the east channel run away: signs of both, one linear step."""
-    o, command = np.zeros(1, extended_observer.STATE_DTYPE), np.zeros(3)
+    o, command = extended_observer.State.zeros(), np.zeros(3)
     o[0]['z'][:, 1] = 0.1       # both accelerate upwards of zero
     levelling.level(o[0], K, np.zeros(2), np.zeros(2), 1.0, command)
     assert (o[0]['input'] < 0.0).all() and command[0] < 0.0 < command[1]
@@ -170,7 +170,7 @@ def test_gravity_in_the_frame_of_the_start_against_a_sum():
 def test_the_solution_is_the_rotation_and_agrees_with_kabsch():
     random = np.random.default_rng(3)
     turn = Rotation.from_euler('xyz', [0.1, -0.2, 2.9])
-    s = np.zeros(1, oba.STATE_DTYPE)
+    s = oba.State.zeros()
     k, start = K.copy(), np.array([0.3, -0.2, 0.1])
     a, b = [], []
     for n in range(1, 400):

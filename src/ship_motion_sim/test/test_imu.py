@@ -21,13 +21,13 @@ constants_of = functools.cache(motion.constants)
 
 
 def truth_at(params, t):
-    truth = np.zeros(1, motion.Truth.dtype)
+    truth = motion.Truth.zeros()
     motion.truth(constants_of(params.ship)[0], t, truth[0])
     return truth
 
 
 def sample(params, t, dt=0.005, normals=NO_NOISE):
-    inputs, outputs = np.zeros(1, imu.INPUTS_DTYPE), np.zeros(1, imu.OUTPUTS_DTYPE)
+    inputs, outputs = imu.Inputs.zeros(), imu.Outputs.zeros()
     inputs['t'], inputs['dt'] = t, dt
     imu.step(imu.initial_state()[0], imu.constants(params)[0], constants_of(params.ship)[0], inputs[0],
              truth_at(params, t)[0], outputs[0], normals)
@@ -86,7 +86,7 @@ def test_noise_is_a_density_and_bias_is_added(dt):
     normals = np.random.default_rng(4).standard_normal((3000, imu.IMU_NORMALS_PER_STEP))
     state, constants, truth = imu.initial_state(), imu.constants(params), truth_at(params, 0.0)
     ship = motion.constants(params.ship)
-    inputs, outputs = np.zeros(1, imu.INPUTS_DTYPE), np.zeros(1, imu.OUTPUTS_DTYPE)
+    inputs, outputs = imu.Inputs.zeros(), imu.Outputs.zeros()
     inputs['dt'] = dt
     rates, forces = [], []
     for row in normals:
@@ -146,7 +146,7 @@ def test_quantised_increments_are_whole_and_lose_nothing():
     total = np.zeros((2, 6))
     for k in range(300):
         for i in range(2):
-            inputs, outputs = np.zeros(1, imu.INPUTS_DTYPE), np.zeros(1, imu.OUTPUTS_DTYPE)
+            inputs, outputs = imu.Inputs.zeros(), imu.Outputs.zeros()
             inputs['t'], inputs['dt'] = k * dt, dt
             imu.step(states[i][0], imu.constants(params[i])[0], ship[0], inputs[0],
                      truth_at(params[i], k * dt)[0], outputs[0], NO_NOISE)

@@ -26,10 +26,10 @@ class Bench:
         self.imu = imu.constants(ShipMotionParameters(ship))
         self.constants, self.state = ins.constants(params), ins.initial_state()
         self.random = np.random.default_rng(seed)
-        self.inputs, self.truth = np.zeros(1, ins.INPUTS_DTYPE), np.zeros(1, motion.Truth.dtype)
+        self.inputs, self.truth = ins.Inputs.zeros(), motion.Truth.zeros()
 
     def step(self, stamp, spoil=None):
-        dt, raw = np.zeros(1, imu.INPUTS_DTYPE), np.zeros(1, imu.OUTPUTS_DTYPE)
+        dt, raw = imu.Inputs.zeros(), imu.Outputs.zeros()
         dt['dt'] = 0.005
         motion.truth(self.ship[0], 1e-9 * stamp, self.truth[0])
         imu.step(imu.initial_state()[0], self.imu[0], self.ship[0], dt[0], self.truth[0], raw[0],
@@ -42,7 +42,7 @@ class Bench:
         return self.run()
 
     def run(self):
-        outputs = np.zeros(1, ins.OUTPUTS_DTYPE)
+        outputs = ins.Outputs.zeros()
         ins.step(self.state[0], self.constants[0], self.inputs[0], outputs[0],
                  self.random.standard_normal(ins.INS_NORMALS_PER_STEP))
         return outputs[0]
@@ -199,6 +199,6 @@ def test_compiled_callers_get_the_same_result():
     one, other = Bench(InsParameters()), Bench(InsParameters())
     for k in range(3):
         expected = one.step(k * STEP)
-        outputs = np.zeros(1, ins.OUTPUTS_DTYPE)
+        outputs = ins.Outputs.zeros()
         call(other.state, other.constants, one.inputs, outputs, other.random.standard_normal(ins.INS_NORMALS_PER_STEP))
         assert outputs[0].tobytes() == expected.tobytes()

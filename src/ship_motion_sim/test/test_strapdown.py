@@ -38,16 +38,16 @@ def measured(state, constants, ship, inputs, truth, outputs, count, angle, force
 def increments(ship, seconds):
     """(angle, force) (n, 3) of an errorless IMU from 0 s on."""
     params, count = ShipMotionParameters(ship, EXACT), round(seconds / DT)
-    inputs = np.zeros(1, imu.INPUTS_DTYPE)
+    inputs = imu.Inputs.zeros()
     inputs['dt'] = DT
     angle, force = np.zeros((count, 3)), np.zeros((count, 3))
     measured(imu.initial_state(), imu.constants(params), motion.constants(ship), inputs,
-             np.zeros(1, motion.Truth.dtype), np.zeros(1, imu.OUTPUTS_DTYPE), count, angle, force)
+             motion.Truth.zeros(), imu.Outputs.zeros(), count, angle, force)
     return angle, force
 
 
 def truth_at(ship, t):
-    truth = np.zeros(1, motion.Truth.dtype)
+    truth = motion.Truth.zeros()
     motion.truth(motion.constants(ship)[0], t, truth[0])
     return truth[0]
 
@@ -60,7 +60,7 @@ def integrate(state, angle, force, dt, earth_rate, command, gravity):
 
 def navigated(ship, angle, force, command=(0.0, 0.0, 0.0)):
     """The STATE record after these increments from the true attitude and velocity at 0 s."""
-    state, start = np.zeros(1, strapdown.STATE_DTYPE), truth_at(ship, 0.0)
+    state, start = strapdown.State.zeros(), truth_at(ship, 0.0)
     strapdown.set_attitude(state[0], *start['quaternion'])
     state['velocity'] = start['velocity']
     integrate(state, angle, force, DT, np.array(earth.rate(LATITUDE)), np.array(command), earth.gravity(LATITUDE))
@@ -83,7 +83,7 @@ def test_without_errors_it_stays_on_the_truth(ship, seconds, angle_limit, veloci
 
 def test_a_wrong_earth_rate_would_be_seen():
     angle, force = increments(SWAY, 60.0)
-    state, start = np.zeros(1, strapdown.STATE_DTYPE), truth_at(SWAY, 0.0)
+    state, start = strapdown.State.zeros(), truth_at(SWAY, 0.0)
     strapdown.set_attitude(state[0], *start['quaternion'])
     integrate(state, angle, force, DT, np.zeros(3), np.zeros(3), earth.gravity(LATITUDE))
     assert apart(state['quaternion'], truth_at(SWAY, 60.0)['quaternion']) == pytest.approx(

@@ -18,7 +18,7 @@ class Bench:
         self.target = target.build(self.params.target, duration)
         self.constants = receiver.constants(self.params, period, self.target)
         self.state = receiver.initial_state()
-        self.inputs = np.zeros(1, receiver.INPUTS_DTYPE)
+        self.inputs = receiver.Inputs.zeros()
         self.inputs['mat_ed'], self.inputs['valid'], self.inputs['stamp_ns'] = ashore_matrix(), 1, -1
         self.period_ns, self.next_ns = round(period * 1e9), 0
         self.point(0.3, 0.6)
@@ -29,7 +29,7 @@ class Bench:
     def run(self, steps=1, rng=None, stamps=None):
         stamps = self.next_ns + self.period_ns * np.arange(steps) if stamps is None else stamps
         count = receiver.normals_per_step(self.params)
-        outputs, out = np.zeros(1, receiver.OUTPUTS_DTYPE), np.zeros(len(stamps), receiver.OUTPUTS_DTYPE)
+        outputs, out = receiver.Outputs.zeros(), np.zeros(len(stamps), receiver.Outputs.dtype)
         for k, stamp in enumerate(stamps):
             self.inputs['stamp_ns'] = stamp
             normals = np.zeros(count) if rng is None else rng.standard_normal(count)

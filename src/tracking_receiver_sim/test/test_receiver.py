@@ -252,7 +252,7 @@ def test_age_of_an_error(values, age):
 @pytest.mark.parametrize('beam', ['held', 'moving'])
 def test_age_of_the_beam_is_that_of_the_steps_its_samples_were_taken_in(kind, n, beam):
     """What the smoothing makes of samples that are the number of their step."""
-    samples, steps, state = 5, 300, np.zeros(1, smoothing.SMOOTHER_DTYPE).view(np.recarray)[0]
+    samples, steps, state = 5, 300, smoothing.Smoother.zeros().view(np.recarray)[0]
     for step in range(steps):
         smoothing.begin(state)
         for _ in range(samples):

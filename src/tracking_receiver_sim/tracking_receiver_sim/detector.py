@@ -22,7 +22,7 @@ MIN_POWER_OVER_NOISE = 0.01
 
 STATE_FIELDS = (
     ('agc_power', 'f8'), ('level_power', 'f8'),
-    ('smooth_cross_elevation', smoothing.SMOOTHER_DTYPE), ('smooth_elevation', smoothing.SMOOTHER_DTYPE),
+    ('smooth_cross_elevation', smoothing.Smoother.dtype), ('smooth_elevation', smoothing.Smoother.dtype),
     ('locked', 'i8'), ('timer_ns', 'i8'))
 """Fields of the state.
 

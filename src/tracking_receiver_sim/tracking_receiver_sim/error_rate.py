@@ -5,7 +5,7 @@ from pedestal_common.geometry.line_of_sight import offset_rates, to_deck
 
 @compiled
 def error_rate(i, position, velocity, target):
-    """Return (d dX/dt, d dE/dt) [rad/s] of a TargetState off the beam; i: record of receiver.INPUTS_DTYPE.
+    """Return (d dX/dt, d dE/dt) [rad/s] of a TargetState off the beam; i: record of receiver.Inputs.
 
     position, velocity (3,): position of the antenna, ENU [m], and its velocity, FLU [m/s]. The rate is exact. In the
     deck frame the target is at r = M^T (p - position), and its derivative is dr/dt = M^T v - velocity - w x r.

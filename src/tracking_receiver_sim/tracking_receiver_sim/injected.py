@@ -5,6 +5,8 @@ from pedestal_common.codes import codes
 from pedestal_common.compiled import compiled
 from pedestal_common.graph.steps import NS_PER_SECOND
 from pedestal_common.injection import message_faults, schedule, table
+from pedestal_common.quantities import Pair
+from pedestal_common.record import Record
 from pedestal_common.wire.records import NO_STAMP
 
 MESSAGE_FAULT_CODES = message_faults.codes('tracking_receiver')
@@ -12,24 +14,31 @@ Fault = codes([fault.name for fault in table.INJECTED_FAULTS['tracking_receiver'
 
 SLOPE_BOTH, SLOPE_CROSS_ELEVATION, SLOPE_ELEVATION = range(3)  # choices of the fault wrong_slope
 
-INJECTED_DTYPE = np.dtype([('power', 'f8'), ('cos_phi', 'f8'), ('sin_phi', 'f8'), ('latency_ns', 'i8'),
-                           ('clock_ns', 'i8'), ('bias', 'f8', (2,)),
-                           ('message_fault', message_faults.MESSAGE_FAULT_DTYPE)], align=True)
-"""Record of the faults.
 
-    power, cos_phi, sin_phi, latency_ns     values of receiver.CONSTANTS_DTYPE without a fault
-    clock_ns                                offset of the stamps
-    bias                                    offset of the errors [rad]
-    message_fault                           faults of the published results
-"""
+class Injected(Record):
+    """Record of the faults.
+
+    power, cos_phi, sin_phi, latency_ns     values of receiver.Constants without a fault
+        clock_ns                                offset of the stamps
+        bias                                    offset of the errors [rad]
+        message_fault                           faults of the published results
+    """
+    power: float
+    cos_phi: float
+    sin_phi: float
+    latency_ns: int
+    clock_ns: int
+    bias: Pair
+    message_fault: message_faults.MessageFault
+
 
 ANGLE_ERROR_TOPIC, ANGLE_RATE_TOPIC = 'tracking_receiver/angle_error', 'tracking_receiver/angle_rate'
 RANGE_TOPIC = 'tracking_receiver/range'
 
 
 def initial(constants) -> np.ndarray:
-    """Return INJECTED_DTYPE (1,) without a fault, for receiver.CONSTANTS_DTYPE (1,)."""
-    e = np.zeros(1, INJECTED_DTYPE)
+    """Return Injected (1,) without a fault, for receiver.Constants (1,)."""
+    e = Injected.zeros()
     for name in ('power', 'cos_phi', 'sin_phi', 'latency_ns'):
         e[name] = constants[name]
     return e
@@ -37,7 +46,7 @@ def initial(constants) -> np.ndarray:
 
 @compiled
 def _clear_faults(c, e):
-    """Restore the constants c of the receiver, and clear the faults in the record e of INJECTED_DTYPE."""
+    """Restore the constants c of the receiver, and clear the faults in the record e of Injected."""
     c.power, c.cos_phi, c.sin_phi, c.latency_ns = e.power, e.cos_phi, e.sin_phi, e.latency_ns
     c.sign[0] = c.sign[1] = 1.0
     e.clock_ns = 0
@@ -47,7 +56,7 @@ def _clear_faults(c, e):
 
 @compiled
 def _apply_fault(c, e, fault, values):
-    """Apply a fault to the constants c of the receiver and to the record e of INJECTED_DTYPE.
+    """Apply a fault to the constants c of the receiver and to the record e of Injected.
 
     values: arguments of the fault, in the order of injection/table.py.
     """
@@ -71,7 +80,7 @@ def _apply_fault(c, e, fault, values):
 
 @compiled
 def apply_due_faults(m, stamp):
-    """Clear all faults, then apply the faults in force in the step of a stamp [ns]; m: record of unit.RECORD_DTYPE."""
+    """Clear all faults, then apply the faults in force in the step of a stamp [ns]; m: record of unit.Record."""
     _clear_faults(m.constants, m.injected)
     schedule.begin(m.schedule)
     for i in range(schedule.MAX_ACTIVE_FAULTS):
@@ -82,7 +91,7 @@ def apply_due_faults(m, stamp):
 
 @compiled
 def corrupt_messages(e, stamp, outputs):
-    """Corrupt the results of a step, according to the record e of INJECTED_DTYPE."""
+    """Corrupt the results of a step, according to the record e of Injected."""
     error, rate, distance = outputs[ANGLE_ERROR_TOPIC], outputs[ANGLE_RATE_TOPIC], outputs[RANGE_TOPIC]
     for i in range(2):
         error.vector[i] += e.bias[i]

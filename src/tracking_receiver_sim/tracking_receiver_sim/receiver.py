@@ -23,6 +23,8 @@ from pedestal_common.compiled import compiled, separate
 from pedestal_common.geometry import blockage
 from pedestal_common.geometry.line_of_sight import angles, earth_angles, offsets, to_deck, to_earth
 from pedestal_common.parameters import ParameterError
+from pedestal_common.quantities import Matrix3, Pair, Vector3
+from pedestal_common.record import Record
 from tracking_receiver_sim import detector, smoothing, target
 from tracking_receiver_sim.detector import Voltages, hertz
 from tracking_receiver_sim.error_rate import error_rate
@@ -48,7 +50,7 @@ Incidence = namedtuple('Incidence', 'dX dE amplitude image hidden rates range')
 multipath.Image, True if hidden; measured rates and range as in Result."""
 NOT_MEASURED = (math.nan, math.nan)  # pair of numbers that the receiver did not measure
 
-STATE_DTYPE = np.dtype([
+State = np.dtype([
     ('stamp_ns', 'i8'), ('error_known', 'i8'), ('cross_elevation', 'f8'), ('elevation', 'f8'), ('direction', 'f8', 3),
     *detector.STATE_FIELDS,
     ('written', 'i8'), ('released', 'i8'),
@@ -69,13 +71,13 @@ STATE_DTYPE = np.dtype([
     antenna_velocity    velocity of the antenna, FLU [m/s]
 """
 
-CONSTANTS_DTYPE = np.dtype([
-    ('target', target.TARGET_DTYPE),
+Constants = np.dtype([
+    ('target', target.TargetRecord.dtype),
     ('beamwidth', 'f8'), ('slope', 'f8'), *detector.CONSTANTS_FIELDS,
     ('cos_beta', 'f8'), ('sin_beta', 'f8'), ('cos_phi', 'f8'), ('sin_phi', 'f8'), ('sign', 'f8', 2),
     ('boresight', 'f8', 2),
-    ('path', arrival.PATH_DTYPE), ('multipath', multipath.MULTIPATH_DTYPE),
-    ('scintillation', scintillation.SCINTILLATION_DTYPE),
+    ('path', arrival.Path.dtype), ('multipath', multipath.Multipath.dtype),
+    ('scintillation', scintillation.Scintillation.dtype),
     ('first_measured_normal', 'i8'), ('first_source_normal', 'i8'), ('first_scintillation_normal', 'i8'),
     ('disk_radius', 'f8'), ('source_sigma', 'f8'), ('period_ns', 'i8'), ('held', 'i8'),
     ('power', 'f8'), ('reference_range', 'f8'), ('half_exponent', 'f8'), ('horizon_mask', 'f8'),
@@ -95,44 +97,63 @@ CONSTANTS_DTYPE = np.dtype([
     range_variance      variance of the range [m2], in single precision
 """
 
-INPUTS_DTYPE = np.dtype([('stamp_ns', 'i8'), ('valid', 'i8'), ('azimuth', 'f8'), ('elevation', 'f8'),
-                         ('mat_ed', 'f8', (3, 3)), ('position', 'f8', 3), ('azimuth_rate', 'f8'),
-                         ('elevation_rate', 'f8'),
-                         ('twist_linear', 'f8', 3), ('twist_angular', 'f8', 3)], align=True)
-"""Inputs of a step.
+
+class Inputs(Record):
+    """Inputs of a step.
 
     valid                           1 if the direction of the beam is known
-    azimuth, elevation, .._rate     true beam on the deck [rad], [rad/s]
-    mat_ed                          true attitude deck -> earth
-    position                        base_link against the station, ENU [m]
-    twist_linear, twist_angular     velocity of base_link [m/s] and rate of the deck [rad/s], FLU
-"""
+        azimuth, elevation, .._rate     true beam on the deck [rad], [rad/s]
+        mat_ed                          true attitude deck -> earth
+        position                        base_link against the station, ENU [m]
+        twist_linear, twist_angular     velocity of base_link [m/s] and rate of the deck [rad/s], FLU
+    """
+    stamp_ns: int
+    valid: int
+    azimuth: float
+    elevation: float
+    mat_ed: Matrix3
+    position: Vector3
+    azimuth_rate: float
+    elevation_rate: float
+    twist_linear: Vector3
+    twist_angular: Vector3
 
-OUTPUTS_DTYPE = np.dtype([
-    ('due', 'i8'), ('stamp_ns', 'i8'), ('cross_elevation', 'f8'), ('elevation', 'f8'), ('cn0_dbhz', 'f8'),
-    ('locked', 'i8'), ('status', 'i8'), ('rate', 'f8', 2), ('range', 'f8'),
-    ('true_cross_elevation', 'f8'), ('true_elevation', 'f8'),
-    ('target_valid', 'i8'), ('target_position', 'f8', 3), ('target_velocity', 'f8', 3)], align=True)
-"""Outputs of a step.
+
+class Outputs(Record):
+    """Outputs of a step.
 
     due                             1 if a result comes out in this step
 
-The result, measured at stamp_ns; its numbers are NaN while not locked, except C/N0:
+    The result, measured at stamp_ns; its numbers are NaN while not locked, except C/N0:
 
     cross_elevation, elevation      errors [rad]
-    cn0_dbhz, locked                C/N0 [dB-Hz]; 1 while locked
-    rate, range                     rates of the errors [rad/s] and range [m], NaN if not measured; the range has the
-                                    single precision of its topic
+        cn0_dbhz, locked                C/N0 [dB-Hz]; 1 while locked
+        rate, range                     rates of the errors [rad/s] and range [m], NaN if not measured; the range has the
+                                        single precision of its topic
 
-Values at the stamp of this step, NaN if not known:
+    Values at the stamp of this step, NaN if not known:
 
     status                          index into STATUS_TEXT_BY_CODE
-    true_..., target_...            true error [rad]; target, ENU [m, m/s]
-"""
+        true_..., target_...            true error [rad]; target, ENU [m, m/s]
+    """
+    due: int
+    stamp_ns: int
+    cross_elevation: float
+    elevation: float
+    cn0_dbhz: float
+    locked: int
+    status: int
+    rate: Pair
+    range: float
+    true_cross_elevation: float
+    true_elevation: float
+    target_valid: int
+    target_position: Vector3
+    target_velocity: Vector3
 
 
 def constants(params, period, built) -> np.ndarray:
-    """Return CONSTANTS_DTYPE (1,) of TrackingReceiverParameters, a drive step `period` [s] and a target.Target.
+    """Return Constants (1,) of TrackingReceiverParameters, a drive step `period` [s] and a target.Target.
 
     Raises ParameterError for a latency that the ring of results does not cover.
     """
@@ -141,7 +162,7 @@ def constants(params, period, built) -> np.ndarray:
         raise ParameterError(f'receiver.latency = {receiver.latency:g} s: must be below {RESULT_RING_SIZE - 1} '
                              f'periods of {period:g} s')
     tau = period / receiver.samples_per_step
-    c = np.zeros(1, CONSTANTS_DTYPE)
+    c = np.zeros(1, Constants)
     c['target'], c['beamwidth'] = built.constants, antenna.beamwidth
     c['slope'] = antenna.slope * antenna.slope_factor
     detector.set_constants(c, antenna, receiver, period)
@@ -177,8 +198,8 @@ def constants(params, period, built) -> np.ndarray:
 
 
 def initial_state() -> np.ndarray:
-    """Return (1,) STATE_DTYPE before the first step: noise in the channels, not locked."""
-    s = np.zeros(1, STATE_DTYPE)
+    """Return (1,) State before the first step: noise in the channels, not locked."""
+    s = np.zeros(1, State)
     s['stamp_ns'], s['agc_power'], s['level_power'] = -1, 1.0, 1.0
     return s
 
@@ -459,7 +480,7 @@ def finish(s, o, true, seen):
 def step(s, c, i, o, breaks, coefficients, normals):
     """Execute one drive step. Never raises: the status of the outputs names a missing input.
 
-    s, c, i, o: records STATE_DTYPE, CONSTANTS_DTYPE, INPUTS_DTYPE, OUTPUTS_DTYPE; breaks, coefficients: of the Target;
+    s, c, i, o: records State, Constants, Inputs, Outputs; breaks, coefficients: of the Target;
     normals: (normals_per_step,).
     """
     true, elapsed_ns = begin(s, c, i, o, breaks, coefficients)

@@ -8,19 +8,26 @@
 y: sample of the error [rad]; x: smoothed error [rad]; n: number of samples [-]; T: time between two samples [s]. The
 argument `kind` is a code such as SMOOTHING_NONE in the compiled laws, and a name of SMOOTHING_KINDS elsewhere.
 """
-import numpy as np
+from typing import Annotated
 
 from pedestal_common.compiled import compiled
+from pedestal_common.quantities import Floats
+from pedestal_common.record import Record
 
 SMOOTHING_KINDS = ('none', 'recursion', 'moving_average')
 SMOOTHING_NONE, SMOOTHING_RECURSION, SMOOTHING_MOVING_AVERAGE = range(len(SMOOTHING_KINDS))
 
 MAX_WINDOW_SAMPLES = 256  # length of the longest moving average [samples]
 
-SMOOTHER_DTYPE = np.dtype([('low_pass', 'f8'), ('sum', 'f8'), ('samples', 'f8', (MAX_WINDOW_SAMPLES,)),
-                           ('count', 'i8')], align=True)
-"""State of a smoother. low_pass: output of the recursion; sum: sum of the samples of this step; samples: the last
-samples; count: number of samples since the start."""
+
+class Smoother(Record):
+    """State of a smoother. low_pass: output of the recursion; sum: sum of the samples of this step; samples: the last
+    samples; count: number of samples since the start.
+    """
+    low_pass: float
+    sum: float
+    samples: Annotated[Floats, (MAX_WINDOW_SAMPLES,)]
+    count: int
 
 
 @compiled

@@ -32,7 +32,8 @@ from pedestal_common.geometry.interval import interval
 from pedestal_common.geometry.line_of_sight import earth_angles, earth_direction
 from pedestal_common.geometry.orbit import TargetError
 from pedestal_common.graph.steps import SECONDS_PER_DAY
-from pedestal_common.parameters import record, record_type
+from pedestal_common.parameters import record
+from pedestal_common.record import Record
 from pedestal_common.sky import bodies
 from tracking_receiver_sim.params import TARGET_KINDS, TARGET_RAMP, TARGET_SINE, TARGET_STEP, AngleParameters
 
@@ -53,8 +54,11 @@ TargetState = namedtuple('TargetState', 'valid position velocity')
 """State of a target. valid: 0 or 1; position: ENU of the station [m]; velocity [m/s]; three floats each, NaN if not
 valid."""
 
-TARGET_DTYPE = np.dtype([('kind', 'i8'), ('angle', record_type(AngleParameters))], align=True)
-"""Constants of a target. kind: index into TARGET_KINDS; angle: AngleParameters."""
+
+class TargetRecord(Record):
+    """Constants of a target. kind: index into TARGET_KINDS; angle: AngleParameters."""
+    kind: int
+    angle: AngleParameters
 
 
 class Target(typing.NamedTuple):
@@ -152,7 +156,7 @@ def build(params, duration, horizon_mask=0.0) -> Target:
                                      **dict.fromkeys(bodies.POSITIONS, _body)}
     # known: start_time and summary, as far as the kind has them.
     breaks, coefficients, *known = builders.get(params.kind, _angles)(params, duration)
-    constants = np.zeros(1, TARGET_DTYPE)
+    constants = TargetRecord.zeros()
     constants['kind'], constants['angle'] = TARGET_KINDS.index(params.kind), record(params.angle)
     built = Target(constants, np.ascontiguousarray(breaks), np.ascontiguousarray(coefficients), *known)
     _require_above(params, built, duration, min(0.0, horizon_mask))

@@ -23,10 +23,10 @@ RANGE_TOPIC = 'tracking_receiver/range'
 FAULT_STATUSES = (receiver.Status.NO_TARGET, receiver.Status.NO_BEAM, receiver.Status.STAMP_ORDER)
 """Statuses that the receiver keeps for the next diagnosis."""
 
-RECORD_DTYPE = np.dtype([('state', receiver.STATE_DTYPE), ('constants', receiver.CONSTANTS_DTYPE),
-                         ('inputs', receiver.INPUTS_DTYPE), ('outputs', receiver.OUTPUTS_DTYPE),
+Record = np.dtype([('state', receiver.State), ('constants', receiver.Constants),
+                         ('inputs', receiver.Inputs.dtype), ('outputs', receiver.Outputs.dtype),
                          ('row', 'i8'), ('fault', 'i8'),
-                         ('schedule', schedule.SCHEDULE_DTYPE), ('injected', injected.INJECTED_DTYPE)], align=True)
+                         ('schedule', schedule.Schedule.dtype), ('injected', injected.Injected.dtype)], align=True)
 """Record of the unit.
 
 row: row of the noise `normals` for the next step; fault: last status of FAULT_STATUSES since the last diagnosis,
@@ -37,7 +37,7 @@ LOCKED if there was none.
 class Memory(typing.NamedTuple):
     """All data of the receiver.
 
-    record: (1,) of RECORD_DTYPE; breaks, coefficients: track of the target, see target.Target; normals: (steps,
+    record: (1,) of Record; breaks, coefficients: track of the target, see target.Target; normals: (steps,
     receiver.normals_per_step), noise of the next steps.
     """
     record: np.ndarray
@@ -116,7 +116,7 @@ class TrackingReceiver(Simulated):
         self._noise = noise.generator(parameters.seed, self.NODE.name)
         self._air, = self._noise.spawn(1)
         constants = receiver.constants(parameters, parameters.period, self.target)
-        record = joined(RECORD_DTYPE, state=receiver.initial_state(), constants=constants,
+        record = joined(Record, state=receiver.initial_state(), constants=constants,
                         fault=receiver.Status.LOCKED, schedule=schedule.empty(), injected=injected.initial(constants))
         record['inputs']['mat_ed'] = line_of_sight.ashore_matrix()
         self.memory = Memory(record, self.target.breaks, self.target.coefficients,

@@ -7,34 +7,37 @@ By the table an alarm may be the consequence of another alarm, its parent. The a
 cases: the condition of the parent is present, or both were raised within CAUSE_WINDOW_S. Only an alarm without a
 parent is annunciated (`report`).
 
-s: record of ALARM_LIST_DTYPE; i: index of an alarm in table.ALARMS; t: stamp of the step [s].
+s: record of AlarmList; i: index of an alarm in table.ALARMS; t: stamp of the step [s].
 """
+from collections.abc import Sequence
+from typing import Annotated
+
 import numpy as np
 
 from acu_tracker.alarms import machine, table
 from pedestal_common.compiled import compiled
+from pedestal_common.record import Record
 
 ALARM_COUNT = len(table.ALARMS)
 
-ALARM_DTYPE = np.dtype([('state', 'i8'), ('active', 'i8'), ('since', 'f8'), ('raised', 'f8'), ('first', 'i8'),
-                        ('parent', 'i8'), ('until', 'f8')], align=True)
-"""State of an alarm.
 
-state   index in machine.ALARM_STATES
-active  1 if its condition is present, after the delays
-since   last stamp at which the condition was as `active` states [s]
-raised  stamp at which the alarm was last raised [s]
-first   1 if it was the first alarm of its burst
-parent  index of the alarm under which it stands, or NO_ALARM
-until   stamp at which a shelved alarm returns [s]
-"""
+class Alarm(Record):
+    """State of an alarm."""
+    state: int  # index in machine.ALARM_STATES
+    active: int  # 1 if its condition is present, after the delays
+    since: float  # last stamp at which the condition was as `active` states [s]
+    raised: float  # stamp at which the alarm was last raised [s]
+    first: int  # 1 if it was the first alarm of its burst
+    parent: int  # index of the alarm under which it stands, or NO_ALARM
+    until: float  # stamp at which a shelved alarm returns [s]
 
-ALARM_LIST_DTYPE = np.dtype([('alarm', ALARM_DTYPE, (ALARM_COUNT,)), ('burst', 'f8'), ('revision', 'i8')], align=True)
-"""State of all alarms.
 
-burst     stamp at which the last burst of alarms began [s]
-revision  number of changes of the published list
-"""
+class AlarmList(Record):
+    """State of all alarms."""
+    alarm: Annotated[Sequence[Alarm], (ALARM_COUNT,)]
+    burst: float  # stamp at which the last burst of alarms began [s]
+    revision: int  # number of changes of the published list
+
 
 NO_ALARM = -1  # index that stands for no alarm
 FIRST_OUT_WINDOW_S = 1.0  # time after the first alarm of a burst within which other alarms belong to the burst [s]
@@ -46,7 +49,7 @@ MAX_SHELVING_TIME_S = 86400.0  # longest time for which an alarm may be shelved 
 
 
 def initialise(s):
-    """Begin with every alarm in the state normal and no list published; s: view of ALARM_LIST_DTYPE."""
+    """Begin with every alarm in the state normal and no list published; s: view of AlarmList."""
     s['alarm']['state'] = machine.State.NORMAL
     s['alarm']['parent'] = NO_ALARM
     s['alarm']['since'] = s['alarm']['raised'] = s['burst'] = -np.inf
@@ -118,7 +121,7 @@ def apply_event(s, i, event, t):
 def _delayed(a, on, t, delay):
     """Set a.active to `on` (the condition is present or not at t) after it has been so for a delay [s].
 
-    a: record of ALARM_DTYPE.
+    a: record of Alarm.
     """
     if on == a.active:
         a.since = t

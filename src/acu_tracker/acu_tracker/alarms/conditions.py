@@ -3,7 +3,7 @@
 The conditions come from the detectors of both axes, from the state of the drive, and from facts of the control unit.
 The result is a number with one bit for each alarm (table.Bit), which the annunciator takes.
 
-s: record of SUPERVISION_DTYPE; u, o: records of signals.INPUTS_DTYPE and of signals.OUTPUTS_DTYPE; facts: the Facts.
+s: record of Supervision; u, o: records of signals.Inputs.dtype and of signals.Outputs; facts: the Facts.
 """
 import math
 from collections import namedtuple
@@ -16,19 +16,19 @@ from acu_tracker.modes import Mode, Reason
 from acu_tracker.servo import position_loop
 from acu_tracker.signals import Flag
 from pedestal_common.compiled import compiled
+from pedestal_common.quantities import BothAxes, Vector3
+from pedestal_common.record import Record
 
-SUPERVISION_DTYPE = np.dtype([
-    ('axis', detectors.AXIS_DETECTORS_DTYPE, (2,)), ('previous', 'f8', (3,)), ('least', 'f8'), ('ready', 'f8'),
-    ('lost', 'i8'), ('alarms', annunciator.ALARM_LIST_DTYPE)], align=True)
-"""State of the alarms and of their conditions.
 
-axis       state of the detectors of each axis
-previous   errors [rad] and C/N0 [dB-Hz] of the receiver in the previous step
-least      lowest C/N0 received so far [dB-Hz]
-ready      last stamp at which the drive was ready [s]
-lost       bits of the axes that had only one motor at that stamp: 1 azimuth, 2 elevation
-alarms     state of the annunciator
-"""
+class Supervision(Record):
+    """State of the alarms and of their conditions."""
+    axis: BothAxes[detectors.AxisDetectors]  # state of the detectors of each axis
+    previous: Vector3  # errors [rad] and C/N0 [dB-Hz] of the receiver in the previous step
+    least: float  # lowest C/N0 received so far [dB-Hz]
+    ready: float  # last stamp at which the drive was ready [s]
+    lost: int  # bits of the axes that had only one motor at that stamp: 1 azimuth, 2 elevation
+    alarms: annunciator.AlarmList  # state of the annunciator
+
 
 INVALID_INPUT_FLAGS = Flag.ENCODER | Flag.ERROR | Flag.ERROR_STAMP | Flag.PROGRAM | Flag.PRESET | Flag.ATTITUDE_ERROR
 """Flags of refused inputs, except the attitude, which has the alarm `INS lost`."""
@@ -60,7 +60,7 @@ DRIVE_SILENCE_GAP_S = 0.3  # gap between two steps above which the drive was sil
 
 
 def initialise(s):
-    """Begin without a condition; s: view of SUPERVISION_DTYPE."""
+    """Begin without a condition; s: view of Supervision."""
     s['least'], s['ready'] = np.inf, -np.inf
     s['axis']['y'] = np.nan
     annunciator.initialise(s['alarms'])
@@ -70,8 +70,8 @@ def initialise(s):
 def _of_motors(d, i, u, envelope, p, facts):
     """Return the bits of the alarms of axis i that follow from its encoder, its motors and its commands.
 
-    d         record of AXIS_DETECTORS_DTYPE of the axis
-    envelope  record of uncommanded_motion.ENVELOPE_DTYPE
+    d         record of AxisDetectors of the axis
+    envelope  record of uncommanded_motion.Envelope
     p         record of AxisParameters
 
     The bit of an azimuth alarm, shifted left by i, is the bit of axis i.
@@ -99,7 +99,7 @@ def _of_motors(d, i, u, envelope, p, facts):
 def _of_loop(d, i, e, o, facts):
     """Return the bits of the alarms of axis i that follow from its following error e [rad] and its limits.
 
-    d: record of AXIS_DETECTORS_DTYPE. The following error does not count while the command is limited in rate or
+    d: record of AxisDetectors. The following error does not count while the command is limited in rate or
     acceleration.
     """
     bits, limited = 0, o.rate_limited[i] or o.acceleration_limited[i]
@@ -116,7 +116,7 @@ def _of_loop(d, i, e, o, facts):
 def _of_axes(s, mode, u, o, c, envelope, facts):
     """Return the bits of the alarms of both axes; an electronic beam has none of them.
 
-    c: records (2,) of control_unit.AXIS_CONSTANTS_DTYPE; envelope: record of uncommanded_motion.ENVELOPE_DTYPE.
+    c: records (2,) of control_unit.AxisConstants; envelope: record of uncommanded_motion.Envelope.
     """
     bits, off = 0, u.stamp - s.ready > BRAKE_GRIP_DEADLINE_S
     for i in range(2):
@@ -204,7 +204,7 @@ def _of_program(u, o):
 def _judged(mode, c):
     """Return the bits of the alarms that have a meaning in a mode; the others are suppressed.
 
-    c: records (2,) of control_unit.AXIS_CONSTANTS_DTYPE.
+    c: records (2,) of control_unit.AxisConstants.
     """
     motors = c[0].p.controller != position_loop.CONTROLLER_BEAM or c[1].p.controller != position_loop.CONTROLLER_BEAM
     return (JUDGED_ALWAYS | (JUDGED_WITH_MOTORS if motors else 0) | (JUDGED_MOVING if mode != Mode.STANDBY else 0)
@@ -216,8 +216,8 @@ def take(s, mode, u, o, c, envelope, facts):
     """Determine the conditions of all alarms in a step, and update the alarms.
 
     mode      code of the mode; standby while the mode commands no motion
-    c         records (2,) of control_unit.AXIS_CONSTANTS_DTYPE
-    envelope  record of uncommanded_motion.ENVELOPE_DTYPE
+    c         records (2,) of control_unit.AxisConstants
+    envelope  record of uncommanded_motion.Envelope
     """
     bits = _of_drive(s, u) | _of_unit(s, u, o, facts) | _of_axes(s, mode, u, o, c, envelope, facts)
     if facts.gap > 0.0:

@@ -3,7 +3,7 @@
 `conditions` calls them in each step and makes alarms of their results. Each condition begins above a first level and
 ends below a second level, which is half of the first unless stated otherwise.
 
-d          record of AXIS_DETECTORS_DTYPE of the axis
+d          record of AxisDetectors of the axis
 y          angle of the load encoder [rad]
 dy         rate of the axis by the encoders of the motors [rad/s]
 T          torque of the motors on the load [Nm]
@@ -12,29 +12,34 @@ dt         time since the previous step [s]
 """
 import math
 
-import numpy as np
-
 from pedestal_common.compiled import compiled
+from pedestal_common.record import Record
 
-AXIS_DETECTORS_DTYPE = np.dtype([
-    ('y', 'f8'), ('dy', 'f8'),                              # of the previous step [rad], [rad/s]; NaN: no value
-    ('mismatch', 'f8'), ('disagrees', 'i8'),                        # of `disagreement` [rad]
-    ('turned', 'f8'), ('moved', 'f8'), ('stuck', 'i8'),             # of motors and encoder, in this test [rad]
-    ('immobile', 'i8'), ('mean_torque', 'f8'), ('overloaded', 'i8'), ('resisted', 'f8'),    # of `brake_not_released`
-    ('work', 'f8'), ('pushed', 'f8'), ('behind', 'i8'), ('moves', 'i8'),
-    ('e', 'f8'), ('area', 'f8'), ('half_waves', 'f8'), ('oscillates', 'i8'),    # of `oscillation` [rad], [rad s], [-]
-], align=True)
-"""State of the detectors of one axis.
 
-disagrees, stuck, immobile, overloaded, behind, moves, oscillates  1 while the condition of a detector is present
-mean_torque  mean of the absolute torque [Nm]
-resisted     time for which a brake has resisted the motors [s]
-work         work of the load on the motors [J]
-pushed       direction of the torque during a gust: 1 or -1; 0 without a gust
-e            last following error other than 0 [rad]
-area         area of the present half wave of the following error [rad s]
-half_waves   number of half waves, which decays
-"""
+class AxisDetectors(Record):
+    """State of the detectors of one axis."""
+    y: float
+    dy: float  # of the previous step [rad], [rad/s]; NaN: no value
+    mismatch: float
+    # disagrees, stuck, immobile, overloaded, behind, moves, oscillates: 1 while the condition of a detector is present
+    # of `disagreement` [rad]
+    disagrees: int
+    turned: float
+    moved: float
+    stuck: int  # of motors and encoder, in this test [rad]
+    immobile: int
+    mean_torque: float  # mean of the absolute torque [Nm]
+    overloaded: int
+    resisted: float  # time for which a brake has resisted the motors [s] of `brake_not_released`
+    work: float  # work of the load on the motors [J]
+    pushed: float  # direction of the torque during a gust: 1 or -1; 0 without a gust
+    behind: int
+    moves: int
+    e: float  # last following error other than 0 [rad]
+    area: float  # area of the present half wave of the following error [rad s]
+    half_waves: float  # number of half waves, which decays
+    oscillates: int  # of `oscillation` [rad], [rad s], [-]
+
 
 MAX_STEP_MISMATCH_RAD = 3e-3
 """Largest difference between the motions of encoder and motors in one step [rad].

@@ -3,7 +3,7 @@
 An alarm is listed in every state except normal and suppressed. Annunciated alarms, at most MAX_ANNUNCIATED_ALARMS,
 come first; their consequences and the shelved alarms follow.
 
-s: view of annunciator.ALARM_LIST_DTYPE; i: index of an alarm in table.ALARMS.
+s: view of annunciator.AlarmList; i: index of an alarm in table.ALARMS.
 """
 from acu_tracker.alarms import annunciator, machine, table
 from pedestal_common.node.unit import LEVEL_ERROR, LEVEL_OK, LEVEL_WARN

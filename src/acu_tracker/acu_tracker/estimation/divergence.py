@@ -10,14 +10,18 @@ An error signal with the wrong sign, with rotated axes or with a gain three time
 its target. Then m becomes large before the beam leaves the target, and it is still large when the signal is lost. In
 this case autotrack must not coast on the wrong estimate.
 
-The detected divergence is latched: it stays until a reset. s: record of DIVERGENCE_DTYPE.
+The detected divergence is latched: it stays until a reset. s: record of Divergence.
 """
-import numpy as np
 
 from pedestal_common.compiled import compiled
+from pedestal_common.record import Record
 
-DIVERGENCE_DTYPE = np.dtype([('m', 'f8'), ('diverged', 'i8')], align=True)
-"""m: the mean [-]; diverged: 1 from the detection of a divergence until its reset."""
+
+class Divergence(Record):
+    """m: the mean [-]; diverged: 1 from the detection of a divergence until its reset."""
+    m: float
+    diverged: int
+
 
 DIVERGENCE_ERROR_COUNT = 100
 """Number of errors in the mean m; they take half a second. Without a fault m stays below 1.25."""

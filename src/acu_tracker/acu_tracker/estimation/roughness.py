@@ -15,9 +15,15 @@ Mathematical Statistics 12 (1941) 367.
 import numpy as np
 
 from pedestal_common.compiled import compiled
+from pedestal_common.quantities import Pair
+from pedestal_common.record import Record
 
-ROUGHNESS_DTYPE = np.dtype([('nu', 'f8', (2,)), ('q', 'f8')], align=True)
-"""nu: innovations of the previous error, of azimuth and elevation [rad], NaN without one; q: the mean [-]."""
+
+class Roughness(Record):
+    """nu: innovations of the previous error, of azimuth and elevation [rad], NaN without one; q: the mean [-]."""
+    nu: Pair
+    q: float
+
 
 ROUGHNESS_ERROR_COUNT = 10  # number of errors in the mean q
 

@@ -26,24 +26,26 @@ The comparison is a likelihood ratio of two hypotheses (Willsky, A survey of des
 dynamic systems, Automatica 12 (1976) 601). Each axis of the receiver is tested by itself. The directions are those in
 the earth frame, because the motion of the deck has no effect there.
 
-s: record of SLOPE_SIGN_DTYPE.
+s: record of SlopeSign.
 """
 import math
 from collections import namedtuple
-
-import numpy as np
+from typing import Annotated
 
 from acu_tracker.geometry.vector import Vector, dot, rotated
 from pedestal_common.compiled import compiled
+from pedestal_common.quantities import Floats
+from pedestal_common.record import Record
 
-SLOPE_SIGN_DTYPE = np.dtype([('stamp', 'f8'), ('n', 'i8'), ('line', 'f8', (5, 2)), ('J', 'f8', (2, 2))], align=True)
-"""State of the test.
 
-stamp  time of the last error [s]; -inf: no error yet
-n      number of errors in the lines
-line   value and rate of the five lines: three components of the beam's unit vector (ENU), then both errors [rad]
-J      J+ and J- of cross-elevation, then of elevation [-]
-"""
+class SlopeSign(Record):
+    """State of the test."""
+    stamp: float  # time of the last error [s]; -inf: no error yet
+    n: int  # number of errors in the lines
+    # value and rate of the five lines: three components of the beam's unit vector (ENU), then both errors [rad]
+    line: Annotated[Floats, (5, 2)]
+    J: Annotated[Floats, (2, 2)]  # J+ and J- of cross-elevation, then of elevation [-]
+
 
 LINE_ERROR_COUNT = 200
 """Number of errors in the memory of a line.
@@ -92,7 +94,7 @@ def beam(mat_ed, A, E):
 def near(u, beamwidth):
     """Return True if an error of the receiver is on the straight part of the error curve.
 
-    u: record of signals.INPUTS_DTYPE; beamwidth [rad].
+    u: record of signals.Inputs.dtype; beamwidth [rad].
     """
     return math.hypot(u.cross_elevation, u.elevation) < MAX_ERROR_BEAMWIDTHS * beamwidth
 

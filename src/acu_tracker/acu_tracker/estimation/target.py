@@ -6,7 +6,7 @@ this module.
 
 g     record of TARGET_DTYPE
 p     record of SharedParameters
-c     record of tracker.CONSTANTS_DTYPE
+c     record of tracker.Constants
 deck  record of ATTITUDE_DTYPE, except where a function states otherwise
 """
 import math
@@ -31,10 +31,15 @@ from acu_tracker.geometry.motion import angles, earth_angles, line_of_sight
 from acu_tracker.geometry.vector import Vector, rotated, rotation
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry import line_of_sight as pointing
+from pedestal_common.record import Record
 
-TARGET_DTYPE = np.dtype([('tracker', tracker.TRACKER_DTYPE), ('frame', estimate_frame.FRAME_DTYPE),
-                         ('lever_arm', lever_arm.LEVER_ARM_DTYPE)], align=True)
-"""tracker: the filter with its gates; frame: the frame of the filter; lever_arm: the vector from INS to antenna."""
+
+class Target(Record):
+    """tracker: the filter with its gates; frame: the frame of the filter; lever_arm: the vector from INS to antenna."""
+    tracker: tracker.Tracker
+    frame: estimate_frame.Frame
+    lever_arm: lever_arm.LeverArm
+
 
 OUTCOME_GATED, OUTCOME_STALE, OUTCOME_NOISY = tracker.OUTCOME_GATED, tracker.OUTCOME_STALE, tracker.OUTCOME_NOISY
 OUTCOME_NO_ATTITUDE = OUTCOME_NOISY + 1
@@ -80,7 +85,7 @@ def _measured_rates(g, deck, u, at):
     The rates are the sum of the rates of the antenna and of the receiver error.
 
     deck   Attitude of the deck when the error was measured
-    u      record of signals.INPUTS_DTYPE
+    u      record of signals.Inputs.dtype
     at     Pointing of the antenna when the error was measured
     """
     n = pointing.displaced_motion(at.A, at.E, at.dA, at.dE, u.cross_elevation, u.elevation, u.error_rate[0],
@@ -95,7 +100,7 @@ def take(g, p, c, deck, u, at, measured, restart_gap):
 
     The outcomes are those of the tracker and OUTCOME_NO_ATTITUDE.
 
-    u            record of signals.INPUTS_DTYPE
+    u            record of signals.Inputs.dtype
     at           Pointing of the antenna when the error was measured
     measured     deck angles (azimuth, elevation) of the target [rad]: those of the antenna, displaced by the error
     restart_gap  time without accepted errors after which the filter restarts [s]

@@ -4,9 +4,10 @@ The gate rejects measurements that differ too much from their prediction. The tr
 consecutive accepted measurements. Between accepted measurements the filter stays at the stamp of the last one;
 `outlook` and `read` predict from there.
 
-t: record of TRACKER_DTYPE; p: record of TrackerParameters; c: record of CONSTANTS_DTYPE; m: a Measurement.
+t: record of Tracker; p: record of TrackerParameters; c: record of Constants; m: a Measurement.
 """
 import math
+from typing import Annotated
 
 import numpy as np
 
@@ -14,28 +15,32 @@ from acu_tracker.estimation import roughness
 from acu_tracker.estimation.filters import target_filter
 from acu_tracker.estimation.filters.measurement import NO_INNOVATION, Measurement, with_azimuth_near, with_rate
 from pedestal_common.compiled import compiled, separate
+from pedestal_common.quantities import Ints, Pair
+from pedestal_common.record import Record
 
-CONSTANTS_DTYPE = np.dtype([('filter', target_filter.CONSTANTS_DTYPE), ('gates', 'f8', (2,))], align=True)
-"""Constants of the tracker.
 
-filter  constants of the filter
-gates   largest accepted nu' S^-1 nu [-] of the two angles, and of one rate or range; nu: innovation, S: its covariance
-"""
+class Constants(Record):
+    """Constants of the tracker."""
+    filter: target_filter.Constants  # constants of the filter
+    # largest accepted nu' S^-1 nu [-] of the two angles, and of one rate or range; nu: innovation, S: its covariance
+    gates: Pair
 
-TRACKER_DTYPE = np.dtype([('filter', target_filter.FILTER_DTYPE), ('stamp', 'f8'), ('running', 'i8'),
-                          ('converged', 'i8'), ('roughness', roughness.ROUGHNESS_DTYPE),
-                          ('accepted_in_a_row', 'i8'), ('gated_in_a_row', 'i8'), ('rates_in_a_row', 'i8', (2,)),
-                          ('gated', 'i8'), ('rates_gated', 'i8'), ('ranges_gated', 'i8')], align=True)
-"""State of the tracker.
 
-stamp              stamp of the last accepted measurement [s]
-running            1 while there is an estimate
-converged          1 if the rates are known well enough for lock
-accepted_in_a_row  number of consecutive accepted measurements
-gated_in_a_row     number of consecutive rejected (gated) measurements
-rates_in_a_row     of each axis: number of consecutive measured rates that agreed with the filter
-gated, rates_gated, ranges_gated  numbers of rejected directions, rates and ranges since the start
-"""
+class Tracker(Record):
+    """State of the tracker."""
+    filter: target_filter.Filter
+    stamp: float  # stamp of the last accepted measurement [s]
+    running: int  # 1 while there is an estimate
+    converged: int  # 1 if the rates are known well enough for lock
+    roughness: roughness.Roughness
+    accepted_in_a_row: int  # number of consecutive accepted measurements
+    gated_in_a_row: int  # number of consecutive rejected (gated) measurements
+    # of each axis: number of consecutive measured rates that agreed with the filter
+    rates_in_a_row: Annotated[Ints, (2,)]
+    gated: int  # gated, rates_gated, ranges_gated: numbers of rejected directions, rates and ranges since the start
+    rates_gated: int
+    ranges_gated: int
+
 
 OUTCOME_STARTED, OUTCOME_ACCEPTED, OUTCOME_GATED, OUTCOME_STALE, OUTCOME_NOISY = range(5)
 """Outcomes of `observe` for a measurement.
@@ -68,7 +73,7 @@ def gate_of_one(gate):
 
 def constants(params, axes) -> np.ndarray:
     """Return the constants (1,) of TrackerParameters and the FilterParameters of both axes."""
-    c = np.zeros(1, CONSTANTS_DTYPE)
+    c = Constants.zeros()
     c['filter'] = target_filter.constants(params.ukf, axes, params.receiver.noise_bandwidth)
     c['gates'] = params.gate, gate_of_one(params.gate)
     return c

@@ -1,34 +1,38 @@
 """The attitude of the deck: the last measurements of the INS,
 interpolated or extrapolated to any instant near them.
 
-s: record of ATTITUDE_DTYPE; p: record of params.SharedParameters; w, dw: angular rate [rad/s] and angular acceleration
+s: record of DeckAttitude; p: record of params.SharedParameters; w, dw: angular rate [rad/s] and angular acceleration
 [rad/s2] of the deck, FLU; T: time between two samples, or since the last sample [s].
 """
 import math
-
-import numpy as np
+from typing import Annotated
 
 from acu_tracker.geometry import attitude_error, attitude_jump, deck_reference
 from acu_tracker.geometry.deck_reference import ZERO_VECTOR, Attitude
-from acu_tracker.geometry.history import bracket, history_type, push
+from acu_tracker.geometry.history import HISTORY_LENGTH, History, bracket, push
 from acu_tracker.geometry.motion import angles, line_of_sight
 from acu_tracker.geometry.vector import Rotation, Vector, turn
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry.line_of_sight import ASHORE_ATTITUDE
 from pedestal_common.geometry.quaternion import product
+from pedestal_common.quantities import Bit, Floats
+from pedestal_common.record import Record
 
-ATTITUDE_DTYPE = np.dtype([('stabilised', 'i8'), ('history', history_type(10)), ('sample', 'f8', (7,)),
-                           ('aligned', 'i8'), ('jump', attitude_jump.ATTITUDE_JUMP_DTYPE),
-                           ('error', attitude_error.ATTITUDE_ERROR_DTYPE)], align=True)
-"""Measured attitude of the deck.
 
-stabilised  1 on a ship; 0 ashore, where the attitude never changes
-history     of the last samples, after the correction of jumps: quaternion (x, y, z, w) deck -> earth, w, dw
-sample      last quaternion and w as received
-aligned     1 if the INS was aligned at the last sample
-jump        state of `attitude_jump`
-error       state of `attitude_error`
-"""
+class AttitudeHistory(History):
+    """Last samples after the correction of jumps: quaternion (x, y, z, w) deck -> earth, w, dw."""
+    sample: Annotated[Floats, (HISTORY_LENGTH, 10)]
+
+
+class DeckAttitude(Record):
+    """Measured attitude of the deck."""
+    stabilised: Bit        # 1 on a ship; 0 ashore, where the attitude never changes
+    history: AttitudeHistory
+    sample: Annotated[Floats, (7,)]     # last quaternion and w as received
+    aligned: Bit           # 1 if the INS was aligned at the last sample
+    jump: attitude_jump.AttitudeJump
+    error: attitude_error.AttitudeError
+
 
 RATE_COLUMN, ACCELERATION_COLUMN = 4, 7
 """First columns of w and of dw in a sample of the history; the quaternion is in columns 0 to 3."""

@@ -3,17 +3,18 @@
 The INS may publish these statistics on ins/error; otherwise parameters define the statistics. `estimation.target` adds
 the noise to the variance of each measured direction. Tilt stands for roll and for pitch.
 """
-import numpy as np
 
 from pedestal_common.compiled import compiled
+from pedestal_common.quantities import Pair
+from pedestal_common.record import Record
 
-ATTITUDE_ERROR_DTYPE = np.dtype([('published', 'i8'), ('noise', 'f8', (2,)), ('walk', 'f8', (2,))], align=True)
-"""Statistics that the INS published.
 
-published  1 after the INS published valid statistics
-noise      variance of the white noise of a sample, of (tilt, heading) [rad2]
-walk       growth of the variance by the random walk of the error, of (tilt, heading) [rad2/s]
-"""
+class AttitudeError(Record):
+    """Statistics that the INS published."""
+    published: int  # 1 after the INS published valid statistics
+    noise: Pair  # variance of the white noise of a sample, of (tilt, heading) [rad2]
+    walk: Pair  # growth of the variance by the random walk of the error, of (tilt, heading) [rad2/s]
+
 
 MAX_ATTITUDE_NOISE = 0.5  # largest accepted 1-sigma of the noise [rad] and of the random walk [rad/sqrt(s)]
 
@@ -38,7 +39,7 @@ def take(e, noise, walk):
 def expected(e, a):
     """Return ((noise of tilt, of heading) [rad2], (walk of tilt, of heading) [rad2/s]).
 
-    e: record of ATTITUDE_ERROR_DTYPE; a: record of AttitudeModelParameters, used if the INS published no statistics.
+    e: record of AttitudeError; a: record of AttitudeModelParameters, used if the INS published no statistics.
     The slow errors of these parameters are Gauss-Markov processes with the standard deviation sigma (tilt_wander,
     heading_wander) and the correlation time tau (wander_time). Their variance first grows by 2 sigma^2 / tau [rad2/s].
     """

@@ -13,14 +13,19 @@ JUMP_DECAY_RATE_RAD_S. Neither a jump of any size nor this decay disturbs tracki
 by the attitude follows the decay so slowly that the operator can check the new attitude.
 """
 import math
-
-import numpy as np
+from typing import Annotated
 
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry.quaternion import product
+from pedestal_common.quantities import Floats
+from pedestal_common.record import Record
 
-ATTITUDE_JUMP_DTYPE = np.dtype([('c', 'f8', (4,)), ('apart', 'i8')], align=True)
-"""c: correcting quaternion (x, y, z, w) earth -> earth; apart: 1 while c is in use, after a jump."""
+
+class AttitudeJump(Record):
+    """c: correcting quaternion (x, y, z, w) earth -> earth; apart: 1 while c is in use, after a jump."""
+    c: Annotated[Floats, (4,)]
+    apart: int
+
 
 MAX_UNEXPLAINED_ANGLE_RAD = 3e-3
 """Largest angle between measured and predicted attitude that is not a jump [rad].

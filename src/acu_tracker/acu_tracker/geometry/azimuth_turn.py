@@ -7,24 +7,23 @@ as the target is inside the travel again.
 """
 import math
 
-import numpy as np
-
 from pedestal_common.compiled import compiled
+from pedestal_common.record import Record
 
-TURN_DTYPE = np.dtype([('under_way', 'i8'), ('begun', 'f8'), ('over', 'f8')], align=True)
-"""State of the turn.
 
-under_way    1 from the change of the azimuth wrap until the beam is on the target again
-begun        begin of this turn or of the last one [s]; -inf: no turn yet
-over         last instant at which this turn was under way [s]; -inf: no turn yet
-"""
+class Turn(Record):
+    """State of the turn."""
+    under_way: int  # 1 from the change of the azimuth wrap until the beam is on the target again
+    begun: float  # begin of this turn or of the last one [s]; -inf: no turn yet
+    over: float  # last instant at which this turn was under way [s]; -inf: no turn yet
+
 
 MAX_OFFSET_BEAMWIDTHS = 0.5
 """Largest intended angle between beam and target [beamwidths] at which the receiver's error is still used."""
 
 
 def initialise(s):
-    """Begin without a turn; s: view of TURN_DTYPE."""
+    """Begin without a turn; s: view of Turn."""
     s['begun'] = s['over'] = -math.inf
 
 

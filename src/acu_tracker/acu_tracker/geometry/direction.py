@@ -9,39 +9,39 @@ import numpy as np
 
 from acu_tracker.geometry.motion import AxisMotion, Motion
 from pedestal_common.compiled import compiled
+from pedestal_common.quantities import Pair
+from pedestal_common.record import Record
 
-DIRECTION_DTYPE = np.dtype([('stamp', 'f8'), ('angle', 'f8', (2,)), ('rate', 'f8', (2,)), ('moves', 'f8'),
-                            ('holds', 'f8')], align=True)
-"""Commanded direction.
 
-stamp  time of the command [s]; -inf: no command yet
-angle  azimuth and elevation at the stamp [rad]
-rate   their rates [rad/s]
-moves  time after the stamp for which the rates continue [s]
-holds  time after the stamp for which the direction is valid [s]
-"""
+class Direction(Record):
+    """Commanded direction."""
+    stamp: float  # time of the command [s]; -inf: no command yet
+    angle: Pair  # azimuth and elevation at the stamp [rad]
+    rate: Pair  # their rates [rad/s]
+    moves: float  # time after the stamp for which the rates continue [s]
+    holds: float  # time after the stamp for which the direction is valid [s]
 
 
 def initialise(d, angles):
-    """Set initial angles (2,) [rad], as no command has come yet; d: view of DIRECTION_DTYPE."""
+    """Set initial angles (2,) [rad], as no command has come yet; d: view of Direction."""
     d['stamp'], d['angle'] = -math.inf, angles
 
 
 def set_moving(d, stamp, angles, rates, moves, holds=0.0):
-    """Set a commanded direction; the arguments are the fields of DIRECTION_DTYPE; d: view of DIRECTION_DTYPE."""
+    """Set a commanded direction; the arguments are the fields of Direction; d: view of Direction."""
     d['stamp'], d['angle'], d['rate'], d['moves'], d['holds'] = stamp, angles, rates, moves, holds
 
 
 def moved(d, times):
     """Return the angles (n, 2) [rad] of the direction at times (n,) [s] at or after its stamp; d: view of
-    DIRECTION_DTYPE."""
+    Direction."""
     return d['angle'] + np.minimum(times - d['stamp'], d['moves'])[:, np.newaxis] * d['rate']
 
 
 def set_chord(d, axis, begins, ends, angles):
     """Move an axis along a straight line: its angles are `angles` (2,) [rad] at the times `begins` and `ends` [s].
 
-    axis: 0 azimuth, 1 elevation; d: view of DIRECTION_DTYPE. Both times lie at or after the stamp.
+    axis: 0 azimuth, 1 elevation; d: view of Direction. Both times lie at or after the stamp.
     """
     at, until = np.minimum((begins - d['stamp'], ends - d['stamp']), d['moves'])
     rate = (angles[1] - angles[0]) / (until - at) if until > at else 0.0

@@ -1,12 +1,17 @@
 """The angles of the load encoders of both axes in the last steps, interpolated to any instant among these steps."""
 import math
 from collections import namedtuple
+from typing import Annotated
 
-from acu_tracker.geometry.history import bracket, history_type, interpolated, push
+from acu_tracker.geometry.history import HISTORY_LENGTH, History, bracket, interpolated, push
 from pedestal_common.compiled import compiled
+from pedestal_common.quantities import Floats
 
-ENCODERS_DTYPE = history_type(4)
-"""History of the encoder angles. Columns of a sample: azimuth, elevation [rad], then their rates [rad/s]."""
+
+class Encoders(History):
+    """History of the encoder angles."""
+    sample: Annotated[Floats, (HISTORY_LENGTH, 4)]      # azimuth, elevation [rad], then their rates [rad/s]
+
 
 Pointing = namedtuple('Pointing', 'A E dA dE')
 """Angles of the antenna [rad] and their rates [rad/s]: of the encoders, or of the beam in deck angles on the sky."""

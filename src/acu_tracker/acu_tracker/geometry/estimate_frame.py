@@ -7,23 +7,26 @@ process noise, and no direction is singular.
 The frame is laid when the filter starts, and again when the target is more than MAX_FRAME_ELEVATION_RAD off the
 equator. Between these instants the frame is fixed to the earth.
 
-f: record of FRAME_DTYPE.
+f: record of Frame.
 """
 import math
-
-import numpy as np
 
 from acu_tracker.geometry.deck_reference import Attitude
 from acu_tracker.geometry.motion import earth_angles, line_of_sight, turned
 from acu_tracker.geometry.vector import Rotation, Vector, cross, dot, rotated, rotated_back, rotation, transposed
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry.line_of_sight import earth_direction
+from pedestal_common.quantities import Matrix3
+from pedestal_common.record import Record
 
 MAX_FRAME_ELEVATION_RAD = math.radians(20.0)
 """Largest angle [rad] of the target off the equator. At this angle the acceleration of a great circle reaches 0.36 of
 the squared rate. A smaller limit lays the frame more often on the way of a target that turns."""
 
-FRAME_DTYPE = np.dtype([('mat', 'f8', (3, 3))], align=True)  # mat: rotation matrix frame -> earth
+
+class Frame(Record):
+    """mat: rotation matrix frame -> earth"""
+    mat: Matrix3
 
 
 @compiled

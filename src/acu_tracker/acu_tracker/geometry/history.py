@@ -1,7 +1,9 @@
 """Stamped samples of the last steps, and their interpolation to an instant; used for the encoders and the attitude."""
-import numpy as np
+from typing import Annotated
 
 from pedestal_common.compiled import compiled
+from pedestal_common.quantities import Floats
+from pedestal_common.record import Record
 
 HISTORY_LENGTH = 64  # number of samples in a history
 
@@ -10,16 +12,12 @@ MAX_DELAY_STEPS = HISTORY_LENGTH - 4
 ahead of them."""
 
 
-def history_type(width) -> np.dtype:
-    """Return the dtype of a history, a ring buffer of HISTORY_LENGTH rows.
-
-    stamp   time of each row [s]
-    sample  `width` numbers of each row
-    newest  row of the last sample
-    count   number of rows in use
-    """
-    return np.dtype([('stamp', 'f8', (HISTORY_LENGTH,)), ('sample', 'f8', (HISTORY_LENGTH, width)),
-                     ('newest', 'i8'), ('count', 'i8')], align=True)
+class History(Record, open=True):
+    """Ring buffer of HISTORY_LENGTH rows. A subclass declares how many numbers a row has."""
+    stamp: Annotated[Floats, (HISTORY_LENGTH,)]     # time of each row [s]
+    sample: Floats          # (HISTORY_LENGTH, width)
+    newest: int             # row of the last sample
+    count: int              # number of rows in use
 
 
 @compiled

@@ -9,19 +9,23 @@ from the INS.
     R, rho   range of the target from the INS and from the antenna   [m]
     u        unit vector from the antenna to the target, FLU         [-]
 
-s: record of LEVER_ARM_DTYPE.
+s: record of LeverArm.
 """
 import math
-
-import numpy as np
 
 from acu_tracker.geometry.motion import AxisMotion, Motion, normalised
 from acu_tracker.geometry.vector import Vector, minus, rotated, vector
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry.line_of_sight import earth_angles, earth_direction, wrap
+from pedestal_common.quantities import Vector3
+from pedestal_common.record import Record
 
-LEVER_ARM_DTYPE = np.dtype([('arm', 'f8', (3,)), ('range', 'f8')], align=True)
-"""arm: r / R, FLU [-], zero without a range; range: smoothed R [m], 0 if the filter started without a range."""
+
+class LeverArm(Record):
+    """arm: r / R, FLU [-], zero without a range; range: smoothed R [m], 0 if the filter started without a range."""
+    arm: Vector3
+    range: float
+
 
 RANGE_SMOOTHING_SHARE = 0.05  # share of each new measurement in the smoothed range [-]
 

@@ -4,9 +4,9 @@ The target is converted to deck angles, the pointing model converts these to enc
 an azimuth wrap inside the limits. Near a keyhole the reference is a planned slew of the look-ahead instead.
 `control_unit` calls this module in each step.
 
-g      record of GUIDANCE_DTYPE
-k      record of tracking.TRACKING_DTYPE
-c      record of control_unit.CONSTANTS_DTYPE
+g      record of Guidance
+k      record of tracking.Tracking
+c      record of control_unit.Constants
 way    bridge.Way: the program, rotated to the place where the target was last tracked
 gap    outage.Outage: the time without a signal of the receiver
 order  the Order of the step
@@ -31,31 +31,27 @@ from acu_tracker.program import bridge, program_track
 from acu_tracker.search import acquisition
 from acu_tracker.servo import position_loop
 from pedestal_common.compiled import compiled, separate
+from pedestal_common.quantities import Pair
+from pedestal_common.record import Record
 
-GUIDANCE_DTYPE = np.dtype([
-    ('preset', direction.DIRECTION_DTYPE), ('slave', direction.DIRECTION_DTYPE), ('manual', manual.MANUAL_DTYPE),
-    ('bridge', bridge.BRIDGE_DTYPE), ('acquisition', acquisition.ACQUISITION_DTYPE),
-    ('lookahead', planner.PLANNER_DTYPE), ('turn', azimuth_turn.TURN_DTYPE),
-    ('azimuth', 'f8'), ('target_angles', 'f8', (2,)), ('direction', 'f8', (2,)), ('unreachable', 'i8'),
-    ('pointing_offset', 'f8'), ('held', 'f8'), ('overtravel', 'i8')],
-    align=True)
-"""State of the guidance.
 
-preset           direction of the mode preset, deck angles on the sky
-slave            direction of the mode slave, earth angles
-manual           point that an operator moves by hand, in the modes stop and rate
-bridge           rotation of the program to the place where the target was last tracked
-acquisition      state of the modes that use the signal level
-lookahead        planned slews through keyholes, and predicted hidden sectors
-turn             turn of the azimuth to another wrap at a limit of its travel
-azimuth          azimuth of the last reference, before the shaper [rad]
-target_angles    encoder angles (azimuth, elevation) of the target for that reference [rad]
-direction        deck angles (azimuth, elevation) of the target on the sky [rad]
-unreachable      1: the beam cannot point to the direction, and points to the nearest one
-pointing_offset  intended angle between beam and target [rad]
-held             last instant [s] at which a limit held the beam off the target
-overtravel       1: no azimuth wrap holds the whole program inside the limits
-"""
+class Guidance(Record):
+    """State of the guidance."""
+    preset: direction.Direction  # direction of the mode preset, deck angles on the sky
+    slave: direction.Direction  # direction of the mode slave, earth angles
+    manual: manual.Manual  # point that an operator moves by hand, in the modes stop and rate
+    bridge: bridge.Bridge  # rotation of the program to the place where the target was last tracked
+    acquisition: acquisition.Acquisition  # state of the modes that use the signal level
+    lookahead: planner.Planner  # planned slews through keyholes, and predicted hidden sectors
+    turn: azimuth_turn.Turn  # turn of the azimuth to another wrap at a limit of its travel
+    azimuth: float  # azimuth of the last reference, before the shaper [rad]
+    target_angles: Pair  # encoder angles (azimuth, elevation) of the target for that reference [rad]
+    direction: Pair  # deck angles (azimuth, elevation) of the target on the sky [rad]
+    unreachable: int  # 1: the beam cannot point to the direction, and points to the nearest one
+    pointing_offset: float  # intended angle between beam and target [rad]
+    held: float  # last instant [s] at which a limit held the beam off the target
+    overtravel: int  # 1: no azimuth wrap holds the whole program inside the limits
+
 
 Order = namedtuple('Order', 'mode begins azimuth stamp')
 """Mode of a step and where it starts.
@@ -68,7 +64,7 @@ stamp    stamp of the step [s]
 
 
 def initialise(g, preset):
-    """Begin with no direction except the preset angles (2,) [rad]; g: view of GUIDANCE_DTYPE."""
+    """Begin with no direction except the preset angles (2,) [rad]; g: view of Guidance."""
     direction.initialise(g['preset'], preset)
     direction.initialise(g['slave'], 0.0)
     manual.initialise(g['manual'])
@@ -261,7 +257,7 @@ def begin_by_level(g, k, c, before, mode, t):
 def check_slope(g, k, c, u, at, way):
     """Compare an error of the receiver with the expected place of the target, to find a slope of the wrong sign.
 
-    u: record of signals.INPUTS_DTYPE; at: Pointing of the beam when the error was measured.
+    u: record of signals.Inputs.dtype; at: Pointing of the beam when the error was measured.
     """
     t = u.error_stamp - c.p.tracker.receiver.age
     motion = attitude.on_deck(k.attitude, c.p, t, signal_level_modes.expected(g.acquisition, way, t))

@@ -4,14 +4,14 @@ The point stops when no new command arrives in time. The mode stop uses the poin
 each axis the rate of the point is ramped towards the commanded rate with a constant acceleration. The angle of the
 point is the integral of its rate.
 
-m: record of MANUAL_DTYPE; i: axis, 0 azimuth, 1 elevation. Angles are deck angles.
+m: record of Manual; i: axis, 0 azimuth, 1 elevation. Angles are deck angles.
 """
 import math
 
-import numpy as np
-
 from acu_tracker.geometry.motion import AxisMotion, Motion
 from pedestal_common.compiled import compiled
+from pedestal_common.quantities import Pair
+from pedestal_common.record import Record
 
 RATE_REQUEST_TIMEOUT_S = 0.5
 """Time for which a command of rates is valid [s]; a client repeats the command while the axes shall move."""
@@ -22,23 +22,23 @@ ACCELERATION_SHARE = 0.5
 Because the share is below 1, the shaper follows the point without lag.
 """
 
-MANUAL_DTYPE = np.dtype([('requested', 'f8', (2,)), ('until', 'f8'), ('angle', 'f8', (2,)), ('rate', 'f8', (2,)),
-                         ('acceleration', 'f8', (2,))], align=True)
-"""State of the manual rates.
 
-requested  commanded rates [rad/s]
-until      last stamp at which the commanded rates are valid [s]
-angle, rate, acceleration  of the commanded point [rad, rad/s, rad/s2]
-"""
+class Manual(Record):
+    """State of the manual rates."""
+    requested: Pair  # commanded rates [rad/s]
+    until: float  # last stamp at which the commanded rates are valid [s]
+    angle: Pair  # angle, rate, acceleration: of the commanded point [rad, rad/s, rad/s2]
+    rate: Pair
+    acceleration: Pair
 
 
 def initialise(m):
-    """Begin without a command; m: view of MANUAL_DTYPE."""
+    """Begin without a command; m: view of Manual."""
     m['until'] = -math.inf
 
 
 def request_rates(m, rates, stamp):
-    """Set the commanded rates (2,) [rad/s] at a stamp [s]; m: view of MANUAL_DTYPE."""
+    """Set the commanded rates (2,) [rad/s] at a stamp [s]; m: view of Manual."""
     m['requested'], m['until'] = rates, stamp + RATE_REQUEST_TIMEOUT_S
 
 

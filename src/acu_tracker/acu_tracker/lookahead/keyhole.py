@@ -10,23 +10,22 @@ is the earliest possible time.
 import math
 from collections import namedtuple
 
-import numpy as np
-
 from acu_tracker.lookahead import path as paths
 from acu_tracker.lookahead import slew as slews
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry.line_of_sight import wrap
+from pedestal_common.record import Record
 
-SLEW_LIMITS_DTYPE = np.dtype([('rate', 'f8'), ('acceleration', 'f8'), ('low', 'f8'), ('high', 'f8'), ('highest', 'f8'),
-                              ('half_beam', 'f8')], align=True)
-"""Limits of a slew.
 
-rate          largest azimuth rate [rad/s]
-acceleration  acceleration of the azimuth [rad/s2]
-low, high     travel of the azimuth [rad]
-highest       largest elevation [rad]
-half_beam     half the beamwidth [rad]
-"""
+class SlewLimits(Record):
+    """Limits of a slew."""
+    rate: float  # largest azimuth rate [rad/s]
+    acceleration: float  # acceleration of the azimuth [rad/s2]
+    low: float  # low, high: travel of the azimuth [rad]
+    high: float
+    highest: float  # largest elevation [rad]
+    half_beam: float  # half the beamwidth [rad]
+
 
 SLEW_CANDIDATE_COUNT, REFINEMENT_COUNT, SLEW_SAMPLE_COUNT, BISECTION_COUNT = 48, 4, 160, 24
 """Effort of a plan: number of candidates for t1, of refinements of t1, of samples in which a slew is evaluated, and of
@@ -44,7 +43,7 @@ Passage = namedtuple('Passage', 'path azimuth limits after tilt')
 
 path     a completed Path
 azimuth  azimuth of the axis at the first row of the path [rad]
-limits   record of SLEW_LIMITS_DTYPE
+limits   record of SlewLimits
 after    time from which the axis can follow the target again [s]
 tilt     rms tilt of the deck about one horizontal axis [rad]; the tilt is normally distributed. A slew follows only a
          share of it, see _evaluate
@@ -179,8 +178,8 @@ def find(path, rate, acceleration):
 def plan(slew, path, azimuth, limits, tilt, previous, planned):
     """Find the keyhole of a completed Path and the best slew through it; return one of the outcomes PLAN_.
 
-    slew      records (2,) of SLEW_DTYPE, the first for the best slew, the second for trials
-    previous  record of SLEW_DTYPE: the previous plan, if planned is True
+    slew      records (2,) of Slew, the first for the best slew, the second for trials
+    previous  record of Slew: the previous plan, if planned is True
     planned   True if there is a previous plan whose slew has not begun
     The other arguments are those of Passage.
 

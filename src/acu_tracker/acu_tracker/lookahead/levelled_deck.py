@@ -3,24 +3,25 @@
 Because the future attitude of a rolling ship is not known, the look-ahead uses the mean attitude.
 """
 import math
-
-import numpy as np
+from typing import Annotated
 
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry.line_of_sight import ASHORE_ATTITUDE
+from pedestal_common.quantities import Floats
+from pedestal_common.record import Record
 
-LEVELLED_DECK_DTYPE = np.dtype([('mean', 'f8', (4,)), ('spread', 'f8'), ('since', 'f8'), ('latest', 'f8')], align=True)
-"""Mean attitude.
 
-mean    quaternion (x, y, z, w) levelled deck -> earth
-spread  mean square of the tilt of the deck from the levelled deck, about both horizontal axes together [rad2]
-since   stamp of the first attitude in the mean [s]
-latest  stamp of the last attitude in the mean [s]; -inf: no attitude yet
-"""
+class LevelledDeck(Record):
+    """Mean attitude."""
+    mean: Annotated[Floats, (4,)]  # quaternion (x, y, z, w) levelled deck -> earth
+    # mean square of the tilt of the deck from the levelled deck, about both horizontal axes together [rad2]
+    spread: float
+    since: float  # stamp of the first attitude in the mean [s]
+    latest: float  # stamp of the last attitude in the mean [s]; -inf: no attitude yet
 
 
 def initialise(s):
-    """Start ashore, before any attitude of a ship; s (n,) of LEVELLED_DECK_DTYPE."""
+    """Start ashore, before any attitude of a ship; s (n,) of LevelledDeck."""
     s['mean'], s['latest'] = ASHORE_ATTITUDE, -math.inf
 
 

@@ -68,7 +68,7 @@ def along_great_circle(path, mat, u, du):
 
 @compiled
 def to_encoders(path, m):
-    """Replace the unit vectors by those of the encoder angles; m: record of pointing_model.MODEL_DTYPE."""
+    """Replace the unit vectors by those of the encoder angles; m: record of pointing_model.PointingModel.dtype."""
     if m.exact:
         return
     for i in range(len(path.rows)):

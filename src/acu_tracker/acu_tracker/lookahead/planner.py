@@ -6,9 +6,10 @@ Without a program the path is the great circle of the estimate. A plan is renewe
 begins. Because the antenna still follows the target then, a renewal moves no axis. A planned slew keeps the levelled
 deck on which it was planned last.
 
-h, c, m: records of PLANNER_DTYPE, of CONSTANTS_DTYPE and of pointing_model.MODEL_DTYPE.
+h, c, m: records of Planner, of Constants and of pointing_model.PointingModel.dtype.
 """
 import math
+from typing import Annotated
 
 import numpy as np
 
@@ -20,6 +21,8 @@ from acu_tracker.program import program_track
 from pedestal_common.compiled import assign, compiled
 from pedestal_common.geometry import blockage
 from pedestal_common.geometry.line_of_sight import angles, rotation
+from pedestal_common.quantities import BothAxes, Floats, Matrix3, Pair
+from pedestal_common.record import Record
 
 LOOK_AHEAD_PERIOD_S = 1.0  # time between two look-aheads [s]. For this time before a slew begins, its plan is final.
 MAX_UNANNOUNCED_TIME_S, MAX_UNANNOUNCED_LOSS_S = 0.5, 0.1
@@ -29,42 +32,44 @@ FORECAST_TEXTS = ('none', 'keyhole', 'no turn')
 """Names of the forecasts: no keyhole; a keyhole with a planned slew; a keyhole for which no slew fits the limits."""
 FORECAST_NONE, FORECAST_KEYHOLE, FORECAST_NO_WRAP = range(len(FORECAST_TEXTS))
 
-PLANNER_DTYPE = np.dtype([
-    ('deck', levelled_deck.LEVELLED_DECK_DTYPE), ('looked', 'f8'),
-    ('forecast', 'i8'), ('forecasts', 'i8'), ('slew', slews.SLEW_DTYPE),
-    ('announced_forecast', 'i8'), ('announced', slews.SLEW_DTYPE), ('level', 'f8', (3, 3)),
-    ('deck_motion', 'f8'), ('hidden', 'f8', (2,)), ('blockages', 'i8'), ('program', 'f8', (7,)),
-    ('next_slew', slews.SLEW_DTYPE, (2,)), ('next_level', 'f8', (3, 3)),
-    ('rows', 'f8', (paths.PATH_ROW_COUNT, paths.PATH_COLUMN_COUNT)),
-], align=True)
-"""State of the planner.
 
-deck         mean attitude of the ship
-looked       time of the last look-ahead [s]
-forecast     index in FORECAST_TEXTS
-forecasts    number of announced forecasts so far
-slew         planned slew, while the forecast is FORECAST_KEYHOLE
-announced_forecast, announced  forecast and planned slew of the last announcement
-level        rotation levelled deck -> earth, of the deck on which the slew was planned
-deck_motion  rms tilt of the deck from the levelled deck when the slew was planned [rad]
-hidden       begin and end of the next time in which a sector will hide the target [s]; NaN: none
-blockages    number of these times so far
-program      key of the last program, for `another_program`: number of its last row, then time, azimuth and elevation
-             of its first row and of its last row
-next_slew, next_level, rows  work space of a look-ahead
-"""
+class Planner(Record):
+    """State of the planner."""
+    deck: levelled_deck.LevelledDeck  # mean attitude of the ship
+    looked: float  # time of the last look-ahead [s]
+    forecast: int  # index in FORECAST_TEXTS
+    forecasts: int  # number of announced forecasts so far
+    slew: slews.Slew  # planned slew, while the forecast is FORECAST_KEYHOLE
+    announced_forecast: int  # announced_forecast, announced: forecast and planned slew of the last announcement
+    announced: slews.Slew
+    level: Matrix3  # rotation levelled deck -> earth, of the deck on which the slew was planned
+    deck_motion: float  # rms tilt of the deck from the levelled deck when the slew was planned [rad]
+    hidden: Pair  # begin and end of the next time in which a sector will hide the target [s]; NaN: none
+    blockages: int  # number of these times so far
+    # key of the last program, for `another_program`: number of its last row, then time, azimuth and elevation of its
+    # first row and of its last row
+    program: Annotated[Floats, (7,)]
+    next_slew: BothAxes[slews.Slew]  # next_slew, next_level, rows: work space of a look-ahead
+    next_level: Matrix3
+    rows: Annotated[Floats, (paths.PATH_ROW_COUNT, paths.PATH_COLUMN_COUNT)]
 
-CONSTANTS_DTYPE = np.dtype([('horizon', 'f8'), ('notice', 'f8'), ('limits', keyhole.SLEW_LIMITS_DTYPE),
-                            ('sectors', 'f8', (blockage.MAX_SECTORS, 3))], align=True)
-"""horizon, notice: parameters of KeyholeParameters [s]; limits: limits of a slew; sectors: hidden sectors of the deck,
-as in pedestal_common.geometry.blockage."""
+
+class Constants(Record):
+    """horizon, notice: parameters of KeyholeParameters [s]; limits: limits of a slew; sectors: hidden sectors of the deck,
+    as in pedestal_common.geometry.blockage.
+    """
+    horizon: float
+    notice: float
+    limits: keyhole.SlewLimits
+    sectors: Annotated[Floats, (blockage.MAX_SECTORS, 3)]
+
 
 MIN_PATH_ROW_COUNT = 3  # least number of rows of a path: the acceleration of the azimuth follows from three rows
 
 
 def constants(params) -> np.ndarray:
     """Return the constants (1,) of AcuParameters."""
-    c, k, a = np.zeros(1, CONSTANTS_DTYPE), params.keyhole, params.azimuth
+    c, k, a = Constants.zeros(), params.keyhole, params.azimuth
     c['horizon'], c['notice'] = k.horizon, k.notice
     c['limits'] = (k.share * a.shaper.rate, k.share * a.shaper.acceleration, a.limits.low, a.limits.high,
                    params.elevation.limits.high - k.elevation_margin, 0.5 * params.tracker.receiver.beamwidth)
@@ -73,7 +78,7 @@ def constants(params) -> np.ndarray:
 
 
 def initialise(h):
-    """Start without a plan; h (n,) of PLANNER_DTYPE."""
+    """Start without a plan; h (n,) of Planner."""
     levelled_deck.initialise(h['deck'])
     h['looked'], h['hidden'] = -math.inf, math.nan
 

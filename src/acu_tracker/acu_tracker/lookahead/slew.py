@@ -1,36 +1,33 @@
 """A slew through the keyhole: the azimuth leaves the target, slews at its limits and meets the target again.
 
-At each instant the elevation takes the angle at which the beam is closest to the target. slew: record of SLEW_DTYPE.
+At each instant the elevation takes the angle at which the beam is closest to the target. slew: record of Slew.
 """
 import math
-
-import numpy as np
 
 from acu_tracker.geometry.motion import AxisMotion, LineOfSight, Motion, line_of_sight, north_west_up
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry.line_of_sight import wrap
+from pedestal_common.record import Record
 
-SLEW_DTYPE = np.dtype([('t1', 'f8'), ('t2', 'f8'), ('azimuth1', 'f8'), ('azimuth2', 'f8'), ('rate1', 'f8'),
-                       ('rate2', 'f8'), ('peak', 'f8'), ('acceleration', 'f8'),
-                       ('culmination', 'f8'), ('highest', 'f8'), ('needed', 'f8'),
-                       ('loss', 'f8'), ('worst', 'f8'), ('cost', 'f8'), ('other_cost', 'f8'), ('long_way', 'i8')],
-                      align=True)
-"""A planned slew. The index 1 marks its begin, where it leaves the target, the index 2 its end, where it meets it.
 
-t1, t2              times [s]
-azimuth1, azimuth2  deck azimuths [rad]
-rate1, rate2        azimuth rates [rad/s]
-peak                largest azimuth rate, with its sign [rad/s]
-acceleration        acceleration to the peak, and deceleration from it [rad/s2]
-culmination         time of the highest point of the target on the levelled deck [s]
-highest             elevation of this point [rad]
-needed              largest azimuth rate that the target would need without a slew [rad/s]
-loss                expected time in which the target is more than half a beamwidth off the beam [s]
-worst               largest pointing offset [rad]
-cost                smooth form of the loss [s], see keyhole._evaluate
-other_cost          cost of the slew in the other direction [s]; inf if the limits forbid it
-long_way            1 if the slew turns opposite to the target
-"""
+class Slew(Record):
+    """A planned slew. The index 1 marks its begin, where it leaves the target, the index 2 its end, where it meets it."""
+    t1: float  # t1, t2: times [s]
+    t2: float
+    azimuth1: float  # azimuth1, azimuth2: deck azimuths [rad]
+    azimuth2: float
+    rate1: float  # rate1, rate2: azimuth rates [rad/s]
+    rate2: float
+    peak: float  # largest azimuth rate, with its sign [rad/s]
+    acceleration: float  # acceleration to the peak, and deceleration from it [rad/s2]
+    culmination: float  # time of the highest point of the target on the levelled deck [s]
+    highest: float  # elevation of this point [rad]
+    needed: float  # largest azimuth rate that the target would need without a slew [rad/s]
+    loss: float  # expected time in which the target is more than half a beamwidth off the beam [s]
+    worst: float  # largest pointing offset [rad]
+    cost: float  # smooth form of the loss [s], see keyhole._evaluate
+    other_cost: float  # cost of the slew in the other direction [s]; inf if the limits forbid it
+    long_way: int  # 1 if the slew turns opposite to the target
 
 
 @compiled

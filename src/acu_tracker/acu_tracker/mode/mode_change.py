@@ -1,35 +1,34 @@
 """State of the mode machine: the mode of the control unit, its reason and the pending request.
 
-Only this module writes the state. m: record of MODE_DTYPE, except where a function states a view of it.
+Only this module writes the state. m: record of ModeState, except where a function states a view of it.
 """
-import numpy as np
 
 from acu_tracker import modes
 from acu_tracker.modes import Mode, Reason
 from pedestal_common.compiled import compiled
+from pedestal_common.record import Record
 
-MODE_DTYPE = np.dtype([('now', 'i8'), ('reason', 'i8'), ('pending', 'i8'), ('begins', 'i8'), ('table', 'i8'),
-                       ('fallback', 'i8')], align=True)
-"""State of the mode machine.
 
-now        code of the present mode
-reason     code of modes.REASONS: why the mode was entered, a request was refused, or the receiver has no signal
-pending    mode that is entered as soon as its conditions hold, or NO_REQUEST
-begins     1 until the mode sends its first command to the axes
-table      mode whose table was followed last: program, tle or sun
-fallback   mode chosen for the loss of the track
-"""
+class ModeState(Record):
+    """State of the mode machine."""
+    now: int  # code of the present mode
+    # code of modes.REASONS: why the mode was entered, a request was refused, or the receiver has no signal
+    reason: int
+    pending: int  # mode that is entered as soon as its conditions hold, or NO_REQUEST
+    begins: int  # 1 until the mode sends its first command to the axes
+    table: int  # mode whose table was followed last: program, tle or sun
+    fallback: int  # mode chosen for the loss of the track
 
 
 def initialise(m, params):
-    """Begin in standby with the initial mode of AcuParameters pending; m: view of MODE_DTYPE."""
+    """Begin in standby with the initial mode of AcuParameters pending; m: view of ModeState."""
     m['pending'] = modes.MODES.index(params.initial_mode)
     m['table'] = Mode.PROGRAM
     choose(m, params.fallback)
 
 
 def choose(m, name):
-    """Choose the mode after the loss of the track, by its name in modes.FALLBACK_MODES; m: view of MODE_DTYPE."""
+    """Choose the mode after the loss of the track, by its name in modes.FALLBACK_MODES; m: view of ModeState."""
     m['fallback'] = modes.FALLBACK_MODES[name]
 
 

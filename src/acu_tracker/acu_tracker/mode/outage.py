@@ -5,17 +5,16 @@ A keyhole, a turn of the azimuth or a hidden sector explains an outage: autotrac
 import math
 from collections import namedtuple
 
-import numpy as np
-
 from acu_tracker.modes import Reason
 from pedestal_common.compiled import compiled
+from pedestal_common.record import Record
 
-OUTAGE_DTYPE = np.dtype([('stamp', 'f8'), ('blocked', 'i8')], align=True)
-"""Last explanation of an outage.
 
-stamp      last stamp at which a keyhole, a turn or a hidden sector explained an outage [s]
-blocked    1 while the target is hidden
-"""
+class OutageRecord(Record):
+    """Last explanation of an outage."""
+    stamp: float  # last stamp at which a keyhole, a turn or a hidden sector explained an outage [s]
+    blocked: int  # 1 while the target is hidden
+
 
 Outage = namedtuple('Outage', 'since coasting permitted')
 """Outage of the receiver at an instant.
@@ -27,7 +26,7 @@ permitted  True if a keyhole, a turn or a hidden sector explains the outage, now
 
 
 def initialise(s):
-    """Begin without an explained outage; s: view of OUTAGE_DTYPE."""
+    """Begin without an explained outage; s: view of OutageRecord."""
     s['stamp'] = -math.inf
 
 
@@ -35,7 +34,7 @@ def initialise(s):
 def now(s, accepted, t, p):
     """Return the Outage at t [s].
 
-    s: record of OUTAGE_DTYPE; accepted: stamp of the last accepted error [s]; p: record of SharedParameters.
+    s: record of OutageRecord; accepted: stamp of the last accepted error [s]; p: record of SharedParameters.
     Autotrack coasts after coast_after without an accepted error, and ends after coast_time. An explanation stays valid
     for coast_time after its last stamp.
     """

@@ -1,8 +1,8 @@
 """Reachable directions: whether fixed angles, or the table that a mode follows, are inside the limits of the axes.
 
 The floor, the lowest elevation of each azimuth, is one of the limits. A table is the program track, or a predicted
-track of a satellite or the sun. k, c, u: records of tracking.TRACKING_DTYPE, of control_unit.CONSTANTS_DTYPE and of
-signals.INPUTS_DTYPE.
+track of a satellite or the sun. k, c, u: records of tracking.Tracking, of control_unit.Constants and of
+signals.Inputs.dtype.
 """
 import math
 
@@ -33,7 +33,7 @@ def outside(c, A, E):
 def judge_direction(m, c, azimuth, elevation):
     """Return OUTSIDE_LIMITS if a direction (deck angles on the sky [rad]) cannot be reached, else NONE.
 
-    m: record of pointing_model.MODEL_DTYPE.
+    m: record of pointing_model.PointingModel.dtype.
     """
     A, E, _ = pointing_model.encoder_of(m, azimuth, elevation)
     return outside(c, A, E)

@@ -6,21 +6,24 @@ keeps the mode, and the control unit requests it again when the drive is ready.
 """
 import math
 
-import numpy as np
-
 from acu_tracker import modes
 from acu_tracker.modes import Mode
 from pedestal_common.compiled import compiled
+from pedestal_common.record import Record
 
-RESUMPTION_DTYPE = np.dtype([('mode', 'i8'), ('until', 'f8')], align=True)
-"""mode: code of the mode before the silence; until: last stamp at which it is resumed [s], -inf if no mode is kept."""
+
+class Resumption(Record):
+    """mode: code of the mode before the silence; until: last stamp at which it is resumed [s], -inf if no mode is kept."""
+    mode: int
+    until: float
+
 
 DRIVE_RESTART_GAP_S = 0.3
 """Shortest silence in which the drive may have been restarted [s]; only after such a silence a mode is kept."""
 
 
 def initialise(s):
-    """Begin with no interrupted mode; s: view of RESUMPTION_DTYPE."""
+    """Begin with no interrupted mode; s: view of Resumption."""
     s['until'] = -math.inf
 
 

@@ -3,8 +3,8 @@
 The signal level is the C/N0 of the receiver. The modes move the beam about the expected place of the target; the
 laws of these motions are in the package `search`.
 
-a    record of acquisition.ACQUISITION_DTYPE
-c    record of control_unit.CONSTANTS_DTYPE
+a    record of acquisition.Acquisition
+c    record of control_unit.Constants
 way  bridge.Way: the program, rotated to the place where the target was last tracked
 """
 import math
@@ -64,7 +64,7 @@ def _offset(a, mode, c, t, motion):
 def advance(a, mode, c, u, way):
     """Take the level of a step and advance the running mode. Return True if acquire has found a slope of wrong sign.
 
-    mode: the mode of the previous step; u: record of signals.INPUTS_DTYPE. While the beam is off the target, the level
+    mode: the mode of the previous step; u: record of signals.Inputs.dtype. While the beam is off the target, the level
     is noise alone; the function then learns the statistics of the noise.
     """
     p, beamwidth = c.p.acquisition, c.p.tracker.receiver.beamwidth

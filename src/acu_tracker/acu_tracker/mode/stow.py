@@ -3,23 +3,22 @@
 A stow pin is a bolt that locks its axis. The axes get a command only while both pins are out and no pin is commanded
 in. The last request to the pins, in or out, stays in force when the mode changes.
 
-s: record of STOW_DTYPE; code: code of adu/stow_pins, the states of both pins.
+s: record of Stow; code: code of adu/stow_pins, the states of both pins.
 """
 import math
-
-import numpy as np
 
 from acu_tracker.modes import Mode, Reason
 from pedestal_common.compiled import compiled
 from pedestal_common.graph import topics
+from pedestal_common.record import Record
 
-STOW_DTYPE = np.dtype([('requested', 'i8'), ('since', 'f8'), ('not_stowed', 'f8')], align=True)
-"""State of stow and unstow.
 
-requested   code of acu/stow_pins: requested position of both pins, NO_TEXT_CODE before the first request
-since       stamp of that request [s]
-not_stowed  last stamp at which the axes were not at rest at the stow angles [s]
-"""
+class Stow(Record):
+    """State of stow and unstow."""
+    requested: int  # code of acu/stow_pins: requested position of both pins, NO_TEXT_CODE before the first request
+    since: float  # stamp of that request [s]
+    not_stowed: float  # last stamp at which the axes were not at rest at the stow angles [s]
+
 
 _REQUEST_TEXTS = topics.TOPIC_BY_NAME['acu/stow_pins'].texts
 REQUEST_PINS_OUT, REQUEST_PINS_IN = _REQUEST_TEXTS.index('out'), _REQUEST_TEXTS.index('in')
@@ -42,7 +41,7 @@ MIN_REST_TIME_S = 0.5
 
 
 def initialise(s):
-    """Begin without a request; s: view of STOW_DTYPE."""
+    """Begin without a request; s: view of Stow."""
     s['requested'], s['since'], s['not_stowed'] = topics.NO_TEXT_CODE, -math.inf, -math.inf
 
 
@@ -91,7 +90,7 @@ def _at_rest(c, u):
 def step(s, c, u, mode):
     """Request the position of the pins that the mode needs. Return True if the mode is stow and the pins are in.
 
-    c, u: records of control_unit.CONSTANTS_DTYPE and of signals.INPUTS_DTYPE.
+    c, u: records of control_unit.Constants and of signals.Inputs.dtype.
     """
     t = u.stamp
     if mode == Mode.UNSTOW:

@@ -22,7 +22,7 @@ def latched(uncommanded, frozen, diverged):
 
 @compiled
 def axes_follow_commands(s):
-    """Return True if both axes follow their commands; s: record of conditions.SUPERVISION_DTYPE.
+    """Return True if both axes follow their commands; s: record of conditions.Supervision.
 
     While an axis does not follow its command, the target leaves the beam although the filter is right.
     """

@@ -7,7 +7,7 @@ from pedestal_common.wire.commands import Reply
 class AlarmDesk:
     """Handler of the alarm commands.
 
-    state    view of control_unit.STATE_DTYPE, which holds the alarms and the stamp
+    state    view of control_unit.State, which holds the alarms and the stamp
     reset    the function control_unit.reset
     reasons  {index of a shelved alarm: reason for shelving}
 

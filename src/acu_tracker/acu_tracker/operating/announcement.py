@@ -1,6 +1,6 @@
 """Texts for the operator on keyholes, hidden sectors and the end of the azimuth's travel; numbers for the diagnostics.
 
-h: record of lookahead.planner.PLANNER_DTYPE; unit: the unit.Acu.
+h: record of lookahead.planner.Planner; unit: the unit.Acu.
 """
 import math
 

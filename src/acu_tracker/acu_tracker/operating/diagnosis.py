@@ -131,7 +131,7 @@ def _values(unit, faults, invalid):
 
 
 def _uncommanded_motion(movement):
-    """Return the text of the measured and commanded rates; movement: view of uncommanded_motion.ENVELOPE_DTYPE."""
+    """Return the text of the measured and commanded rates; movement: view of uncommanded_motion.Envelope."""
     return ', '.join('{} {:.3g} deg/s, commanded {:.3g} to {:.3g}'.format(axis, *map(math.degrees, rates))
                      for axis, rates in zip(topics.AXES, movement['measured']))
 

@@ -8,10 +8,11 @@ points then depends on the receiver alone. Hence no hand-over between modes caus
 A new model takes effect gradually: the terms go from the old to the new values along a smooth curve. This avoids a
 jump of the antenna.
 
-s      record of POINTING_DTYPE
-m      its field `model`, a record of pointing_model.MODEL_DTYPE
+s      record of PointingRecord
+m      its field `model`, a record of pointing_model.PointingModel.dtype
 """
 import math
+from typing import Annotated
 
 import numpy as np
 
@@ -21,19 +22,23 @@ from pedestal_common.compiled import compiled
 from pedestal_common.geometry import pointing_model
 from pedestal_common.geometry.pointing_model import FACTORS, TERMS
 from pedestal_common.graph import topics
+from pedestal_common.quantities import Floats
+from pedestal_common.record import Record
 
-POINTING_DTYPE = np.dtype([('model', pointing_model.MODEL_DTYPE), ('before', 'f8', (len(TERMS),)),
-                           ('after', 'f8', (len(TERMS),)), ('begins', 'f8'), ('ends', 'f8'), ('changing', 'i8'),
-                           ('report', 'i8')], align=True)
-"""State of the pointing model.
 
-model          the model in force
-before, after  terms at the begin and at the end of the last change [rad, -]
-begins, ends   begin and end of this change [s]
-changing       1 while the terms change
-report         number of the report on acu/pointing: 0 of the model at the start, 2 n - 1 and 2 n of the begin and of
-               the end of the n-th change; topics.NO_TEXT_CODE without a model at the start
-"""
+class PointingRecord(Record):
+    """State of the pointing model."""
+    model: pointing_model.PointingModel  # the model in force
+    # before, after: terms at the begin and at the end of the last change [rad, -]
+    before: Annotated[Floats, (len(TERMS),)]
+    after: Annotated[Floats, (len(TERMS),)]
+    begins: float  # begins, ends: begin and end of this change [s]
+    ends: float
+    changing: int  # 1 while the terms change
+    # number of the report on acu/pointing: 0 of the model at the start, 2 n - 1 and 2 n of the begin and of the end of
+    # the n-th change; topics.NO_TEXT_CODE without a model at the start
+    report: int
+
 
 MAX_CHANGE_RATE_RAD_S = math.radians(0.1)
 """Largest rate at which a new model moves the encoder angles [rad/s], near the zenith in cross-elevation."""
@@ -54,7 +59,7 @@ def initialise(s, terms, named):
 def replace(s, terms, stamp):
     """Begin the change to other terms (20,) at a stamp [s]; return the time until it is complete [s].
 
-    s: view of POINTING_DTYPE. The time follows from MAX_CHANGE_RATE_RAD_S and the sum of the changes of all terms, as
+    s: view of PointingRecord. The time follows from MAX_CHANGE_RATE_RAD_S and the sum of the changes of all terms, as
     if all terms pulled in the same direction.
     """
     now = s['model']['terms'].copy()

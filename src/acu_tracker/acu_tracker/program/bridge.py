@@ -4,30 +4,30 @@ The antenna follows the rotated program during an outage of the receiver. For ma
 accurate than the rate and the acceleration that the filter has estimated. The rotation is the one with the smallest
 angle.
 
-b: record of BRIDGE_DTYPE; program: a ProgramTrack; w: a Way.
+b: record of Bridge; program: a ProgramTrack; w: a Way.
 """
 import math
 from collections import namedtuple
-
-import numpy as np
 
 from acu_tracker.geometry.motion import LineOfSight, earth_angles, line_of_sight
 from acu_tracker.geometry.vector import Vector, cross, dot, vector
 from acu_tracker.modes import Reason
 from acu_tracker.program import program_track
 from pedestal_common.compiled import compiled
+from pedestal_common.quantities import Vector3
+from pedestal_common.record import Record
 
-BRIDGE_DTYPE = np.dtype([('axis', 'f8', (3,)), ('cos', 'f8'), ('valid', 'i8')], align=True)
-"""Rotation of the program.
 
-axis   axis of the rotation, ENU; its length is the sine of the angle of the rotation
-cos    cosine of the angle
-valid  1 if there is a rotation
-"""
+class Bridge(Record):
+    """Rotation of the program."""
+    axis: Vector3  # axis of the rotation, ENU; its length is the sine of the angle of the rotation
+    cos: float  # cosine of the angle
+    valid: int  # 1 if there is a rotation
+
 
 Way = namedtuple('Way', 'program valid axis cos')
 """Path that the antenna may follow: the ProgramTrack `program`, rotated if `valid` is 1; axis, cos: as in
-BRIDGE_DTYPE."""
+Bridge."""
 
 MIN_PROGRAM_COSINE = math.cos(math.radians(3.0))
 """Cosine of the largest angle between program and estimate for which the program is rotated [-]: 3 deg."""

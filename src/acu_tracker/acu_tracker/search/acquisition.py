@@ -13,43 +13,44 @@ passed its peak, the mode acquire returns the beam to the peak. Acquire has thes
 The result is the offset of the beam from the expected place of the target; the caller supplies this place. An offset
 may jump, because the shaper of each axis smooths the motion.
 
-s: record of ACQUISITION_DTYPE; p: record of AcquisitionParameters, except where a function states otherwise;
+s: record of Acquisition; p: record of AcquisitionParameters, except where a function states otherwise;
 beamwidth: half-power beamwidth [rad]; z: signal level, C/N0 [dB-Hz].
 """
 import math
-
-import numpy as np
+from typing import Annotated
 
 from acu_tracker.search import level, pattern, place, side_lobe, slope_check, step_track
 from acu_tracker.search.pattern import Area, Point
 from pedestal_common.codes import codes
 from pedestal_common.compiled import compiled
+from pedestal_common.quantities import Floats, Pair
+from pedestal_common.record import Record
 
 ACQUISITION_PHASES = ('settle', 'look around', 'peak', 'check', 'checked', 'wrong slope')
 Phase = codes(ACQUISITION_PHASES)
 
-ACQUISITION_DTYPE = np.dtype([
-    ('level', level.LEVEL_DTYPE), ('slopes', slope_check.SLOPES_DTYPE), ('step_track', step_track.STEP_TRACK_DTYPE),
-    ('place', place.PLACE_DTYPE), ('began', 'f8'), ('radius', 'f8'), ('peak', 'f8'), ('centre', 'f8', (2,)),
-    ('phase', 'i8'), ('since', 'f8'), ('place_number', 'i8'), ('levels', 'f8', (1 + side_lobe.LOOK_AROUND_PLACES,)),
-    ('look_around_count', 'i8'), ('peak_count', 'i8'), ('wrong_slope_count', 'i8'), ('fair', 'f8'),
-], align=True)
-"""State of search and acquire.
 
-level, slopes, step_track  states of the modules of the same names (slopes: slope_check)
-place               expected place of the target without a program
-began               begin of search or acquire [s]
-radius              radius of the small area [rad]
-peak                highest level so far [dB-Hz]
-centre              offset of the beam from the expected place: of the highest level in search, then the present centre
-                    of acquire, or the offset of step track; cross-elevation, elevation [rad]
-phase, since        phase of acquire, and the time at which it or its present place began [s]
-place_number        number of the present place in the phase; 0: the centre
-levels              levels at the places of the phase [dB-Hz]
-look_around_count, peak_count  numbers of the phases look around and peak so far
-wrong_slope_count   number of slope checks with a wrong slope
-fair                last time at which the level was not suspected to be that of a side lobe [s]
-"""
+class Acquisition(Record):
+    """State of search and acquire."""
+    level: level.Level  # level, slopes, step_track: states of the modules of the same names (slopes: slope_check)
+    slopes: slope_check.Slopes
+    step_track: step_track.StepTrack
+    place: place.Place  # expected place of the target without a program
+    began: float  # begin of search or acquire [s]
+    radius: float  # radius of the small area [rad]
+    peak: float  # highest level so far [dB-Hz]
+    # offset of the beam from the expected place: of the highest level in search, then the present centre of acquire,
+    # or the offset of step track; cross-elevation, elevation [rad]
+    centre: Pair
+    phase: int  # phase, since: phase of acquire, and the time at which it or its present place began [s]
+    since: float
+    place_number: int  # number of the present place in the phase; 0: the centre
+    levels: Annotated[Floats, (1 + side_lobe.LOOK_AROUND_PLACES,)]  # levels at the places of the phase [dB-Hz]
+    look_around_count: int  # look_around_count, peak_count: numbers of the phases look around and peak so far
+    peak_count: int
+    wrong_slope_count: int  # number of slope checks with a wrong slope
+    fair: float  # last time at which the level was not suspected to be that of a side lobe [s]
+
 
 LEVEL_SETTLING_LAGS = 4.0  # number of time constants of the level after which it is that of a new place
 PEAK_DROP_DB = 1.0  # drop of the level below its peak at which search ends and the beam returns to the peak [dB]
@@ -74,7 +75,7 @@ PEAK_OFFSETS_BEAMWIDTHS = ((0.0, 0.0), (PEAK_STEP_BEAMWIDTHS, 0.0), (-PEAK_STEP_
 
 
 def initialise(s):
-    """Start before the first level; s (n,) of ACQUISITION_DTYPE."""
+    """Start before the first level; s (n,) of Acquisition."""
     s['level']['stamp'] = -math.inf
 
 

@@ -19,26 +19,29 @@ three thresholds above m:
 The threshold loss is at least m + 2 sqrt(V). With a lower threshold the noise alone would count as a target after the
 target is lost.
 
-s, p: records of LEVEL_DTYPE and of AcquisitionParameters.
+s, p: records of Level and of AcquisitionParameters.
 """
 import math
 from collections import namedtuple
 
-import numpy as np
-
 from pedestal_common.compiled import compiled
+from pedestal_common.record import Record
 
-LEVEL_DTYPE = np.dtype([('mean', 'f8'), ('variance', 'f8'), ('samples', 'i8'), ('learnt', 'f8'),
-                        ('z', 'f8'), ('stamp', 'f8'), ('above_detect', 'f8'), ('above_track', 'f8'),
-                        ('below_loss', 'f8'), ('present', 'i8')], align=True)
-"""State of the detection.
 
-mean, variance   m [dB-Hz] and V [dB2]
-samples, learnt  number n of the samples of noise, and their total duration [s]
-z, stamp         last level [dB-Hz] and its stamp [s]
-above_detect, above_track, below_loss  time for which the level has been above or below the threshold [s]
-present          1 if there is a target
-"""
+class Level(Record):
+    """State of the detection."""
+    mean: float  # mean, variance: m [dB-Hz] and V [dB2]
+    variance: float
+    samples: int  # samples, learnt: number n of the samples of noise, and their total duration [s]
+    learnt: float
+    z: float  # z, stamp: last level [dB-Hz] and its stamp [s]
+    stamp: float
+    # above_detect, above_track, below_loss: time for which the level has been above or below the threshold [s]
+    above_detect: float
+    above_track: float
+    below_loss: float
+    present: int  # 1 if there is a target
+
 
 Thresholds = namedtuple('Thresholds', 'detect track loss')  # thresholds of the level [dB-Hz]
 DETECTION_SIGMAS = 4.0  # height of the detection threshold above the mean noise, in standard deviations of the noise

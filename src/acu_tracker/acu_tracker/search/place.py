@@ -11,16 +11,21 @@ a Singer model (Singer 1970). In the time T the target has moved by the angle
 """
 import math
 
-import numpy as np
-
 from acu_tracker.geometry.great_circle import turned
 from acu_tracker.geometry.motion import AxisMotion, LineOfSight, Motion, angles, earth_angles
 from acu_tracker.geometry.vector import Vector, dot, times, vector
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry import line_of_sight
+from pedestal_common.quantities import Vector3
+from pedestal_common.record import Record
 
-PLACE_DTYPE = np.dtype([('u', 'f8', (3,)), ('du', 'f8', (3,)), ('stamp', 'f8')], align=True)
-"""Last known place: ENU unit vector u [-] towards the target at the stamp [s], and its rate du [1/s]."""
+
+class Place(Record):
+    """Last known place: ENU unit vector u [-] towards the target at the stamp [s], and its rate du [1/s]."""
+    u: Vector3
+    du: Vector3
+    stamp: float
+
 
 ZERO_VECTOR = Vector(0.0, 0.0, 0.0)  # vector of length 0
 RATE_FADE_TIME_S = 10.0  # time constant with which the expected rate fades [s]

@@ -12,15 +12,23 @@ Each of these vectors is (cross-elevation, elevation). The diagonal of K is 1 wi
 wrong, and cos(beta) if the axes of the errors are turned by beta. A constant error of the expected place changes only
 the means, and not K.
 
-s: record of SLOPES_DTYPE.
+s: record of Slopes.
 """
-import numpy as np
+from typing import Annotated
 
 from pedestal_common.compiled import compiled
+from pedestal_common.quantities import Floats, Pair, Vector3
+from pedestal_common.record import Record
 
-SLOPES_DTYPE = np.dtype([('n', 'i8'), ('d', 'f8', (2,)), ('e', 'f8', (2,)), ('dd', 'f8', (3,)), ('ed', 'f8', (2, 2))],
-                        align=True)
-"""n: number of samples; d, e: their means d', e' [rad]; dd, ed: the sums S_dd (xx, xe, ee) and S_ed [rad2]."""
+
+class Slopes(Record):
+    """n: number of samples; d, e: their means d', e' [rad]; dd, ed: the sums S_dd (xx, xe, ee) and S_ed [rad2]."""
+    n: int
+    d: Pair
+    e: Pair
+    dd: Vector3
+    ed: Annotated[Floats, (2, 2)]
+
 
 MIN_SLOPE = 0.5
 """Slope below which autotrack does not begin [-].

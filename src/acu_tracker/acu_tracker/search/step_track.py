@@ -16,20 +16,21 @@ large as the step.
 """
 import math
 
-import numpy as np
-
 from pedestal_common.compiled import compiled
+from pedestal_common.quantities import Pair
+from pedestal_common.record import Record
 
-STEP_TRACK_DTYPE = np.dtype([('place', 'f8', (2,)), ('began', 'f8'), ('phase', 'i8'), ('since', 'f8'),
-                             ('sum', 'f8'), ('samples', 'i8'), ('plus', 'f8')], align=True)
-"""State of step track.
 
-place         offset of the beam between its steps: cross-elevation, elevation [rad]
-began         begin of the cycle [s]
-phase, since  index in STEP_PHASES, and begin of this phase [s]
-sum, samples  sum [dB-Hz] and number of the levels in this phase
-plus          mean level on the plus side [dB-Hz]
-"""
+class StepTrack(Record):
+    """State of step track."""
+    place: Pair  # offset of the beam between its steps: cross-elevation, elevation [rad]
+    began: float  # begin of the cycle [s]
+    phase: int  # phase, since: index in STEP_PHASES, and begin of this phase [s]
+    since: float
+    sum: float  # sum, samples: sum [dB-Hz] and number of the levels in this phase
+    samples: int
+    plus: float  # mean level on the plus side [dB-Hz]
+
 
 STEP_PHASES = ('cross-elevation plus', 'cross-elevation minus', 'elevation plus', 'elevation minus', 'rest')
 REST_PHASE = len(STEP_PHASES) - 1

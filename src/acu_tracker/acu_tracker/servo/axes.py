@@ -1,7 +1,7 @@
 """The position loops of both axes of the antenna: start from the actual angles, following of the reference, rest.
 
-axis     records (2,) of position_loop.AXIS_LOOP_DTYPE
-c, u, o  records of control_unit.CONSTANTS_DTYPE, of signals.INPUTS_DTYPE and of signals.OUTPUTS_DTYPE
+axis     records (2,) of position_loop.AxisLoop
+c, u, o  records of control_unit.Constants, of signals.Inputs.dtype and of signals.Outputs
 """
 from collections import namedtuple
 

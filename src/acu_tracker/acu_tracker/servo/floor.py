@@ -3,16 +3,19 @@
 The floor keeps the dish clear of structures around the antenna. A table of points, joined by straight lines, defines
 the floor. Where the floor rises, the azimuth waits until the elevation is above the floor ahead.
 
-c, u: records of control_unit.CONSTANTS_DTYPE and of signals.INPUTS_DTYPE; floor: record of FLOOR_DTYPE; limits: record
+c, u: records of control_unit.Constants and of signals.Inputs.dtype; floor: record of Floor; limits: record
 of the LimitsParameters of an axis; A, E: azimuth and elevation in encoder angles [rad].
 """
 import math
+from typing import Annotated
 
 import numpy as np
 
 from acu_tracker.servo.ends import Ends, braking_distance
 from pedestal_common.compiled import compiled
 from pedestal_common.parameters import ParameterError
+from pedestal_common.quantities import Floats
+from pedestal_common.record import Record
 
 MAX_FLOOR_POINTS = 64  # largest number of points of a floor
 FLOOR_DOC = ("floor of the elevation over the azimuth, at most 64 points: 'azimuth elevation; ...' [rad] on the deck, "
@@ -21,11 +24,15 @@ FLOOR_DOC = ("floor of the elevation over the azimuth, at most 64 points: 'azimu
 CELL_COUNT = 720  # number of cells of a turn in which the floor is looked up: half a degree each
 CELL_WIDTH_RAD = 2.0 * math.pi / CELL_COUNT  # width of a cell [rad]
 
-FLOOR_DTYPE = np.dtype([('given', 'i8'), ('highest', 'f8', (CELL_COUNT,))], align=True)
-"""given: 1 if there is a floor; highest: highest value of the floor in each cell [rad].
 
-Cell 0 is from azimuth 0 to CELL_WIDTH_RAD.
-"""
+class Floor(Record):
+    """given: 1 if there is a floor; highest: highest value of the floor in each cell [rad].
+
+    Cell 0 is from azimuth 0 to CELL_WIDTH_RAD.
+    """
+    given: int
+    highest: Annotated[Floats, (CELL_COUNT,)]
+
 
 MAX_AZIMUTH_RAD = 1e3
 """Azimuth beyond the travel of every axis [rad].
@@ -69,12 +76,12 @@ def at(text, A):
 
 
 def table(text) -> np.ndarray:
-    """Return the FLOOR_DTYPE (1,) of a text as in FLOOR_DOC.
+    """Return the Floor (1,) of a text as in FLOOR_DOC.
 
     The value of a cell is the highest value of the floor at its two ends and at the points of the table inside it.
     """
     A, f = points(text)
-    floor = np.zeros(1, FLOOR_DTYPE)
+    floor = Floor.zeros()
     if A:
         edges = np.interp(CELL_WIDTH_RAD * np.arange(CELL_COUNT + 1), A, f, period=2.0 * math.pi)
         highest = np.maximum(edges[:-1], edges[1:])

@@ -8,20 +8,22 @@
 A drive that moves has noise in its currents and steps in its encoders. The measurements are therefore constant only at
 rest. If all measurements repeat while x grows, the motion is not measured, and the position loop is open.
 
-s: record of FROZEN_DTYPE.
+s: record of Frozen.
 """
-import numpy as np
+from typing import Annotated
 
 from pedestal_common.compiled import compiled
+from pedestal_common.quantities import Floats, Pair
+from pedestal_common.record import Record
 
-FROZEN_DTYPE = np.dtype([('last', 'f8', (6,)), ('since', 'f8'), ('travel', 'f8', (2,)), ('frozen', 'i8')], align=True)
-"""State of the test.
 
-last    angles [rad], rates [rad/s] and torques [Nm] of both axes in the step before
-travel  x of azimuth and elevation [rad]
-since   last stamp at which no x was above FROZEN_TEST_TRAVEL_RAD [s]
-frozen  1 from the detection of a frozen drive until its reset
-"""
+class Frozen(Record):
+    """State of the test."""
+    last: Annotated[Floats, (6,)]  # angles [rad], rates [rad/s] and torques [Nm] of both axes in the step before
+    since: float  # last stamp at which no x was above FROZEN_TEST_TRAVEL_RAD [s]
+    travel: Pair  # x of azimuth and elevation [rad]
+    frozen: int  # 1 from the detection of a frozen drive until its reset
+
 
 FROZEN_TEST_TRAVEL_RAD = 3e-3
 """Travel within which a measurement must change [rad].
@@ -47,7 +49,7 @@ def release(s, t):
 def watch(s, u, hold, restart):
     """Take the measurements of a step; return True if the drive is frozen.
 
-    u        record of signals.INPUTS_DTYPE
+    u        record of signals.Inputs.dtype
     hold     longest time until a command has an effect on the measurements [s]
     restart  True if no earlier command is in force
     """

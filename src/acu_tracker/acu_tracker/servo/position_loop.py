@@ -11,31 +11,37 @@ beam         steers an electronic beam, which has no dynamics. Its command is th
 
 t_k: stamp of the step [s]; t_m: middle of the interval in which the command of the step is in force [s].
 
-axis  record of AXIS_LOOP_DTYPE
-c     record of the constants of the axis, control_unit.AXIS_CONSTANTS_DTYPE
+axis  record of AxisLoop
+c     record of the constants of the axis, control_unit.AxisConstants
 p     record of AxisParameters
 """
 import dataclasses
 from collections import namedtuple
-
-import numpy as np
+from typing import Annotated
 
 from acu_tracker.estimation.filters import constant_gain
 from acu_tracker.geometry.motion import AxisMotion
 from acu_tracker.servo import adrc, beam_loop, ends, feedforward, notch, pid, reference
 from pedestal_common.compiled import compiled
+from pedestal_common.quantities import Floats, Vector3
+from pedestal_common.record import Record
 
 CONTROLLERS = ('pid', 'feedforward', 'adrc', 'beam')
 CONTROLLER_PID, CONTROLLER_FEEDFORWARD, CONTROLLER_ADRC, CONTROLLER_BEAM = range(len(CONTROLLERS))
 
-AXIS_LOOP_DTYPE = np.dtype([
-    ('controller', 'i8'), ('command', 'f8'),                                  # of the last step; [rad/s]
-    ('reference', reference.REFERENCE_DTYPE),
-    ('integral', 'f8'), ('error', 'f8'), ('derivative', 'f8'),                # I [rad/s], e [rad], D [rad/s] of pid
-    ('z', 'f8', (3,)), ('observed', 'f8'),                                    # adrc: z1 z2 z3, and their instant [s]
-    ('notch', 'f8', (4,)),                                                    # memory of notch.removed
-], align=True)
-"""State of the position loop of one axis."""
+
+class AxisLoop(Record):
+    """State of the position loop of one axis."""
+    controller: int
+    command: float  # of the last step; [rad/s]
+    reference: reference.Reference
+    integral: float
+    error: float
+    derivative: float  # I [rad/s], e [rad], D [rad/s] of pid
+    z: Vector3
+    observed: float  # adrc: z1 z2 z3, and their instant [s]
+    notch: Annotated[Floats, (4,)]  # memory of notch.removed
+
 
 Instants = namedtuple('Instants', 't_k t_m dt')
 """Times of a step [s].

@@ -6,22 +6,30 @@ history keeps the reference until the encoder reports this instant, so that both
 The controller pid uses no shaped reference. The reference is then kept at the angle and rate of the axis, so that
 another controller can begin there.
 
-r: record of REFERENCE_DTYPE.
+r: record of Reference.
 """
-import numpy as np
+from typing import Annotated
 
-from acu_tracker.geometry.history import HISTORY_LENGTH, bracket, history_type, interpolated, push
+from acu_tracker.geometry.history import HISTORY_LENGTH, History, bracket, interpolated, push
 from acu_tracker.geometry.motion import AxisMotion
 from acu_tracker.servo import shaper
 from pedestal_common.compiled import compiled
+from pedestal_common.quantities import Floats, Radians, RadiansPerSecond, RadiansPerSecond2
+from pedestal_common.record import Record
 
-REFERENCE_DTYPE = np.dtype([('angle', 'f8'), ('rate', 'f8'), ('acceleration', 'f8'), ('planned', history_type(4))],
-                           align=True)
-"""Shaped reference.
 
-angle, rate, acceleration  the newest reference [rad, rad/s, rad/s2]
-planned                    history of the reference and of the rate command [rad/s]; the stamp of a row is t_m
-"""
+class Planned(History):
+    """The reference in the steps before; the stamp of a row is t_m."""
+    sample: Annotated[Floats, (HISTORY_LENGTH, 4)]      # reference and rate command [rad/s]; see ANGLE_COLUMN
+
+
+class Reference(Record):
+    """Shaped reference: the newest, and those before it."""
+    angle: Radians
+    rate: RadiansPerSecond
+    acceleration: RadiansPerSecond2
+    planned: Planned
+
 
 ANGLE_COLUMN, RATE_COLUMN, ACCELERATION_COLUMN, COMMAND_COLUMN = range(4)
 """Columns of the history: angle, rate, acceleration of the reference; rate command."""

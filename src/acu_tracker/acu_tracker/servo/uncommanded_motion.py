@@ -11,25 +11,28 @@ a is dt / ENVELOPE_TIME_CONSTANT_S, but 0 as long as the command that made the e
 An axis may lag behind its commands and overshoot them. Therefore every rate between 0 and the envelope is allowed. The
 rate may also exceed this range by a threshold and a share of the width of the envelope.
 
-s: record of ENVELOPE_DTYPE.
+s: record of Envelope.
 """
 import math
-
-import numpy as np
+from typing import Annotated
 
 from pedestal_common.compiled import compiled
+from pedestal_common.quantities import Floats, Pair
+from pedestal_common.record import Record
 
-ENVELOPE_DTYPE = np.dtype([('high', 'f8', (2,)), ('low', 'f8', (2,)),      # h, l of both axes [rad/s]
-                           ('high_at', 'f8', (2,)), ('low_at', 'f8', (2,)),    # last command that made them [s]
-                           ('since', 'f8'), ('beyond', 'f8'), ('moves', 'i8'),
-                           ('measured', 'f8', (2, 3))], align=True)
-"""State of the detection.
 
-since     stamp from which the axes are watched [s]
-beyond    last stamp at which no rate was outside its allowed range [s]
-moves     1 after a rate was outside for MIN_EXCESS_TIME_S, until a reset
-measured  of each axis, at the detection: rate, lowest and highest allowed rate [rad/s]
-"""
+class Envelope(Record):
+    """State of the detection."""
+    high: Pair
+    low: Pair  # h, l of both axes [rad/s]
+    high_at: Pair
+    low_at: Pair  # last command that made them [s]
+    since: float  # stamp from which the axes are watched [s]
+    beyond: float  # last stamp at which no rate was outside its allowed range [s]
+    moves: int  # 1 after a rate was outside for MIN_EXCESS_TIME_S, until a reset
+    # of each axis, at the detection: rate, lowest and highest allowed rate [rad/s]
+    measured: Annotated[Floats, (2, 3)]
+
 
 ENVELOPE_TIME_CONSTANT_S = 0.2
 """Time constant with which the envelope shrinks [s].
@@ -48,7 +51,7 @@ A gust of 4000 Nm on both axes causes a shorter excess.
 
 
 def initialise(s):
-    """Start before the first step; s: view of ENVELOPE_DTYPE."""
+    """Start before the first step; s: view of Envelope."""
     s['since'] = -math.inf
 
 

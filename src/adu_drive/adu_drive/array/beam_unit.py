@@ -12,6 +12,7 @@ from adu_drive.array import electronic_beam
 from pedestal_common.compiled import compiled
 from pedestal_common.graph import nodes, topics
 from pedestal_common.node.unit import LEVEL_ERROR, LEVEL_OK, LEVEL_WARN, Diagnosis, joined
+from pedestal_common.record import Record
 from pedestal_common.wire.records import NO_STAMP
 
 JOINT_STATES_TOPIC, DRIVE_TRUTH_TOPIC, CLOCK_TOPIC = 'joint_states', 'adu/truth', 'clock'
@@ -20,28 +21,32 @@ STATE_CODE_ENABLED, STATE_CODE_DISABLED, STATE_CODE_EMERGENCY_STOP = (
     AngleDrive.STATE_TEXTS.index(text) for text in (ENABLED_TEXT, 'disabled', EMERGENCY_STOP_TEXT))
 """Codes of the texts of adu/state."""
 
-SWITCHES_DTYPE = np.dtype([('wanted', 'i8'), ('emergency', 'i8'), ('stamp', 'i8'), ('invalid', 'i8')])
-"""Switches of a beam.
 
-wanted      1 at the start and after a request to enable; 0 after a request to disable
-emergency   1 while an emergency stop is latched
-stamp       stamp of the last step [ns]
-invalid     1 if a command since the last diagnosis was invalid
-"""
+class Switches(Record, align=False):
+    """Switches of a beam."""
+    wanted: int  # 1 at the start and after a request to enable; 0 after a request to disable
+    emergency: int  # 1 while an emergency stop is latched
+    stamp: int  # stamp of the last step [ns]
+    invalid: int  # 1 if a command since the last diagnosis was invalid
 
-RECORD_DTYPE = np.dtype([('state', electronic_beam.STATE_DTYPE), ('constants', electronic_beam.CONSTANTS_DTYPE),
-                         ('inputs', electronic_beam.INPUTS_DTYPE), ('outputs', electronic_beam.OUTPUTS_DTYPE),
-                         ('switches', SWITCHES_DTYPE)], align=True)
+
+class UnitRecord(Record):
+    """Record."""
+    state: electronic_beam.State
+    constants: electronic_beam.Constants
+    inputs: electronic_beam.Inputs
+    outputs: electronic_beam.Outputs
+    switches: Switches
 
 
 class Memory(typing.NamedTuple):
-    """Memory of a beam; record: (1,) of RECORD_DTYPE."""
+    """Memory of a beam; record: (1,) of Record."""
     record: np.ndarray
 
 
 @compiled
 def condition(switches):
-    """Return the code of adu/state from a record SWITCHES_DTYPE."""
+    """Return the code of adu/state from a record Switches."""
     if switches.emergency:
         return STATE_CODE_EMERGENCY_STOP
     return STATE_CODE_ENABLED if switches.wanted else STATE_CODE_DISABLED
@@ -101,10 +106,10 @@ class Beam(AngleDrive):
     def __init__(self, parameters, reads):
         super().__init__(parameters, reads)
         p = parameters
-        switches = np.zeros(1, SWITCHES_DTYPE)
+        switches = Switches.zeros()
         switches['wanted'], switches['stamp'] = 1, NO_STAMP
         constants = electronic_beam.constants(p.period, p.transport_delay, p.command_timeout * p.period)
-        self.memory = Memory(joined(RECORD_DTYPE, constants=constants, switches=switches,
+        self.memory = Memory(joined(UnitRecord.dtype, constants=constants, switches=switches,
                                     state=electronic_beam.initial_state(p.initial_azimuth, p.initial_elevation)))
         electronic_beam.read(self.parts['state'], self.parts['outputs'])
 

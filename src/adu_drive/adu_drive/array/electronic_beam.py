@@ -4,44 +4,51 @@ A command stamped t_k is active from the first step at or after t_k + transport 
 active. This models the delays of the beam steering computer and the array of paper 002 (section 2, figure 2). The hold
 models the closed-loop period of that paper. Arguments: s state, c constants, u inputs, y outputs (records below).
 """
+from typing import Annotated
+
 import numpy as np
 
 from pedestal_common.compiled import compiled
 from pedestal_common.parameters import ParameterError
+from pedestal_common.quantities import Floats, Ints, Pair
+from pedestal_common.record import Record
 from pedestal_common.wire.records import NO_STAMP
 
 BEAM_RING_SIZE = 512  # largest number of commands within the delay
 MAX_COMMAND_ANGLE_RAD = 1e3  # largest valid angle of a command [rad]; a command beyond it, infinite or NaN is ignored
 
-CONSTANTS_DTYPE = np.dtype([('delay_ns', 'i8'), ('timeout_ns', 'i8')], align=True)
 
-STATE_DTYPE = np.dtype([('ring_stamp_ns', 'i8', (BEAM_RING_SIZE,)), ('ring_position', 'f8', (BEAM_RING_SIZE, 2)),
-                        ('written', 'i8'),
-                        ('released', 'i8'), ('command_stamp_ns', 'i8'), ('position', 'f8', (2,))], align=True)
-"""State of a beam.
+class Constants(Record):
+    """Record."""
+    delay_ns: int
+    timeout_ns: int
 
-ring_stamp_ns, ring_position    stamps [ns] and angles (azimuth, elevation) [rad] of the commands within the delay
-written, released    numbers of commands put into and taken out of the ring since the start
-command_stamp_ns     stamp of the newest valid command [ns]
-position             active beam (azimuth, elevation) [rad]
-"""
 
-INPUTS_DTYPE = np.dtype([('stamp_ns', 'i8'), ('due', 'i8'), ('command_stamp_ns', 'i8'), ('position', 'f8', (2,))],
-                        align=True)
-"""Inputs of a step.
+class State(Record):
+    """State of a beam."""
+    # ring_stamp_ns, ring_position: stamps [ns] and angles (azimuth, elevation) [rad] of the commands within the delay
+    ring_stamp_ns: Annotated[Ints, (BEAM_RING_SIZE,)]
+    ring_position: Annotated[Floats, (BEAM_RING_SIZE, 2)]
+    written: int  # written, released: numbers of commands put into and taken out of the ring since the start
+    released: int
+    command_stamp_ns: int  # stamp of the newest valid command [ns]
+    position: Pair  # active beam (azimuth, elevation) [rad]
 
-stamp_ns           stamp t_k of the step [ns]
-due                1 if the step has a new command
-command_stamp_ns, position    stamp [ns] and beam (azimuth, elevation) [rad] of this command
-"""
 
-OUTPUTS_DTYPE = np.dtype([('position', 'f8', (2,)), ('stale', 'i8'), ('invalid_command', 'i8')], align=True)
-"""Outputs at t_k+1.
+class Inputs(Record):
+    """Inputs of a step."""
+    stamp_ns: int  # stamp t_k of the step [ns]
+    due: int  # 1 if the step has a new command
+    command_stamp_ns: int  # command_stamp_ns, position: stamp [ns] and beam (azimuth, elevation) [rad] of this command
+    position: Pair
 
-position          active beam from t_k on (azimuth, elevation) [rad]
-stale             1 if the newest valid command was older than the timeout at t_k, or missing
-invalid_command   1 if the command of this step was invalid or not newer than the previous one; the beam stays
-"""
+
+class Outputs(Record):
+    """Outputs at t_k+1."""
+    position: Pair  # active beam from t_k on (azimuth, elevation) [rad]
+    stale: int  # 1 if the newest valid command was older than the timeout at t_k, or missing
+    # 1 if the command of this step was invalid or not newer than the previous one; the beam stays
+    invalid_command: int
 
 
 def check_delay(period, transport_delay):
@@ -52,14 +59,14 @@ def check_delay(period, transport_delay):
 
 
 def constants(period, transport_delay, timeout) -> np.ndarray:
-    """Return CONSTANTS_DTYPE (1,) for a period, a delay and the age at which a command is stale, all in s."""
+    """Return Constants (1,) for a period, a delay and the age at which a command is stale, all in s."""
     check_delay(period, transport_delay)
-    return np.array([(round(transport_delay * 1e9), round(timeout * 1e9))], CONSTANTS_DTYPE)
+    return np.array([(round(transport_delay * 1e9), round(timeout * 1e9))], Constants.dtype)
 
 
 def initial_state(azimuth, elevation) -> np.ndarray:
-    """Return STATE_DTYPE (1,): the beam at these angles [rad], without a command."""
-    s = np.zeros(1, STATE_DTYPE)
+    """Return State (1,): the beam at these angles [rad], without a command."""
+    s = State.zeros()
     s['position'], s['command_stamp_ns'] = (azimuth, elevation), NO_STAMP
     return s
 
@@ -90,13 +97,13 @@ def release(s, c, stamp_ns):
 
 @compiled
 def read(s, y):
-    """Write the present outputs, for t_0 before the first step. Records STATE_DTYPE, OUTPUTS_DTYPE."""
+    """Write the present outputs, for t_0 before the first step. Records State, Outputs."""
     y.position[0], y.position[1] = s.position[0], s.position[1]
 
 
 @compiled
 def step(s, c, u, y):
-    """Advance one step from t_k to t_k+1. Records STATE_DTYPE, CONSTANTS_DTYPE, INPUTS_DTYPE, OUTPUTS_DTYPE.
+    """Advance one step from t_k to t_k+1. Records State, Constants, Inputs, Outputs.
 
     s and y are written.
     """

@@ -117,7 +117,7 @@ def respond(drive, rate, torque):
     """
     drive = dataclasses.replace(drive, wind=WindParameters(), initially_enabled=True)
     state, constants = drive_unit.initial_state(drive), drive_unit.constants(drive)
-    inputs, outputs = np.zeros(1, drive_unit.INPUTS_DTYPE), np.zeros(1, drive_unit.OUTPUTS_DTYPE)
+    inputs, outputs = drive_unit.Inputs.zeros(), drive_unit.Outputs.zeros()
     inputs['enable'] = 1
     drive_unit.read(state[0], constants[0], outputs[0])
     position, motors = np.empty_like(rate), np.empty((len(rate), 2, 4))

@@ -22,6 +22,8 @@ from pedestal_common.graph.steps import NS_PER_SECOND
 from pedestal_common.law import by_type
 from pedestal_common.law_key import template
 from pedestal_common.node.unit import MAX_BLOCK_STEPS, Unit, announced
+from pedestal_common.quantities import Pair
+from pedestal_common.record import Record
 from pedestal_common.wire import records
 
 COMMAND_TOPIC, REFERENCE_TOPIC = 'acu/rate_command', 'acu/reference'
@@ -30,9 +32,14 @@ STEP_DTYPE = records.of(*(topic.name for topic in topics.TOPICS
                           if topic.rate == 'step' or records.is_text(topic.name)))
 """Record of one step: every topic except the program track, commands and the diagnostics."""
 
-TRUTH_DTYPE = np.dtype([('bias', 'f8', 2), ('error', 'f8', 2)])
-"""Numbers of the time t_k that no topic holds: bias torques (azimuth, elevation) [Nm], true error of the beam
-(cross-elevation, elevation) [rad]."""
+
+class Truth(Record, align=False):
+    """Numbers of the time t_k that no topic holds: bias torques (azimuth, elevation) [Nm], true error of the beam
+    (cross-elevation, elevation) [rad].
+    """
+    bias: Pair
+    error: Pair
+
 
 # Compiled code finds the law of a unit by the type of its Memory, which holds state, inputs and outputs of its step.
 _LAWS = {memory: law for node in nodes.UNIT_NODES for memory, (law, _) in node.unit_type().LAWS.items()}
@@ -51,7 +58,7 @@ by_type(step, lambda memory: None if isinstance(memory, types.NoneType) else _LA
 
 
 def true_bias(drive, truth):
-    """Write the bias torques of the drive into the record `truth` of TRUTH_DTYPE; an array has none. drive: memory of
+    """Write the bias torques of the drive into the record `truth` of Truth; an array has none. drive: memory of
     its unit. Only compiled code calls this function."""
     raise NotImplementedError
 
@@ -78,7 +85,7 @@ def loop(units, first, period_ns, before, injected, steps, truth):
     injected   (n, 2) for azimuth and elevation: added to the commands on their way to the drive. A drive follows the
                rates [rad/s], the beam of an array follows the angles [rad]; the number is added to both.
     steps      (n,) of STEP_DTYPE, filled
-    truth      (n,) of TRUTH_DTYPE, filled
+    truth      (n,) of Truth, filled
     """
     drive, ship, ins, receiver, acu = units
     for k in range(len(steps)):
@@ -106,7 +113,7 @@ class Run:
     """Result of a run of the closed loop, kept in memory; memory_recording gives it the interface of a recording.
 
     steps      (n,) of STEP_DTYPE, or of some of its topics
-    truth      (n,) of TRUTH_DTYPE; empty for one of several runs that the module side_by_side computes together
+    truth      (n,) of Truth; empty for one of several runs that the module side_by_side computes together
     stamps     stamps of the steps (n,) [ns]
     units      {node: Unit} after the run
     forecasts  [(stamp [ns], announcement.numbers)] at every whole second: the keyhole forecasts of the control unit
@@ -210,7 +217,7 @@ class Loop:
         """
         if injected is None:
             injected = np.zeros((self.steps, 2))
-        steps, truth = records.empty(STEP_DTYPE, self.steps), np.zeros(self.steps, TRUTH_DTYPE)
+        steps, truth = records.empty(STEP_DTYPE, self.steps), np.zeros(self.steps, Truth.dtype)
         before = records.empty(STEP_DTYPE, 1)
         forecasts: list[tuple] = []
         first = 0

@@ -14,7 +14,7 @@ from acu_tracker.program.program_track import ProgramTrack
 from acu_tracker.program.tables import Tables
 from adu_drive import lanes
 from adu_drive import unit as drive_unit
-from pedestal_bringup.loop.closed_loop import STEP_DTYPE, TRUTH_DTYPE, Run
+from pedestal_bringup.loop.closed_loop import STEP_DTYPE, Run, Truth
 from pedestal_common.compiled import compiled
 from pedestal_common.wire import records
 from tracking_receiver_sim import unit as receiver_unit
@@ -181,6 +181,6 @@ def runs(loops, names, kept=None):
                        ControlUnits(acu_record, Tables(*tables), np.array(ends)), first, last, period_ns, steps, keeps)
         first = last
     lanes.from_lanes(moving, drive_record)
-    return [Run(steps, np.zeros(0, TRUTH_DTYPE), np.arange(count) * period_ns, loop.units, forecast, loop.replies,
+    return [Run(steps, np.zeros(0, Truth.dtype), np.arange(count) * period_ns, loop.units, forecast, loop.replies,
                 loop.tracks)
             for loop, steps, forecast in zip(loops, kept, forecasts)]

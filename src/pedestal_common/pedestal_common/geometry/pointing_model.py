@@ -32,38 +32,64 @@ one on its edge.
 On the sky means in the frame of the deck: azimuth clockwise from the bow, ashore from north. On a ship the tilt is the
 misalignment between the INS and the pedestal.
 
-m        record of MODEL_DTYPE
+m        record of PointingModel
 A, E     azimuth and elevation of the encoders [rad]
 a, e     the same without the zeros [rad]
 suffix _dot, _ddot   first and second time derivative
 """
 import math
 from collections.abc import Mapping
+from typing import Annotated
 
 import numpy as np
 
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry.line_of_sight import angles, direction, wrap
-
-TERMS = ('p1', 'p3', 'p4', 'p5', 'p6', 'p7', 'p8', 'p9', 'p11', 'p12', 'p13', 'p14', 'p15', 'p16', 'p17', 'p18', 'p19',
-         'p20', 'p21', 'p22')
-"""Names of the terms."""
+from pedestal_common.quantities import Bit, Floats, Matrix3
+from pedestal_common.record import Record
 
 FACTORS = ('p9', 'p12')  # terms that are factors [-]; the others are angles [rad]
 
-MODEL_DTYPE = np.dtype([('terms', 'f8', (len(TERMS),)), ('exact', 'i8'), ('periodic', 'i8'),
-                        ('p', np.dtype([(name, 'f8') for name in TERMS])),
-                        ('tilt', 'f8', (3, 3)), ('sin_lean', 'f8'), ('cos_lean', 'f8'), ('sin_off', 'f8'),
-                        ('cos_off', 'f8')], align=True)
-"""Pointing model.
 
-terms     the values of TERMS [rad, -]; the other fields follow from these values
-exact     1: all terms are zero, so that encoders and sky have the same angles
-periodic  1: a term of step 2 is not zero
-p         the same values by name
-tilt      rotation (3, 3) from the frame of the azimuth axis to the deck, FLU
-sin_lean, cos_lean, sin_off, cos_off  of P3 and of P4
-"""
+class Terms(Record, align=False):
+    """The values of TERMS by name [rad; -]."""
+    p1: float
+    p3: float
+    p4: float
+    p5: float
+    p6: float
+    p7: float
+    p8: float
+    p9: float
+    p11: float
+    p12: float
+    p13: float
+    p14: float
+    p15: float
+    p16: float
+    p17: float
+    p18: float
+    p19: float
+    p20: float
+    p21: float
+    p22: float
+
+
+TERMS = tuple(Terms.dtype.names)  # names of the terms
+
+
+class PointingModel(Record):
+    """Pointing model. All fields follow from `terms`."""
+    terms: Annotated[Floats, (len(TERMS),)]
+    exact: Bit             # 1: all terms are zero, so that encoders and sky have the same angles
+    periodic: Bit          # 1: a term of step 2 is not zero
+    p: Terms                # the same values as `terms`
+    tilt: Matrix3           # rotation from the frame of the azimuth axis to the deck, FLU
+    sin_lean: float         # of P3
+    cos_lean: float
+    sin_off: float          # of P4
+    cos_off: float
+
 
 MIN_ZENITH_DISTANCE_RAD = 1e-6  # distance from the azimuth axis below which the rates of the azimuth are limited [rad]
 MAX_CONE_ROUNDING = 1e-12  # excess of a sine over 1 that is rounding, not a direction that the beam cannot reach
@@ -77,7 +103,7 @@ def model(terms: Mapping[str, float]) -> np.ndarray:
     unknown = sorted(set(terms) - set(TERMS))
     if unknown:
         raise ValueError(f'term {unknown[0]}: must be one of {", ".join(TERMS)}')
-    m = np.zeros(1, MODEL_DTYPE)
+    m = PointingModel.zeros()
     put(m[0], np.array([terms.get(name, 0.0) for name in TERMS]))
     return m
 

@@ -5,30 +5,39 @@ message, and then calls `numbers`, so that frozen numbers contain the noise of t
 carries out the fault drop.
 """
 import math
+from typing import Annotated
 
 import numpy as np
 
 from pedestal_common.compiled import compiled
 from pedestal_common.injection import table
+from pedestal_common.quantities import Floats
+from pedestal_common.record import Record
 
 MAX_HELD_NUMBERS = 32  # largest number of values that a node freezes: the size of `held`
 
-MESSAGE_FAULT_DTYPE = np.dtype([('drop', 'i8'), ('freeze', 'i8'), ('nan', 'i8'), ('holds', 'i8'),
-                                ('held', 'f8', (MAX_HELD_NUMBERS,)),
-                                ('sigma', 'f8'), ('seed', 'i8')], align=True)
-"""Record of the message faults of a node that are in force.
+
+class MessageFault(Record):
+    """Record of the message faults of a node that are in force.
 
     drop, freeze, nan    1 while in force
-    held                 numbers of the first frozen step; holds: 1 once they are stored
-    sigma, seed          1 sigma of white noise, in the unit of the numbers, 0 for none; its seed
-"""
+        held                 numbers of the first frozen step; holds: 1 once they are stored
+        sigma, seed          1 sigma of white noise, in the unit of the numbers, 0 for none; its seed
+    """
+    drop: int
+    freeze: int
+    nan: int
+    holds: int
+    held: Annotated[Floats, (MAX_HELD_NUMBERS,)]
+    sigma: float
+    seed: int
 
 
 @compiled
 def clear(e):
     """End every fault of the message. Afterwards `apply` sets the faults that are still in force.
 
-    e: MESSAGE_FAULT_DTYPE of the node. e.holds becomes 1 if the step before had a freeze: a freeze that continues then
+    e: MessageFault of the node. e.holds becomes 1 if the step before had a freeze: a freeze that continues then
     uses the same held numbers.
     """
     e.holds = e.freeze

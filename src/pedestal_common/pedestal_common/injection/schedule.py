@@ -8,37 +8,40 @@ The law of the node checks the record once per step. It begins with these lines,
 A node without a fault therefore behaves as if faults did not exist. `take` clears all faults, then applies again the
 fault of every row that is in force. No state must be restored after a fault.
 """
+from collections.abc import Sequence
+from typing import Annotated
+
 import numpy as np
 
 from pedestal_common.compiled import compiled
 from pedestal_common.graph.steps import NS_PER_SECOND
 from pedestal_common.injection import table
+from pedestal_common.quantities import Floats
+from pedestal_common.record import Record
 from pedestal_common.wire.records import NO_STAMP
 
 MAX_ACTIVE_FAULTS = 16  # largest number of faults in force in a node at a time
 
-FAULT_DTYPE = np.dtype([('used', 'i8'), ('fault', 'i8'), ('end', 'i8'), ('duration', 'i8'),
-                        ('values', 'f8', (table.MAX_FAULT_VALUES,))], align=True)
-"""Row of a fault.
 
-used      1 for a fault in force
-fault     code of the fault, see table.code
-end       stamp [ns] of the first step without the fault, NO_STAMP before its first step
-duration  time for which the fault is in force [ns]
-values    its arguments; an option is stored as its index
-"""
+class Fault(Record):
+    """Row of a fault."""
+    used: int  # 1 for a fault in force
+    fault: int  # code of the fault, see table.code
+    end: int  # stamp [ns] of the first step without the fault, NO_STAMP before its first step
+    duration: int  # time for which the fault is in force [ns]
+    values: Annotated[Floats, (table.MAX_FAULT_VALUES,)]  # its arguments; an option is stored as its index
 
-SCHEDULE_DTYPE = np.dtype([('stamp', 'i8'), ('pending', 'i8'), ('row', FAULT_DTYPE, (MAX_ACTIVE_FAULTS,))], align=True)
-"""Faults of a node.
 
-stamp    stamp of the last step [ns], NO_STAMP before the first
-pending  1 while the law must check the rows, because a fault is in force or was in the last step
-"""
+class Schedule(Record):
+    """Faults of a node."""
+    stamp: int  # stamp of the last step [ns], NO_STAMP before the first
+    pending: int  # 1 while the law must check the rows, because a fault is in force or was in the last step
+    row: Annotated[Sequence[Fault], (MAX_ACTIVE_FAULTS,)]
 
 
 def empty() -> np.ndarray:
-    """Return SCHEDULE_DTYPE (1,) before the first step, without a fault."""
-    made = np.zeros(1, SCHEDULE_DTYPE)
+    """Return Schedule (1,) before the first step, without a fault."""
+    made = Schedule.zeros()
     made['stamp'] = NO_STAMP
     return made
 
@@ -71,7 +74,7 @@ def in_force(schedule, row, stamp):
 
 
 def add(schedule, code, values, duration):
-    """Add a fault to a SCHEDULE_DTYPE, in force from the next step for a duration [s]. Raise ValueError where no row
+    """Add a fault to a Schedule, in force from the next step for a duration [s]. Raise ValueError where no row
     is free."""
     free = np.flatnonzero(schedule['row']['used'] == 0)
     if not free.size:

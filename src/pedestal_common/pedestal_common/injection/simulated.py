@@ -7,7 +7,7 @@ from pedestal_common.wire.records import NO_STAMP
 
 
 class Simulated(Unit):
-    """Unit of simulated equipment. Its record has a field `schedule` (schedule.SCHEDULE_DTYPE), which its law reads.
+    """Unit of simulated equipment. Its record has a field `schedule` (schedule.Schedule), which its law reads.
     Its parameters have the field `inject`.
 
     FAULTS_OF    node of table.INJECTED_FAULTS whose faults it has; '': its own node

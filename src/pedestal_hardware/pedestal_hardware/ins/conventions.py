@@ -15,7 +15,7 @@ MIN_UPRIGHT = 0.5  # smallest cosine of the tilt of a deck; a ship is never furt
 def fitting(check, declared, case, q):
     """Return the (earth, body, rate_body) that fit, those with the fewest changes from the declared ones only.
 
-    check     record of frame_check.CHECK_DTYPE
+    check     record of frame_check.Check
     declared  (earth, body, rate_body) of the parameters, which do not fit
     case      rotation case -> deck (3, 3)
     q         last quaternion of the device, in its own frames

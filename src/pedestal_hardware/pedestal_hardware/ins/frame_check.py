@@ -14,10 +14,11 @@ but not with the parameters, leaves a and r equal; the direction of the specific
 finds it.
 """
 import math
-
-import numpy as np
+from typing import Annotated
 
 from pedestal_common.compiled import compiled
+from pedestal_common.quantities import Floats, Matrix3, Vector3
+from pedestal_common.record import Record
 from pedestal_hardware.ins.frames import rotation_vector
 
 BLOCK_TIME_S = 0.2  # length of a block [s]; noise of the attitude matters little over this time
@@ -47,21 +48,28 @@ MAX_FORCE_M_S2 = 1000.0  # specific force [m/s2] that no ship has; more is not u
 FRAME_UNKNOWN, FRAME_RIGHT, FRAME_WRONG = range(3)
 """Verdicts: not enough motion so far, all axes with motion agree, an axis disagrees."""
 
-CHECK_DTYPE = np.dtype([('runs', 'i8'), ('begin', 'i8'), ('last', 'i8'), ('q', 'f8', (4,)), ('w', 'f8', (3,)),
-                        ('integral', 'f8', (3,)), ('cross', 'f8', (3, 3)), ('attitude', 'f8', (3,)),
-                        ('rates', 'f8', (3,)), ('weight', 'f8'), ('force', 'f8', (3,)), ('force_weight', 'f8'),
-                        ('moved', 'f8', (3,)), ('jumps', 'i8'), ('rest', 'i8'), ('verdict', 'i8'), ('down', 'i8')],
-                       align=True)
-"""State of the check.
 
-runs, begin, last      1 after the first sample; stamps of the begin of the block and of the last sample [ns]
-q, w, integral         quaternion at the begin of the block; rate of the last sample; integral of the rate [rad]
-cross                  faded sums r_i a_j [rad2]; attitude, rates: of a_i^2 and r_i^2; weight: of the blocks
-force, force_weight    faded sum of the specific force [m/s2], and of the samples
-moved                  time during which an axis was compared [s]
-jumps, rest            number of jumps of the attitude; blocks until the next jump may be
-verdict, down          of FRAME_*; 1 if the specific force points downwards
-"""
+class Check(Record):
+    """State of the check."""
+    # runs, begin, last: 1 after the first sample; stamps of the begin of the block and of the last sample [ns]
+    runs: int
+    begin: int
+    last: int
+    # q, w, integral: quaternion at the begin of the block; rate of the last sample; integral of the rate [rad]
+    q: Annotated[Floats, (4,)]
+    w: Vector3
+    integral: Vector3
+    cross: Matrix3  # faded sums r_i a_j [rad2]; attitude, rates: of a_i^2 and r_i^2; weight: of the blocks
+    attitude: Vector3
+    rates: Vector3
+    weight: float
+    force: Vector3  # force, force_weight: faded sum of the specific force [m/s2], and of the samples
+    force_weight: float
+    moved: Vector3  # time during which an axis was compared [s]
+    jumps: int  # jumps, rest: number of jumps of the attitude; blocks until the next jump may be
+    rest: int
+    verdict: int  # verdict, down: of FRAME_*; 1 if the specific force points downwards
+    down: int
 
 
 @compiled

@@ -10,11 +10,14 @@ Quaternions are (x, y, z, w), body -> earth. With the matrices as quaternions, a
     H    rotation about the vertical by the heading at which the device reports 0
 """
 import math
+from typing import Annotated
 
 import numpy as np
 
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry.quaternion import product
+from pedestal_common.quantities import Floats, Matrix3
+from pedestal_common.record import Record
 
 BODY_MATRICES = {'flu': np.eye(3), 'frd': np.diag((1.0, -1.0, -1.0)),
                  'rfu': np.array(((0.0, 1.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 0.0, 1.0)))}
@@ -24,8 +27,12 @@ EARTH_MATRICES = {'enu': np.eye(3), 'nwu': np.array(((0.0, -1.0, 0.0), (1.0, 0.0
                   'ned': np.array(((0.0, 1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, -1.0)))}
 """{frame of the earth: rotation to ENU}. nwu: north, west, up, as ENU with yaw 0 at north."""
 
-FRAME_DTYPE = np.dtype([('left', 'f8', (4,)), ('right', 'f8', (4,)), ('rate', 'f8', (3, 3))], align=True)
-"""Constants of a conversion: quaternions H E and B^-1 M^-1, matrix M R."""
+
+class Frame(Record):
+    """Constants of a conversion: quaternions H E and B^-1 M^-1, matrix M R."""
+    left: Annotated[Floats, (4,)]
+    right: Annotated[Floats, (4,)]
+    rate: Matrix3
 
 
 def quaternion_of(matrix):
@@ -52,13 +59,13 @@ def mounting_matrix(roll, pitch, yaw):
 
 
 def constants(earth, body, rate_body, mounting, heading_zero):
-    """Return the FRAME_DTYPE (1,) of a device.
+    """Return the Frame (1,) of a device.
 
     earth, body, rate_body: names of frames; mounting: (roll, pitch, yaw) of its case [rad]; heading_zero: true
     heading at which the device reports 0 [rad], clockwise.
     """
     case = mounting_matrix(*mounting)
-    found = np.zeros(1, FRAME_DTYPE)
+    found = Frame.zeros()
     turn = mounting_matrix(0.0, 0.0, -heading_zero)
     found['left'][0] = quaternion_of(turn @ EARTH_MATRICES[earth])
     found['right'][0] = quaternion_of((case @ BODY_MATRICES[body]).T)
@@ -68,14 +75,14 @@ def constants(earth, body, rate_body, mounting, heading_zero):
 
 @compiled
 def attitude(c, q):
-    """Return the quaternion deck -> earth of the quaternion q (4,) of a device; c: record of FRAME_DTYPE."""
+    """Return the quaternion deck -> earth of the quaternion q (4,) of a device; c: record of Frame."""
     return product(product(c.left, q), c.right)
 
 
 @compiled
 def on_deck(c, v):
     """Return the components on the deck of a vector v (3,) in the body frame of the rates; c: record of
-    FRAME_DTYPE."""
+    Frame."""
     return (c.rate[0, 0] * v[0] + c.rate[0, 1] * v[1] + c.rate[0, 2] * v[2],
             c.rate[1, 0] * v[0] + c.rate[1, 1] * v[1] + c.rate[1, 2] * v[2],
             c.rate[2, 0] * v[0] + c.rate[2, 1] * v[1] + c.rate[2, 2] * v[2])

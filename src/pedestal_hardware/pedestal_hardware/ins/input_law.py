@@ -1,31 +1,58 @@
 """Law of one sample of an INS: frames, check of the frames, rates, and the reason why a sample is not published."""
 import math
-
-import numpy as np
+from typing import Annotated
 
 from pedestal_common.codes import codes
 from pedestal_common.compiled import compiled
+from pedestal_common.quantities import Floats, Vector3
+from pedestal_common.record import Record
 from pedestal_hardware.ins import frame_check, frames, rate_estimator
 
-CONSTANTS_DTYPE = np.dtype([('frame', frames.FRAME_DTYPE), ('bandwidth', 'f8'), ('max_gap_ns', 'i8'),
-                            ('checked', 'i8')], align=True)
-"""frame: of the device; bandwidth: of rate_estimator [rad/s]; max_gap_ns: longest time between two samples, after
-which the rates begin again; checked: 1 if a failed check withholds the attitude."""
 
-STATE_DTYPE = np.dtype([('check', frame_check.CHECK_DTYPE), ('estimator', rate_estimator.ESTIMATOR_DTYPE),
-                        ('runs', 'i8'), ('last', 'i8'), ('gaps', 'i8')], align=True)
-"""runs: 1 after the first sample; last: its stamp [ns]; gaps: number of gaps."""
+class Constants(Record):
+    """frame: of the device; bandwidth: of rate_estimator [rad/s]; max_gap_ns: longest time between two samples, after
+    which the rates begin again; checked: 1 if a failed check withholds the attitude.
+    """
+    frame: frames.Frame
+    bandwidth: float
+    max_gap_ns: int
+    checked: int
 
-INPUTS_DTYPE = np.dtype([('stamp', 'i8'), ('q', 'f8', (4,)), ('w', 'f8', (3,)), ('force', 'f8', (3,)),
-                         ('axes', 'i8')], align=True)
-"""Sample in the frames of the device: stamp [ns], quaternion, rates [rad/s], specific force [m/s2] or NaN; axes: bit
-mask of the known rates, 0 for none."""
 
-OUTPUTS_DTYPE = np.dtype([('q', 'f8', (4,)), ('w', 'f8', (3,)), ('force', 'f8', (3,))], align=True)
-"""Sample in the frames of the graph: quaternion deck -> earth, deck rate [rad/s], specific force [m/s2]."""
+class State(Record):
+    """runs: 1 after the first sample; last: its stamp [ns]; gaps: number of gaps."""
+    check: frame_check.Check
+    estimator: rate_estimator.Estimator
+    runs: int
+    last: int
+    gaps: int
 
-RECORD_DTYPE = np.dtype([('constants', CONSTANTS_DTYPE), ('state', STATE_DTYPE), ('inputs', INPUTS_DTYPE),
-                         ('outputs', OUTPUTS_DTYPE)], align=True)
+
+class Inputs(Record):
+    """Sample in the frames of the device: stamp [ns], quaternion, rates [rad/s], specific force [m/s2] or NaN; axes: bit
+    mask of the known rates, 0 for none.
+    """
+    stamp: int
+    q: Annotated[Floats, (4,)]
+    w: Vector3
+    force: Vector3
+    axes: int
+
+
+class Outputs(Record):
+    """Sample in the frames of the graph: quaternion deck -> earth, deck rate [rad/s], specific force [m/s2]."""
+    q: Annotated[Floats, (4,)]
+    w: Vector3
+    force: Vector3
+
+
+class UnitRecord(Record):
+    """Record."""
+    constants: Constants
+    state: State
+    inputs: Inputs
+    outputs: Outputs
+
 
 MAX_NORM_ERROR = 0.01  # largest difference of the length of a quaternion from 1
 MAX_RATE_RAD_S = 2.0  # largest rate of a deck [rad/s]
@@ -45,7 +72,7 @@ def _is_attitude(q, w, axes):
 
 @compiled
 def step(record):
-    """Convert the sample in the inputs. Return the code of its outcome; record: (1,) of RECORD_DTYPE."""
+    """Convert the sample in the inputs. Return the code of its outcome; record: (1,) of Record."""
     m = record[0]
     c, s, u, o = m.constants, m.state, m.inputs, m.outputs
     if not _is_attitude(u.q, u.w, u.axes):

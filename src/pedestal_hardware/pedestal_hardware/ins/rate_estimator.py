@@ -8,16 +8,26 @@ attitude. The gains depend on the pole p = exp(-bandwidth T) of a step T:
 A constant acceleration causes no error. Source: Morrison, Introduction to Sequential Smoothing and Prediction, 1969.
 """
 import math
-
-import numpy as np
+from typing import Annotated
 
 from pedestal_common.compiled import compiled
+from pedestal_common.quantities import Floats, Vector3
+from pedestal_common.record import Record
 from pedestal_hardware.ins.frames import rotation_vector, turned
 
-ESTIMATOR_DTYPE = np.dtype([('q', 'f8', (4,)), ('w', 'f8', (3,)), ('dw', 'f8', (3,)), ('since', 'i8'),
-                            ('last', 'i8'), ('runs', 'i8'), ('jumps', 'i8')], align=True)
-"""State: estimated quaternion, rate [rad/s] and acceleration [rad/s2]; stamps of the first and the last sample [ns];
-runs: 1 after the first sample; jumps: number of consecutive samples that were not used."""
+
+class Estimator(Record):
+    """State: estimated quaternion, rate [rad/s] and acceleration [rad/s2]; stamps of the first and the last sample [ns];
+    runs: 1 after the first sample; jumps: number of consecutive samples that were not used.
+    """
+    q: Annotated[Floats, (4,)]
+    w: Vector3
+    dw: Vector3
+    since: int
+    last: int
+    runs: int
+    jumps: int
+
 
 MAX_JUMP_RAD_S, MAX_JUMPS = 1.0, 3
 """Largest deviation of a sample from its prediction, per time since the last sample [rad/s], and number of consecutive

@@ -46,7 +46,7 @@ class Sample(typing.NamedTuple):
 
 
 class Memory(typing.NamedTuple):
-    """Memory of the law: a record (1,) of input_law.RECORD_DTYPE."""
+    """Memory of the law: a record (1,) of input_law.Record."""
     record: np.ndarray
 
 
@@ -61,7 +61,7 @@ class InsInputUnit:
         p = self.parameters = parameters
         frame = (p.imu.earth, p.imu.body, p.imu.rate_body) if p.source == 'imu' else ('enu', 'flu', 'flu')
         self._declared, self._case = frame, frames.mounting_matrix(*p.mounting.radians)
-        self.memory = Memory(np.zeros(1, input_law.RECORD_DTYPE))
+        self.memory = Memory(input_law.UnitRecord.zeros())
         self.record = self.memory.record
         constants = self.record['constants'][0]
         constants['frame'] = frames.constants(*frame, p.mounting.radians, math.radians(p.heading_zero))[0]

@@ -14,10 +14,13 @@ with the modulation slope g. Sherman and Barton, Monopulse Principles and Techni
 """
 import cmath
 import math
+from typing import Annotated
 
 import numpy as np
 
 from pedestal_common.compiled import compiled
+from pedestal_common.quantities import Complexes
+from pedestal_common.record import Record
 from pedestal_hardware.monopulse.params import FEED_KINDS, ONE_CHANNEL, THREE_CHANNELS
 from tracking_receiver_sim import receiver
 from tracking_receiver_sim.monopulse import sum_pattern
@@ -32,21 +35,27 @@ SPREAD_PHASES, SPREAD_POINTS = 16, 32
 """Number of phases of the scan at the begin of a window, and points of an integral, for the spread of the reference.
 """
 
-FEED_DTYPE = np.dtype([('kind', 'i8'), ('of_sum', 'f8'), ('of_difference', 'c16', 2), ('squint', 'f8'),
-                       ('angle', 'f8'), ('turn', 'f8')], align=True)
-"""Record of the simulated feed.
+
+class Feed(Record):
+    """Record of the simulated feed.
 
     kind            index into FEED_KINDS
-    of_sum          share of the sum voltage in the signal [-]
-    of_difference   shares of the differences, with their phases [-]
-    squint          angle between beam and axis of rotation [rad]
-    angle, turn     angle of the scan [rad], and its change in a sample [rad]
-"""
+        of_sum          share of the sum voltage in the signal [-]
+        of_difference   shares of the differences, with their phases [-]
+        squint          angle between beam and axis of rotation [rad]
+        angle, turn     angle of the scan [rad], and its change in a sample [rad]
+    """
+    kind: int
+    of_sum: float
+    of_difference: Annotated[Complexes, (2,)]
+    squint: float
+    angle: float
+    turn: float
 
 
 def record(p) -> np.ndarray:
-    """Return FEED_DTYPE (1,) of MonopulseParameters, at the angle 0."""
-    f, feed = np.zeros(1, FEED_DTYPE), p.feed
+    """Return Feed (1,) of MonopulseParameters, at the angle 0."""
+    f, feed = Feed.zeros(), p.feed
     f['kind'] = FEED_KINDS.index(feed.kind)
     f['of_sum'] = math.sqrt(1.0 - feed.coupling)
     f['of_difference'] = [cmath.rect(math.sqrt(feed.coupling), phase)

@@ -20,6 +20,7 @@ import numpy as np
 
 from pedestal_common.codes import codes
 from pedestal_common.compiled import compiled
+from pedestal_common.record import Record
 from tracking_receiver_sim import detector
 from tracking_receiver_sim.detector import Voltages
 
@@ -29,7 +30,7 @@ STATUS_TEXTS = dict(LOCKED='locked', NO_LOCK='no lock', SEARCH='search for the c
 STATUS_TEXT_BY_CODE = tuple(STATUS_TEXTS.values())
 Status = codes(STATUS_TEXTS)
 
-STATE_DTYPE = np.dtype([
+State = np.dtype([
     *detector.STATE_FIELDS,
     ('phase', 'f8'), ('turn', 'f8'), ('rate', 'f8'), ('last_real', 'f8'), ('last_imag', 'f8'), ('error', 'f8'),
     ('carrier', 'i8'), ('unlocked_ns', 'i8'), ('noise', 'f8'), ('blocks', 'i8'), ('bad', 'i8'),
@@ -47,7 +48,7 @@ STATE_DTYPE = np.dtype([
     skew                imaginary part of the multiplied difference over the sum, smoothed; 0 with the right phases
 """
 
-CONSTANTS_DTYPE = np.dtype([
+Constants = np.dtype([
     *detector.CONSTANTS_FIELDS,
     ('part', 'i8'), ('block_ns', 'i8'), ('loop_gain', 'f8'), ('error_gain', 'f8'), ('noise_gain', 'f8'),
     ('largest_error', 'f8'), ('give_up_ns', 'i8'), ('ratio_gain', 'f8'),
@@ -61,10 +62,17 @@ CONSTANTS_DTYPE = np.dtype([
     matrix_...          calibration matrix
 """
 
-OUTPUTS_DTYPE = np.dtype([('cross_elevation', 'f8'), ('elevation', 'f8'), ('cn0_dbhz', 'f8'), ('locked', 'i8'),
-                          ('status', 'i8')], align=True)
-"""Outputs of a block: errors [rad], NaN while not locked; C/N0 [dB-Hz]; 1 while locked; index of
-STATUS_TEXT_BY_CODE."""
+
+class Outputs(Record):
+    """Outputs of a block: errors [rad], NaN while not locked; C/N0 [dB-Hz]; 1 while locked; index of
+    STATUS_TEXT_BY_CODE.
+    """
+    cross_elevation: float
+    elevation: float
+    cn0_dbhz: float
+    locked: int
+    status: int
+
 
 RATIO_TIME_S = 1.0  # time constant of the ratios of difference and sum [s]
 ERROR_TIME_S = 0.05  # time constant of the smoothed frequency error [s]
@@ -72,8 +80,8 @@ SMALLEST_POWER = 1e-30  # smallest noise power of a sample, in place of 0 in a s
 
 
 def constants(p) -> np.ndarray:
-    """Return CONSTANTS_DTYPE (1,) of MonopulseParameters."""
-    c, carrier = np.zeros(1, CONSTANTS_DTYPE), p.carrier
+    """Return Constants (1,) of MonopulseParameters."""
+    c, carrier = np.zeros(1, Constants), p.carrier
     detector.set_constants(c, p.antenna, p.receiver, p.period)
     c['part'], c['block_ns'] = p.block // p.receiver.samples_per_step, round(p.period * 1e9)
     c['loop_gain'], c['noise_gain'] = carrier.loop_gain, -math.expm1(-p.period / carrier.noise_time)
@@ -86,8 +94,8 @@ def constants(p) -> np.ndarray:
 
 
 def initial_state(p) -> np.ndarray:
-    """Return STATE_DTYPE (1,) before the first block of MonopulseParameters: noise in the channels, no carrier."""
-    s = np.zeros(1, STATE_DTYPE)
+    """Return State (1,) before the first block of MonopulseParameters: noise in the channels, no carrier."""
+    s = np.zeros(1, State)
     s['agc_power'] = s['level_power'] = 1.0
     s['turn'] = 2.0 * math.pi * p.carrier.centre / p.source.rate
     return s

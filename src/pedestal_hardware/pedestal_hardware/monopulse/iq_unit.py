@@ -25,10 +25,10 @@ SIGNAL_FAULTS = {THREE_CHANNELS: ('fade', 'wrong_slope', 'phase_180'),
                  ONE_CHANNEL: ('fade', 'wrong_slope', 'phase_180'), CONICAL_SCAN: ('fade',)}
 """{kind of a feed: injected faults of the receiver that its samples can have}. A conical scan has no differences."""
 
-RECORD_DTYPE = np.dtype([('state', receiver.STATE_DTYPE), ('constants', receiver.CONSTANTS_DTYPE),
-                         ('inputs', receiver.INPUTS_DTYPE), ('outputs', receiver.OUTPUTS_DTYPE), ('row', 'i8'),
-                         ('schedule', schedule.SCHEDULE_DTYPE), ('injected', injected.INJECTED_DTYPE),
-                         ('closing', 'f8'), ('feed', feed.FEED_DTYPE)], align=True)
+Record = np.dtype([('state', receiver.State), ('constants', receiver.Constants),
+                         ('inputs', receiver.Inputs.dtype), ('outputs', receiver.Outputs.dtype), ('row', 'i8'),
+                         ('schedule', schedule.Schedule.dtype), ('injected', injected.Injected.dtype),
+                         ('closing', 'f8'), ('feed', feed.Feed.dtype)], align=True)
 """Record of the unit, with the records of the simulated receiver. row: row of `normals` for the next step; closing:
 rate of the distance of the target [m/s], positive away, NaN without a target."""
 
@@ -36,7 +36,7 @@ rate of the distance of the target [m/s], positive away, NaN without a target.""
 class Memory(typing.NamedTuple):
     """All data of the unit.
 
-    record: (1,) of RECORD_DTYPE; breaks, coefficients: track of the target; normals: (steps, n) noise of the
+    record: (1,) of Record; breaks, coefficients: track of the target; normals: (steps, n) noise of the
     scintillation; voltages: (rows, channels) of the last step without noise. A row belongs to an integral of three
     channels, and to a sample of a scanned feed, whose second channel is its reference.
     """
@@ -133,7 +133,7 @@ class SimulatedIq(Simulated):
         constants = receiver.constants(p, p.period, self.target)
         constants['first_scintillation_normal'] = 0
         count = receiver.normals_per_step(p) - receiver.NORMALS_PER_SAMPLE * p.receiver.samples_per_step
-        record = joined(RECORD_DTYPE, state=receiver.initial_state(), constants=constants, schedule=schedule.empty(),
+        record = joined(Record, state=receiver.initial_state(), constants=constants, schedule=schedule.empty(),
                         injected=injected.initial(constants), feed=feed.record(p))
         record['inputs']['mat_ed'] = line_of_sight.ashore_matrix()
         rows = p.block if p.feed.scanned else p.receiver.samples_per_step

@@ -20,6 +20,8 @@ import math
 import numpy as np
 
 from pedestal_common.compiled import compiled
+from pedestal_common.quantities import Pair, Vector3
+from pedestal_common.record import Record
 from pedestal_hardware.monopulse import feed, front_end
 from tracking_receiver_sim import detector
 from tracking_receiver_sim.detector import Voltages
@@ -38,38 +40,56 @@ amplitude, largest number of turns by more than 110 deg in a scan [-]."""
 
 REVERSAL_COSINE = -0.34  # cosine of the turn of the reference, 110 deg, above which the turn counts as a reversal
 
-WINDOW_DTYPE = np.dtype([
-    ('blocks', 'i8'), ('parts', 'f8'), ('sum', 'f8', 3), ('square', 'f8', 3), ('product', 'f8', 2),
-    ('energy', 'f8'), ('lagged', 'f8'), ('age_ns', 'i8'), ('last', 'i8'), ('idle', 'i8'), ('scale', 'f8'),
-    ('rotation', 'c16'), ('expected', 'f8'), ('smoothing', 'f8'), ('scan', 'i8'), ('before', 'c16'), ('count', 'i8'),
-    ('advance', 'f8'), ('reversals', 'f8'), ('mean', 'c16'), ('slope', 'f8', 2)], align=True)
-"""Window of a fit.
+
+class Window(Record):
+    """Window of a fit.
 
     blocks, last        number of blocks in it so far, and of a complete window
-    idle                number of blocks since a window was complete
-    parts               number of integrals in it
-    sum                 sums of Re r, Im r and power of the integrals
-    square              sums of Re r^2, Re r Im r, Im r^2
-    product             sums of power Re r, power Im r
-    energy, lagged      mean power of the samples of the reference, and mean product of each one with the one before,
-                        which has no noise; sums over the integrals
-    age_ns              time from the middle of the window to the middle of its last block [ns]
-    scale               k_m / g: difference over sum of a modulation of 1 [-]
-    rotation            factor that turns the received reference
-    scan                status of the scan of the last window: LOCKED, NO_SCAN or WRONG_SCAN
-    expected            angle of the scan from one integral to the next, by the parameters [rad]
-    smoothing           share of the way to its input that a value below moves in an integral
-    before, count       last averaged reference, 0 without one; number of these values
-    advance             angle from one averaged reference to the next [rad], smoothed
-    reversals           number of turns of the reference by more than 110 deg in a scan [-], smoothed
-    mean                mean of the reference, over its amplitude, smoothed
-    slope               modulation in both directions, smoothed [-]
-"""
+        idle                number of blocks since a window was complete
+        parts               number of integrals in it
+        sum                 sums of Re r, Im r and power of the integrals
+        square              sums of Re r^2, Re r Im r, Im r^2
+        product             sums of power Re r, power Im r
+        energy, lagged      mean power of the samples of the reference, and mean product of each one with the one before,
+                            which has no noise; sums over the integrals
+        age_ns              time from the middle of the window to the middle of its last block [ns]
+        scale               k_m / g: difference over sum of a modulation of 1 [-]
+        rotation            factor that turns the received reference
+        scan                status of the scan of the last window: LOCKED, NO_SCAN or WRONG_SCAN
+        expected            angle of the scan from one integral to the next, by the parameters [rad]
+        smoothing           share of the way to its input that a value below moves in an integral
+        before, count       last averaged reference, 0 without one; number of these values
+        advance             angle from one averaged reference to the next [rad], smoothed
+        reversals           number of turns of the reference by more than 110 deg in a scan [-], smoothed
+        mean                mean of the reference, over its amplitude, smoothed
+        slope               modulation in both directions, smoothed [-]
+    """
+    blocks: int
+    parts: float
+    sum: Vector3
+    square: Vector3
+    product: Pair
+    energy: float
+    lagged: float
+    age_ns: int
+    last: int
+    idle: int
+    scale: float
+    rotation: complex
+    expected: float
+    smoothing: float
+    scan: int
+    before: complex
+    count: int
+    advance: float
+    reversals: float
+    mean: complex
+    slope: Pair
 
 
 def initial_window(p) -> np.ndarray:
-    """Return WINDOW_DTYPE (1,) of MonopulseParameters."""
-    w, steps = np.zeros(1, WINDOW_DTYPE), p.steps_per_error
+    """Return Window (1,) of MonopulseParameters."""
+    w, steps = Window.zeros(), p.steps_per_error
     w['last'], w['age_ns'] = steps, round(0.5 * (steps - 1) * p.period * 1e9)
     w['scale'] = p.antenna.slope / feed.modulation_slope(p)
     w['rotation'] = complex(math.cos(p.feed.reference_phase), math.sin(p.feed.reference_phase))
@@ -81,7 +101,7 @@ def initial_window(p) -> np.ndarray:
 
 
 def constants(p) -> np.ndarray:
-    """Return front_end.CONSTANTS_DTYPE (1,) of MonopulseParameters. The detector takes one sample in each window."""
+    """Return front_end.Constants (1,) of MonopulseParameters. The detector takes one sample in each window."""
     c, time = front_end.constants(p), p.steps_per_error * p.period
     c['samples'] = 1
     c['agc_gain'] = -math.expm1(-time / p.receiver.agc_time_constant)

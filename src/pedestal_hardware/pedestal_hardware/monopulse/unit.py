@@ -19,14 +19,14 @@ AXIS_NAMES = 'cross_elevation', 'elevation'
 MAX_PASSED_GAP_S = 0.2
 """Longest gap after which the loop continues at its frequency [s]. At 3 kHz/s the carrier moves by 600 Hz in it."""
 
-_FIELDS = [('state', front_end.STATE_DTYPE), ('constants', front_end.CONSTANTS_DTYPE),
-           ('outputs', front_end.OUTPUTS_DTYPE)]
-RECORD_DTYPE = np.dtype(_FIELDS, align=True)
-SCANNED_RECORD_DTYPE = np.dtype([*_FIELDS, ('window', scan.WINDOW_DTYPE)], align=True)
+_FIELDS = [('state', front_end.State), ('constants', front_end.Constants),
+           ('outputs', front_end.Outputs.dtype)]
+Record = np.dtype(_FIELDS, align=True)
+SCANNED_RECORD_DTYPE = np.dtype([*_FIELDS, ('window', scan.Window.dtype)], align=True)
 
 
 class Memory(typing.NamedTuple):
-    """Memory of the unit for three channels. record: (1,) of RECORD_DTYPE; samples: (n, 3) of a block; dumps: (parts,
+    """Memory of the unit for three channels. record: (1,) of Record; samples: (n, 3) of a block; dumps: (parts,
     3) integrals."""
     record: np.ndarray
     samples: np.ndarray
@@ -101,7 +101,7 @@ class MonopulseReceiver(Unit):
             memory, record = ScannedMemory, joined(SCANNED_RECORD_DTYPE, state=front_end.initial_state(p),
                                                    constants=scan.constants(p), window=scan.initial_window(p))
         else:
-            memory, record = Memory, joined(RECORD_DTYPE, state=front_end.initial_state(p),
+            memory, record = Memory, joined(Record, state=front_end.initial_state(p),
                                             constants=front_end.constants(p))
         record['outputs']['status'] = front_end.Status.WAIT
         self.memory = memory(record, np.zeros((p.block, channels), np.complex64),

@@ -6,11 +6,13 @@ The control unit computes the reference for the time at which the device has rea
 set-point is sent when the reference has moved from the last set-point by more than the dead band, because each
 set-point starts and stops the motors of a rotator.
 
-Records: s STATE_DTYPE, c CONSTANTS_DTYPE, u INPUTS_DTYPE, y OUTPUTS_DTYPE.
+Records: s State, c Constants, u Inputs, y Outputs.
 """
 import numpy as np
 
 from pedestal_common.compiled import compiled
+from pedestal_common.quantities import Pair
+from pedestal_common.record import Record
 from pedestal_common.wire.records import NO_STAMP
 
 MAX_REFERENCE_RAD = 1e3  # largest valid angle of a reference [rad]; a reference beyond it, infinite or NaN is ignored
@@ -21,29 +23,55 @@ MAX_START_DISTANCE_RAD = 0.05
 After a stop the control unit still holds the reference of the mode before, to which the rotator must not move.
 """
 
-CONSTANTS_DTYPE = np.dtype([('dead_band', 'f8'), ('resolution', 'f8'), ('low', 'f8', (2,)),
-                            ('high', 'f8', (2,)), ('timeout_ns', 'i8')], align=True)
-"""Constants: dead band and resolution [rad], range of azimuth and elevation [rad], age from which a
-reference is stale [ns]."""
 
-STATE_DTYPE = np.dtype([('set_point', 'f8', (2,)), ('moving', 'i8'), ('reference_stamp_ns', 'i8')], align=True)
-"""State: last set-point [rad]; 1 if it is in force, 0 after a stop; stamp of the newest valid reference [ns]."""
+class Constants(Record):
+    """Constants: dead band and resolution [rad], range of azimuth and elevation [rad], age from which a
+    reference is stale [ns].
+    """
+    dead_band: float
+    resolution: float
+    low: Pair
+    high: Pair
+    timeout_ns: int
 
-INPUTS_DTYPE = np.dtype([('stamp_ns', 'i8'), ('enabled', 'i8'), ('by_hand', 'i8'), ('reference_stamp_ns', 'i8'),
-                         ('angle', 'f8', (2,)), ('rate', 'f8', (2,)), ('measured', 'f8', (2,))], align=True)
-"""Inputs: stamp of the step [ns]; 1 if the drive is enabled and the mode moves the antenna; 1 in a mode in which an
-operator commands rates; stamp [ns], angles [rad] and rates [rad/s] of the newest reference, NO_STAMP without a new
-one; measured angles [rad]."""
 
-OUTPUTS_DTYPE = np.dtype([('send', 'i8'), ('stop', 'i8'), ('set_point', 'f8', (2,)), ('stale', 'i8'),
-                          ('invalid', 'i8'), ('outside', 'i8'), ('far', 'i8')], align=True)
-"""Outputs: 1 for a set-point [rad] to send; 1 for a stop to send; 1 for a stale reference, for an invalid reference,
-for a target outside the range of the device, and for a mode `rate` that would begin far from the measured angles."""
+class State(Record):
+    """State: last set-point [rad]; 1 if it is in force, 0 after a stop; stamp of the newest valid reference [ns]."""
+    set_point: Pair
+    moving: int
+    reference_stamp_ns: int
+
+
+class Inputs(Record):
+    """Inputs: stamp of the step [ns]; 1 if the drive is enabled and the mode moves the antenna; 1 in a mode in which an
+    operator commands rates; stamp [ns], angles [rad] and rates [rad/s] of the newest reference, NO_STAMP without a new
+    one; measured angles [rad].
+    """
+    stamp_ns: int
+    enabled: int
+    by_hand: int
+    reference_stamp_ns: int
+    angle: Pair
+    rate: Pair
+    measured: Pair
+
+
+class Outputs(Record):
+    """Outputs: 1 for a set-point [rad] to send; 1 for a stop to send; 1 for a stale reference, for an invalid reference,
+    for a target outside the range of the device, and for a mode `rate` that would begin far from the measured angles.
+    """
+    send: int
+    stop: int
+    set_point: Pair
+    stale: int
+    invalid: int
+    outside: int
+    far: int
 
 
 def initial_state() -> np.ndarray:
-    """Return STATE_DTYPE (1,) without a set-point."""
-    s = np.zeros(1, STATE_DTYPE)
+    """Return State (1,) without a set-point."""
+    s = State.zeros()
     s['reference_stamp_ns'] = NO_STAMP
     return s
 

@@ -12,6 +12,8 @@ from pedestal_common.compiled import compiled
 from pedestal_common.graph import nodes, topics
 from pedestal_common.graph.modes import MODES
 from pedestal_common.node.unit import LEVEL_ERROR, LEVEL_OK, LEVEL_WARN, Diagnosis, joined
+from pedestal_common.quantities import Pair
+from pedestal_common.record import Record
 from pedestal_common.wire.records import NO_STAMP
 from pedestal_hardware.rotator import set_point
 
@@ -28,31 +30,39 @@ MODE_CODE_STANDBY, MODE_CODE_STOP, MODE_CODE_RATE = (MODES.index(mode) for mode 
 
 STUCK_TIME_S = 5.0  # time without motion, away from the set-point, after which the rotator is reported as stuck [s]
 
-DEVICE_DTYPE = np.dtype([('angle', 'f8', (2,)), ('rate', 'f8', (2,)), ('came', 'i8'), ('silent', 'i8')],
-                        align=True)
-"""State of the device.
 
-angle, rate   newest measured angles [rad], and the rate between the last two measurements [rad/s]
-came          1 if a measurement has arrived since the last step
-silent        1 while the newest measurement is too old
-"""
+class Device(Record):
+    """State of the device."""
+    angle: Pair  # angle, rate: newest measured angles [rad], and the rate between the last two measurements [rad/s]
+    rate: Pair
+    came: int  # 1 if a measurement has arrived since the last step
+    silent: int  # 1 while the newest measurement is too old
 
-SWITCHES_DTYPE = np.dtype([('wanted', 'i8'), ('emergency', 'i8')], align=True)
-"""Switches of the drive: 1 after a request to enable; 1 while an emergency stop is latched."""
 
-RECORD_DTYPE = np.dtype([('state', set_point.STATE_DTYPE), ('constants', set_point.CONSTANTS_DTYPE),
-                         ('inputs', set_point.INPUTS_DTYPE), ('outputs', set_point.OUTPUTS_DTYPE),
-                         ('switches', SWITCHES_DTYPE), ('device', DEVICE_DTYPE)], align=True)
+class Switches(Record):
+    """Switches of the drive: 1 after a request to enable; 1 while an emergency stop is latched."""
+    wanted: int
+    emergency: int
+
+
+class UnitRecord(Record):
+    """Record."""
+    state: set_point.State
+    constants: set_point.Constants
+    inputs: set_point.Inputs
+    outputs: set_point.Outputs
+    switches: Switches
+    device: Device
 
 
 class Memory(typing.NamedTuple):
-    """Memory of a rotator; record: (1,) of RECORD_DTYPE."""
+    """Memory of a rotator; record: (1,) of Record."""
     record: np.ndarray
 
 
 @compiled
 def condition(switches, device):
-    """Return the code of STATE_TEXTS; records of SWITCHES_DTYPE and DEVICE_DTYPE."""
+    """Return the code of STATE_TEXTS; records of Switches and Device."""
     if switches.emergency:
         return STATE_CODE_EMERGENCY_STOP
     if device.silent:
@@ -96,13 +106,13 @@ class Rotator(AngleDrive):
     def __init__(self, parameters, reads):
         super().__init__(parameters, reads)
         p = parameters
-        constants = np.zeros(1, set_point.CONSTANTS_DTYPE)
+        constants = set_point.Constants.zeros()
         constants['timeout_ns'] = p.timeout_ns
         constants['dead_band'], constants['resolution'] = math.radians(p.dead_band), math.radians(p.step_deg)
         constants['low'][0], constants['high'][0] = zip(*p.travel_rad)
-        switches, device = np.zeros(1, SWITCHES_DTYPE), np.zeros(1, DEVICE_DTYPE)
+        switches, device = Switches.zeros(), Device.zeros()
         switches['wanted'] = device['silent'] = 1
-        self.memory = Memory(joined(RECORD_DTYPE, constants=constants, switches=switches, device=device,
+        self.memory = Memory(joined(UnitRecord.dtype, constants=constants, switches=switches, device=device,
                                     state=set_point.initial_state()))
         self.measured_at, self.counts, self.fault = None, {}, ''
         # Times of the monotonic clock [s]: of the last motion, and since when the rotator is away from the set-point.

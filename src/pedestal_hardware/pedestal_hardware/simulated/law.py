@@ -4,7 +4,7 @@ A drive runs its speed loop every 0.5 ms. It takes commands and gives reports in
 of both motors of an axis hang on one relay, which the brake outputs of both drives hold open: the axis is free while
 one of them does.
 
-Arguments: d is the record of a drive (DRIVE_DTYPE), m that of the unit (RECORD_DTYPE).
+Arguments: d is the record of a drive (DRIVE_DTYPE), m that of the unit (Record).
 """
 import math
 
@@ -52,11 +52,11 @@ rate, sum           speed reference [rad/s]; integral part [Nm]
 
 # The own fields come first. Numba takes a record that begins with the fields of the drive unit for its subtype, and
 # warns about it.
-RECORD_DTYPE = np.dtype([('drive', DRIVE_DTYPE, (pdo.DRIVE_COUNT,)), ('tick', 'i8'), ('period', 'i8'),
-                         ('state', drive_unit.STATE_DTYPE), ('constants', drive_unit.CONSTANTS_DTYPE),
-                         ('inputs', drive_unit.INPUTS_DTYPE), ('outputs', drive_unit.OUTPUTS_DTYPE),
-                         ('link', adu_unit.LINK_DTYPE), ('schedule', schedule.SCHEDULE_DTYPE),
-                         ('injected', injected.DRIVE_INJECTED_DTYPE)], align=True)
+Record = np.dtype([('drive', DRIVE_DTYPE, (pdo.DRIVE_COUNT,)), ('tick', 'i8'), ('period', 'i8'),
+                         ('state', drive_unit.State), ('constants', drive_unit.Constants),
+                         ('inputs', drive_unit.Inputs.dtype), ('outputs', drive_unit.Outputs.dtype),
+                         ('link', adu_unit.Link.dtype), ('schedule', schedule.Schedule.dtype),
+                         ('injected', injected.DriveInjected.dtype)], align=True)
 """All data of the simulated drives. tick: number of the last period of the speed loops; period: time between two
 synchronisations [ns]."""
 
@@ -214,7 +214,7 @@ def _drive_axis(m, a, c, i):
 
 @compiled
 def advance(records, now):
-    """Advance drives and plant to a time [ns], at most by MAX_CATCH_UP_TICKS. records: (1,) of RECORD_DTYPE."""
+    """Advance drives and plant to a time [ns], at most by MAX_CATCH_UP_TICKS. records: (1,) of Record."""
     _advance(records[0], now)
 
 
@@ -255,7 +255,7 @@ def _steps(x, bits):
 
 @compiled
 def report(records, reports):
-    """Write the reports of the drives (4,) of pdo.REPORT_DTYPE, aligned. records: (1,) of RECORD_DTYPE."""
+    """Write the reports of the drives (4,) of pdo.REPORT_DTYPE, aligned. records: (1,) of Record."""
     m = records[0]
     s, c, y = m.state, m.constants, m.outputs
     drive_unit.read(s, c, y)

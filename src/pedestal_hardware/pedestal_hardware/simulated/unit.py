@@ -23,7 +23,7 @@ ALIGNED_REPORT_DTYPE = np.dtype([(name, 'i8') for name in pdo.REPORT_FIELDS])
 
 
 class Memory(typing.NamedTuple):
-    """Memory of the simulated drives; record: (1,) of law.RECORD_DTYPE."""
+    """Memory of the simulated drives; record: (1,) of law.Record."""
     record: np.ndarray
 
 
@@ -34,12 +34,12 @@ class SimulatedDrives(Simulated):
 
     def __init__(self, parameters, reads):
         super().__init__(parameters, reads)
-        link = np.zeros(1, adu_unit.LINK_DTYPE)
+        link = adu_unit.Link.zeros()
         link['truth_stamp'] = NO_STAMP
         at_rest = dataclasses.replace(parameters, initially_enabled=False)
         self.memory = Memory(joined(
-            law.RECORD_DTYPE, state=drive_unit.initial_state(at_rest), constants=drive_unit.constants(parameters),
-            link=link, schedule=schedule.empty(), injected=np.zeros(1, injected.DRIVE_INJECTED_DTYPE)))
+            law.Record, state=drive_unit.initial_state(at_rest), constants=drive_unit.constants(parameters),
+            link=link, schedule=schedule.empty(), injected=injected.DriveInjected.zeros()))
         self.parts['tick'], self.parts['period'] = NO_STAMP, round(parameters.period * 1e9)
         self.reports = np.zeros(pdo.DRIVE_COUNT, ALIGNED_REPORT_DTYPE)
         for drive in range(pdo.DRIVE_COUNT):

@@ -59,7 +59,7 @@ def filter_step(**parameters):
     constants = axis_filter.constants(build(FilterParameters, parameters))
     t = FILTER_PERIOD_S * np.arange(FILTER_STEPS)
     y = 0.02 * t + 5e-4 * np.random.default_rng(1).standard_normal(FILTER_STEPS)
-    variance, state = np.full(FILTER_STEPS, 2.5e-7), np.zeros(1, axis_filter.FILTER_DTYPE)
+    variance, state = np.full(FILTER_STEPS, 2.5e-7), axis_filter.Filter.zeros()
     _filter_steps(state, constants, t, y, variance)
     return best_of(lambda: _filter_steps(state, constants, t, y, variance)) / FILTER_STEPS * 1e6
 
@@ -76,7 +76,7 @@ def _filter_steps(state, constants, t, y, R):
 
 def unscented_step():
     """Return the time [us] of one step of both Cartesian filters, with azimuth, elevation and range measured."""
-    state, constants = np.zeros(1, unscented.STATE_DTYPE), unscented.constants(UkfParameters())
+    state, constants = unscented.State.zeros(), unscented.constants(UkfParameters())
     noise = np.random.default_rng(1).standard_normal((FILTER_STEPS, 3)) * (5e-4, 5e-4, 1.0)
     measured = noise + np.outer(FILTER_PERIOD_S * np.arange(FILTER_STEPS), (0.001, 0.0, 0.0)) + (0.0, 0.3, 500.0)
     _unscented_steps(state, constants, measured)
@@ -171,7 +171,7 @@ def drive_rows():
     The trial speed is the simulated time of all lanes over the CPU time of one core.
     """
     params = AduParameters(initial_elevation=0.7)
-    one = np.zeros(1, adu_unit.RECORD_DTYPE)
+    one = np.zeros(1, adu_unit.Record)
     one['state'], one['constants'] = drive_unit.initial_state(params), drive_unit.constants(params)
     one['inputs']['azimuth']['rate'], one['inputs']['elevation']['rate'], one['inputs']['enable'] = 0.02, -0.01, 1
     drives, (state, constants, inputs, outputs) = lanes.to_lanes(one), (

@@ -306,12 +306,12 @@ def simulated_run(batch, run):
                       accelerometer_scale=70e-6, output='increment'))
     ship, n = motion.constants(params.ship), round(batch.duration / IMU_PERIOD_S)
     ship['phase'][0, :4] = random.uniform(0.0, 2.0 * math.pi, 4)
-    inputs, truth = np.zeros(1, imu.INPUTS_DTYPE), np.zeros(1, motion.Truth.dtype)
+    inputs, truth = imu.Inputs.zeros(), motion.Truth.zeros()
     inputs['dt'] = IMU_PERIOD_S
     motion.truth(ship[0], 0.0, truth[0])
     start = misaligned(truth[0]['quaternion'], conditions.misalignment)
     increments = Increments(np.zeros((n, 3)), np.zeros((n, 3)), np.zeros((n, 4)))
-    simulate(Sensors(imu.initial_state(), imu.constants(params), ship, inputs, truth, np.zeros(1, imu.OUTPUTS_DTYPE)),
+    simulate(Sensors(imu.initial_state(), imu.constants(params), ship, inputs, truth, imu.Outputs.zeros()),
              random.standard_normal((n, imu.IMU_NORMALS_PER_STEP)), disturbance(batch, random, n), increments)
     return increments, start
 

@@ -74,7 +74,7 @@ RATE_SOURCE_MEANINGS = {
 
 
 class FlybyRecord(typing.NamedTuple):
-    """Measured angle [rad], measured rate [rad/s] and axis_filter.ESTIMATE_DTYPE of a flyby, each (n,)."""
+    """Measured angle [rad], measured rate [rad/s] and axis_filter.Estimate of a flyby, each (n,)."""
     angle: np.ndarray
     rate: np.ndarray
     estimate: np.ndarray
@@ -120,7 +120,7 @@ def steady_state_matrices(sigma_a, rate_sigma):
     c = axis_filter.constants(filter_of(math.radians(sigma_a), 1.0))        # floor 1: sigma_a = a_max at all times
     R_rate = math.radians(rate_sigma) ** 2
     zero_rate = 0.0 if math.isfinite(R_rate) else math.nan
-    f = np.zeros(1, axis_filter.FILTER_DTYPE)
+    f = axis_filter.Filter.zeros()
     _settle(f, c, zero_rate, R_rate, SETTLING_STEPS)
 
     def after(x, y, y_rate):
@@ -180,12 +180,12 @@ def differenced_rate(y, steps):
 
 
 def filtered(t, target, y, y_rate, R_rate):
-    """Return the estimates (n,), ESTIMATE_DTYPE, of the filter from measured angles y and rates y_rate (n,).
+    """Return the estimates (n,), Estimate, of the filter from measured angles y and rates y_rate (n,).
 
     t: times (n,) [s]. target (n, 3): true angle, rate and acceleration. R_rate: variance of y_rate [rad2/s2].
     """
     c = axis_filter.constants(filter_of(MAX_ACCELERATION_RATIO * np.abs(target[:, 2]).max(), MIN_SIGMA_RATIO))
-    out = np.zeros(len(t), axis_filter.ESTIMATE_DTYPE)
+    out = np.zeros(len(t), axis_filter.Estimate.dtype)
     axis_filter.estimates(c, t, y, np.full(len(t), ANGLE_SIGMA_RAD * ANGLE_SIGMA_RAD), y_rate, np.full(len(t), R_rate),
                           ensemble.INITIAL_RATE_SIGMA_RAD_S, out)
     return out

@@ -44,7 +44,7 @@ SMOOTHING_SAMPLES = 20  # number n of samples in the smoothing S1 and S2, as in 
 FULL_SCALE_BEAMWIDTHS, K_M = ReceiverParameters().full_scale, AntennaParameters().slope
 """Full scale of the receiver [beamwidths], and slope of the difference pattern of its antenna [1/beamwidth]."""
 
-SMOOTHER_RECORD = np.dtype([('error', smoothing.SMOOTHER_DTYPE)], align=True)
+SMOOTHER_RECORD = np.dtype([('error', smoothing.Smoother.dtype)], align=True)
 
 Target = namedtuple('Target', 'angle attitude rate noise')
 """Target and carrier, such as a ship, on the grid, each (n,).
@@ -158,7 +158,7 @@ class FilterLoop:
                                         self.tau)
         _filter_loop(constants, Target(np.asarray(target), attitude[measured] if self.use_ins else zeros,
                                        rate[measured] if self.use_ins else zeros, zeros if noise is None else noise),
-                     np.zeros(1, SMOOTHER_RECORD), np.zeros(1, axis_filter.FILTER_DTYPE), _beam(self.delay, self.hold),
+                     np.zeros(1, SMOOTHER_RECORD), axis_filter.Filter.zeros(), _beam(self.delay, self.hold),
                      beam, errors)
         return beam, errors
 
@@ -168,8 +168,8 @@ def _beam(delay, hold):
     return Beam(electronic_beam.initial_state(0.0, 0.0),
                 electronic_beam.constants(GRID_STEP_S, transport_delay=delay * GRID_STEP_S,
                                           timeout=2 * hold * GRID_STEP_S),
-                np.zeros(1, electronic_beam.INPUTS_DTYPE),
-                np.zeros(1, electronic_beam.OUTPUTS_DTYPE))
+                electronic_beam.Inputs.zeros(),
+                electronic_beam.Outputs.zeros())
 
 
 @compiled

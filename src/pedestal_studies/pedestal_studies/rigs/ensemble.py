@@ -98,7 +98,7 @@ def moments(params, t, truth, noise, measured):
                               noise.bandwidth if noise.expected else 0.0)
     series = Series(t, y, np.full(len(t), noise.sigma**2), y_rate, np.full(len(t), (noise.rate_sigma or 0.0) ** 2))
     sums = np.zeros(y.shape, MOMENTS)
-    _add_runs(c, AxisMotion(*truth), series, INITIAL_RATE_SIGMA_RAD_S, np.zeros(len(t), axis_filter.ESTIMATE_DTYPE),
+    _add_runs(c, AxisMotion(*truth), series, INITIAL_RATE_SIGMA_RAD_S, np.zeros(len(t), axis_filter.Estimate.dtype),
               sums)
     return sums
 
@@ -107,7 +107,7 @@ def moments(params, t, truth, noise, measured):
 def _add_runs(c, truth, m, initial_rate, out, sums):
     """Add the errors of a filter over a Series m to MOMENTS (runs, n).
 
-    c: constants of the filter. truth: AxisMotion of arrays (n,). out: working memory, ESTIMATE_DTYPE (n,).
+    c: constants of the filter. truth: AxisMotion of arrays (n,). out: working memory, Estimate (n,).
     """
     for run in range(len(m.y)):
         axis_filter.estimates(c, m.t, m.y[run], m.R, m.y_rate[run], m.R_rate, initial_rate, out)
@@ -117,7 +117,7 @@ def _add_runs(c, truth, m, initial_rate, out, sums):
 
 @compiled
 def _add(s, o, truth, k, y):
-    """Add the errors of an estimate o (ESTIMATE_DTYPE) at step k to a record s of MOMENTS; y: measured angle [rad]."""
+    """Add the errors of an estimate o (Estimate) at step k to a record s of MOMENTS; y: measured angle [rad]."""
     angle = truth.angle[k]
     d1, d2, d3, raw = o.angle - angle, o.rate - truth.rate[k], o.acceleration - truth.acceleration[k], y - angle
     s.runs += 1.0
@@ -162,10 +162,10 @@ def _add_unscented_runs(c, T, truth, measured, rate_variance, sums):
     c: constants of the filter. truth: AxisMotion of arrays (n,). rate_variance: at the start [rad2/s2].
     """
     R, R_range = measured.R, measured.R_range
-    out = np.zeros(1, axis_filter.ESTIMATE_DTYPE)
+    out = axis_filter.Estimate.zeros()
     o = out[0]
     for run in range(len(measured.azimuth)):
-        state = np.zeros(1, unscented.STATE_DTYPE)
+        state = unscented.State.zeros()
         s = state[0]
         for k in range(len(truth.angle)):
             A, E, r = measured.azimuth[run, k], measured.elevation[run, k], measured.ranges[run, k]

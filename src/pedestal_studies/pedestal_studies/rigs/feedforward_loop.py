@@ -200,7 +200,7 @@ def steps_of(axis, source, first, count, rate=S_MOTION_RATE_RAD_S):
     [normals] = ensemble.normal_draws(NOISE_SEED, first, count, len(t), 1)
     out = np.zeros((count, len(t)), STEP_RECORD)
     c = axis_filter.constants(source.filter or FilterParameters())
-    f, M = np.zeros(1, axis_filter.FILTER_DTYPE), rate_loop_step(*RATE_LOOP_CONSTANTS)
+    f, M = axis_filter.Filter.zeros(), rate_loop_step(*RATE_LOOP_CONSTANTS)
     if not source.difference_steps:
         _follow(target, known, f, c, lead, M, normals, out)
         return out

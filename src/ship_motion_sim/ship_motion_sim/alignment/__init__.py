@@ -6,7 +6,7 @@ adrc_scheduled      observer of adrc with a bandwidth that falls as 6 / t; azimu
 riccati_eso         observer of adrc with the gains of a Kalman filter
 oba                 optimisation-based: the rotation that maps one set of vectors onto another, no feedback loop
 
-Each method is a module with one `step` and its STATE_DTYPE. The methods share extended_observer, levelling, slope,
+Each method is a module with one `step` and its State. The methods share extended_observer, levelling, slope,
 steady_state and the conditions; navigator runs the selected method. Sources: paper 001 (Zhou, Yang, Qin 2011) with
 corrected equations (levelling, adrc); Han 2009 (ADRC); Horn 1987 and Wu 2013 (optimisation-based alignment).
 

@@ -21,31 +21,42 @@ import math
 import numpy as np
 
 from pedestal_common.compiled import compiled
+from pedestal_common.quantities import Pair, Vector3
+from pedestal_common.record import Record
 from pedestal_common.reproducible import solution
 from ship_motion_sim.alignment import extended_observer, levelling, slope, steady_state
 from ship_motion_sim.alignment.conditions import UNKNOWN_AZIMUTH_SIGMA_RAD
 
-CONSTANTS_DTYPE = np.dtype([
-    ('w_o', 'f8'), ('w_c', 'f8'),           # bandwidth of observer and of level control [rad/s]
-    ('start', 'f8'),                        # time after which the azimuth uses the commands [s]
-    ('velocity_variance', 'f8'),            # variance of the velocity in the settled loop [m2/s2]
-    ('innovation_variance', 'f8'),          # variance of the innovations in the settled loop [m2/s2]
-    ('swell', 'f8'),                        # variance of velocity divided by that of innovations [-]
-    ('level', 'f8'),                        # 1 sigma of level of the settled loop [rad]
-], align=True)
 
-STATE_DTYPE = np.dtype([
-    ('t', 'f8'),                            # time since power-up [s]
-    ('observer', extended_observer.STATE_DTYPE),
-    ('v1', 'f8', (2,)), ('v2', 'f8', (2,)),     # tracking differentiator: reference of velocity and of its rate
-    ('first', 'f8', (2,)), ('second', 'f8', (2,)), ('count', 'i8'),     # running sums of slope.added for w_cE, w_cN
-    ('command', 'f8', (3,)), ('azimuth', 'f8'), ('azimuth_sigma', 'f8'), ('level_sigma', 'f8'),
-], align=True)
+class Constants(Record):
+    """Record."""
+    w_o: float
+    w_c: float  # bandwidth of observer and of level control [rad/s]
+    start: float  # time after which the azimuth uses the commands [s]
+    velocity_variance: float  # variance of the velocity in the settled loop [m2/s2]
+    innovation_variance: float  # variance of the innovations in the settled loop [m2/s2]
+    swell: float  # variance of velocity divided by that of innovations [-]
+    level: float  # 1 sigma of level of the settled loop [rad]
+
+
+class State(Record):
+    """Record."""
+    t: float  # time since power-up [s]
+    observer: extended_observer.State
+    v1: Pair
+    v2: Pair  # tracking differentiator: reference of velocity and of its rate
+    first: Pair
+    second: Pair
+    count: int  # running sums of slope.added for w_cE, w_cN
+    command: Vector3
+    azimuth: float
+    azimuth_sigma: float
+    level_sigma: float
 
 
 def constants(k, p, h) -> np.ndarray:
-    """Return the constants, one record of CONSTANTS_DTYPE; p: AdrcParameters; h: step [s]; k: CONDITIONS_DTYPE."""
-    record = np.zeros((), CONSTANTS_DTYPE)
+    """Return the constants, one record of Constants; p: AdrcParameters; h: step [s]; k: Conditions."""
+    record = np.zeros((), Constants.dtype)
     record['w_o'], record['w_c'], record['start'] = p.observer, p.control, p.start
     g, r = float(k['gravity']), float(k['velocity_density']) / h
     # Model of one channel (east or north) while the function fhan of its level command is linear. The state is
@@ -78,9 +89,9 @@ def constants(k, p, h) -> np.ndarray:
 
 @compiled
 def azimuth_sigma(c, k, o, window):
-    """Return the 1 sigma [rad] of the azimuth from the slope over a window [s]; o: extended_observer.STATE_DTYPE.
+    """Return the 1 sigma [rad] of the azimuth from the slope over a window [s]; o: extended_observer.State.
 
-    c, k: records CONSTANTS_DTYPE, CONDITIONS_DTYPE. The variance of the slope has two parts:
+    c, k: records Constants, Conditions. The variance of the slope has two parts:
 
     - The random walk of the gyros, gyro_noise, adds 1.2 gyro_noise^2 / window, because the slope is a mean of the
       commands with the weights of a parabola.
@@ -114,7 +125,7 @@ def level_sigma(c, k, o, t):
 def step(s, c, k, v_east, v_north, h):
     """Execute one step h [s] after the last; v_east, v_north: velocity error in n' [m/s].
 
-    s, c, k: records STATE_DTYPE, CONSTANTS_DTYPE, CONDITIONS_DTYPE.
+    s, c, k: records State, Constants, Conditions.
     """
     s.t += h
     o = s.observer

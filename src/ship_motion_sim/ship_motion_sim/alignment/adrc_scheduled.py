@@ -10,21 +10,26 @@ later.
 """
 import math
 
-import numpy as np
-
 from pedestal_common.compiled import compiled
+from pedestal_common.quantities import Pair, Vector3
+from pedestal_common.record import Record
 from ship_motion_sim.alignment import extended_observer, levelling
 
 BANDWIDTH_TIME_PRODUCT = 6.0  # product of observer bandwidth and time, w_o t [-]
 MAX_OBSERVER_BANDWIDTH_RAD_S, MIN_CONTROL_BANDWIDTH_RAD_S = 1.0, 0.1
 """Limits of the bandwidth of observer and of level control [rad/s]."""
 
-STATE_DTYPE = np.dtype([
-    ('t', 'f8'),                            # time since power-up [s]
-    ('observer', extended_observer.STATE_DTYPE),
-    ('v1', 'f8', (2,)), ('v2', 'f8', (2,)),     # tracking differentiator: reference of velocity and of its rate
-    ('command', 'f8', (3,)), ('azimuth', 'f8'), ('azimuth_sigma', 'f8'), ('level_sigma', 'f8'),
-], align=True)
+
+class State(Record):
+    """Record."""
+    t: float  # time since power-up [s]
+    observer: extended_observer.State
+    v1: Pair
+    v2: Pair  # tracking differentiator: reference of velocity and of its rate
+    command: Vector3
+    azimuth: float
+    azimuth_sigma: float
+    level_sigma: float
 
 
 @compiled
@@ -37,7 +42,7 @@ def bandwidth(t):
 def step(s, k, v_east, v_north, h):
     """Execute one step h [s] after the last; v_east, v_north: velocity error in n' [m/s].
 
-    s, k: records STATE_DTYPE, CONDITIONS_DTYPE.
+    s, k: records State, Conditions.
     """
     o, r = s.observer, k.velocity_density / h
     s.t += h

@@ -19,30 +19,42 @@ import math
 import numpy as np
 
 from pedestal_common.compiled import compiled
+from pedestal_common.quantities import Pair, Vector3
+from pedestal_common.record import Record
 from ship_motion_sim.alignment import steady_state
 from ship_motion_sim.alignment.conditions import UNKNOWN_AZIMUTH_SIGMA_RAD
 
 MAX_AZIMUTH_RATE_RAD_S = 0.1
 """Limit of the azimuth command [rad/s]; without it the first levelling would reach 0.2 rad/s."""
 
-CONSTANTS_DTYPE = np.dtype([
-    ('s0', 'f8'),                                       # bandwidth [rad/s]
-    ('K1', 'f8'), ('k2', 'f8'), ('K3', 'f8'), ('K4', 'f8'),
-    ('azimuth_sigma', 'f8'), ('level_sigma', 'f8'), ('residual', 'f8'),     # 1 sigmas in the settled loop [rad]
-], align=True)
 
-STATE_DTYPE = np.dtype([
-    ('t', 'f8'),                    # time since power-up [s]
-    ('lagged', 'f8'),               # v_N / (s + K4) [m]
-    ('residual', 'f8'),             # azimuth that the loop still corrects, smoothed [rad]
-    ('correction', 'f8', (2,)),     # to subtract from v_E, v_N in this step [m/s]
-    ('command', 'f8', (3,)), ('azimuth', 'f8'), ('azimuth_sigma', 'f8'), ('level_sigma', 'f8'),
-], align=True)
+class Constants(Record):
+    """Record."""
+    s0: float  # bandwidth [rad/s]
+    K1: float
+    k2: float
+    K3: float
+    K4: float
+    azimuth_sigma: float
+    level_sigma: float
+    residual: float  # 1 sigmas in the settled loop [rad]
+
+
+class State(Record):
+    """Record."""
+    t: float  # time since power-up [s]
+    lagged: float  # v_N / (s + K4) [m]
+    residual: float  # azimuth that the loop still corrects, smoothed [rad]
+    correction: Pair  # to subtract from v_E, v_N in this step [m/s]
+    command: Vector3
+    azimuth: float
+    azimuth_sigma: float
+    level_sigma: float
 
 
 def constants(k, s0, h) -> np.ndarray:
-    """Return one record of CONSTANTS_DTYPE for the bandwidth s0 [rad/s] and steps of h [s]; k: CONDITIONS_DTYPE."""
-    record = np.zeros((), CONSTANTS_DTYPE)
+    """Return one record of Constants for the bandwidth s0 [rad/s] and steps of h [s]; k: Conditions."""
+    record = np.zeros((), Constants.dtype)
     g, w_north = float(k['gravity']), float(k['earth_rate'][1])
     K1 = K4 = 2.0 * s0
     k2, K3 = 4.0 * s0**2 / g, 4.0 * s0**4 / g
@@ -71,7 +83,7 @@ def envelope(x):
 def step(s, c, k, v_east, v_north, h):
     """Execute one step h [s] after the last; v_east, v_north: velocity error in n' [m/s].
 
-    s, c, k: records STATE_DTYPE, CONSTANTS_DTYPE, CONDITIONS_DTYPE.
+    s, c, k: records State, Constants, Conditions.
     """
     s.t += h
     s.lagged += h * (v_north - c.K4 * s.lagged)

@@ -13,20 +13,23 @@
 
 The observer of the paper is linear too, because its delta = 20000 keeps the nonlinear function fal in its linear zone.
 The gains are fixed, scheduled, or those of a Kalman filter; the covariance is valid for any gains. Arguments: o is a
-record of STATE_DTYPE, k of CONDITIONS_DTYPE.
+record of State, k of Conditions.
 """
 import math
-
-import numpy as np
+from typing import Annotated
 
 from pedestal_common.compiled import compiled
+from pedestal_common.quantities import Floats, Pair
+from pedestal_common.record import Record
 
-STATE_DTYPE = np.dtype([
-    ('z', 'f8', (2, 3)),                # east, north: z1, z2, z3
-    ('input', 'f8', (2,)),              # input b0 u since the last step [m/s3]
-    ('p', 'f8', (6,)),                  # p11, p12, p13, p22, p23, p33, the same for both channels
-    ('innovation_ratio', 'f8'),         # running mean of innovation^2 over its expected variance
-], align=True)
+
+class State(Record):
+    """Record."""
+    z: Annotated[Floats, (2, 3)]  # east, north: z1, z2, z3
+    input: Pair  # input b0 u since the last step [m/s3]
+    p: Annotated[Floats, (6,)]  # p11, p12, p13, p22, p23, p33, the same for both channels
+    innovation_ratio: float  # running mean of innovation^2 over its expected variance
+
 
 INNOVATION_TIME_CONSTANT_S = 30.0  # time constant of the running mean of innovation_ratio [s]
 EXPECTED_INNOVATION_RATIO = 1.2  # innovation ratio on a sea as expected, with the noise of the running mean [-]
@@ -78,7 +81,7 @@ INITIAL_VELOCITY_SIGMA_M_S, INITIAL_LEVEL_SIGMA_RAD, INITIAL_AZIMUTH_SIGMA_RAD =
 
 @compiled
 def start(o, k, level_sigma, azimuth_sigma):
-    """Reset the STATE_DTYPE o at power-up; level_sigma, azimuth_sigma: 1 sigma [rad]; k: CONDITIONS_DTYPE."""
+    """Reset the State o at power-up; level_sigma, azimuth_sigma: 1 sigma [rad]; k: Conditions."""
     for i in range(2):
         o.input[i] = 0.0
         for j in range(3):

@@ -42,9 +42,9 @@ def command(z1, z2, z3, v1, v2, b0, w_c):
 
 @compiled
 def level(o, k, v1, v2, w_c, out):
-    """Put the commands of both channels of o, extended_observer.STATE_DTYPE, into out (3,) (w_cE, w_cN, w_cU) [rad/s].
+    """Put the commands of both channels of o, extended_observer.State, into out (3,) (w_cE, w_cN, w_cU) [rad/s].
 
-    k: record of CONDITIONS_DTYPE;
+    k: record of Conditions;
     v1, v2 (2,): references; w_c: bandwidth [rad/s]. The observer receives the limited command.
     """
     g = k.gravity

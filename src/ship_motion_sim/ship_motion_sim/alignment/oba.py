@@ -15,32 +15,38 @@ removes the unknown velocity of the ship at power-up. If this velocity is assume
 of the alignment at 100 s is 15 times larger. The velocity of the swell after power-up averages out.
 """
 import math
-
-import numpy as np
+from typing import Annotated
 
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry.quaternion import product
+from pedestal_common.quantities import Floats, Matrix3, Vector3
+from pedestal_common.record import Record
 from ship_motion_sim import strapdown
 from ship_motion_sim.alignment import extended_observer, riccati_eso
 
 MAX_JACOBI_SWEEPS = 12  # largest number of sweeps of Jacobi rotations; 4 to 6 are enough
 
-STATE_DTYPE = np.dtype([
-    ('t', 'f8'),                                        # time since power-up [s]
-    ('observer', extended_observer.STATE_DTYPE),        # gives the 1 sigmas from the x, y parts of a
-    ('coriolis', 'f8', (3,)),                           # int w_ie x v dt [m/s]
-    ('count', 'f8'),                                    # number of pairs (a, b)
-    ('sum_a', 'f8', (3,)), ('sum_b', 'f8', (3,)), ('sum_ab', 'f8', (3, 3)),     # sums of a, b, a b^T
-    ('matrix', 'f8', (4, 4)), ('vectors', 'f8', (4, 4)),        # matrix of Horn; its eigenvectors, in columns
-    ('azimuth_sigma', 'f8'), ('level_sigma', 'f8'),
-], align=True)
-"""State of the method. The observer does not change the attitude. Its covariance is the information limit: the least
-that any linear method can reach with these measurements (module riccati_eso)."""
+
+class State(Record):
+    """State of the method. The observer does not change the attitude. Its covariance is the information limit: the least
+    that any linear method can reach with these measurements (module riccati_eso).
+    """
+    t: float  # time since power-up [s]
+    observer: extended_observer.State  # gives the 1 sigmas from the x, y parts of a
+    coriolis: Vector3  # int w_ie x v dt [m/s]
+    count: float  # number of pairs (a, b)
+    sum_a: Vector3
+    sum_b: Vector3
+    sum_ab: Matrix3  # sums of a, b, a b^T
+    matrix: Annotated[Floats, (4, 4)]
+    vectors: Annotated[Floats, (4, 4)]  # matrix of Horn; its eigenvectors, in columns
+    azimuth_sigma: float
+    level_sigma: float
 
 
 @compiled
 def gravity_integral(t, k):
-    """Return b [m/s] in n0 after t [s], in closed form; k: record of CONDITIONS_DTYPE.
+    """Return b [m/s] in n0 after t [s], in closed form; k: record of Conditions.
 
     b is the integral of the reaction to gravity, which turns with the earth.
     """
@@ -53,7 +59,7 @@ def gravity_integral(t, k):
 
 @compiled
 def step(s, k, a, v, h):
-    """Add one pair of vectors, h [s] after the last; s, k: records STATE_DTYPE, CONDITIONS_DTYPE.
+    """Add one pair of vectors, h [s] after the last; s, k: records State, Conditions.
 
     a: int C_b^b0 f dt in b0, three floats [m/s]; if the ship has a speed log, its velocity is subtracted. v: velocity
     in n by GNSS [m/s], zeros without GNSS. With a speed log, the model omits the Coriolis force: at 7 m/s the level
@@ -145,7 +151,7 @@ def solve(s):
 def attitude(s, k, qx, qy, qz, qw):
     """Return the present quaternion (x, y, z, w) deck -> n.
 
-    s, k: records STATE_DTYPE, CONDITIONS_DTYPE; qx, qy, qz, qw: quaternion deck -> b0 from the gyros.
+    s, k: records State, Conditions; qx, qy, qz, qw: quaternion deck -> b0 from the gyros.
     """
     turned = strapdown.from_rotvec(-s.t * k.earth_rate[0], -s.t * k.earth_rate[1], -s.t * k.earth_rate[2])
     return product(turned, product(solve(s), (qx, qy, qz, qw)))

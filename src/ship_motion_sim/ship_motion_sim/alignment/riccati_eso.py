@@ -12,26 +12,31 @@ walks at random by q.
 """
 import math
 
-import numpy as np
-
 from pedestal_common.compiled import compiled
+from pedestal_common.quantities import Pair, Vector3
+from pedestal_common.record import Record
 from ship_motion_sim.alignment import extended_observer, levelling
 
 ALIGNING_BANDWIDTH_RAD_S, NAVIGATING_BANDWIDTH_RAD_S = 1.0, 0.1
 """Bandwidth of the level control [rad/s]: high to level a deck, low in navigation with only noise to follow."""
 
-STATE_DTYPE = np.dtype([
-    ('observer', extended_observer.STATE_DTYPE),
-    ('v1', 'f8', (2,)), ('v2', 'f8', (2,)),
-    ('command', 'f8', (3,)), ('azimuth', 'f8'), ('azimuth_sigma', 'f8'), ('level_sigma', 'f8'),
-], align=True)
-"""State. v1, v2: references of x1 [m/s] and x2 [m/s2] of both channels; command: rate of n' about east, north and up
-[rad/s]; azimuth: estimated misalignment [rad]; azimuth_sigma, level_sigma: stated 1 sigma [rad]."""
+
+class State(Record):
+    """State. v1, v2: references of x1 [m/s] and x2 [m/s2] of both channels; command: rate of n' about east, north and up
+    [rad/s]; azimuth: estimated misalignment [rad]; azimuth_sigma, level_sigma: stated 1 sigma [rad].
+    """
+    observer: extended_observer.State
+    v1: Pair
+    v2: Pair
+    command: Vector3
+    azimuth: float
+    azimuth_sigma: float
+    level_sigma: float
 
 
 @compiled
 def advance_covariance(o, k, h):
-    """Advance the covariance of the observer o by one step h [s] with its measurement; k: record of CONDITIONS_DTYPE.
+    """Advance the covariance of the observer o by one step h [s] with its measurement; k: record of Conditions.
 
     Return (l1, l2, l3, expected variance of the innovation [m2/s2]).
     """
@@ -47,7 +52,7 @@ def advance_covariance(o, k, h):
 def step(s, k, v_east, v_north, h, w_c):
     """Execute one step h [s] after the last; v_east, v_north: velocity error in n' [m/s].
 
-    s, k: records STATE_DTYPE, CONDITIONS_DTYPE; w_c: bandwidth of the level control [rad/s]. The level control does
+    s, k: records State, Conditions; w_c: bandwidth of the level control [rad/s]. The level control does
     not affect the estimate, because the observer receives its exact commands.
     """
     o = s.observer

@@ -11,6 +11,8 @@ import numpy as np
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry.line_of_sight import quaternion, rotation, to_deck
 from pedestal_common.parameters import ParameterError
+from pedestal_common.quantities import Vector3
+from pedestal_common.record import Record
 from ship_motion_sim import earth
 from ship_motion_sim.navigation import ins, navigator
 from ship_motion_sim.navigation.ins import LATENCY_RING_FIELDS, LATENCY_RING_SIZE, NO_STAMP
@@ -23,21 +25,23 @@ MAX_IMU_GAP_S = 0.1
 An angular acceleration of the deck of 0.1 rad/s2 causes an error of 0.5 mrad within this time.
 """
 
-CONSTANTS_DTYPE = np.dtype([
-    ('ship', motion.Constants.dtype),
-    ('earth_rate', 'f8', (3,)),             # ENU [rad/s]
-    ('latency_ns', 'i8'),
-    ('increment', 'i8'),                    # 1: mean rates of the IMU since its last sample, 0: rates at the stamp
-    ('aid_noise', 'f8'),                    # rms [m/s]
-    ('navigator', navigator.CONSTANTS_DTYPE),
-    ('power_up', navigator.STATE_DTYPE),    # state of the navigator at power-up
-], align=True)
 
-STATE_DTYPE = np.dtype([
+class Constants(Record):
+    """Record."""
+    ship: motion.Constants
+    earth_rate: Vector3  # ENU [rad/s]
+    latency_ns: int
+    increment: int  # 1: mean rates of the IMU since its last sample, 0: rates at the stamp
+    aid_noise: float  # rms [m/s]
+    navigator: navigator.Constants
+    power_up: navigator.State  # state of the navigator at power-up
+
+
+State = np.dtype([
     ('last_stamp_ns', 'i8'),
     ('truth', motion.Truth.dtype),        # true motion of the ship, for the aid
     *LATENCY_RING_FIELDS,
-    ('navigator', navigator.STATE_DTYPE),
+    ('navigator', navigator.State.dtype),
     ('imu_stamp_ns', 'i8'),                 # of the last usable IMU message
     ('last_rate', 'f8', (3,)), ('last_force', 'f8', (3,)),      # in the last usable IMU message
     ('angle', 'f8', (3,)), ('force', 'f8', (3,)),   # increments since that message [rad, m/s]
@@ -47,9 +51,9 @@ STATE_DTYPE = np.dtype([
 
 
 def constants(params: InsParameters) -> np.ndarray:
-    """Return the record (1,) of CONSTANTS_DTYPE. Raises ParameterError if the azimuth cannot reach
+    """Return the record (1,) of Constants. Raises ParameterError if the azimuth cannot reach
     alignment.aligned_sigma."""
-    record, latitude = np.zeros(1, CONSTANTS_DTYPE), math.radians(params.ship.latitude_deg)
+    record, latitude = Constants.zeros(), math.radians(params.ship.latitude_deg)
     record['ship'] = motion.constants(params.ship)
     record['earth_rate'] = earth.rate(latitude)
     record['latency_ns'] = round(params.latency * 1e9)
@@ -66,8 +70,8 @@ def constants(params: InsParameters) -> np.ndarray:
 
 
 def initial_state(constants) -> np.ndarray:
-    """Return the record (1,) of STATE_DTYPE before the first sample; constants: CONSTANTS_DTYPE (1,)."""
-    state = np.zeros(1, STATE_DTYPE)
+    """Return the record (1,) of State before the first sample; constants: Constants (1,)."""
+    state = np.zeros(1, State)
     state['last_stamp_ns'] = state['imu_stamp_ns'] = NO_STAMP
     state['navigator'] = constants['power_up']
     return state

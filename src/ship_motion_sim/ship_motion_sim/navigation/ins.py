@@ -8,12 +8,15 @@ rate of the IMU with that of the law, and its status reports a difference. `alig
 Arguments: s state, c constants, i inputs, out outputs (records of this module).
 """
 import math
+from typing import Annotated
 
 import numpy as np
 
 from pedestal_common.codes import codes
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry.line_of_sight import quaternion
+from pedestal_common.quantities import Floats, Vector3
+from pedestal_common.record import Record
 from ship_motion_sim import earth, imu
 from ship_motion_sim.params import InsParameters
 from ship_motion_sim.sea import motion
@@ -31,19 +34,21 @@ Status = codes(STATUS_TEXTS)
 LATENCY_RING_SIZE = 256  # largest number of samples that wait for the latency to pass: the largest latency at 1 kHz
 NO_STAMP = -2 ** 63  # stamp before the first message
 
-CONSTANTS_DTYPE = np.dtype([
-    ('ship', motion.Constants.dtype),
-    ('earth_rate', 'f8', (3,)),             # ENU [rad/s]
-    ('bias', 'f8', (3,)),                   # roll, pitch, yaw [rad]
-    ('wander', 'f8', (3,)),                 # rms of the slow error of roll, pitch, yaw [rad]
-    ('wander_time', 'f8'),                  # correlation time of the slow error [s]
-    ('noise', 'f8', (3,)),                  # rms of the white noise of roll, pitch, yaw [rad]
-    ('rate_noise', 'f8'),                   # rms of the white noise of the deck rate [rad/s]
-    ('imu_tolerance', 'f8'),                # largest difference between the rates of IMU and law [rad/s]
-    ('latency_ns', 'i8'),
-    ('variance', 'f8', (3,)),               # declared variance of roll, pitch, heading [rad2]
-    ('walk', 'f8', (3,)),                   # declared random walk of roll, pitch, heading [rad/sqrt(s)]
-], align=True)
+
+class Constants(Record):
+    """Record."""
+    ship: motion.Constants
+    earth_rate: Vector3  # ENU [rad/s]
+    bias: Vector3  # roll, pitch, yaw [rad]
+    wander: Vector3  # rms of the slow error of roll, pitch, yaw [rad]
+    wander_time: float  # correlation time of the slow error [s]
+    noise: Vector3  # rms of the white noise of roll, pitch, yaw [rad]
+    rate_noise: float  # rms of the white noise of the deck rate [rad/s]
+    imu_tolerance: float  # largest difference between the rates of IMU and law [rad/s]
+    latency_ns: int
+    variance: Vector3  # declared variance of roll, pitch, heading [rad2]
+    walk: Vector3  # declared random walk of roll, pitch, heading [rad/sqrt(s)]
+
 
 LATENCY_RING_FIELDS = [
     ('measured', 'i8'), ('released', 'i8'),     # numbers of samples in and out; n has the index n % LATENCY_RING_SIZE
@@ -56,38 +61,42 @@ LATENCY_RING_FIELDS = [
 ]
 """Ring of the samples whose latency has not passed."""
 
-STATE_DTYPE = np.dtype([
+State = np.dtype([
     ('last_stamp_ns', 'i8'),
     ('wander', 'f8', (3,)),                 # slow error of roll, pitch, yaw [rad]
     ('truth', motion.Truth.dtype),        # ship at the last stamp
     *LATENCY_RING_FIELDS,
 ], align=True)
 
-INPUTS_DTYPE = np.dtype([
-    ('stamp_ns', 'i8'),                     # of the IMU message
-    ('angular_velocity', 'f8', (3,)),       # of the IMU message [rad/s]
-    ('linear_acceleration', 'f8', (3,)),    # of the IMU message [m/s2]
-], align=True)
 
-OUTPUTS_DTYPE = np.dtype([
-    ('status', 'i8'),                       # one of Status, index into INS_STATUS_TEXTS
-    ('due', 'i8'),                          # 1: the result below is new; 0: nothing to publish
-    ('stamp_ns', 'i8'),                     # of the measurement
-    ('quaternion', 'f8', (4,)),             # x, y, z, w, deck -> earth, with error
-    ('angular_velocity', 'f8', (3,)),       # deck against earth, FLU, with noise [rad/s]
-    ('linear_acceleration', 'f8', (3,)),    # of the IMU message with this stamp [m/s2]
-    ('variance', 'f8', (3,)),               # declared variance of roll, pitch, heading [rad2]
-    ('stage', 'i8'),                        # stage of this result, index of navigator.STAGES; NO_STAGE for the model
-    ('noise', 'f8', (3,)), ('walk', 'f8', (3,)),    # declared, of roll, pitch, heading [rad], [rad/sqrt(s)]
-    ('velocity', 'f8', (3,)),               # present velocity of an INS that navigates, ENU [m/s]
-], align=True)
+class Inputs(Record):
+    """Record."""
+    stamp_ns: int  # of the IMU message
+    angular_velocity: Vector3  # of the IMU message [rad/s]
+    linear_acceleration: Vector3  # of the IMU message [m/s2]
+
+
+class Outputs(Record):
+    """Record."""
+    status: int  # one of Status, index into INS_STATUS_TEXTS
+    due: int  # 1: the result below is new; 0: nothing to publish
+    stamp_ns: int  # of the measurement
+    quaternion: Annotated[Floats, (4,)]  # x, y, z, w, deck -> earth, with error
+    angular_velocity: Vector3  # deck against earth, FLU, with noise [rad/s]
+    linear_acceleration: Vector3  # of the IMU message with this stamp [m/s2]
+    variance: Vector3  # declared variance of roll, pitch, heading [rad2]
+    stage: int  # stage of this result, index of navigator.STAGES; NO_STAGE for the model
+    noise: Vector3
+    walk: Vector3  # declared, of roll, pitch, heading [rad], [rad/sqrt(s)]
+    velocity: Vector3  # present velocity of an INS that navigates, ENU [m/s]
+
 
 NO_STAGE = -1  # stage of a result of method `model`
 
 
 def constants(params: InsParameters) -> np.ndarray:
-    """Return the record (1,) of CONSTANTS_DTYPE."""
-    record = np.zeros(1, CONSTANTS_DTYPE)
+    """Return the record (1,) of Constants."""
+    record = Constants.zeros()
     record['ship'] = motion.constants(params.ship)
     record['earth_rate'] = earth.rate(math.radians(params.ship.latitude_deg))
     record['bias'] = params.roll_bias, params.pitch_bias, -params.heading_bias
@@ -109,8 +118,8 @@ def model_variance(p):
 
 
 def initial_state() -> np.ndarray:
-    """Return the record (1,) of STATE_DTYPE before the first sample."""
-    state = np.zeros(1, STATE_DTYPE)
+    """Return the record (1,) of State before the first sample."""
+    state = np.zeros(1, State)
     state['last_stamp_ns'] = NO_STAMP
     return state
 
@@ -183,7 +192,7 @@ def release(c, s, now_ns, out):
 def step(s, c, i, out, normals):
     """Take one IMU message.
 
-    s, c, i, out: records STATE_DTYPE, CONSTANTS_DTYPE, INPUTS_DTYPE, OUTPUTS_DTYPE; normals: (INS_NORMALS_PER_STEP,).
+    s, c, i, out: records State, Constants, Inputs, Outputs; normals: (INS_NORMALS_PER_STEP,).
     A stamp that does not advance changes nothing, and a message that is not finite gives no sample. The status reports
     both.
     """

@@ -24,9 +24,11 @@ import numpy as np
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry.line_of_sight import to_earth
 from pedestal_common.geometry.quaternion import product
+from pedestal_common.quantities import Vector3
+from pedestal_common.record import Record
 from ship_motion_sim import strapdown
 from ship_motion_sim.alignment import adrc, adrc_scheduled, classical, extended_observer, oba, riccati_eso
-from ship_motion_sim.alignment.conditions import CONDITIONS_DTYPE, UNKNOWN_AZIMUTH_SIGMA_RAD, conditions
+from ship_motion_sim.alignment.conditions import UNKNOWN_AZIMUTH_SIGMA_RAD, Conditions, conditions
 from ship_motion_sim.params import INS_METHODS, VELOCITY_AIDS
 
 STAGES = ('aligning', 'aligned')
@@ -35,37 +37,46 @@ METHOD_CLASSICAL, METHOD_ADRC, METHOD_ADRC_SCHEDULED, METHOD_RICCATI_ESO, METHOD
     INS_METHODS.index, ('classical', 'adrc', 'adrc_scheduled', 'riccati_eso', 'oba'))
 AID_NONE, AID_LOG, AID_GNSS = range(len(VELOCITY_AIDS))
 
-CONSTANTS_DTYPE = np.dtype([
-    ('method', 'i8'), ('aid', 'i8'),            # index into INS_METHODS, VELOCITY_AIDS
-    ('step', 'f8'),                             # step of the laws [s]
-    ('aligned_sigma', 'f8'),                    # 1 sigma of azimuth at which navigation begins [rad]
-    ('conditions', CONDITIONS_DTYPE),
-    ('classical', classical.CONSTANTS_DTYPE), ('adrc', adrc.CONSTANTS_DTYPE),
-], align=True)
 
-STATE_DTYPE = np.dtype([
-    ('stage', 'i8'),
-    ('velocity_set', 'i8'),                     # 1 after the first step has set the velocity to that of the aid
-    ('since_step', 'f8'),                       # time since the last step of the laws [s]
-    ('unaided_time', 'f8'),                     # time since navigation without aid began [s]
-    ('strapdown', strapdown.STATE_DTYPE),
-    ('command', 'f8', (3,)),                    # w_c [rad/s]
-    ('north_command_smoothed', 'f8'),           # w_cN of the gyrocompass, smoothed [rad/s]
-    ('azimuth', 'f8'),                          # estimated azimuth of n' [rad]
-    ('azimuth_sigma', 'f8'), ('level_sigma', 'f8'),         # [rad]
-    ('aligned_azimuth_sigma', 'f8'), ('aligned_level_sigma', 'f8'),     # at the start of navigation [rad]
-    ('zero_rate', 'f8', (3,)),                  # zeros, for the integration in inertial space
-    ('classical', classical.STATE_DTYPE), ('adrc', adrc.STATE_DTYPE), ('adrc_scheduled', adrc_scheduled.STATE_DTYPE),
-    ('riccati_eso', riccati_eso.STATE_DTYPE), ('oba', oba.STATE_DTYPE),
-], align=True)
+class Constants(Record):
+    """Record."""
+    method: int
+    aid: int  # index into INS_METHODS, VELOCITY_AIDS
+    step: float  # step of the laws [s]
+    aligned_sigma: float  # 1 sigma of azimuth at which navigation begins [rad]
+    conditions: Conditions
+    classical: classical.Constants
+    adrc: adrc.Constants
+
+
+class State(Record):
+    """Record."""
+    stage: int
+    velocity_set: int  # 1 after the first step has set the velocity to that of the aid
+    since_step: float  # time since the last step of the laws [s]
+    unaided_time: float  # time since navigation without aid began [s]
+    strapdown: strapdown.State
+    command: Vector3  # w_c [rad/s]
+    north_command_smoothed: float  # w_cN of the gyrocompass, smoothed [rad/s]
+    azimuth: float  # estimated azimuth of n' [rad]
+    azimuth_sigma: float
+    level_sigma: float  # [rad]
+    aligned_azimuth_sigma: float
+    aligned_level_sigma: float  # at the start of navigation [rad]
+    zero_rate: Vector3  # zeros, for the integration in inertial space
+    classical: classical.State
+    adrc: adrc.State
+    adrc_scheduled: adrc_scheduled.State
+    riccati_eso: riccati_eso.State
+    oba: oba.State
 
 
 def constants(p, method, aid, latitude) -> np.ndarray:
-    """Return the record (1,) of CONSTANTS_DTYPE of AlignmentParameters p.
+    """Return the record (1,) of Constants of AlignmentParameters p.
 
     method, aid: names of INS_METHODS, VELOCITY_AIDS; latitude [rad].
     """
-    record = np.zeros(1, CONSTANTS_DTYPE)
+    record = Constants.zeros()
     k = conditions(p, latitude)
     record['method'], record['aid'] = INS_METHODS.index(method), VELOCITY_AIDS.index(aid)
     record['step'], record['aligned_sigma'] = p.step, p.aligned_sigma
@@ -78,7 +89,7 @@ def constants(p, method, aid, latitude) -> np.ndarray:
 def least_azimuth_sigma(c):
     """Return the 1 sigma [rad] of azimuth that the method approaches after a long time.
 
-    c: record of CONSTANTS_DTYPE.
+    c: record of Constants.
     """
     if c['method'] == METHOD_CLASSICAL:
         return float(c['classical']['azimuth_sigma'])
@@ -87,15 +98,15 @@ def least_azimuth_sigma(c):
 
 
 def initial_state(constants, quaternion) -> np.ndarray:
-    """Return the record (1,) of STATE_DTYPE at power-up; quaternion (x, y, z, w) deck -> n': assumed attitude."""
-    state = np.zeros(1, STATE_DTYPE)
+    """Return the record (1,) of State at power-up; quaternion (x, y, z, w) deck -> n': assumed attitude."""
+    state = State.zeros()
     begin(state[0], constants[0], *map(float, quaternion))
     return state
 
 
 @compiled
 def begin(s, c, qx, qy, qz, qw):
-    """Set the state s (zeros of STATE_DTYPE) to the state at power-up; qx, qy, qz, qw: assumed attitude deck -> n'."""
+    """Set the state s (zeros of State) to the state at power-up; qx, qy, qz, qw: assumed attitude deck -> n'."""
     if c.method == METHOD_OBA:
         qx, qy, qz, qw = 0.0, 0.0, 0.0, 1.0
     strapdown.set_attitude(s.strapdown, qx, qy, qz, qw)
@@ -241,7 +252,7 @@ def begin_navigation(s, c, aid):
 
 @compiled
 def grow_unaided_sigmas(s, k, h):
-    """Increase the 1 sigmas of an INS without aid over h [s]; k: record of CONDITIONS_DTYPE.
+    """Increase the 1 sigmas of an INS without aid over h [s]; k: record of Conditions.
 
     The causes are the random walk and the bias of the gyros. The level is also tilted by the earth rate, whose
     components are computed with a heading that is wrong by its 1 sigma.
@@ -255,7 +266,7 @@ def grow_unaided_sigmas(s, k, h):
 
 @compiled
 def step(s, c, angle, force, dt, aid):
-    """Process one IMU interval of dt [s]; s, c: records STATE_DTYPE, CONSTANTS_DTYPE.
+    """Process one IMU interval of dt [s]; s, c: records State, Constants.
 
     angle, force (3,): increments of the interval, FLU [rad, m/s]; aid (3,) [m/s], finite.
     """

@@ -14,17 +14,22 @@ import numpy as np
 
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry.geodesy import SPEED_OF_LIGHT_M_S
+from pedestal_common.record import Record
 
 MIN_ELEVATION_RAD = math.radians(1.0)  # elevation [rad] below which the refraction stays constant
 
-PATH_DTYPE = np.dtype([('refractivity', 'f8'), ('light_time', 'i8')], align=True)
-"""Constants of the path. refractivity: N, 0: no refraction; light_time: 1 to include the travel time of
-the wave."""
+
+class Path(Record):
+    """Constants of the path. refractivity: N, 0: no refraction; light_time: 1 to include the travel time of
+    the wave.
+    """
+    refractivity: float
+    light_time: int
 
 
 def constants(p) -> np.ndarray:
-    """Return PATH_DTYPE (1,) of PathParameters p."""
-    return np.array([(p.refractivity, p.light_time)], PATH_DTYPE)
+    """Return Path (1,) of PathParameters p."""
+    return np.array([(p.refractivity, p.light_time)], Path.dtype)
 
 
 @compiled
@@ -62,7 +67,7 @@ def _bent(N, r, v):
 @compiled
 def seen(c, r, v):
     """Return the apparent (vector [m], velocity [m/s]) of a target at r with velocity v, ENU from the antenna; three
-    floats each; c: record of PATH_DTYPE."""
+    floats each; c: record of Path."""
     if c.light_time != 0:
         t = math.sqrt(r[0] * r[0] + r[1] * r[1] + r[2] * r[2]) / SPEED_OF_LIGHT_M_S
         r = r[0] - v[0] * t, r[1] - v[1] * t, r[2] - v[2] * t
@@ -73,7 +78,7 @@ def seen(c, r, v):
 
 @compiled
 def _all_seen(c, r, v, out):
-    """Write the apparent vectors into `out` (n, 3) [m]; c: (1,) of PATH_DTYPE; r, v: as in `all_seen`."""
+    """Write the apparent vectors into `out` (n, 3) [m]; c: (1,) of Path; r, v: as in `all_seen`."""
     for k in range(len(r)):
         out[k, 0], out[k, 1], out[k, 2] = seen(c[0], (r[k, 0], r[k, 1], r[k, 2]), (v[k, 0], v[k, 1], v[k, 2]))[0]
 

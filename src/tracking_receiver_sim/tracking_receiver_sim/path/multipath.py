@@ -20,25 +20,31 @@ import numpy as np
 
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry.line_of_sight import offsets, to_deck
+from pedestal_common.record import Record
 
-MULTIPATH_DTYPE = np.dtype([('reflection', 'f8'), ('rough', 'f8'), ('phase', 'f8')], align=True)
-"""Constants of the image. reflection: rho; rough: 2 pi sigma_h / lambda; phase: 4 pi h / lambda."""
+
+class Multipath(Record):
+    """Constants of the image. reflection: rho; rough: 2 pi sigma_h / lambda; phase: 4 pi h / lambda."""
+    reflection: float
+    rough: float
+    phase: float
+
 
 Image = namedtuple('Image', 'real imaginary dX dE')
 """Image of a target. real, imaginary: Gamma; dX, dE: cross-elevation and elevation of the image off the beam [rad]."""
 
 
 def constants(p) -> np.ndarray:
-    """Return MULTIPATH_DTYPE (1,) of MultipathParameters."""
+    """Return Multipath (1,) of MultipathParameters."""
     per_m = 2.0 * math.pi / p.wavelength
-    return np.array([(p.reflection, per_m * p.roughness, 2.0 * per_m * p.height)], MULTIPATH_DTYPE)
+    return np.array([(p.reflection, per_m * p.roughness, 2.0 * per_m * p.height)], Multipath.dtype)
 
 
 @compiled
 def image(c, i, e, n, u):
     """Return the Image of a target at the apparent vector (e, n, u) from the antenna, ENU [m].
 
-    c: record of MULTIPATH_DTYPE; i: record of receiver.INPUTS_DTYPE.
+    c: record of Multipath; i: record of receiver.Inputs.
     """
     if c.reflection == 0.0 or u <= 0.0:
         return Image(0.0, 0.0, 0.0, 0.0)

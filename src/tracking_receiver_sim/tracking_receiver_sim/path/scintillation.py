@@ -15,29 +15,36 @@ import math
 import numpy as np
 
 from pedestal_common.compiled import compiled
+from pedestal_common.record import Record
 
 NORMALS_PER_STEP = 3  # number of standard normals of a step: level, two axes
 
 MIN_SIN_ELEVATION = math.sin(math.radians(4.0))
 """Sine of the elevation (4 deg, the limit of P.618) below which the scintillation stays constant."""
 
-SCINTILLATION_DTYPE = np.dtype([('level', 'f8'), ('angle', 'f8'), ('keep', 'f8'), ('draw', 'f8'), ('on', 'i8')],
-                               align=True)
-"""Constants of the scintillation. level, angle: 1-sigma at the zenith [dB], [rad]; keep, draw: factors of the process
-of unit variance, x = keep x + draw w."""
+
+class Scintillation(Record):
+    """Constants of the scintillation. level, angle: 1-sigma at the zenith [dB], [rad]; keep, draw: factors of the process
+    of unit variance, x = keep x + draw w.
+    """
+    level: float
+    angle: float
+    keep: float
+    draw: float
+    on: int
 
 
 def constants(p, period) -> np.ndarray:
-    """Return SCINTILLATION_DTYPE (1,) of ScintillationParameters, for steps of period [s]."""
+    """Return Scintillation (1,) of ScintillationParameters, for steps of period [s]."""
     keep = math.exp(-period / p.time_constant)
-    return np.array([(p.level_db, p.angle, keep, math.sqrt(1.0 - keep * keep), p.on)], SCINTILLATION_DTYPE)
+    return np.array([(p.level_db, p.angle, keep, math.sqrt(1.0 - keep * keep), p.on)], Scintillation.dtype)
 
 
 @compiled
 def wander(c, x, sin_E, normals, first):
     """Return (factor of the amplitude, deflection of the wave in cross-elevation, elevation [rad]) one step later.
 
-    c: record of SCINTILLATION_DTYPE; sin_E: sine of the elevation; x (3,): state of the process, updated; normals:
+    c: record of Scintillation; sin_E: sine of the elevation; x (3,): state of the process, updated; normals:
     used from index `first` on.
     """
     for i in range(NORMALS_PER_STEP):

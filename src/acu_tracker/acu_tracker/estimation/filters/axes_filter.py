@@ -1,6 +1,6 @@
 """The filters of both axes: one `axis_filter` for the azimuth and one for the elevation of the target.
 
-f, c: records (2,) of axis_filter.FILTER_DTYPE and of axis_filter.CONSTANTS_DTYPE; m: a Measurement. The prior fields
+f, c: records (2,) of axis_filter.Filter and of axis_filter.Constants; m: a Measurement. The prior fields
 of a filter hold its prediction.
 """
 import math

@@ -10,9 +10,11 @@ The noise of the angle may be coloured by a first-order lag. The filter then use
 whose noise is white (Bryson, Henrikson 1968; kalman.update_correlated). Here y_k is the angle of measurement k, and
 rho is the correlation of the noise of two successive angles.
 
-f, c: records of FILTER_DTYPE and of CONSTANTS_DTYPE; j: number of a model in the bank.
+f, c: records of Filter and of Constants; j: number of a model in the bank.
 """
 import math
+from collections.abc import Sequence
+from typing import Annotated
 
 import numpy as np
 
@@ -23,64 +25,69 @@ from acu_tracker.estimation.filters.measurement import AxisInnovation, AxisMeasu
 from acu_tracker.estimation.filters.motion_models import COLUMN_NAMES
 from acu_tracker.geometry.motion import AxisMotion
 from pedestal_common.compiled import compiled
+from pedestal_common.quantities import Floats
+from pedestal_common.record import Record
 
 BANK_SIZE = len(COLUMN_NAMES)  # largest number of models in a bank
 
 P11_COLUMN, P33_COLUMN = Symmetric._fields.index('p11'), Symmetric._fields.index('p33')
 """Columns of the variances of angle and acceleration in a row of `p`."""
 
-CONSTANTS_DTYPE = np.dtype([('count', 'i8'), ('bank', 'i8'),
-                            ('models', motion_models.MOTION_MODEL_DTYPE, (BANK_SIZE,)), ('states', 'i8'),
-                            ('dwell', 'f8'), ('alpha', 'f8'), ('beta', 'f8'), ('gamma', 'f8'),
-                            ('rate_measurement', 'i8'), ('noise_bandwidth', 'f8')], align=True)
-"""Constants of the filter.
 
-models            parameters of the models; only the first `count` are in use
-count             number of models in use
-bank              number that identifies the set of models
-states            largest number of states of a model: 2 or 3
-dwell             mean time for which one model holds [s]
-alpha, beta, gamma  gains of a filter of constant gain [-]; alpha is 0 for a Kalman filter
-rate_measurement  1 if measured rates are used
-noise_bandwidth   bandwidth of the noise of the angle [rad/s]; 0: white noise
-"""
+class Constants(Record):
+    """Constants of the filter."""
+    count: int  # number of models in use
+    bank: int  # number that identifies the set of models
+    # parameters of the models; only the first `count` are in use
+    models: Annotated[Sequence[motion_models.MotionModelRecord], (BANK_SIZE,)]
+    states: int  # largest number of states of a model: 2 or 3
+    dwell: float  # mean time for which one model holds [s]
+    alpha: float  # alpha, beta, gamma: gains of a filter of constant gain [-]; alpha is 0 for a Kalman filter
+    beta: float
+    gamma: float
+    rate_measurement: int  # 1 if measured rates are used
+    noise_bandwidth: float  # bandwidth of the noise of the angle [rad/s]; 0: white noise
 
-FILTER_DTYPE = np.dtype([('bank', 'i8'), ('count', 'i8'), ('states', 'i8'), ('T', 'f8'),
-                         ('x', 'f8', (BANK_SIZE, 3)), ('p', 'f8', (BANK_SIZE, 6)), ('mu', 'f8', (BANK_SIZE,)),
-                         ('x_prior', 'f8', (BANK_SIZE, 3)), ('p_prior', 'f8', (BANK_SIZE, 6)),
-                         ('mu_prior', 'f8', (BANK_SIZE,)), ('last_angle', 'f8'), ('correlated', 'i8'),
-                         ('past', 'f8', (BANK_SIZE, 5)), ('weights', 'f8', (BANK_SIZE,)),
-                         ('drift_variance_rate', 'f8')], align=True)
-"""State of the filter.
 
-bank, count, states  values of the constants to which x, p and mu belong
-x, p, mu             estimate, covariance (as in kalman.Symmetric) and probability of each model after the last
-                     measurement
-x_prior, p_prior, mu_prior  prediction of x, p and mu by T; the prior fields
-T                    time of the prediction since the last measurement [s]
-past                 x1, p11, c1, c2, c3 of the kalman.PreviousAngle of each model, for this prediction
-last_angle           last measured angle [rad]
-correlated           1 if the noise of the next angle is correlated with that of last_angle
-drift_variance_rate  variance per second [rad2/s] that each prediction adds to the variance of the angle, for the
-                     random walk of the attitude error (estimation/target.py)
-weights              scratch
-"""
+class Filter(Record):
+    """State of the filter."""
+    bank: int  # bank, count, states: values of the constants to which x, p and mu belong
+    count: int
+    states: int
+    T: float  # time of the prediction since the last measurement [s]
+    # x, p, mu: estimate, covariance (as in kalman.Symmetric) and probability of each model after the last measurement
+    x: Annotated[Floats, (BANK_SIZE, 3)]
+    p: Annotated[Floats, (BANK_SIZE, 6)]
+    mu: Annotated[Floats, (BANK_SIZE,)]
+    # x_prior, p_prior, mu_prior: prediction of x, p and mu by T; the prior fields
+    x_prior: Annotated[Floats, (BANK_SIZE, 3)]
+    p_prior: Annotated[Floats, (BANK_SIZE, 6)]
+    mu_prior: Annotated[Floats, (BANK_SIZE,)]
+    last_angle: float  # last measured angle [rad]
+    correlated: int  # 1 if the noise of the next angle is correlated with that of last_angle
+    # x1, p11, c1, c2, c3 of the kalman.PreviousAngle of each model, for this prediction
+    past: Annotated[Floats, (BANK_SIZE, 5)]
+    weights: Annotated[Floats, (BANK_SIZE,)]  # scratch
+    # variance per second [rad2/s] that each prediction adds to the variance of the angle, for the random walk of the
+    # attitude error (estimation/target.py)
+    drift_variance_rate: float
 
-ESTIMATE_DTYPE = np.dtype([('angle', 'f8'), ('rate', 'f8'), ('acceleration', 'f8'), ('variance', 'f8'),
-                           ('covariance', 'f8'), ('rate_variance', 'f8'), ('innovation', 'f8'),
-                           ('rate_innovation', 'f8'), ('nis', 'f8'), ('mu', 'f8', (BANK_SIZE,))], align=True)
-"""One row of the result of `estimates`.
 
-angle, rate, acceleration  estimate [rad, rad/s, rad/s2]
-variance, rate_variance    variances of angle and rate [rad2, rad2/s2]
-covariance                 covariance of angle and rate [rad2/s]
-innovation                 innovation of the angle [rad]
-rate_innovation            innovation of the rate [rad/s]
-nis                        normalised innovation squared [-]
-mu                         probability of each of COLUMN_NAMES; NaN for a model that is not in the bank
+class Estimate(Record):
+    """One row of the result of `estimates`.
 
-The innovations and nis are NaN if nothing was measured.
-"""
+    The innovations and nis are NaN if nothing was measured.
+    """
+    angle: float  # angle, rate, acceleration: estimate [rad, rad/s, rad/s2]
+    rate: float
+    acceleration: float
+    variance: float  # variance, rate_variance: variances of angle and rate [rad2, rad2/s2]
+    covariance: float  # covariance of angle and rate [rad2/s]
+    rate_variance: float
+    innovation: float  # innovation of the angle [rad]
+    rate_innovation: float  # innovation of the rate [rad/s]
+    nis: float  # normalised innovation squared [-]
+    mu: Annotated[Floats, (BANK_SIZE,)]  # probability of each of COLUMN_NAMES; NaN for a model that is not in the bank
 
 
 def constants(params, noise_bandwidth=0.0) -> np.ndarray:
@@ -88,7 +95,7 @@ def constants(params, noise_bandwidth=0.0) -> np.ndarray:
 
     noise_bandwidth: bandwidth of the noise of the measured angle [Hz]; 0: white noise.
     """
-    c, bank = np.zeros(1, CONSTANTS_DTYPE), FILTER_KINDS[params.kind].bank(params)
+    c, bank = Constants.zeros(), FILTER_KINDS[params.kind].bank(params)
     c['count'] = len(bank.models)
     c['models'][0, :len(bank.models)] = bank.models
     c['bank'], c['states'] = np.sum(1 << bank.models['column']), bank.models['states'].max()
@@ -318,17 +325,17 @@ def probabilities(f, c, mu):
 def estimates(c, t, y, R, y_rate, R_rate, initial_rate, out):
     """Filter whole arrays (n,) of measurements, for tests and studies.
 
-    c                (1,) of CONSTANTS_DTYPE
+    c                (1,) of Constants
     t                stamps [s]
     y, R             angles [rad] and their variances [rad2]
     y_rate, R_rate   rates [rad/s] and their variances [rad2/s2]
     initial_rate     standard deviation of the rate at the start [rad/s]
-    out              (n,) of ESTIMATE_DTYPE; row k is the estimate after measurement k
+    out              (n,) of Estimate; row k is the estimate after measurement k
 
     The filter starts at the first angle; earlier rows are NaN. The filter ignores an angle that is NaN or whose stamp
     does not advance. The row of such an angle is the prediction from the last accepted angle.
     """
-    state = np.zeros(1, FILTER_DTYPE)
+    state = Filter.zeros()
     f, model = state[0], c[0]
     f.mu[:] = last = math.nan
     f.count = model.count

@@ -19,7 +19,7 @@ starts as a least-squares fit."""
 class Bank(typing.NamedTuple):
     """The motion models of the filter of one axis.
 
-    models  (count,) of motion_models.MOTION_MODEL_DTYPE
+    models  (count,) of motion_models.MotionModelRecord
     dwell   mean time for which one of several models holds [s]
     gains   alpha, beta, gamma of a filter of constant gain [-]; alpha is 0 for a Kalman filter
     """

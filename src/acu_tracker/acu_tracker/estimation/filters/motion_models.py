@@ -31,6 +31,7 @@ import numpy as np
 
 from acu_tracker.estimation.filters.kalman import Symmetric, Transition
 from pedestal_common.compiled import compiled, inlined
+from pedestal_common.record import Record
 
 
 class MotionModel(typing.NamedTuple):
@@ -70,30 +71,28 @@ MAX_RUNG_COUNT = 8  # largest number of models ca in a bank
 COLUMN_NAMES = (*MODEL_NAMES, *(f'ca_{rung}' for rung in range(2, MAX_RUNG_COUNT + 1)))
 """Names of the models of the largest bank. ca is the first rung of a `ladder`, ca_2 its second rung."""
 
-MOTION_MODEL_DTYPE = np.dtype([('kind', 'i8'), ('column', 'i8'), ('states', 'i8'), ('initial_sigma', 'f8'),
-                               ('alpha', 'f8'), ('noise', 'f8'), ('sigma', 'f8'), ('a_max', 'f8'), ('floor', 'f8')],
-                              align=True)
-"""Constants of one model.
 
-kind            index in MODEL_NAMES
-column          index in COLUMN_NAMES
-states          number of states, as in the row of the model
-initial_sigma   standard deviation of the acceleration at the start [rad/s2]
-alpha           of singer and current_statistical [1/s]
-noise           of cv: root density of the white acceleration [rad/s2/sqrt(Hz)]; of ca: that of the white jerk
-                [rad/s3/sqrt(Hz)]
-sigma           of singer: standard deviation of the acceleration [rad/s2]
-a_max           of current_statistical: largest acceleration [rad/s2]
-floor           of current_statistical: least sigma_a over a_max [-]
+class MotionModelRecord(Record):
+    """Constants of one model.
 
-The density is two-sided: the integral of E[w(t) w(s)] over s is noise^2 for white noise w.
-"""
+    The density is two-sided: the integral of E[w(t) w(s)] over s is noise^2 for white noise w.
+    """
+    kind: int  # index in MODEL_NAMES
+    column: int  # index in COLUMN_NAMES
+    states: int  # number of states, as in the row of the model
+    initial_sigma: float  # standard deviation of the acceleration at the start [rad/s2]
+    alpha: float  # of singer and current_statistical [1/s]
+    # of cv: root density of the white acceleration [rad/s2/sqrt(Hz)]; of ca: that of the white jerk [rad/s3/sqrt(Hz)]
+    noise: float
+    sigma: float  # of singer: standard deviation of the acceleration [rad/s2]
+    a_max: float  # of current_statistical: largest acceleration [rad/s2]
+    floor: float  # of current_statistical: least sigma_a over a_max [-]
 
 
 def constants(name, params, **changes) -> np.ndarray:
-    """Return the constants (1,) of the model of this name with its parameters; changes: fields of MOTION_MODEL_DTYPE
+    """Return the constants (1,) of the model of this name with its parameters; changes: fields of MotionModelRecord
     with other values."""
-    m, kind = np.zeros(1, MOTION_MODEL_DTYPE), MODEL_NAMES.index(name)
+    m, kind = MotionModelRecord.zeros(), MODEL_NAMES.index(name)
     m['kind'] = m['column'] = kind
     m['states'], m['initial_sigma'] = MODEL_ROWS[kind].states, MODEL_ROWS[kind].initial_sigma(params)
     for field, value in {**vars(params), **changes}.items():
@@ -200,7 +199,7 @@ def acceleration_variance(abar, a_max, floor):
 
 @inlined
 def mean_transition(m, T):
-    """Return the Transition that predicts the mean of X over T [s]; m: record of MOTION_MODEL_DTYPE."""
+    """Return the Transition that predicts the mean of X over T [s]; m: record of MotionModelRecord."""
     if m.kind == MODEL_CV:
         return Transition(0.0, 0.0, 0.0)
     if m.kind == MODEL_SINGER:

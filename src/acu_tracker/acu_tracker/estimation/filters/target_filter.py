@@ -12,9 +12,10 @@ is imm_ukf and the receiver measures the range:
 
 Measured rates go to the axis filters only. The prior fields of a filter hold its prediction.
 
-f, c: records of FILTER_DTYPE and of CONSTANTS_DTYPE; m: a Measurement.
+f, c: records of Filter and of Constants; m: a Measurement.
 """
 import math
+from typing import Annotated
 
 import numpy as np
 
@@ -24,26 +25,27 @@ from acu_tracker.estimation.filters.measurement import AxisInnovation, Estimate,
 from acu_tracker.geometry.motion import AxisMotion, Motion
 from pedestal_common.compiled import compiled, separate
 from pedestal_common.geometry.line_of_sight import wrap
+from pedestal_common.quantities import BothAxes, Ints
+from pedestal_common.record import Record
 
-CONSTANTS_DTYPE = np.dtype([('axis', axis_filter.CONSTANTS_DTYPE, (2,)), ('cartesian', unscented.CONSTANTS_DTYPE),
-                            ('range_share_2', 'f8'), ('wanted', 'i8', (2,))], align=True)
-"""Constants of the filter.
 
-axis, cartesian  constants of the axis filters and of the Cartesian filter
-range_share_2    square of ukf.range_share [-]
-wanted           of each axis: 1 if its kind uses the Cartesian filter
-"""
+class Constants(Record):
+    """Constants of the filter."""
+    axis: BothAxes[axis_filter.Constants]  # axis, cartesian: constants of the axis filters and of the Cartesian filter
+    cartesian: unscented.Constants
+    range_share_2: float  # square of ukf.range_share [-]
+    wanted: Annotated[Ints, (2,)]  # of each axis: 1 if its kind uses the Cartesian filter
 
-FILTER_DTYPE = np.dtype([('axis', axis_filter.FILTER_DTYPE, (2,)), ('cartesian', unscented.STATE_DTYPE),
-                         ('running', 'i8'), ('used', 'i8', (2,)), ('predicted', 'f8')], align=True)
-"""State of the filter.
 
-axis, cartesian  states of the axis filters and of the Cartesian filter
-running          1 while the Cartesian filter runs
-used             of each axis: 1 if the estimate of the Cartesian filter is used
-predicted        time by which the prior fields are predicted from the present estimate [s]; NaN if they belong to an
-                 earlier estimate
-"""
+class Filter(Record):
+    """State of the filter."""
+    axis: BothAxes[axis_filter.Filter]  # axis, cartesian: states of the axis filters and of the Cartesian filter
+    cartesian: unscented.State
+    running: int  # 1 while the Cartesian filter runs
+    used: Annotated[Ints, (2,)]  # of each axis: 1 if the estimate of the Cartesian filter is used
+    # time by which the prior fields are predicted from the present estimate [s]; NaN if they belong to an earlier
+    # estimate
+    predicted: float
 
 
 def constants(ukf, axes, noise_bandwidth) -> np.ndarray:
@@ -54,7 +56,7 @@ def constants(ukf, axes, noise_bandwidth) -> np.ndarray:
     noise_bandwidth  bandwidth of the noise of the measured angles [Hz]; 0: white noise. The Cartesian filter always
                      assumes white noise
     """
-    c = np.zeros(1, CONSTANTS_DTYPE)
+    c = Constants.zeros()
     c['axis'] = np.concatenate([axis_filter.constants(params, noise_bandwidth) for params in axes])
     c['cartesian'], c['range_share_2'] = unscented.constants(ukf), ukf.range_share**2
     c['wanted'] = [FILTER_KINDS[params.kind].cartesian for params in axes]

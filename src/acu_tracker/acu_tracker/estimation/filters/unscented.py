@@ -17,9 +17,10 @@ The angles of the points are relative to those of the centre point, so that the 
 alpha = 1, kappa = 3 - n, beta = 2 of the points no weight of the seven is negative. The covariance S of the innovation
 is then positive for every geometry.
 
-s: record of STATE_DTYPE; c: record of CONSTANTS_DTYPE; m: a Measurement; j: number of the mode, 0 CV, 1 CA.
+s: record of State; c: record of Constants; m: a Measurement; j: number of the mode, 0 CV, 1 CA.
 """
 import math
+from typing import Annotated
 
 import numpy as np
 
@@ -29,6 +30,8 @@ from acu_tracker.geometry.motion import line_of_sight, motion_of_position
 from acu_tracker.geometry.vector import Vector, dot, rotated, times
 from pedestal_common.compiled import assign, compiled
 from pedestal_common.geometry.line_of_sight import earth_angles, wrap
+from pedestal_common.quantities import BothAxes, Floats, Pair
+from pedestal_common.record import Record
 
 N = 9  # number of states n
 MODE_MODELS = motion_models.MODEL_CV, motion_models.MODEL_CA
@@ -41,27 +44,37 @@ SIGMA_POINT_WEIGHT = 0.5 / (N + LAMBDA)  # weight of each of the six points that
 CENTRE_COVARIANCE_WEIGHT = 1.0 - 6.0 * SIGMA_POINT_WEIGHT + 1.0 - ALPHA**2 + BETA
 """Weight in a covariance of the centre point, together with the twelve points that have its measurement [-]."""
 
-STATE_DTYPE = np.dtype([
-    ('x', 'f8', (2, N)), ('p', 'f8', (2, N, N)), ('mu', 'f8', (2,)),
-    ('x_prior', 'f8', (2, N)), ('p_prior', 'f8', (2, N, N)), ('mu_prior', 'f8', (2,)),
-    ('z', 'f8', (2, 3)), ('s', 'f8', (2, 3, 3)), ('g', 'f8', (2, N, 3)), ('points', 'f8', (2, 3, 3)),
-    ('weights', 'f8', (2,)), ('mean', 'f8', (N,)), ('covariance', 'f8', (N, N))], align=True)
-"""State of both modes.
 
-x, p, mu                    estimate, covariance and probability of each mode after the last measurement
-x_prior, p_prior, mu_prior  their prediction by `predict`; the prior fields
-z                           expected measurement (azimuth, elevation, range) of each mode, set by `innovation`
-s, g                        covariance of this measurement, and its covariance with X; `correct` overwrites g
-points, weights, mean, covariance  scratch
-"""
+class State(Record):
+    """State of both modes."""
+    # x, p, mu: estimate, covariance and probability of each mode after the last measurement
+    x: Annotated[Floats, (2, N)]
+    p: Annotated[Floats, (2, N, N)]
+    mu: Pair
+    x_prior: Annotated[Floats, (2, N)]  # x_prior, p_prior, mu_prior: their prediction by `predict`; the prior fields
+    p_prior: Annotated[Floats, (2, N, N)]
+    mu_prior: Pair
+    z: Annotated[Floats, (2, 3)]  # expected measurement (azimuth, elevation, range) of each mode, set by `innovation`
+    # s, g: covariance of this measurement, and its covariance with X; `correct` overwrites g
+    s: Annotated[Floats, (2, 3, 3)]
+    g: Annotated[Floats, (2, N, 3)]
+    points: Annotated[Floats, (2, 3, 3)]  # points, weights, mean, covariance: scratch
+    weights: Pair
+    mean: Annotated[Floats, (N,)]
+    covariance: Annotated[Floats, (N, N)]
 
-CONSTANTS_DTYPE = np.dtype([('models', motion_models.MOTION_MODEL_DTYPE, (2,)), ('dwell', 'f8'),
-                            ('initial_speed', 'f8'), ('initial_acceleration', 'f8')], align=True)
+
+class Constants(Record):
+    """Record."""
+    models: BothAxes[motion_models.MotionModelRecord]
+    dwell: float
+    initial_speed: float
+    initial_acceleration: float
 
 
 def constants(params) -> np.ndarray:
     """Return the constants (1,) of UkfParameters."""
-    c = np.zeros(1, CONSTANTS_DTYPE)
+    c = Constants.zeros()
     c['models']['kind'] = MODE_MODELS
     c['models']['noise'] = params.cv_noise, params.ca_noise
     c['dwell'] = params.dwell
