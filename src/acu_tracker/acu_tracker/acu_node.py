@@ -8,11 +8,12 @@ import pedestal_common.entry  # noqa: F401
 
 # isort: split
 import sys
+from collections.abc import Sequence
 
 from pedestal_common.node import unit_node
 
 
-def main(args=None):
+def main(args: Sequence[str] | None = None) -> int:
     """Run the node until it is stopped; args: arguments of the command line, None for sys.argv."""
     return unit_node.main('acu_tracker.acu_node', args)
 

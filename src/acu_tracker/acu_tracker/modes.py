@@ -3,11 +3,13 @@
 A row of pedestal_common.graph.modes.MODE_ROWS describes each mode. `next_mode` is a pure function of the present mode,
 of a request and of the Situation. `mode.mode_change` calls it and keeps the result; control_unit makes the Situation.
 """
-from collections import namedtuple
+
+from typing import NamedTuple
 
 from pedestal_common.codes import codes
 from pedestal_common.compiled import compiled
-from pedestal_common.graph.modes import MODE_ROWS, MODES
+from pedestal_common.graph.modes import MODE_ROWS as MODE_ROWS
+from pedestal_common.graph.modes import MODES as MODES
 
 Mode = codes(MODES)  # codes of the modes. Each tuple below holds one value for each mode, from its row of MODE_ROWS.
 FOLLOWS_TARGET = tuple(row.follows for row in MODE_ROWS)
@@ -52,50 +54,48 @@ NO_REQUEST, REQUEST_REFUSED, REQUEST_ACCEPTED = -1, 0, 1
 """Results of a request. NO_REQUEST is also the value of `request` in a step without a request."""
 
 
-Conditions = namedtuple('Conditions', 'nothing stow pin preset direction program tle sun lock slope track level')
-"""Conditions of the modes. Each field is Reason.NONE if its condition holds, otherwise the reason why it does not.
+class Conditions(NamedTuple):
+    """Conditions of the modes: Reason.NONE if the condition holds, otherwise the reason why it does not hold."""
+    nothing: int    # always holds
+    stow: int       # the stow angles can be reached
+    pin: int        # at least one stow pin is not out
+    preset: int     # the preset angles can be reached
+    direction: int  # a direction for the mode slave was commanded and is valid
+    program: int    # the table of the mode program, tle or sun can be followed
+    tle: int
+    sun: int
+    lock: int       # autotrack can begin
+    slope: int      # autotrack has not diverged
+    track: int      # autotrack has its target
+    level: int      # the running mode uses the signal level, and has neither failed nor lost its signal
 
-nothing    always holds
-stow       the stow angles can be reached
-pin        at least one stow pin is not out
-preset     the preset angles can be reached
-direction  a direction for the mode slave was commanded and is valid
-program, tle, sun  the table of the mode can be followed
-lock       autotrack can begin
-slope      autotrack has not diverged
-track      autotrack has its target
-level      the running mode uses the signal level, and has neither failed nor lost its signal
-"""
 
 # For each mode: index in Conditions of the condition for its entry, and of the condition whose loss ends the mode.
 _NEEDS, _ENDS = (tuple(Conditions._fields.index(name or 'nothing') for name in names)
                  for names in zip(*((row.needs, row.ends) for row in MODE_ROWS)))
 
-Situation = namedtuple('Situation', 'encoder_valid drive attitude pins handover table chosen conditions')
-"""Facts that decide on a change of mode.
 
-encoder_valid  True if the encoders of this step are valid
-drive          Reason.NONE, or why the axes may not be driven; the running mode then ends, and no mode begins
-attitude       Reason.NONE, or why the attitude of the deck is not known
-pins           Reason.NONE, or why the stow pins forbid motion
-handover       True if the running mode may hand over to another mode by itself
-table          mode whose table was followed last
-chosen         fallback: mode after the loss of the track; AUTOTRACK: stay in autotrack
-conditions     the Conditions
-"""
+class Situation(NamedTuple):
+    """Facts that decide on a change of mode."""
+    encoder_valid: bool     # True if the encoders of this step are valid
+    drive: int      # Reason.NONE, or why the axes may not be driven; the running mode then ends, and no mode begins
+    attitude: int   # Reason.NONE, or why the attitude of the deck is not known
+    pins: int       # Reason.NONE, or why the stow pins forbid motion
+    handover: bool  # True if the running mode may hand over to another mode by itself
+    table: int      # mode whose table was followed last
+    chosen: int     # fallback: mode after the loss of the track; AUTOTRACK: stay in autotrack
+    conditions: Conditions
 
 
-Decision = namedtuple('Decision', 'mode reason result')
-"""Decision of a step.
-
-mode    mode from now on
-reason  why the mode has changed, or a request was refused; Reason.NONE if neither happened
-result  result of the request: NO_REQUEST, REQUEST_REFUSED or REQUEST_ACCEPTED
-"""
+class Decision(NamedTuple):
+    """Decision of a step."""
+    mode: int       # from now on
+    reason: int     # why the mode has changed, or a request was refused; Reason.NONE if neither happened
+    result: int     # of the request: NO_REQUEST, REQUEST_REFUSED or REQUEST_ACCEPTED
 
 
 @compiled
-def obstacle(request, now):
+def obstacle(request: int, now: Situation) -> int:
     """Return the reason why a requested mode cannot be entered in a Situation `now`, or Reason.NONE."""
     if request == Mode.STANDBY:
         return Reason.NONE
@@ -113,7 +113,7 @@ def obstacle(request, now):
 
 
 @compiled
-def _end(mode, now):
+def _end(mode: int, now: Situation) -> int:
     """Return the reason why a running mode ends in a Situation `now`, or Reason.NONE.
 
     A mode cannot begin on a table that is outside the limits at present, but a running mode continues on it.
@@ -123,7 +123,7 @@ def _end(mode, now):
 
 
 @compiled
-def next_mode(mode, request, now):
+def next_mode(mode: int, request: int, now: Situation) -> Decision:
     """Return the Decision of one step in a Situation `now`; mode: the present mode; request: a mode or NO_REQUEST."""
     why, result = Reason.NONE, NO_REQUEST
     if request != NO_REQUEST:

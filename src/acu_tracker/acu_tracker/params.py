@@ -32,6 +32,7 @@ from pedestal_common.graph import nodes
 from pedestal_common.graph.graph_parameters import topic_flags
 from pedestal_common.graph.modes import MODES
 from pedestal_common.parameters import ParameterError, Parameters, choice, group, parameter, text
+from pedestal_common.quantities import Seconds
 from pedestal_common.wire.commands import SCHEDULE_DOC, schedule
 
 
@@ -52,7 +53,7 @@ class AxisParameters(Parameters):
     shaper: ShaperParameters = group(ShaperParameters)
     limits: LimitsParameters = group(LimitsParameters)
 
-    def check(self):
+    def check(self) -> None:
         """Raise ParameterError if stow or preset is outside the limits, or the shaper exceeds them."""
         for name in ('stow', 'preset'):
             if not self.limits.low <= getattr(self, name) <= self.limits.high:
@@ -121,7 +122,7 @@ class AcuParameters(SharedParameters):
     azimuth: AxisParameters = group(AxisParameters)
     elevation: ElevationParameters = group(ElevationParameters)
 
-    def check_graph(self, beams, lockstep):
+    def check_graph(self, beams: int, lockstep: bool) -> None:
         """Raise ParameterError if the controllers do not suit the drive.
 
         beams: number of electronic beams of the drive, 0 for a drive with motors. An array (beams > 0) needs the
@@ -138,7 +139,7 @@ class AcuParameters(SharedParameters):
             raise ParameterError('stow_pins = true: must be false: the drive is an array')
 
     @property
-    def reaction(self):
+    def reaction(self) -> Seconds:
         """Reaction time of an axis in front of a limit [s]: e tau.
 
         e is Euler's number. tau is the delay of a command plus two periods: one until the effect of the command is
@@ -147,7 +148,7 @@ class AcuParameters(SharedParameters):
         """
         return math.e * (self.command_delay + 2.0 * self.period)
 
-    def _check_travel(self):
+    def _check_travel(self) -> None:
         """Raise ParameterError if an axis needs more than half its travel to brake from its full rate.
 
         Raise it also if the stow angles or the preset angles are below the floor.
@@ -167,7 +168,7 @@ class AcuParameters(SharedParameters):
                 raise ParameterError(f'elevation.{name} = {E:g} rad: is below the floor, {lowest:g} rad at '
                                      f'azimuth.{name} = {A:g} rad')
 
-    def check(self):
+    def check(self) -> None:
         """Raise ParameterError for parameters that do not go together.
 
         Each delay must fit into the histories of past steps. A notch must be below half the step rate. An attitude

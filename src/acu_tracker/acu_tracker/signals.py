@@ -57,15 +57,15 @@ INPUT_TOPICS = nodes.row('acu').reads  # topics that the control unit reads
 
 class Inputs(Record):
     """Inputs of a step: the numbers of INPUT_TOPICS (inputs.fields, topics.TOPICS), and what the unit adds."""
-    position: Pair
-    velocity: Pair
-    torque: Pair
-    error_came: Bit
+    position: Pair              # encoder angles [rad]
+    velocity: Pair              # [rad/s]
+    torque: Pair                # of the drive on the load [Nm]
+    error_came: Bit             # 1 in a step in which a message of the receiver came
     error_stamp: Seconds
     cross_elevation: Radians
     elevation: Radians
     cn0_dbhz: DecibelHertz
-    error_rate: Pair
+    error_rate: Pair            # of the errors [rad/s]
     error_rate_sigma: RadiansPerSecond
     range: Meters
     range_variance: float       # [m2]
@@ -78,63 +78,64 @@ class Inputs(Record):
     drive: int                  # code of adu/state
     pins: int                   # code of adu/stow_pins
     stamp: Seconds              # t_k of the step
-    encoder_valid: Bit         # 1: angles have come
-    error_valid: Bit           # 1: the receiver is locked and has published an error
-    stabilised: Bit            # 1: the pedestal stands on a ship
-    attitude_valid: Bit        # 1: an attitude has come
-    aligning: Bit              # 1: the INS is still aligning
-    drive_ready: Bit           # 1: the drive follows commands
+    encoder_valid: Bit          # 1: angles have come
+    error_valid: Bit            # 1: the receiver is locked and has published an error
+    stabilised: Bit             # 1: the pedestal stands on a ship
+    attitude_valid: Bit         # 1: an attitude has come
+    aligning: Bit               # 1: the INS is still aligning
+    drive_ready: Bit            # 1: the drive follows commands
     # for each mode that follows a table: Reason.NONE, or why there is no table
     unpredicted: Annotated[Ints, (sum(row.table for row in MODE_ROWS),)]
-    gap: Bit                   # 1: rows of the program are missing at t_k
-    turnaround: Bit            # 1: the last segment was refused, its turnaround is too fast
+    gap: Bit                    # 1: rows of the program are missing at t_k
+    turnaround: Bit             # 1: the last segment was refused, its turnaround is too fast
     preset: Pair                # new preset, deck angles [rad]
-    preset_valid: Bit          # 1: it came before this step
+    preset_valid: Bit           # 1: it came before this step
 
 
 class Outputs(Record):
     """Outputs of a step."""
-    mode: int
-    reason: int  # codes of modes.MODES and modes.REASONS
-    rate: Pair
-    torque: Pair  # rate command [rad/s], feed-forward torque [Nm]
-    estimate: Annotated[Floats, (2, 3)]  # of the target at t_k: earth angle, rate, acceleration;
-    reference: Annotated[Floats, (2, 3)]  # encoder angle, rate, acceleration at t_k; for a beam: the
-    covariance: Annotated[Floats, (2, 3)]  # of the estimate: variance of the angle, covariance, variance
+    mode: int                   # code of modes.MODES
+    reason: int                 # code of modes.REASONS
+    rate: Pair                  # rate command [rad/s]
+    torque: Pair                # feed-forward torque [Nm]
+    estimate: Annotated[Floats, (2, 3)]     # of the target at t_k: earth angle, rate, acceleration; NaN: no estimate
+    # encoder angle, rate, acceleration at t_k; for a beam: the command at t_m, the middle of its interval
+    reference: Annotated[Floats, (2, 3)]
+    covariance: Annotated[Floats, (2, 3)]   # of the estimate: variance of the angle, covariance, variance of the rate
     probability: Annotated[Floats, (2, len(COLUMN_NAMES))]  # of the motion models COLUMN_NAMES
-    innovation: Pair
-    rate_innovation: Pair  # of the angle and of the rate; NaN: no error
-    innovation_sigma: Pair  # predicted 1-sigma of the innovation of the angle [rad]
-    nis: Pair
-    gated: int  # normalised innovation squared; number of gated errors so far
-    rates_gated: int
-    ranges_gated: int  # numbers of gated rates and ranges so far
-    coasting: int
-    locked: int
-    blocked: int
-    invalid_input: int  # flags; bits of Flag
-    time_to_limit: Pair  # time to the next limit at the present rates [s]; inf: never
-    alarms: int  # number of changes of the list of alarms
-    pins: int
-    pins_wrong: int  # code of acu/stow_pins; bits of the axes whose pin failed
+    innovation: Pair            # of the angle [rad]; NaN: no error
+    rate_innovation: Pair       # of the rate [rad/s]; NaN: no error
+    innovation_sigma: Pair      # predicted 1-sigma of the innovation of the angle [rad]
+    nis: Pair                   # normalised innovation squared
+    gated: int                  # number of gated errors so far
+    rates_gated: int            # number of gated rates so far
+    ranges_gated: int           # number of gated ranges so far
+    coasting: Bit
+    locked: Bit
+    blocked: Bit
+    invalid_input: int          # bits of Flag
+    time_to_limit: Pair         # time to the next limit at the present rates [s]; inf: never
+    alarms: int                 # number of changes of the list of alarms
+    pins: int                   # code of acu/stow_pins
+    pins_wrong: int             # bits of the axes whose pin failed
     angle_limited: Annotated[Ints, (2,)]
     rate_limited: Annotated[Ints, (2,)]
     acceleration_limited: Annotated[Ints, (2,)]
 
 
 @compiled
-def clear(o):
-    """Reset, at the start of a step, the outputs o that a step may leave unwritten."""
-    o.coasting, o.blocked, o.invalid_input = 0, 0, 0
-    o.torque[:] = 0.0
-    o.innovation[:] = math.nan
-    o.rate_innovation[:] = math.nan
-    o.innovation_sigma[:] = math.nan
-    o.nis[:] = math.nan
-    o.estimate[:] = math.nan
-    o.covariance[:] = math.nan
-    o.probability[:] = math.nan
-    o.reference[:] = 0.0
-    o.angle_limited[:] = 0
-    o.rate_limited[:] = 0
-    o.acceleration_limited[:] = 0
+def clear(outputs: Outputs) -> None:
+    """Reset, at the start of a step, the outputs that a step may leave unwritten."""
+    outputs.coasting, outputs.blocked, outputs.invalid_input = 0, 0, 0
+    outputs.torque[:] = 0.0
+    outputs.innovation[:] = math.nan
+    outputs.rate_innovation[:] = math.nan
+    outputs.innovation_sigma[:] = math.nan
+    outputs.nis[:] = math.nan
+    outputs.estimate[:] = math.nan
+    outputs.covariance[:] = math.nan
+    outputs.probability[:] = math.nan
+    outputs.reference[:] = 0.0
+    outputs.angle_limited[:] = 0
+    outputs.rate_limited[:] = 0
+    outputs.acceleration_limited[:] = 0

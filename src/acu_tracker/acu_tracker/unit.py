@@ -7,7 +7,8 @@ the commands of clients.
 import datetime
 import functools
 import math
-import typing
+from collections.abc import Iterable, Mapping
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,18 +21,34 @@ from acu_tracker.operating import announcement, diagnosis
 from acu_tracker.operating.alarm_desk import AlarmDesk
 from acu_tracker.operating.authority import Authority
 from acu_tracker.operating.command_table import ACU_COMMANDS, ALARM_COMMAND_NAMES, ARGUMENT_SETTERS
+from acu_tracker.params import AcuParameters
 from acu_tracker.pointing import model
 from acu_tracker.pointing.params import PointingParameters
 from acu_tracker.program import segments, tables
 from acu_tracker.program.air import WEATHER_QUANTITIES, Air
-from acu_tracker.program.prediction import Predictor
+from acu_tracker.program.prediction import Predicted, Predictor
+from acu_tracker.program.program_track import ProgramTrack
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry import pointing_model
 from pedestal_common.graph import nodes, topics
-from pedestal_common.node.unit import NEVER_DUE_NS, Unit, joined
+from pedestal_common.graph.modes import Row as ModeRow
+from pedestal_common.node.unit import NEVER_DUE_NS, Diagnosis, Unit, joined
+from pedestal_common.parameters import Parameters
+from pedestal_common.quantities import (
+    AnyRecord,
+    Message,
+    Nanoseconds,
+    Pairs,
+    Radians,
+    Records,
+    Seconds,
+    Stamps,
+    Times,
+    Value,
+)
 from pedestal_common.record import Record
 from pedestal_common.wire import messages
-from pedestal_common.wire.commands import Reply, schedule
+from pedestal_common.wire.commands import Command, Reply, schedule
 from pedestal_common.wire.inputs import taking
 from pedestal_common.wire.records import NO_STAMP
 
@@ -51,15 +68,12 @@ INS_ALIGNING = topics.TOPIC_BY_NAME[INS_STATE_TOPIC].texts.index('aligning')
 
 
 class UnitRecord(Record):
-    """Memory of the control unit: state, constants, inputs and outputs of the law.
-
-    invalid: bits of signals.INVALID_INPUTS that were set since the last diagnosis.
-    """
+    """Memory of the control unit: the records of its law."""
     state: control_unit.State
     constants: control_unit.Constants
     inputs: signals.Inputs
     outputs: signals.Outputs
-    invalid: int
+    invalid: int    # bits of signals.INVALID_INPUTS that were set since the last diagnosis
 
 
 SILENCE_REFUSAL = f'no {JOINT_STATES_TOPIC}, the drive is silent'
@@ -75,93 +89,92 @@ MOTOR_LOST_ALARMS = tuple(table.ALARM_INDEX[f'{axis} motor lost'] for axis in to
 """Indices of the alarms for the silence of the drive, and of those whose report contains the text of adu/state."""
 
 
-class Memory(typing.NamedTuple):
-    """Memory of the law: a record (1,) of Record, and the tables that the modes follow."""
-    record: np.ndarray
-    tables: tables.Tables
+class Memory(NamedTuple):
+    """Memory of the law."""
+    record: Records     # a UnitRecord (1,)
+    tables: tables.Tables   # tables that the modes follow
 
 
 _take = taking(signals.INPUT_TOPICS)
 
 
 @compiled
-def decode(u, stamp, inputs):
-    """Convert the messages of a step into the inputs of the control unit.
+def decode(inputs: signals.Inputs, stamp: Nanoseconds, received: AnyRecord) -> None:
+    """Convert the messages of a step, received on the input topics, into the inputs of the control unit.
 
-    u: record of signals.Inputs.dtype; stamp: of the step [ns]; inputs: record of the input topics. An attitude stays
-    until the next one comes. A rate or a range is used only if an error has the same stamp.
+    An attitude stays until the next one comes. A rate or a range is used only if an error has the same stamp.
     """
-    _take(u, inputs)
-    error, rate, distance = inputs[ANGLE_ERROR_TOPIC], inputs[ANGLE_RATE_TOPIC], inputs[RANGE_TOPIC]
-    u.stamp, u.encoder_valid = stamp * 1e-9, 1
-    u.error_valid = 1 if u.error_came and u.cross_elevation == u.cross_elevation else 0
+    _take(inputs, received)
+    error, rate, distance = received[ANGLE_ERROR_TOPIC], received[ANGLE_RATE_TOPIC], received[RANGE_TOPIC]
+    inputs.stamp, inputs.encoder_valid = stamp * 1e-9, 1
+    inputs.error_valid = 1 if inputs.error_came and inputs.cross_elevation == inputs.cross_elevation else 0
     if rate.stamp == NO_STAMP or rate.stamp != error.stamp:
-        u.error_rate[0] = u.error_rate[1] = math.nan
+        inputs.error_rate[0] = inputs.error_rate[1] = math.nan
     if distance.stamp == NO_STAMP or distance.stamp != error.stamp:
-        u.range = math.nan
-    if inputs[ATTITUDE_TOPIC].stamp != NO_STAMP:
-        u.attitude_valid = 1
-    u.aligning, u.drive_ready = inputs[INS_STATE_TOPIC] == INS_ALIGNING, u.drive <= signals.DRIVE_READY
+        inputs.range = math.nan
+    if received[ATTITUDE_TOPIC].stamp != NO_STAMP:
+        inputs.attitude_valid = 1
+    inputs.aligning = received[INS_STATE_TOPIC] == INS_ALIGNING
+    inputs.drive_ready = inputs.drive <= signals.DRIVE_READY
 
 
 @compiled
-def encode(o, s, stamp, outputs):
+def encode(outputs: signals.Outputs, state: control_unit.State, stamp: Nanoseconds, sent: AnyRecord) -> None:
     """Convert the outputs of the control unit and the counts of its reports into the records of its messages.
 
-    o, s: records of signals.Outputs and of control_unit.State; stamp: of the step [ns]; outputs: record of
-    the output topics.
+    sent: record of the output topics.
     """
-    command, estimate, reference = outputs[RATE_COMMAND_TOPIC], outputs[ESTIMATE_TOPIC], outputs[REFERENCE_TOPIC]
-    command.stamp = estimate.stamp = reference.stamp = outputs[FILTER_TOPIC].stamp = stamp
+    command, estimate, reference = sent[RATE_COMMAND_TOPIC], sent[ESTIMATE_TOPIC], sent[REFERENCE_TOPIC]
+    command.stamp = estimate.stamp = reference.stamp = sent[FILTER_TOPIC].stamp = stamp
     for i in range(2):
-        command.velocity[i], command.effort[i] = o.rate[i], o.torque[i]
-        estimate.position[i], reference.position[i] = o.estimate[i, 0], o.reference[i, 0]
-        estimate.velocity[i], reference.velocity[i] = o.estimate[i, 1], o.reference[i, 1]
-        estimate.acceleration[i], reference.acceleration[i] = o.estimate[i, 2], o.reference[i, 2]
+        command.velocity[i], command.effort[i] = outputs.rate[i], outputs.torque[i]
+        estimate.position[i], reference.position[i] = outputs.estimate[i, 0], outputs.reference[i, 0]
+        estimate.velocity[i], reference.velocity[i] = outputs.estimate[i, 1], outputs.reference[i, 1]
+        estimate.acceleration[i], reference.acceleration[i] = outputs.estimate[i, 2], outputs.reference[i, 2]
         # In the order of topics.FILTER.
-        numbers = outputs[FILTER_TOPIC].position[i * FILTER_COLUMN_COUNT:]
-        numbers[0], numbers[1], numbers[2] = o.innovation[i], o.rate_innovation[i], o.nis[i]
-        numbers[3], numbers[4] = math.sqrt(o.covariance[i, 0]), math.sqrt(o.covariance[i, 2])
-        numbers[5] = o.covariance[i, 1] / (numbers[3] * numbers[4])
-        numbers[6] = o.innovation_sigma[i]
+        numbers = sent[FILTER_TOPIC].position[i * FILTER_COLUMN_COUNT:]
+        numbers[0], numbers[1], numbers[2] = outputs.innovation[i], outputs.rate_innovation[i], outputs.nis[i]
+        numbers[3], numbers[4] = math.sqrt(outputs.covariance[i, 0]), math.sqrt(outputs.covariance[i, 2])
+        numbers[5] = outputs.covariance[i, 1] / (numbers[3] * numbers[4])
+        numbers[6] = outputs.innovation_sigma[i]
         for j in range(MODEL_COUNT):
-            numbers[FILTER_COLUMN_COUNT - MODEL_COUNT + j] = o.probability[i, j]
-    lookahead = s.guidance.lookahead
-    (outputs[MODE_TOPIC], outputs[KEYHOLE_TOPIC], outputs[BLOCKAGE_TOPIC]) = (o.mode, lookahead.forecasts - 1,
-                                                                              lookahead.blockages - 1)
-    outputs[ALARMS_TOPIC], outputs[STOW_PINS_TOPIC] = o.alarms, o.pins
-    outputs[POINTING_TOPIC] = s.tracking.pointing.report
+            numbers[FILTER_COLUMN_COUNT - MODEL_COUNT + j] = outputs.probability[i, j]
+    lookahead = state.guidance.lookahead
+    sent[MODE_TOPIC] = outputs.mode
+    sent[KEYHOLE_TOPIC], sent[BLOCKAGE_TOPIC] = lookahead.forecasts - 1, lookahead.blockages - 1
+    sent[ALARMS_TOPIC], sent[STOW_PINS_TOPIC] = outputs.alarms, outputs.pins
+    sent[POINTING_TOPIC] = state.tracking.pointing.report
 
 
 @compiled
-def law(memory, stamp, inputs, outputs):
+def law(memory: Memory, stamp: Nanoseconds, inputs: AnyRecord, outputs: AnyRecord) -> None:
     """Run one step; the arguments are those of the law of a unit (pedestal_common.node.unit.Unit)."""
-    m = memory.record[0]
-    decode(m.inputs, stamp, inputs)
-    measurements.correct_error(m.constants.p.tracker.matrix, m.inputs)
-    control_unit.step(m.state, m.constants, m.inputs, m.outputs, memory.tables)
-    m.inputs.preset_valid = 0
-    m.invalid |= m.outputs.invalid_input
-    encode(m.outputs, m.state, stamp, outputs)
+    record = memory.record[0]
+    decode(record.inputs, stamp, inputs)
+    measurements.correct_error(record.constants.p.tracker.matrix, record.inputs)
+    control_unit.step(record.state, record.constants, record.inputs, record.outputs, memory.tables)
+    record.inputs.preset_valid = 0
+    record.invalid |= record.outputs.invalid_input
+    encode(record.outputs, record.state, stamp, outputs)
 
 
 @compiled
-def laws(memory, stamps, inputs, outputs):
+def laws(memory: Memory, stamps: Stamps, inputs: Records, outputs: Records) -> None:
     """Run `law` for arrays of stamps, inputs and outputs."""
     for k in range(len(stamps)):
         law(memory, stamps[k], inputs[k], outputs[k])
 
 
 @compiled
-def _encoder_angles(m, azimuth, elevation):
-    """Return the encoder angles [rad] of a direction; m: record of pointing_model.PointingModel.dtype."""
-    A, E, _ = pointing_model.encoder_of(m, azimuth, elevation)
+def _encoder_angles(pointing: pointing_model.PointingModel, azimuth: Radians,
+                    elevation: Radians) -> tuple[Radians, Radians]:
+    A, E, _ = pointing_model.encoder_of(pointing, azimuth, elevation)
     return A, E
 
 
 @functools.lru_cache(1)
-def _initial(parameters):
-    """Return the Record (1,) of a control unit before its first step; parameters: AcuParameters.
+def _initial(parameters: AcuParameters) -> Records:
+    """Return the UnitRecord (1,) of a control unit before its first step.
 
     The cache saves time in successive trials with equal parameters.
     """
@@ -170,11 +183,7 @@ def _initial(parameters):
 
 
 class Acu(Unit):
-    """The antenna control unit.
-
-    parameters  AcuParameters
-    reads       topics that the unit reads; with ship/imu/data among them the antenna stands on a ship
-    """
+    """The antenna control unit. If it reads ship/imu/data, the antenna stands on a ship."""
     NODE, LAWS = nodes.row('acu'), {Memory: (law, laws)}
     LIVE = ('tracker', 'azimuth', 'elevation')
     REQUESTS = (*(f'acu/{mode}' for mode in modes.MODES), 'acu/acknowledge', 'acu/reset_faults')
@@ -182,7 +191,10 @@ class Acu(Unit):
     CALLS = ('adu/emergency_stop', 'adu/reset_faults')
     MOMENTARY = (KEYHOLE_TOPIC, BLOCKAGE_TOPIC, ALARMS_TOPIC)
 
-    def __init__(self, parameters, reads):
+    parameters: AcuParameters
+    memory: Memory
+
+    def __init__(self, parameters: AcuParameters, reads: Iterable[str]) -> None:
         super().__init__(parameters, reads)
         self.memory = Memory(_initial(parameters).copy(), tables.NO_TABLES)
         self.parts['inputs']['stabilised'], self.parts['inputs']['drive_ready'] = ATTITUDE_TOPIC in self.reads, 1
@@ -193,28 +205,33 @@ class Acu(Unit):
         self.segments = segments.Segments([(axis.limits.rate, axis.limits.acceleration) for axis in (
             parameters.azimuth, parameters.elevation)])
         self.air = Air(parameters.refraction)
-        self.predictor, self.predicted = Predictor(parameters.prediction, air=self.air), {}
-        self._apparent, self._slave, self._bend_due = {}, None, NEVER_DUE_NS
-        self.offset, self._tables_valid = (0.0, 0.0, 0.0), (NEVER_DUE_NS, NO_STAMP)
+        self.predictor = Predictor(parameters.prediction, air=self.air)
+        self.predicted: dict[str, Predicted] = {}       # by name of the mode
+        # {name of the mode: (track, revision of the air, track with apparent elevations)}
+        self._apparent: dict[str, tuple[ProgramTrack, int, ProgramTrack]] = {}
+        self._slave: AnyRecord = None       # commanded direction of the mode slave; None: no direction
+        self._bend_due: Nanoseconds = NEVER_DUE_NS
+        self.offset: tuple[Seconds, Radians, Radians] = (0.0, 0.0, 0.0)     # of time, azimuth and elevation
+        self._tables_valid: tuple[Nanoseconds, Nanoseconds] = (NEVER_DUE_NS, NO_STAMP)      # since, until
         self.desk = AlarmDesk(self.parts['state'], control_unit.reset)
         self._silent, self._reset_stamp = False, -math.inf
         self.pointing, self.refused_model = parameters.pointing, ''
         self.pointing_reports = [self.pointing.report()]
 
     @property
-    def silent(self):
+    def silent(self) -> bool:
         """True if the drive is silent. Setting it raises the alarm, because without the drive no step detects it."""
         return self._silent
 
     @silent.setter
-    def silent(self, silent):
+    def silent(self, silent: bool) -> None:
         self._silent = silent
         if silent:
             stamp = self.parts['state']['stamp']
             annunciator.set_condition(self.alarms, DRIVE_SILENT_ALARM, True, stamp if math.isfinite(stamp) else 0.0)
             self.outputs[ALARMS_TOPIC] = self.alarms['revision']
 
-    def prepare_requests(self):
+    def prepare_requests(self) -> None:
         """Compile the functions behind the requests and the alarm commands, and those of the diagnosis."""
         super().prepare_requests()
         self.desk.prepare()
@@ -223,7 +240,7 @@ class Acu(Unit):
         self.diagnose()
         self.air.raised(np.zeros(2), np.zeros((2, 2)))
 
-    def configure(self, parameters):
+    def configure(self, parameters: Parameters) -> None:
         """Put new values of the LIVE parameters into the constants; the state stays as it is.
 
         A state without a step, as after a reset, begins with the pointing model that was in force, at its last terms.
@@ -233,10 +250,10 @@ class Acu(Unit):
             model.initialise(self.parts['state']['tracking']['pointing'], self.pointing.terms, self.pointing.named)
             self.pointing_reports = [self.pointing.report()]
             self.bend(None)
-        self.memory.record['constants'] = control_unit.constants(parameters)
+        self.memory.record['constants'] = control_unit.constants(self.parameters)
         self._tables_valid = NEVER_DUE_NS, NO_STAMP
 
-    def decode(self, topic, message):
+    def decode(self, topic: str, message: Message) -> None:
         """Take a message on acu/program_track, or a reading of the weather station.
 
         A bad message on acu/program_track raises ValueError; Air counts the readings that it drops. Two or more points
@@ -256,10 +273,10 @@ class Acu(Unit):
             start = messages.nanoseconds(message.header.stamp) * 1e-9
             self._append(times + start, angles)
 
-    def _append(self, times, angles):
+    def _append(self, times: Times, angles: Pairs) -> None:
         """Append a segment to the program track; raise ValueError if it is refused.
 
-        times: stamps of its rows (n,) [s]; angles: azimuth and elevation (n, 2) [rad].
+        times: stamps of its rows; angles: azimuth and elevation [rad].
         """
         state, inputs = self.parts['state'], self.parts['inputs']
         followed = state['mode']['now'] == Mode.PROGRAM
@@ -272,12 +289,12 @@ class Acu(Unit):
         self.update_tables()
 
     @property
-    def next_due(self):
-        """Time [ns] of the next command of the schedule, or of the next update of a table or of the refraction."""
+    def next_due(self) -> Nanoseconds:
+        """Time of the next command of the schedule, or of the next update of a table or of the refraction."""
         return min(super().next_due, self._tables_valid[1], self._bend_due)
 
-    def execute_due(self, stamp):
-        """Execute the scheduled commands that are due before the step of a stamp [ns].
+    def execute_due(self, stamp: Nanoseconds) -> None:
+        """Execute the scheduled commands that are due before the step of a stamp.
 
         The tables of the law are brought to this stamp before.
         """
@@ -292,23 +309,23 @@ class Acu(Unit):
         super().execute_due(stamp)
 
     @property
-    def now(self):
-        """Stamp [ns] of the last step, 0 before the first."""
+    def now(self) -> Nanoseconds:
+        """Stamp of the last step, 0 before the first."""
         stamp = float(self.parts['state']['stamp'])
         return round(stamp * 1e9) if math.isfinite(stamp) else 0
 
     @property
-    def utc(self):
-        """UTC of the last step, a datetime; None in lockstep, whose stamps are no UTC."""
+    def utc(self) -> datetime.datetime | None:
+        """UTC of the last step; None in lockstep, whose stamps are no UTC."""
         since = datetime.timedelta(microseconds=(self.epoch + self.now) // 1000)
         return datetime.datetime(1970, 1, 1) + since if self.epoch else None
 
-    def _predict_by(self, predictor):
+    def _predict_by(self, predictor: Predictor) -> None:
         """Replace the Predictor and discard its predictions."""
         self.predictor, self.predicted, self._tables_valid = predictor, {}, (NEVER_DUE_NS, NO_STAMP)
 
-    def update_tables(self, stamp=None):
-        """Bring the tables of the law to a stamp [ns]; None: the stamp of the last step.
+    def update_tables(self, stamp: Nanoseconds | None = None) -> None:
+        """Bring the tables of the law to a stamp; None: the stamp of the last step.
 
         The tables are the piece of the program track that is due, and the predictions of satellite and sun. The
         refraction is added to true directions. All are shifted by the offset that an operator has commanded.
@@ -329,7 +346,7 @@ class Acu(Unit):
                            self.offset)
             for row in tables.TABLE_MODES)))
 
-    def _apparent_track(self, row, track):
+    def _apparent_track(self, row: ModeRow, track: ProgramTrack) -> ProgramTrack:
         """Return the table of a row of TABLE_MODES with apparent elevations; the last result is kept.
 
         A new weather changes neither the first nor the last elevation of a table. The planner recognises a program by
@@ -337,26 +354,27 @@ class Acu(Unit):
         """
         if not self.air.on or not (row.predicted or self.parameters.refraction.program == 'geometric'):
             return track
-        known, revision, apparent = self._apparent.get(row.name, (None, None, None))
-        if known is not track or revision != self.air.revision:
-            before, apparent = apparent, self.air.apparent(track)
-            if known is track and len(track.times):
-                apparent.angles[[0, -1]] = before.angles[[0, -1]]
-            self._apparent[row.name] = track, self.air.revision, apparent
+        kept = self._apparent.get(row.name)
+        if kept is not None and kept[0] is track and kept[1] == self.air.revision:
+            return kept[2]
+        apparent = self.air.apparent(track)
+        if kept is not None and kept[0] is track and len(track.times):
+            apparent.angles[[0, -1]] = kept[2].angles[[0, -1]]
+        self._apparent[row.name] = track, self.air.revision, apparent
         return apparent
 
-    def bend(self, slave):
+    def bend(self, slave: AnyRecord) -> None:
         """Add the refraction to a direction of the mode slave, from now on and again every BEND_INTERVAL_S.
 
-        slave: the commanded direction, direction.Direction; None: there is no direction.
+        slave: the commanded direction.Direction; None: there is no direction.
         """
         self._slave, self._bend_due = slave, NEVER_DUE_NS
         if (slave is not None and math.isfinite(slave['stamp']) and self.air.on
                 and self.parameters.refraction.slave == 'geometric'):
             self._bend(float(slave['stamp']))
 
-    def _bend(self, t):
-        """Add the refraction to the direction of the mode slave for BEND_INTERVAL_S from t [s] on.
+    def _bend(self, t: Seconds) -> None:
+        """Add the refraction to the direction of the mode slave for BEND_INTERVAL_S from t on.
 
         Between both times the elevation moves on a straight line, which meets the next one without a step.
         """
@@ -366,7 +384,7 @@ class Acu(Unit):
         direction.set_chord(self.parts['state']['guidance']['slave'], 1, t, ends, elevations)
         self._bend_due = round(ends * 1e9) if t <= self._slave['stamp'] + self._slave['holds'] else NEVER_DUE_NS
 
-    def _check_model(self):
+    def _check_model(self) -> None:
         """Discard a model of the parameters whose date is later than now; the pedestal then counts as ideal.
 
         The date can be judged in realtime only, before the first step, when the epoch of the stamps is known.
@@ -377,10 +395,10 @@ class Acu(Unit):
             self.refused_model, self.pointing = str(error), PointingParameters()
             model.initialise(self.parts['state']['tracking']['pointing'], self.pointing.terms, False)
 
-    def take_model(self, arguments):
+    def take_model(self, arguments: Mapping[str, Value]) -> Reply:
         """Take another pointing model, gradually, and return the Reply. Raise ValueError if it is refused.
 
-        arguments: {name of a field of PointingParameters: value}.
+        arguments: by name of a field of PointingParameters.
         """
         pointing = PointingParameters(**arguments)
         pointing.check_antenna(self.parameters.antenna)
@@ -395,13 +413,13 @@ class Acu(Unit):
         return Reply(True, f'pointing model {changing.title}; it is in force in {duration:.1f} s'
                      + (f'; {unchecked}' if unchecked else ''))
 
-    def take_text(self, topic, text):
+    def take_text(self, topic: str, text: str) -> None:
         """Take the text of a text topic; the text of adu/state is also kept for the diagnosis."""
         super().take_text(topic, text)
         if topic == DRIVE_STATE_TOPIC:
             self.drive_state = text
 
-    def encode(self, topic, code):
+    def encode(self, topic: str, code: int) -> Message:
         """Return the text that a code on a text topic stands for; for acu/alarms return the message."""
         lookahead = self.parts['state']['guidance']['lookahead']
         if topic == KEYHOLE_TOPIC:
@@ -415,11 +433,11 @@ class Acu(Unit):
             return self.pointing_reports[code].text
         return modes.MODES[code] if topic == MODE_TOPIC else super().encode(topic, code)
 
-    def schedule(self):
-        """Return [(time [ns], Command)] of the parameter `commands`."""
+    def schedule(self) -> list[tuple[Nanoseconds, Command]]:
+        """Return the commands of the parameter `commands`, with their times."""
         return schedule('commands', self.parameters.commands, ACU_COMMANDS)
 
-    def execute(self, command, arguments):
+    def execute(self, command: Command, arguments: Mapping[str, Value]) -> Reply:
         """Return the Reply to a command of VERBS; a refusal states the reason and changes nothing."""
         verb, state = command.verb, self.parts['state']
         if verb == 'reset':
@@ -458,7 +476,7 @@ class Acu(Unit):
                 self.update_tables()
         return reply
 
-    def take_elements(self, line_1, line_2, omm):
+    def take_elements(self, line_1: str, line_2: str, omm: str) -> None:
         """Predict the satellite from other elements; raise ValueError for invalid elements.
 
         line_1, line_2: TLE, in which _ stands for a blank; omm: OMM in JSON.
@@ -466,30 +484,31 @@ class Acu(Unit):
         self._predict_by(self.predictor.with_elements(line_1.replace('_', ' '), line_2.replace('_', ' '), omm))
         self.update_tables()
 
-    def admit(self, command):
+    def admit(self, command: Command) -> None:
         """Raise ValueError for a command of a client, if another client holds control."""
         self.authority.admit(command)
 
-    def request(self, name):
+    def request(self, name: str) -> Reply:
         """Return the Reply to a request of a service: acu/MODE, acu/acknowledge or acu/reset_faults.
 
         A refusal states the reason.
         """
         mode = name.removeprefix('acu/')
-        m, outputs = self.parts, self.parts['outputs']
+        parts, outputs = self.parts, self.parts['outputs']
         if mode == 'reset_faults':
             return self._reset()
         if mode == 'acknowledge':
             return self.desk.acknowledge()
         if self.silent and mode != 'standby':
             return Reply(False, f'refused: {SILENCE_REFUSAL}; mode is {modes.MODES[outputs["mode"]]}')
-        m['inputs']['drive_ready'] = self.inputs[0][DRIVE_STATE_TOPIC] <= signals.DRIVE_READY
+        parts['inputs']['drive_ready'] = self.inputs[0][DRIVE_STATE_TOPIC] <= signals.DRIVE_READY
         code = modes.MODES.index(mode)
-        granted = control_unit.request(m['state'], m['constants'], m['inputs'], outputs, self.memory.tables, code)
+        granted = control_unit.request(parts['state'], parts['constants'], parts['inputs'], outputs,
+                                       self.memory.tables, code)
         refusal = '' if granted else f'refused: {self._refusal(code, outputs["reason"])}; '
         return Reply(bool(granted), f'{refusal}mode is {modes.MODES[outputs["mode"]]}')
 
-    def _reset(self):
+    def _reset(self) -> Reply:
         """Return the Reply to a reset of the latched alarms and faults; also request the reset of a drive in fault.
 
         The control unit does not reset an emergency stop of the drive: only an operator does, at adu/reset_faults.
@@ -501,15 +520,15 @@ class Acu(Unit):
             return Reply(True, f'{reply.text}; the drive reports {self.drive_state}')
         return reply
 
-    def _refusal(self, mode, reason):
-        """Return the text of the reason why a mode is refused, with its details; mode, reason: codes."""
+    def _refusal(self, mode: int, reason: int) -> str:
+        """Return the text of the reason why a mode is refused, with its details."""
         more = self.predictor.refusal_details(mode, reason, self.now * 1e-9) if mode in (Mode.TLE, Mode.SUN) else ''
         more = more or diagnosis.missing(self, diagnosis.INPUTS_OF_REASONS.get(reason, ''))
         beyond = self._beyond_limits(modes.MODES[mode]) if reason == Reason.OUTSIDE_LIMITS else ''
         return modes.REASONS[reason] + (f', {more}' if more else beyond)
 
     @property
-    def pointing_model(self):
+    def pointing_model(self) -> str:
         """The pointing model in force, in words; '' without a model."""
         state = self.parts['state']['tracking']['pointing']
         if state['report'] == topics.NO_TEXT_CODE:
@@ -518,27 +537,27 @@ class Acu(Unit):
         return f'{title}; in force from {state["ends"]:.1f} s on' if state['changing'] else title
 
     @property
-    def drive_status(self):
+    def drive_status(self) -> str:
         """State of the drive as the drive published it, or 'silent'."""
         return 'silent' if self.silent else self.drive_state
 
-    def refusals(self):
+    def refusals(self) -> dict[str, str]:
         """Return {name of a mode: text of the reason} for the modes that would be refused now."""
         if self.silent:
             return dict.fromkeys((mode for mode in modes.MODES if mode != 'standby'), SILENCE_REFUSAL)
-        m, why = self.parts, np.zeros(len(modes.MODES), int)
-        control_unit.refusals(m['state'], m['constants'], m['inputs'], self.memory.tables, why)
-        words = {code: modes.REASONS[code] for code in set(why) - {Reason.NONE}}
+        parts, why = self.parts, np.zeros(len(modes.MODES), np.int64)
+        control_unit.refusals(parts['state'], parts['constants'], parts['inputs'], self.memory.tables, why)
+        words = {code: modes.REASONS[code] for code in set(why.tolist()) - {Reason.NONE}}
         if Reason.DRIVE_NOT_READY in words:
             words[Reason.DRIVE_NOT_READY] += f': {self.drive_status}'
         for reason, name in diagnosis.INPUTS_OF_REASONS.items():
             if reason in words and (text := diagnosis.missing(self, name)):
                 words[reason] += f', {text}'
-        refused = {mode: words[code] for mode, code in zip(modes.MODES, why) if code in words}
+        refused = {mode: words[code] for mode, code in zip(modes.MODES, why.tolist()) if code in words}
         return {mode: text + self._beyond_limits(mode) if text == modes.REASONS[Reason.OUTSIDE_LIMITS] else text
                 for mode, text in refused.items()}
 
-    def _beyond_limits(self, mode):
+    def _beyond_limits(self, mode: str) -> str:
         """Return the details of the reason OUTSIDE_LIMITS for the modes preset and stow; '' for another mode."""
         p, state = self.parameters, self.parts['state']
         angles = {'preset': _encoder_angles(state['tracking']['pointing']['model'],
@@ -546,11 +565,11 @@ class Acu(Unit):
                   'stow': (p.azimuth.stow, p.elevation.stow)}.get(mode)
         return '' if angles is None else f', {diagnosis.beyond_limits(p, angles)}'
 
-    def requests_for(self, topic, text):
+    def requests_for(self, topic: str, text: str) -> list[str]:
         """Return [name of the service that requests the mode] for a text on acu/mode, else []."""
         return [f'acu/{text}'] if topic == MODE_TOPIC and text in modes.MODES else []
 
-    def diagnose(self):
+    def diagnose(self) -> Diagnosis:
         """Return the Diagnosis and clear the bits of the invalid inputs.
 
         The level is ERROR for a latched fault or invalid inputs since the last diagnosis. The level is WARN for gated
@@ -561,7 +580,7 @@ class Acu(Unit):
         return result
 
     @property
-    def calls(self):
+    def calls(self) -> tuple[str, ...]:
         """Services of the drive that the unit calls now.
 
         The unit calls the emergency stop during uncommanded motion, and the reset for a short time after a reset by an
@@ -573,18 +592,18 @@ class Acu(Unit):
         return (reset,) if 0.0 < self.parts['state']['stamp'] - self._reset_stamp < RESET_REQUEST_DURATION_S else ()
 
     @property
-    def alarms(self):
+    def alarms(self) -> AnyRecord:
         """Record of all alarms."""
         return self.desk.alarms
 
     @property
-    def faults(self):
+    def faults(self) -> tuple[str, ...]:
         """Names of the latched faults that wait for acu/reset_faults."""
         bits = control_unit.latched(self.parts['state'])
         return tuple(fault for fault in diagnosis.FAULT_TEXTS if bits >> table.ALARM_INDEX[fault] & 1)
 
     @property
-    def urgent(self):
+    def urgent(self) -> tuple[object, ...]:
         """Values whose change is published at once in the diagnostics.
 
         The values are faults, mode, silence, lock, state of the drive, pins and alignment.
@@ -594,7 +613,7 @@ class Acu(Unit):
                 outputs['locked'], inputs['drive'], inputs['pins'], inputs['aligning'])
 
     @staticmethod
-    def idle(numbers):
+    def idle(numbers: Mapping[str, Message]) -> str:
         """Return the reason why a recording does not exercise the unit, or ''; numbers: recorded numbers by topic.
 
         The reasons are a receiver that never locked, and a control unit that was never in autotrack.
@@ -604,8 +623,8 @@ class Acu(Unit):
         return '' if 'autotrack' in numbers[MODE_TOPIC] else 'the ACU was never in autotrack'
 
 
-def rows(message):
-    """Return (times since the stamp of the message (n,) [s], azimuth and elevation (n, 2) [rad]) of a JointTrajectory.
+def rows(message: Message) -> tuple[Times, Pairs]:
+    """Return (times since the stamp of the message, azimuth and elevation [rad]) of a JointTrajectory.
 
     Raise ValueError if an axis or a position is missing.
     """

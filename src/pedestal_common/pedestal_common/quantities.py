@@ -54,3 +54,4 @@ BothAxes: TypeAlias = Annotated[Sequence[_R], (2,)]     # a record of each axis:
 AnyRecord: TypeAlias = Any  # a record whose fields depend on data, as those of a node depend on its topics
 Message: TypeAlias = Any    # a ROS message, whose class is made by ROS without types
 Json: TypeAlias = Any       # what a JSON or YAML file holds; the code that takes a value from it checks the value
+Value: TypeAlias = Any      # of a parameter or of an argument of a command, whose declaration states the type

@@ -7,7 +7,7 @@ By the table an alarm may be the consequence of another alarm, its parent. The a
 cases: the condition of the parent is present, or both were raised within CAUSE_WINDOW_S. Only an alarm without a
 parent is annunciated (`report`).
 
-s: record of AlarmList; i: index of an alarm in table.ALARMS; t: stamp of the step [s].
+i is the index of an alarm in table.ALARMS, t is the stamp of the step.
 """
 from collections.abc import Sequence
 from typing import Annotated
@@ -16,6 +16,7 @@ import numpy as np
 
 from acu_tracker.alarms import machine, table
 from pedestal_common.compiled import compiled
+from pedestal_common.quantities import Bit, Records, Seconds
 from pedestal_common.record import Record
 
 ALARM_COUNT = len(table.ALARMS)
@@ -23,20 +24,20 @@ ALARM_COUNT = len(table.ALARMS)
 
 class Alarm(Record):
     """State of an alarm."""
-    state: int  # index in machine.ALARM_STATES
-    active: int  # 1 if its condition is present, after the delays
-    since: float  # last stamp at which the condition was as `active` states [s]
-    raised: float  # stamp at which the alarm was last raised [s]
-    first: int  # 1 if it was the first alarm of its burst
-    parent: int  # index of the alarm under which it stands, or NO_ALARM
-    until: float  # stamp at which a shelved alarm returns [s]
+    state: int      # index in machine.ALARM_STATES
+    active: Bit     # 1 if its condition is present, after the delays
+    since: Seconds  # last stamp at which the condition was as `active` states
+    raised: Seconds     # stamp at which the alarm was last raised
+    first: Bit      # 1 if it was the first alarm of its burst
+    parent: int     # index of the alarm under which it stands, or NO_ALARM
+    until: Seconds  # stamp at which a shelved alarm returns
 
 
 class AlarmList(Record):
     """State of all alarms."""
-    alarm: Annotated[Sequence[Alarm], (ALARM_COUNT,)]
-    burst: float  # stamp at which the last burst of alarms began [s]
-    revision: int  # number of changes of the published list
+    alarm: Annotated[Sequence[Alarm], (ALARM_COUNT,)]   # in the order of table.ALARMS
+    burst: Seconds  # stamp at which the last burst of alarms began
+    revision: int   # number of changes of the published list
 
 
 NO_ALARM = -1  # index that stands for no alarm
@@ -48,30 +49,30 @@ CAUSE_WINDOW_S = 5.0
 MAX_SHELVING_TIME_S = 86400.0  # longest time for which an alarm may be shelved [s]: a day
 
 
-def initialise(s):
-    """Begin with every alarm in the state normal and no list published; s: view of AlarmList."""
-    s['alarm']['state'] = machine.State.NORMAL
-    s['alarm']['parent'] = NO_ALARM
-    s['alarm']['since'] = s['alarm']['raised'] = s['burst'] = -np.inf
-    s['revision'] = 1
+def initialise(alarms: Records) -> None:
+    """Begin with every alarm in the state normal and no list published."""
+    alarms['alarm']['state'] = machine.State.NORMAL
+    alarms['alarm']['parent'] = NO_ALARM
+    alarms['alarm']['since'] = alarms['alarm']['raised'] = alarms['burst'] = -np.inf
+    alarms['revision'] = 1
 
 
 @compiled
-def restart(s, t):
-    """Restart the delays at t [s], after a gap between steps."""
+def restart(alarms: AlarmList, t: Seconds) -> None:
+    """Restart the delays at t, after a gap between steps."""
     for i in range(ALARM_COUNT):
-        s.alarm[i].since = t
+        alarms.alarm[i].since = t
 
 
 @compiled
-def _parent(s, i, t):
+def _parent(alarms: AlarmList, i: int, t: Seconds) -> int:
     """Return the index of the parent of alarm i, or NO_ALARM.
 
     The parent is the first possible cause in the table that is listed, not shelved, and present or raised within
     CAUSE_WINDOW_S.
     """
     for j in range(i):
-        cause = s.alarm[j]
+        cause = alarms.alarm[j]
         if table.CAUSE_BITS[i] >> j & 1 and machine.IS_ANNUNCIATED[cause.state] and (
                 cause.active or t - cause.raised <= CAUSE_WINDOW_S):
             return j
@@ -79,136 +80,133 @@ def _parent(s, i, t):
 
 
 @compiled
-def _raised(s, i, t):
+def _raised(alarms: AlarmList, i: int, t: Seconds) -> None:
     """Note that alarm i has been raised: set its first-out mark and its parent.
 
     Alarm i also becomes the parent of its recent consequences, if these have no parent yet.
     """
-    a = s.alarm[i]
-    a.first = t - s.burst > FIRST_OUT_WINDOW_S
-    if a.first:
-        s.burst = t
-    a.raised, a.parent = t, _parent(s, i, t)
+    alarm = alarms.alarm[i]
+    alarm.first = t - alarms.burst > FIRST_OUT_WINDOW_S
+    if alarm.first:
+        alarms.burst = t
+    alarm.raised, alarm.parent = t, _parent(alarms, i, t)
     for k in range(i + 1, ALARM_COUNT):
-        other = s.alarm[k]
+        other = alarms.alarm[k]
         if (table.CAUSE_BITS[k] >> i & 1 and other.parent == NO_ALARM and machine.IS_ANNUNCIATED[other.state]
                 and t - other.raised <= CAUSE_WINDOW_S):
             other.parent = i
 
 
 @compiled
-def _enter(s, i, state, t):
+def _enter(alarms: AlarmList, i: int, state: int, t: Seconds) -> None:
     """Put alarm i into another state of machine.ALARM_STATES."""
-    a = s.alarm[i]
-    if machine.IS_LISTED[a.state] or machine.IS_LISTED[state]:
-        s.revision += 1
-    a.state = state
+    alarm = alarms.alarm[i]
+    if machine.IS_LISTED[alarm.state] or machine.IS_LISTED[state]:
+        alarms.revision += 1
+    alarm.state = state
     if state == machine.State.UNACKNOWLEDGED:
-        _raised(s, i, t)
+        _raised(alarms, i, t)
 
 
 @compiled
-def apply_event(s, i, event, t):
-    """Apply an event of machine.ALARM_EVENTS to alarm i at t [s]. Return True if its state accepts the event."""
-    before = s.alarm[i].state
+def apply_event(alarms: AlarmList, i: int, event: int, t: Seconds) -> bool:
+    """Apply an event of machine.ALARM_EVENTS to alarm i at t. Return True if its state accepts the event."""
+    before = alarms.alarm[i].state
     after = machine.next_state(before, event, table.LATCHED_FLAGS[i])
     if after != before and after != machine.EVENT_REFUSED:
-        _enter(s, i, after, t)
+        _enter(alarms, i, after, t)
     return after != machine.EVENT_REFUSED
 
 
 @compiled
-def _delayed(a, on, t, delay):
-    """Set a.active to `on` (the condition is present or not at t) after it has been so for a delay [s].
-
-    a: record of Alarm.
-    """
-    if on == a.active:
-        a.since = t
-    elif t - a.since >= delay:
-        a.active, a.since = on, t
+def _delayed(alarm: Alarm, on: bool, t: Seconds, delay: Seconds) -> None:
+    """Set `active` to `on` (the condition is present or not at t) after it has been so for a delay."""
+    if on == alarm.active:
+        alarm.since = t
+    elif t - alarm.since >= delay:
+        alarm.active, alarm.since = on, t
 
 
 @compiled
-def update(s, t, conditions, judged):
-    """Run one step at t [s].
+def update(alarms: AlarmList, t: Seconds, conditions: int, judged: int) -> None:
+    """Run one step at t.
 
     conditions: bits of the alarms whose condition is present; judged: bits of the alarms that have a meaning in this
     step. The other alarms are suppressed.
     """
     for i in range(ALARM_COUNT):
-        a = s.alarm[i]
+        alarm = alarms.alarm[i]
         on, is_judged = conditions & judged & 1 << i != 0, judged & 1 << i != 0
         usual = machine.State.NORMAL if is_judged else machine.State.SUPPRESSED_BY_DESIGN
-        if not on and a.active == 0 and a.state == usual:
+        if not on and alarm.active == 0 and alarm.state == usual:
             # This avoids the work below in the usual case, in which nothing would change.
-            a.since = t
+            alarm.since = t
             continue
-        _delayed(a, on, t, table.ON_DELAYS_S[i] if on else table.OFF_DELAYS_S[i])
-        if a.state == machine.State.SHELVED and t >= a.until:
-            apply_event(s, i, machine.Event.UNSHELVE, t)
-        apply_event(s, i, machine.Event.RELEASE if is_judged else machine.Event.SUPPRESS, t)
-        apply_event(s, i, machine.Event.RAISE if a.active else machine.Event.CLEAR, t)
+        _delayed(alarm, on, t, table.ON_DELAYS_S[i] if on else table.OFF_DELAYS_S[i])
+        if alarm.state == machine.State.SHELVED and t >= alarm.until:
+            apply_event(alarms, i, machine.Event.UNSHELVE, t)
+        apply_event(alarms, i, machine.Event.RELEASE if is_judged else machine.Event.SUPPRESS, t)
+        apply_event(alarms, i, machine.Event.RAISE if alarm.active else machine.Event.CLEAR, t)
 
 
 @compiled
-def active_parent(s, i):
+def active_parent(alarms: AlarmList, i: int) -> int:
     """Return the index of the parent of alarm i, if the parent is listed and not shelved, else NO_ALARM."""
-    parent = s.alarm[i].parent
-    if parent != NO_ALARM and machine.IS_ANNUNCIATED[s.alarm[parent].state]:
+    parent = alarms.alarm[i].parent
+    if parent != NO_ALARM and machine.IS_ANNUNCIATED[alarms.alarm[parent].state]:
         return parent
     return NO_ALARM
 
 
 @compiled
-def acknowledge(s, i, t):
+def acknowledge(alarms: AlarmList, i: int, t: Seconds) -> bool:
     """Acknowledge alarm i and all alarms that stand under it. Return True if one of them waited for it."""
-    done = apply_event(s, i, machine.Event.ACKNOWLEDGE, t)
+    done = apply_event(alarms, i, machine.Event.ACKNOWLEDGE, t)
     for k in range(i + 1, ALARM_COUNT):
         top = k
         while top != NO_ALARM and top != i:
-            top = active_parent(s, top)
+            top = active_parent(alarms, top)
         if top == i:
-            done |= apply_event(s, k, machine.Event.ACKNOWLEDGE, t)
+            done |= apply_event(alarms, k, machine.Event.ACKNOWLEDGE, t)
     return done
 
 
 @compiled
-def shelve(s, i, t, seconds):
-    """Shelve alarm i, in any state, for some seconds from t [s] on."""
-    s.alarm[i].until = t + seconds
-    s.revision += 1
-    apply_event(s, i, machine.Event.SHELVE, t)
+def shelve(alarms: AlarmList, i: int, t: Seconds, seconds: Seconds) -> None:
+    """Shelve alarm i, in any state, for some seconds from t on."""
+    alarms.alarm[i].until = t + seconds
+    alarms.revision += 1
+    apply_event(alarms, i, machine.Event.SHELVE, t)
 
 
 @compiled
-def persisting_alarm(s, without):
+def persisting_alarm(alarms: AlarmList, without: int) -> int:
     """Return the index of a latching alarm whose condition is still present, or NO_ALARM.
 
     without: bits of the alarms that are not considered.
     """
     for i in range(ALARM_COUNT):
-        alarm = s.alarm[i]
+        alarm = alarms.alarm[i]
         if table.LATCHED_FLAGS[i] and not without >> i & 1 and alarm.active and machine.IS_ANNUNCIATED[alarm.state]:
             return i
     return NO_ALARM
 
 
 @compiled
-def set_condition(s, i, there, t):
-    """Set the condition of alarm i at t [s] without its delays; there: True if the condition is present."""
-    s.alarm[i].active = there
-    apply_event(s, i, machine.Event.RAISE if there else machine.Event.CLEAR, t)
+def set_condition(alarms: AlarmList, i: int, there: bool, t: Seconds) -> None:
+    """Set the condition of alarm i at t without its delays; there: True if the condition is present."""
+    alarms.alarm[i].active = there
+    apply_event(alarms, i, machine.Event.RAISE if there else machine.Event.CLEAR, t)
 
 
 @compiled
-def reset(s, t):
+def reset(alarms: AlarmList, t: Seconds) -> bool:
     """Reset the latched alarms. Return True if there was one.
 
     The caller must make sure before that no latched alarm has its condition (`persisting_alarm`).
     """
     done = False
     for i in range(ALARM_COUNT):
-        if machine.IS_LATCHED[s.alarm[i].state]:
-            done |= apply_event(s, i, machine.Event.RESET, t)
+        if machine.IS_LATCHED[alarms.alarm[i].state]:
+            done |= apply_event(alarms, i, machine.Event.RESET, t)
     return done

@@ -3,42 +3,49 @@
 `conditions` calls them in each step and makes alarms of their results. Each condition begins above a first level and
 ends below a second level, which is half of the first unless stated otherwise.
 
-d          record of AxisDetectors of the axis
-y          angle of the load encoder [rad]
-dy         rate of the axis by the encoders of the motors [rad/s]
-T          torque of the motors on the load [Nm]
-high, low  envelope of the recent rate commands, from servo.uncommanded_motion [rad/s]
-dt         time since the previous step [s]
+y          angle of the load encoder
+dy         rate of the axis by the encoders of the motors
+T          torque of the motors on the load
+high, low  envelope of the recent rate commands, from servo.uncommanded_motion
+dt         time since the previous step
 """
 import math
 
+from acu_tracker.servo.params import FeedforwardParameters
 from pedestal_common.compiled import compiled
+from pedestal_common.quantities import (
+    Bit,
+    KilogramMeters2,
+    NewtonMeters,
+    Radians,
+    RadiansPerSecond,
+    RadiansPerSecond2,
+    Seconds,
+)
 from pedestal_common.record import Record
 
 
 class AxisDetectors(Record):
-    """State of the detectors of one axis."""
-    y: float
-    dy: float  # of the previous step [rad], [rad/s]; NaN: no value
-    mismatch: float
-    # disagrees, stuck, immobile, overloaded, behind, moves, oscillates: 1 while the condition of a detector is present
-    # of `disagreement` [rad]
-    disagrees: int
-    turned: float
-    moved: float
-    stuck: int  # of motors and encoder, in this test [rad]
-    immobile: int
-    mean_torque: float  # mean of the absolute torque [Nm]
-    overloaded: int
-    resisted: float  # time for which a brake has resisted the motors [s] of `brake_not_released`
-    work: float  # work of the load on the motors [J]
-    pushed: float  # direction of the torque during a gust: 1 or -1; 0 without a gust
-    behind: int
-    moves: int
-    e: float  # last following error other than 0 [rad]
-    area: float  # area of the present half wave of the following error [rad s]
-    half_waves: float  # number of half waves, which decays
-    oscillates: int  # of `oscillation` [rad], [rad s], [-]
+    """State of the detectors of one axis. A Bit is 1 while the condition of its detector is present."""
+    y: Radians              # angle of the load encoder in the previous step; NaN: no value
+    dy: RadiansPerSecond    # rate by the encoders of the motors in the previous step
+    mismatch: Radians       # decaying sum of the differences between encoder and motors, of `disagreement`
+    disagrees: Bit
+    turned: Radians         # travel of the motors in the present test of `encoder_stuck`
+    moved: Radians          # travel of the encoder in this test
+    stuck: Bit
+    immobile: Bit
+    mean_torque: NewtonMeters   # mean of the absolute torque
+    overloaded: Bit
+    resisted: Seconds       # time for which a brake has resisted the motors, of `brake_not_released`
+    work: float             # work of the load on the motors [J]
+    pushed: float           # direction of the torque during a gust: 1 or -1; 0 without a gust
+    behind: Bit
+    moves: Bit
+    e: Radians              # last following error other than 0
+    area: float             # area of the present half wave of the following error [rad s]
+    half_waves: float       # number of half waves, which decays
+    oscillates: Bit
 
 
 MAX_STEP_MISMATCH_RAD = 3e-3
@@ -117,7 +124,7 @@ OSCILLATION_HALF_WAVES = 10.0
 
 
 @compiled
-def beyond(was, x, on, off):
+def beyond(was: int, x: float, on: float, off: float) -> bool:
     """Return True if x is above a level with hysteresis; NaN is not above.
 
     was: True if x was above it before; on, off: levels at which the condition begins and ends.
@@ -126,13 +133,15 @@ def beyond(was, x, on, off):
 
 
 @compiled
-def initialise(d, y, dy):
+def initialise(state: AxisDetectors, y: Radians, dy: RadiansPerSecond) -> None:
     """Begin at an angle y and a rate dy, after a gap or an invalid encoder."""
-    d.y, d.dy, d.turned, d.moved, d.mismatch, d.e, d.area, d.work = y, dy, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    state.y, state.dy, state.turned, state.moved, state.mismatch = y, dy, 0.0, 0.0, 0.0
+    state.e, state.area, state.work = 0.0, 0.0, 0.0
 
 
 @compiled
-def encoder_motor_mismatch(d, y, dy, dt, acceleration):
+def encoder_motor_mismatch(state: AxisDetectors, y: Radians, dy: RadiansPerSecond, dt: Seconds,
+                           acceleration: RadiansPerSecond2) -> Radians:
     """Return x, the difference between the motions of encoder and motors in this step [rad].
 
         x = y - y' - (dy + dy') dt / 2;    y', dy': values of the previous step
@@ -141,45 +150,45 @@ def encoder_motor_mismatch(d, y, dy, dt, acceleration):
     may then have moved by acceleration dt^2 / 4 more than the formula gives. The function subtracts this uncertainty
     from |x|.
     """
-    x = y - d.y - 0.5 * (dy + d.dy) * dt
+    x = y - state.y - 0.5 * (dy + state.dy) * dt
     return math.copysign(max(abs(x) - 0.25 * acceleration * dt * dt, 0.0), x)
 
 
 @compiled
-def encoder_jump(x):
+def encoder_jump(x: Radians) -> bool:
     """Return True if the load encoder has jumped: |x| of encoder_motor_mismatch is above MAX_STEP_MISMATCH_RAD."""
     return abs(x) > MAX_STEP_MISMATCH_RAD
 
 
 @compiled
-def encoder_stuck(d, y, dy, dt):
+def encoder_stuck(state: AxisDetectors, y: Radians, dy: RadiansPerSecond, dt: Seconds) -> bool:
     """Return True if the encoder stands still while the motors turn.
 
     A test ends when the motors have turned by STUCK_TEST_TRAVEL_RAD in one direction.
     """
-    d.turned += 0.5 * (dy + d.dy) * dt
-    d.moved += y - d.y
-    if abs(d.turned) > STUCK_TEST_TRAVEL_RAD:
-        share = abs(d.moved) / STUCK_TEST_TRAVEL_RAD
-        d.stuck = share < (FREE_TRAVEL_SHARE if d.stuck else STUCK_TRAVEL_SHARE)
-        d.turned = d.moved = 0.0
-    return d.stuck != 0
+    state.turned += 0.5 * (dy + state.dy) * dt
+    state.moved += y - state.y
+    if abs(state.turned) > STUCK_TEST_TRAVEL_RAD:
+        share = abs(state.moved) / STUCK_TEST_TRAVEL_RAD
+        state.stuck = share < (FREE_TRAVEL_SHARE if state.stuck else STUCK_TRAVEL_SHARE)
+        state.turned = state.moved = 0.0
+    return state.stuck != 0
 
 
 @compiled
-def disagreement(d, x, dt):
+def disagreement(state: AxisDetectors, x: Radians, dt: Seconds) -> bool:
     """Return True if encoder and motors have recently moved by different angles.
 
     x: result of encoder_motor_mismatch. The sum X of the differences x follows X' = x / dt - X /
     MISMATCH_TIME_CONSTANT_S. The condition begins when |X| is above MAX_MISMATCH_RAD.
     """
-    d.mismatch += x - d.mismatch * dt / MISMATCH_TIME_CONSTANT_S
-    d.disagrees = beyond(d.disagrees, abs(d.mismatch), MAX_MISMATCH_RAD, 0.5 * MAX_MISMATCH_RAD)
-    return d.disagrees != 0
+    state.mismatch += x - state.mismatch * dt / MISMATCH_TIME_CONSTANT_S
+    state.disagrees = beyond(state.disagrees, abs(state.mismatch), MAX_MISMATCH_RAD, 0.5 * MAX_MISMATCH_RAD)
+    return state.disagrees != 0
 
 
 @compiled
-def immobile(d, dy, high, low):
+def immobile(state: AxisDetectors, dy: RadiansPerSecond, high: RadiansPerSecond, low: RadiansPerSecond) -> bool:
     """Return True if the motors do not follow the recent commands.
 
     The recent commands must have one sign and be above MIN_COMMANDED_RATE_RAD_S. The axis becomes immobile when its
@@ -187,27 +196,28 @@ def immobile(d, dy, high, low):
     share, and until the commands fall below half of MIN_COMMANDED_RATE_RAD_S. A fast motion against the commands does
     not count as immobile.
     """
-    threshold = 0.5 * MIN_COMMANDED_RATE_RAD_S if d.immobile else MIN_COMMANDED_RATE_RAD_S
+    threshold = 0.5 * MIN_COMMANDED_RATE_RAD_S if state.immobile else MIN_COMMANDED_RATE_RAD_S
     # u: recent command of the smallest magnitude, if all recent commands have one sign.
     u = low if low > threshold else high
     if low <= threshold and high >= -threshold:
-        d.immobile = 0
+        state.immobile = 0
     else:
-        d.immobile = abs(dy / u) < (3.0 * IMMOBILE_RATE_SHARE if d.immobile else IMMOBILE_RATE_SHARE)
-    return d.immobile != 0
+        state.immobile = abs(dy / u) < (3.0 * IMMOBILE_RATE_SHARE if state.immobile else IMMOBILE_RATE_SHARE)
+    return state.immobile != 0
 
 
 @compiled
-def excess_torque(d, T, limit, dt):
-    """Return True if the mean of the absolute torque is above a limit [Nm]."""
+def excess_torque(state: AxisDetectors, T: NewtonMeters, limit: NewtonMeters, dt: Seconds) -> bool:
+    """Return True if the mean of the absolute torque is above a limit."""
     if math.isfinite(T):
-        d.mean_torque += (abs(T) - d.mean_torque) * min(dt / TORQUE_TIME_CONSTANT_S, 1.0)
-    d.overloaded = beyond(d.overloaded, d.mean_torque, limit, 0.5 * limit)
-    return d.overloaded != 0
+        state.mean_torque += (abs(T) - state.mean_torque) * min(dt / TORQUE_TIME_CONSTANT_S, 1.0)
+    state.overloaded = beyond(state.overloaded, state.mean_torque, limit, 0.5 * limit)
+    return state.overloaded != 0
 
 
 @compiled
-def pushed_by_wind(d, T, dy, inertia, limit, dt):
+def pushed_by_wind(state: AxisDetectors, T: NewtonMeters, dy: RadiansPerSecond, inertia: KilogramMeters2,
+                   limit: NewtonMeters, dt: Seconds) -> bool:
     """Return True if the load has moved the axis against the torque T of its motors, as only a gust does.
 
     A brake takes work from an axis and never does work on it. The work W that the load has done on the motors is
@@ -217,33 +227,34 @@ def pushed_by_wind(d, T, dy, inertia, limit, dt):
     E     kinetic energy of the axis [J]; J: `inertia` [kg m2]
     f     INERTIA_UNCERTAINTY while the axis slows down, its inverse while the axis accelerates. Therefore an inertia
           that differs from J by this factor does not look like a gust
-    limit  excess torque [Nm]
+    limit  excess torque
 
     W counts while the torque has one sign and is above WIND_TORQUE_SHARE of the limit. The result stays True as long.
     """
     least = WIND_TORQUE_SHARE * limit
-    if d.pushed * T < least:
-        d.pushed = 0.0
+    if state.pushed * T < least:
+        state.pushed = 0.0
     if not abs(T) > least:
-        d.work = 0.0
+        state.work = 0.0
         return False
-    energy = 0.5 * inertia * (dy * dy - d.dy * d.dy)
+    energy = 0.5 * inertia * (dy * dy - state.dy * state.dy)
     factor = INERTIA_UNCERTAINTY if energy < 0.0 else 1.0 / INERTIA_UNCERTAINTY
-    d.work = max(d.work - T * dy * dt + factor * energy, 0.0)
-    if d.work > limit * MIN_GIVE_RAD:
-        d.pushed = math.copysign(1.0, T)
-    return d.pushed != 0.0
+    state.work = max(state.work - T * dy * dt + factor * energy, 0.0)
+    if state.work > limit * MIN_GIVE_RAD:
+        state.pushed = math.copysign(1.0, T)
+    return state.pushed != 0.0
 
 
 @compiled
-def resists(T, dy, high, low, friction):
+def resists(T: NewtonMeters, dy: RadiansPerSecond, high: RadiansPerSecond, low: RadiansPerSecond,
+            friction: NewtonMeters) -> bool:
     """Return True if an axis with excess torque stands in spite of its commands, or moves with an even larger torque.
 
     The axis stands if its rate is below IMMOBILE_RATE_SHARE of the smallest recent command. Commands and torque must
     have one sign, and the commands must be above STANDSTILL_RATE_RAD_S. The axis moves if its motors move it at more
     than MIN_DRAG_RATE_RAD_S; the torque must then be above DRAG_TORQUE_RATIO.
 
-    friction: Coulomb friction [Nm].
+    friction: Coulomb friction.
     """
     if abs(dy) > MIN_DRAG_RATE_RAD_S and abs(T) > DRAG_TORQUE_RATIO * friction:
         return T * dy > 0.0
@@ -252,59 +263,62 @@ def resists(T, dy, high, low, friction):
 
 
 @compiled
-def brake_not_released(d, T, dy, high, low, p, dt):
+def brake_not_released(state: AxisDetectors, T: NewtonMeters, dy: RadiansPerSecond, high: RadiansPerSecond,
+                       low: RadiansPerSecond, params: FeedforwardParameters, dt: Seconds) -> bool:
     """Return True if a brake resists the motors of an axis with excess torque, and no gust explains the torque.
 
-    p: record of FeedforwardParameters. The result stays True as long as the excess torque.
+    The result stays True as long as the excess torque.
     """
-    limit = EXCESS_TORQUE_RATIO * p.friction
-    pushed = pushed_by_wind(d, T, dy, p.inertia, limit, dt)
-    if not excess_torque(d, T, limit, dt):
-        d.resisted = 0.0
-    elif not pushed and resists(T, dy, high, low, p.friction):
-        d.resisted += dt
-    return d.resisted > MIN_RESISTED_TIME_S and not pushed
+    limit = EXCESS_TORQUE_RATIO * params.friction
+    pushed = pushed_by_wind(state, T, dy, params.inertia, limit, dt)
+    if not excess_torque(state, T, limit, dt):
+        state.resisted = 0.0
+    elif not pushed and resists(T, dy, high, low, params.friction):
+        state.resisted += dt
+    return state.resisted > MIN_RESISTED_TIME_S and not pushed
 
 
 @compiled
-def moves(d, dy):
+def moves(state: AxisDetectors, dy: RadiansPerSecond) -> bool:
     """Return True if an axis moves."""
-    d.moves = beyond(d.moves, abs(dy), STANDSTILL_RATE_RAD_S, 0.5 * STANDSTILL_RATE_RAD_S)
-    return d.moves != 0
+    state.moves = beyond(state.moves, abs(dy), STANDSTILL_RATE_RAD_S, 0.5 * STANDSTILL_RATE_RAD_S)
+    return state.moves != 0
 
 
 @compiled
-def opposes_command(dy, high, low, threshold):
+def opposes_command(dy: RadiansPerSecond, high: RadiansPerSecond, low: RadiansPerSecond,
+                    threshold: RadiansPerSecond) -> bool:
     """Return True if the axis moves against its recent commands, which all had one sign.
 
-    threshold: rate above which a motion against the commands counts [rad/s].
+    threshold: rate above which a motion against the commands counts.
     """
     return (dy > threshold and high <= 0.0 and low < -STANDSTILL_RATE_RAD_S
             or dy < -threshold and low >= 0.0 and high > STANDSTILL_RATE_RAD_S)
 
 
 @compiled
-def following_error(d, e, limit):
-    """Return True if the following error e [rad] is above FOLLOWING_ERROR_BEAMWIDTHS; limit: the beamwidth [rad]."""
-    d.behind = beyond(d.behind, abs(e), FOLLOWING_ERROR_BEAMWIDTHS * limit, 0.5 * FOLLOWING_ERROR_BEAMWIDTHS * limit)
-    return d.behind != 0
+def following_error(state: AxisDetectors, e: Radians, beamwidth: Radians) -> bool:
+    """Return True if the following error e is above FOLLOWING_ERROR_BEAMWIDTHS."""
+    level = FOLLOWING_ERROR_BEAMWIDTHS * beamwidth
+    state.behind = beyond(state.behind, abs(e), level, 0.5 * FOLLOWING_ERROR_BEAMWIDTHS * beamwidth)
+    return state.behind != 0
 
 
 @compiled
-def oscillation(d, e, dt):
-    """Return True if the following error e [rad] oscillates.
+def oscillation(state: AxisDetectors, e: Radians, dt: Seconds) -> bool:
+    """Return True if the following error e oscillates.
 
     The law counts half waves with an area (time integral) above MIN_HALF_WAVE_AREA. The count decays with the time
     constant OSCILLATION_WINDOW_S. The error oscillates if the count is above OSCILLATION_HALF_WAVES (T. Haegglund, A
     control-loop performance monitor, Control Engineering Practice 3, 1995).
     """
-    d.half_waves *= math.exp(-dt / OSCILLATION_WINDOW_S)
-    if e * d.e < 0.0:
-        if d.area > MIN_HALF_WAVE_AREA:
-            d.half_waves = min(d.half_waves + 1.0, 2.0 * OSCILLATION_HALF_WAVES)
-        d.area = 0.0
+    state.half_waves *= math.exp(-dt / OSCILLATION_WINDOW_S)
+    if e * state.e < 0.0:
+        if state.area > MIN_HALF_WAVE_AREA:
+            state.half_waves = min(state.half_waves + 1.0, 2.0 * OSCILLATION_HALF_WAVES)
+        state.area = 0.0
     if e != 0.0:
-        d.e = e
-    d.area += abs(e) * dt
-    d.oscillates = beyond(d.oscillates, d.half_waves, OSCILLATION_HALF_WAVES, 0.5 * OSCILLATION_HALF_WAVES)
-    return d.oscillates != 0
+        state.e = e
+    state.area += abs(e) * dt
+    state.oscillates = beyond(state.oscillates, state.half_waves, OSCILLATION_HALF_WAVES, 0.5 * OSCILLATION_HALF_WAVES)
+    return state.oscillates != 0

@@ -55,7 +55,7 @@ IS_LATCHED = (False, False, False, False, True, True, False, False)  # states th
 
 
 @compiled
-def next_state(state, event, latched):
+def next_state(state: int, event: int, latched: int) -> int:
     """Return the state after an event, or EVENT_REFUSED if the state does not accept the event.
 
     latched: 1 for an alarm that latches by its row of the table.

@@ -3,10 +3,13 @@
 An alarm is listed in every state except normal and suppressed. Annunciated alarms, at most MAX_ANNUNCIATED_ALARMS,
 come first; their consequences and the shelved alarms follow.
 
-s: view of annunciator.AlarmList; i: index of an alarm in table.ALARMS.
+`alarms` is a view of annunciator.AlarmList, i the index of an alarm in table.ALARMS.
 """
+from collections.abc import Mapping
+
 from acu_tracker.alarms import annunciator, machine, table
 from pedestal_common.node.unit import LEVEL_ERROR, LEVEL_OK, LEVEL_WARN
+from pedestal_common.quantities import AnyRecord, Message
 from pedestal_common.wire import messages
 
 MAX_ANNUNCIATED_ALARMS = 10
@@ -16,37 +19,38 @@ DIAGNOSTIC_LEVELS = {'critical': LEVEL_ERROR, 'high': LEVEL_ERROR, 'medium': LEV
 """{priority of an alarm: level of its DiagnosticStatus}."""
 
 
-def order(s):
+def order(alarms: AnyRecord) -> list[int]:
     """Return the indices of the alarms that are listed and not shelved, by priority, then by the time of raising."""
-    chosen = [i for i in range(annunciator.ALARM_COUNT) if machine.IS_ANNUNCIATED[s['alarm'][i]['state']]]
+    chosen = [i for i in range(annunciator.ALARM_COUNT) if machine.IS_ANNUNCIATED[alarms['alarm'][i]['state']]]
     return sorted(chosen, key=lambda i: (table.ALARM_PRIORITIES.index(table.ALARMS[i].priority),
-                                         s['alarm'][i]['raised'], i))
+                                         alarms['alarm'][i]['raised'], i))
 
 
-def annunciated(s):
+def annunciated(alarms: AnyRecord) -> list[int]:
     """Return the indices of the annunciated alarms, which call for the attention of an operator.
 
     The annunciated alarms are the first MAX_ANNUNCIATED_ALARMS alarms that are no consequence of another one.
     """
-    return [i for i in order(s) if annunciator.active_parent(s, i) == annunciator.NO_ALARM][:MAX_ANNUNCIATED_ALARMS]
+    causes = [i for i in order(alarms) if annunciator.active_parent(alarms, i) == annunciator.NO_ALARM]
+    return causes[:MAX_ANNUNCIATED_ALARMS]
 
 
-def listed(s):
+def listed(alarms: AnyRecord) -> list[int]:
     """Return the indices of the published alarms: first the annunciated, then their consequences, then the shelved."""
-    first = annunciated(s)
-    shelved = [i for i in range(annunciator.ALARM_COUNT) if s['alarm'][i]['state'] == machine.State.SHELVED]
-    return [*first, *(i for i in order(s) if i not in first), *shelved]
+    first = annunciated(alarms)
+    shelved = [i for i in range(annunciator.ALARM_COUNT) if alarms['alarm'][i]['state'] == machine.State.SHELVED]
+    return [*first, *(i for i in order(alarms) if i not in first), *shelved]
 
 
-def status(s, i, detail='', reason=''):
+def status(alarms: AnyRecord, i: int, detail: str = '', reason: str = '') -> Message:
     """Return the DiagnosticStatus of alarm i.
 
     detail: text with details of the fault; reason: text why the alarm is shelved; '' for none.
     """
-    alarm, row, above = s['alarm'][i], table.ALARMS[i], annunciator.active_parent(s, i)
+    alarm, row, above = alarms['alarm'][i], table.ALARMS[i], annunciator.active_parent(alarms, i)
     shelved = alarm['state'] == machine.State.SHELVED
     values = {'state': machine.ALARM_STATES[alarm['state']], 'priority': row.priority,
-              'annunciated': str(int(i in annunciated(s))), 'raised_s': f'{alarm["raised"]:.3f}',
+              'annunciated': str(int(i in annunciated(alarms))), 'raised_s': f'{alarm["raised"]:.3f}',
               'first_out': str(int(alarm['first'])),
               'cause': table.ALARM_NAMES[above] if above != annunciator.NO_ALARM else '', 'action': row.action}
     if detail:
@@ -59,10 +63,10 @@ def status(s, i, detail='', reason=''):
         values=[messages.KeyValue(key=key, value=value) for key, value in values.items()])
 
 
-def message(s, details, reasons):
+def message(alarms: AnyRecord, details: Mapping[int, str], reasons: Mapping[int, str]) -> Message:
     """Return the DiagnosticArray of the list.
 
     details, reasons: {index of an alarm: text}, for the arguments detail and reason of `status`.
     """
     return messages.DiagnosticArray(header=messages.header(''), status=[
-        status(s, i, details.get(i, ''), reasons.get(i, '')) for i in listed(s)])
+        status(alarms, i, details.get(i, ''), reasons.get(i, '')) for i in listed(alarms)])

@@ -3,10 +3,11 @@
 In the table every cause stands before its consequences. The annunciator needs this order, because it searches the
 parent of an alarm only among the rows before it.
 """
-import typing
+from typing import NamedTuple
 
 from pedestal_common.codes import bits
 from pedestal_common.graph.topics import AXES
+from pedestal_common.quantities import Seconds
 
 ALARM_PRIORITIES = ('critical', 'high', 'medium', 'low')
 
@@ -20,38 +21,27 @@ following  in a mode that follows a target
 """
 
 
-class Alarm(typing.NamedTuple):
-    """Row of ALARMS.
-
-    name         text of the alarm in messages and commands
-    priority     of ALARM_PRIORITIES
-    on_delay     time for which the condition must last before the alarm is raised [s]
-    off_delay    time for which the condition must be gone before the alarm clears [s]
-    latched      True if the alarm stays until it is reset
-    cause        names of the alarms that may cause this alarm
-    meaning      condition that is reported
-    action       recommended action of the operator
-    judged       one of JUDGED_CASES
-    """
-    name: str
-    priority: str
-    on_delay: float
-    off_delay: float
-    latched: bool
-    cause: tuple
-    meaning: str
-    action: str
-    judged: str = 'always'
+class Alarm(NamedTuple):
+    """Row of ALARMS."""
+    name: str               # in messages and commands
+    priority: str           # of ALARM_PRIORITIES
+    on_delay: Seconds       # time for which the condition must last before the alarm is raised
+    off_delay: Seconds      # time for which the condition must be gone before the alarm clears
+    latched: bool           # True if the alarm stays until it is reset
+    cause: tuple[str, ...]  # names of the alarms that may cause this alarm
+    meaning: str            # condition that is reported
+    action: str             # recommended action of the operator
+    judged: str = 'always'  # one of JUDGED_CASES
 
 
-def _of_axes(name, *columns, cause=(), judged='motors'):
+def _of_axes(name: str, priority: str, on_delay: Seconds, off_delay: Seconds, latched: bool, meaning: str, action: str,
+             cause: tuple[str, ...] = (), judged: str = 'motors') -> tuple[Alarm, ...]:
     """Return an Alarm for each axis; in the names of `cause`, '*' stands for the axis."""
-    priority, on_delay, off_delay, latched, meaning, action = columns
     return tuple(Alarm(f'{axis} {name}', priority, on_delay, off_delay, latched,
                        tuple(other.replace('*', axis) for other in cause), meaning, action, judged) for axis in AXES)
 
 
-def _both(*names):
+def _both(*names: str) -> tuple[str, ...]:
     """Return the full names of alarms of both axes; names: without the axis."""
     return tuple(f'{axis} {name}' for name in names for axis in AXES)
 

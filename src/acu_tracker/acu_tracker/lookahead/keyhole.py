@@ -8,23 +8,27 @@ The slew may turn clockwise or counter-clockwise. For each direction t1 is chose
 is the earliest possible time.
 """
 import math
-from collections import namedtuple
+from collections.abc import MutableSequence
+from typing import NamedTuple
 
 from acu_tracker.lookahead import path as paths
 from acu_tracker.lookahead import slew as slews
+from acu_tracker.lookahead.path import Path
+from acu_tracker.lookahead.slew import Slew
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry.line_of_sight import wrap
+from pedestal_common.quantities import Radians, RadiansPerSecond, RadiansPerSecond2, Seconds
 from pedestal_common.record import Record
 
 
 class SlewLimits(Record):
     """Limits of a slew."""
-    rate: float  # largest azimuth rate [rad/s]
-    acceleration: float  # acceleration of the azimuth [rad/s2]
-    low: float  # low, high: travel of the azimuth [rad]
-    high: float
-    highest: float  # largest elevation [rad]
-    half_beam: float  # half the beamwidth [rad]
+    rate: RadiansPerSecond              # largest azimuth rate
+    acceleration: RadiansPerSecond2     # of the azimuth
+    low: Radians                        # least azimuth
+    high: Radians                       # largest azimuth
+    highest: Radians                    # largest elevation
+    half_beam: Radians                  # half the beamwidth
 
 
 SLEW_CANDIDATE_COUNT, REFINEMENT_COUNT, SLEW_SAMPLE_COUNT, BISECTION_COUNT = 48, 4, 160, 24
@@ -38,43 +42,43 @@ PLAN_NO_KEYHOLE, PLAN_SLEW, PLAN_NO_WRAP, PLAN_BEYOND_PATH = range(4)
 """Outcomes of `plan`: no keyhole; a planned slew; no azimuth wrap inside the limits; a keyhole that ends beyond the
 path."""
 
-Passage = namedtuple('Passage', 'path azimuth limits after tilt')
-"""A keyhole that needs a slew.
 
-path     a completed Path
-azimuth  azimuth of the axis at the first row of the path [rad]
-limits   record of SlewLimits
-after    time from which the axis can follow the target again [s]
-tilt     rms tilt of the deck about one horizontal axis [rad]; the tilt is normally distributed. A slew follows only a
-         share of it, see _evaluate
-"""
+class Passage(NamedTuple):
+    """A keyhole that needs a slew."""
+    path: Path          # completed
+    azimuth: Radians    # azimuth of the axis at the first row of the path
+    limits: SlewLimits
+    after: Seconds      # time from which the axis can follow the target again
+    # rms tilt of the deck about one horizontal axis; the tilt is normally distributed. A slew follows only a share of
+    # it, see _evaluate
+    tilt: Radians
 
-Keyhole = namedtuple('Keyhole', 'first last needed')
-"""Keyhole of a path.
 
-first, last  rows of the path between which the axis cannot follow the target; -1: no keyhole
-needed       largest azimuth rate of the target there [rad/s]
-"""
+class Keyhole(NamedTuple):
+    """Keyhole of a path."""
+    first: int      # first and last row of the path between which the axis cannot follow the target; -1: no keyhole
+    last: int
+    needed: RadiansPerSecond    # largest azimuth rate of the target there
 
 
 @compiled
-def _fit(slew, passage, turn, t1):
-    """Fit a slew that leaves the target at t1 [s] and meets it as early as possible; return False if there is none.
+def _fit(slew: Slew, passage: Passage, turn: float, t1: Seconds) -> bool:
+    """Fit a slew that leaves the target at t1 and meets it as early as possible; return False if there is none.
 
     turn: 1 clockwise, -1 counter-clockwise. The slew meets the target not before passage.after. The function tries t2
     at the end of the path, then at passage.after. Then it bisects between `early`, which is too early, and `late`,
     which is possible. The azimuth at t1 is set within +-pi.
     """
-    path, k = passage.path, passage.limits
-    A1, v1 = paths.azimuth_at(path, t1, k.rate)
+    path, limits = passage.path, passage.limits
+    A1, v1 = paths.azimuth_at(path, t1, limits.rate)
     early, late, v = passage.after, paths.end(path), math.inf
     for i in range(BISECTION_COUNT):
         t2 = late if i == 0 else early if i == 1 else 0.5 * (early + late)
-        A2, v2 = paths.azimuth_at(path, t2, k.rate)
+        A2, v2 = paths.azimuth_at(path, t2, limits.rate)
         D = turn * (A2 - A1)
         D -= 2.0 * math.pi * math.floor(D / (2.0 * math.pi))
-        tried = slews.peak_rate(D, t2 - t1, turn * v1, turn * v2, k.acceleration)
-        if tried <= k.rate:
+        tried = slews.peak_rate(D, t2 - t1, turn * v1, turn * v2, limits.acceleration)
+        if tried <= limits.rate:
             late, v = t2, tried
             slew.t2, slew.azimuth2, slew.rate2 = t2, A1 + turn * D, v2
             if i == 1:
@@ -84,15 +88,15 @@ def _fit(slew, passage, turn, t1):
         else:
             early = t2
     slew.t1, slew.azimuth1, slew.rate1 = t1, A1, v1
-    slew.peak, slew.acceleration = turn * v, k.acceleration
+    slew.peak, slew.acceleration = turn * v, limits.acceleration
     # `slew.azimuth_at` accelerates from both ends to the peak. A slew whose peak is below the rate
     # at an end would have to decelerate first, and is rejected. The tolerance covers rounding.
-    return v >= max(turn * v1, turn * slew.rate2) - 1e-6 * k.rate
+    return v >= max(turn * v1, turn * slew.rate2) - 1e-6 * limits.rate
 
 
 @compiled
-def _unwrap(slew, path, azimuth):
-    """Put a fitted slew on the azimuth wrap of the axis; azimuth: of the axis at the first row of the path [rad]."""
+def _unwrap(slew: Slew, path: Path, azimuth: Radians) -> None:
+    """Put a fitted slew on the azimuth wrap of the axis; azimuth: of the axis at the first row of the path."""
     first = path.rows[int((slew.t1 - path.t0) / path.h), paths.AZIMUTH_COLUMN]
     revolutions = math.floor((azimuth - path.rows[0, paths.AZIMUTH_COLUMN]) / (2.0 * math.pi) + 0.5)
     start = 2.0 * math.pi * revolutions + first + wrap(slew.azimuth1 - first)
@@ -101,8 +105,8 @@ def _unwrap(slew, path, azimuth):
 
 
 @compiled
-def _fits(slew, path, low, high):
-    """Return True if an unwrapped slew and the travel of the path after it stay inside low..high [rad]."""
+def _fits(slew: Slew, path: Path, low: Radians, high: Radians) -> bool:
+    """Return True if an unwrapped slew and the travel of the path after it stay inside low..high."""
     i = min(int((slew.t2 - path.t0) / path.h) + 1, len(path.rows) - 1)
     met = path.rows[i]
     # Difference of the wraps of the slew and of the path at the row where they meet.
@@ -112,7 +116,7 @@ def _fits(slew, path, low, high):
 
 
 @compiled
-def _evaluate(slew, passage, samples):
+def _evaluate(slew: Slew, passage: Passage, samples: int) -> None:
     """Set the fields cost, loss and worst of a fitted slew; samples: number of instants at which it is evaluated.
 
     cost   integral of x^8 / (1 + x^8) over the time of the slew [s]; x: pointing offset in half beamwidths. This
@@ -124,26 +128,27 @@ def _evaluate(slew, passage, samples):
     distributed offset, which adds to the pointing offset. Therefore loss contains the error function of a distance
     over sqrt(2) standard deviations.
     """
-    k = passage.limits
+    limits = passage.limits
     T = (slew.t2 - slew.t1) / samples
     cost = loss = worst = 0.0
     for i in range(samples):
         t = slew.t1 + (i + 0.5) * T
         u, _ = paths.at(passage.path, t)
-        offset = slews.pointing_offset(slews.azimuth_at(slew, t).angle, u, k.highest)
-        x2 = (offset / k.half_beam)**2
+        offset = slews.pointing_offset(slews.azimuth_at(slew, t).angle, u, limits.highest)
+        x2 = (offset / limits.half_beam)**2
         x8 = x2 * x2 * x2 * x2
         cost += T * x8 / (1.0 + x8)
         worst = max(worst, offset)
         share = slews.true_deck_share(slew, t).angle
         scale = math.sqrt(2.0) * max(passage.tilt * (1.0 - share), 1e-9)     # 1e-9 avoids a division by zero.
-        loss += T * (1.0 - 0.5 * (math.erf((k.half_beam - offset) / scale) + math.erf((k.half_beam + offset) / scale)))
+        loss += T * (1.0 - 0.5 * (math.erf((limits.half_beam - offset) / scale)
+                                  + math.erf((limits.half_beam + offset) / scale)))
     slew.cost, slew.loss, slew.worst = cost, loss, worst
 
 
 @compiled
-def _attempt(slew, passage, turn, t1, samples):
-    """Fit, unwrap and evaluate a slew that leaves the target at t1 [s]. Return (True if there is one, its cost [s]).
+def _attempt(slew: Slew, passage: Passage, turn: float, t1: Seconds, samples: int) -> tuple[bool, Seconds]:
+    """Fit, unwrap and evaluate a slew that leaves the target at t1. Return (True if there is one, its cost).
 
     The cost is inf for a slew outside the limits of the azimuth. turn, samples: as in _fit and _evaluate.
     """
@@ -157,8 +162,8 @@ def _attempt(slew, passage, turn, t1, samples):
 
 
 @compiled
-def find(path, rate, acceleration):
-    """Return the first Keyhole of a path, where the target exceeds the azimuth rate [rad/s] or acceleration [rad/s2].
+def find(path: Path, rate: RadiansPerSecond, acceleration: RadiansPerSecond2) -> Keyhole:
+    """Return the first Keyhole of a path, where the target exceeds the azimuth rate or acceleration.
 
     Two excesses belong to two keyholes if the time between them is longer than the time of half a revolution.
     """
@@ -175,11 +180,12 @@ def find(path, rate, acceleration):
 
 
 @compiled
-def plan(slew, path, azimuth, limits, tilt, previous, planned):
+def plan(work: MutableSequence[Slew], path: Path, azimuth: Radians, limits: SlewLimits, tilt: Radians, previous: Slew,
+         planned: bool) -> int:
     """Find the keyhole of a completed Path and the best slew through it; return one of the outcomes PLAN_.
 
-    slew      records (2,) of Slew, the first for the best slew, the second for trials
-    previous  record of Slew: the previous plan, if planned is True
+    work      two slews, the first for the best slew, the second for trials
+    previous  the previous plan, if planned is True
     planned   True if there is a previous plan whose slew has not begun
     The other arguments are those of Passage.
 
@@ -193,7 +199,7 @@ def plan(slew, path, azimuth, limits, tilt, previous, planned):
     first, last, needed = find(path, limits.rate, limits.acceleration)
     if first < 0:
         return PLAN_NO_KEYHOLE
-    best, trial = slew[0], slew[1]
+    best, trial = work[0], work[1]
     t_in, t_out = path.t0 + first * path.h, path.t0 + last * path.h
     passage = Passage(path, azimuth, limits, t_out, tilt)
     own_travel = path.rows[last, paths.AZIMUTH_COLUMN] - path.rows[first, paths.AZIMUTH_COLUMN]
@@ -229,14 +235,14 @@ def plan(slew, path, azimuth, limits, tilt, previous, planned):
             if trial.cost < 0.999 * least:
                 least = trial.cost
                 trial.long_way = side
-                slew[0] = trial
+                work[0] = trial
     if least == math.inf:
         return PLAN_NO_WRAP
     turn, t1 = math.copysign(1.0, previous.peak), min(previous.t1, t_in)
     if planned and _attempt(trial, passage, turn, t1, 10 * SLEW_SAMPLE_COUNT)[1] < least + MIN_GAIN_S:
         trial.long_way = 1 if turn * own_travel < 0.0 else 0
         other = least if trial.long_way != best.long_way else other
-        slew[0] = trial
+        work[0] = trial
     top = first
     for i in range(first, last + 1):
         top = i if path.rows[i, paths.UP_COLUMN] > path.rows[top, paths.UP_COLUMN] else top

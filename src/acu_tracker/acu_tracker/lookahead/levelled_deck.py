@@ -3,48 +3,45 @@
 Because the future attitude of a rolling ship is not known, the look-ahead uses the mean attitude.
 """
 import math
-from typing import Annotated
 
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry.line_of_sight import ASHORE_ATTITUDE
-from pedestal_common.quantities import Floats
+from pedestal_common.quantities import Bit, Quaternion, Radians2, Records, Seconds
 from pedestal_common.record import Record
 
 
 class LevelledDeck(Record):
     """Mean attitude."""
-    mean: Annotated[Floats, (4,)]  # quaternion (x, y, z, w) levelled deck -> earth
-    # mean square of the tilt of the deck from the levelled deck, about both horizontal axes together [rad2]
-    spread: float
-    since: float  # stamp of the first attitude in the mean [s]
-    latest: float  # stamp of the last attitude in the mean [s]; -inf: no attitude yet
+    mean: Quaternion    # levelled deck -> earth
+    spread: Radians2    # mean square of the tilt of the deck from the levelled deck, about both horizontal axes
+    since: Seconds      # stamp of the first attitude in the mean
+    latest: Seconds     # stamp of the last attitude in the mean; -inf: no attitude yet
 
 
-def initialise(s):
-    """Start ashore, before any attitude of a ship; s (n,) of LevelledDeck."""
-    s['mean'], s['latest'] = ASHORE_ATTITUDE, -math.inf
+def initialise(deck: Records) -> None:
+    """Start ashore, before any attitude of a ship."""
+    deck['mean'], deck['latest'] = ASHORE_ATTITUDE, -math.inf
 
 
 @compiled
-def take(s, stamp, q, mean_time, restart):
-    """Add an attitude to the mean, which is an average over about mean_time [s].
+def take(deck: LevelledDeck, stamp: Seconds, q: Quaternion, mean_time: Seconds, restart: Bit) -> None:
+    """Add an attitude to the mean, which is an average over about mean_time.
 
-    stamp    of the attitude [s]
-    q        quaternion (4,) deck -> earth
-    restart  True if the mean shall begin with this attitude
+    q        deck -> earth
+    restart  1 if the mean shall begin with this attitude
 
     A mean begins as a horizontal deck with the heading of its first attitude.
     """
-    mean = s.mean
-    if restart or not s.latest > -math.inf:
-        s.since = stamp
+    mean = deck.mean
+    if restart or not deck.latest > -math.inf:
+        deck.since = stamp
         # The part (z, w) of the quaternion is its rotation about the vertical.
         length = math.hypot(q[2], q[3])
         mean[0] = mean[1] = 0.0
         mean[2], mean[3] = q[2] / length, q[3] / length
-        s.spread = 0.0
+        deck.spread = 0.0
     else:
-        T = stamp - s.latest
+        T = stamp - deck.latest
         share = T / (mean_time + T)
         dot = 0.0
         for i in range(4):
@@ -60,5 +57,5 @@ def take(s, stamp, q, mean_time, restart):
         x = 2.0 * (q[0] * q[2] - q[3] * q[1] - mean[0] * mean[2] + mean[3] * mean[1])
         y = 2.0 * (q[1] * q[2] + q[3] * q[0] - mean[1] * mean[2] - mean[3] * mean[0])
         # Until mean_time has passed, all attitudes have the same weight in the spread.
-        s.spread += T / (min(stamp - s.since, mean_time) + T) * (x * x + y * y - s.spread)
-    s.latest = stamp
+        deck.spread += T / (min(stamp - deck.since, mean_time) + T) * (x * x + y * y - deck.spread)
+    deck.latest = stamp

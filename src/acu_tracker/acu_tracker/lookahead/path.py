@@ -4,14 +4,16 @@ The path follows the program track, or the great circle on which the target move
 The rows are directions on the sky first; `to_encoders` converts them to encoder angles, by which the axes move.
 """
 import math
-from collections import namedtuple
+from typing import NamedTuple
 
+from acu_tracker.geometry.azimuth_wrap import Travel
 from acu_tracker.geometry.great_circle import turned
 from acu_tracker.geometry.vector import Vector, dot, minus, rotated_back, rotation
 from acu_tracker.program import bridge
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry import pointing_model
 from pedestal_common.geometry.line_of_sight import angles, direction, wrap
+from pedestal_common.quantities import Floats, Matrix3, Radians, RadiansPerSecond, Seconds
 
 PATH_ROW_COUNT, PATH_COLUMN_COUNT = 1025, 6  # largest number of rows of a path, and number of its columns
 
@@ -23,14 +25,15 @@ AZIMUTH         azimuth, without jumps of a turn [rad]
 LEAST, LARGEST  least and largest azimuth from this row to the end of the path, or to the end of the program [rad]
 """
 
-Path = namedtuple('Path', 'rows t0 h')
-"""Path of the target.
 
-rows  (n, 6): unit vector towards the target (FLU of the levelled deck), then three columns of the azimuth, which
-      `complete` sets
-t0    time of the first row [s]
-h     time between two rows [s]
-"""
+class Path(NamedTuple):
+    """Path of the target."""
+    # (n, 6): unit vector towards the target (FLU of the levelled deck), then three columns of the azimuth, which
+    # `complete` sets
+    rows: Floats
+    t0: Seconds     # time of the first row
+    h: Seconds      # time between two rows
+
 
 MIN_ZENITH_DISTANCE_SQUARED = 1e-12
 """Square of the horizontal part of a unit vector below which its azimuth rate is computed with this value instead [-].
@@ -40,10 +43,10 @@ This avoids a division by zero at the zenith.
 
 
 @compiled
-def along_program(path, mat, way):
-    """Write the unit vectors of the path of a bridge.Way; return the number of rows that the program covers.
+def along_program(path: Path, mat: Matrix3, way: bridge.Way) -> int:
+    """Write the unit vectors of the path of a Way; return the number of rows that the program covers.
 
-    mat (3, 3): rotation levelled deck -> earth.
+    mat: rotation levelled deck -> earth.
     """
     level = rotation(mat)
     for i in range(len(path.rows)):
@@ -55,10 +58,10 @@ def along_program(path, mat, way):
 
 
 @compiled
-def along_great_circle(path, mat, u, du):
+def along_great_circle(path: Path, mat: Matrix3, u: Vector, du: Vector) -> int:
     """Write the unit vectors of the path along a great circle; return the number of rows.
 
-    mat (3, 3): rotation levelled deck -> earth; u, du: ENU unit vector of the target at t0 and its rate [1/s].
+    mat: rotation levelled deck -> earth; u, du: ENU unit vector of the target at t0 and its rate [1/s].
     """
     W, level = math.sqrt(dot(du, du)), rotation(mat)
     for i in range(len(path.rows)):
@@ -67,19 +70,19 @@ def along_great_circle(path, mat, u, du):
 
 
 @compiled
-def to_encoders(path, m):
-    """Replace the unit vectors by those of the encoder angles; m: record of pointing_model.PointingModel.dtype."""
-    if m.exact:
+def to_encoders(path: Path, model: pointing_model.PointingModel) -> None:
+    """Replace the unit vectors by those of the encoder angles."""
+    if model.exact:
         return
     for i in range(len(path.rows)):
         azimuth, elevation = angles(path.rows[i, 0], path.rows[i, 1], path.rows[i, 2])
-        A, E, _ = pointing_model.encoder_of(m, azimuth, elevation)
+        A, E, _ = pointing_model.encoder_of(model, azimuth, elevation)
         path.rows[i, 0], path.rows[i, 1], path.rows[i, 2] = direction(A, E)
 
 
 @compiled
-def complete(path, travel):
-    """Write the azimuth columns; travel: the Travel of the azimuth from the end of the path to that of the program."""
+def complete(path: Path, travel: Travel) -> None:
+    """Write the azimuth columns; travel: of the azimuth from the end of the path to that of the program."""
     rows, n = path.rows, len(path.rows)
     before = math.atan2(-rows[0, 1], rows[0, 0])
     rows[0, AZIMUTH_COLUMN] = before
@@ -95,8 +98,8 @@ def complete(path, travel):
 
 
 @compiled
-def at(path, t):
-    """Return (unit vector u, its rate du [1/s]) of the path at t [s], interpolated linearly between the rows."""
+def at(path: Path, t: Seconds) -> tuple[Vector, Vector]:
+    """Return (unit vector u, its rate du [1/s]) of the path at t, interpolated linearly between the rows."""
     i = min(max(int((t - path.t0) / path.h), 0), len(path.rows) - 2)
     f = (t - path.t0) / path.h - i
     a = Vector(path.rows[i, 0], path.rows[i, 1], path.rows[i, 2])
@@ -106,14 +109,14 @@ def at(path, t):
 
 
 @compiled
-def azimuth_at(path, t, rate):
-    """Return (azimuth [rad], azimuth rate [rad/s]) of the path at t [s]; the rate is limited to +-rate."""
+def azimuth_at(path: Path, t: Seconds, rate: RadiansPerSecond) -> tuple[Radians, RadiansPerSecond]:
+    """Return (azimuth, azimuth rate) of the path at t; the rate is limited to +-rate."""
     u, du = at(path, t)
     dA = (u.y * du.x - u.x * du.y) / max(u.x * u.x + u.y * u.y, MIN_ZENITH_DISTANCE_SQUARED)
     return math.atan2(-u.y, u.x), min(max(dA, -rate), rate)
 
 
 @compiled
-def end(path):
-    """Return the time of the last row [s]."""
+def end(path: Path) -> Seconds:
+    """Return the time of the last row."""
     return path.t0 + (len(path.rows) - 1) * path.h

@@ -1,38 +1,41 @@
 """A slew through the keyhole: the azimuth leaves the target, slews at its limits and meets the target again.
 
-At each instant the elevation takes the angle at which the beam is closest to the target. slew: record of Slew.
+At each instant the elevation takes the angle at which the beam is closest to the target.
 """
 import math
 
 from acu_tracker.geometry.motion import AxisMotion, LineOfSight, Motion, line_of_sight, north_west_up
+from acu_tracker.geometry.vector import Vector
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry.line_of_sight import wrap
+from pedestal_common.quantities import Bit, Radians, RadiansPerSecond, RadiansPerSecond2, Seconds
 from pedestal_common.record import Record
 
 
 class Slew(Record):
-    """A planned slew. The index 1 marks its begin, where it leaves the target, the index 2 its end, where it meets it."""
-    t1: float  # t1, t2: times [s]
-    t2: float
-    azimuth1: float  # azimuth1, azimuth2: deck azimuths [rad]
-    azimuth2: float
-    rate1: float  # rate1, rate2: azimuth rates [rad/s]
-    rate2: float
-    peak: float  # largest azimuth rate, with its sign [rad/s]
-    acceleration: float  # acceleration to the peak, and deceleration from it [rad/s2]
-    culmination: float  # time of the highest point of the target on the levelled deck [s]
-    highest: float  # elevation of this point [rad]
-    needed: float  # largest azimuth rate that the target would need without a slew [rad/s]
-    loss: float  # expected time in which the target is more than half a beamwidth off the beam [s]
-    worst: float  # largest pointing offset [rad]
-    cost: float  # smooth form of the loss [s], see keyhole._evaluate
-    other_cost: float  # cost of the slew in the other direction [s]; inf if the limits forbid it
-    long_way: int  # 1 if the slew turns opposite to the target
+    """A planned slew. The index 1 marks its begin, where it leaves the target; the index 2 its end, where it meets the
+    target."""
+    t1: Seconds
+    t2: Seconds
+    azimuth1: Radians           # deck azimuths
+    azimuth2: Radians
+    rate1: RadiansPerSecond     # azimuth rates
+    rate2: RadiansPerSecond
+    peak: RadiansPerSecond      # largest azimuth rate, with its sign
+    acceleration: RadiansPerSecond2     # acceleration to the peak, and deceleration from it
+    culmination: Seconds        # time of the highest point of the target on the levelled deck
+    highest: Radians            # elevation of this point
+    needed: RadiansPerSecond    # largest azimuth rate that the target would need without a slew
+    loss: Seconds               # expected time in which the target is more than half a beamwidth off the beam
+    worst: Radians              # largest pointing offset
+    cost: Seconds               # smooth form of the loss, see keyhole._evaluate
+    other_cost: Seconds         # cost of the slew in the other direction; inf if the limits forbid it
+    long_way: Bit               # 1 if the slew turns opposite to the target
 
 
 @compiled
-def azimuth_at(slew, t):
-    """Return the AxisMotion of the azimuth at t1 <= t <= t2 [s].
+def azimuth_at(slew: Slew, t: Seconds) -> AxisMotion:
+    """Return the motion of the azimuth at t1 <= t <= t2.
 
     The azimuth accelerates to its peak rate, keeps this rate, and decelerates.
     """
@@ -50,8 +53,8 @@ def azimuth_at(slew, t):
 
 
 @compiled
-def true_deck_share(slew, t):
-    """Return the share to which a slew follows the true deck at t [s], with its derivatives [-, 1/s, 1/s2].
+def true_deck_share(slew: Slew, t: Seconds) -> AxisMotion:
+    """Return the share to which a slew follows the true deck at t, with its derivatives [-, 1/s, 1/s2].
 
     A slew is planned on the levelled deck. The target, which the slew leaves and meets, moves on the true deck.
     `motion_at` therefore adds a share of the azimuth difference between both decks to the slew. The share is 1 at the
@@ -63,10 +66,10 @@ def true_deck_share(slew, t):
 
 
 @compiled
-def best_elevation(azimuth, sight):
-    """Return the AxisMotion of the elevation at which the beam is closest to the target.
+def best_elevation(azimuth: AxisMotion, sight: LineOfSight) -> AxisMotion:
+    """Return the motion of the elevation at which the beam is closest to the target.
 
-    azimuth: AxisMotion of the beam; sight: LineOfSight to the target, FLU. An elevation above pi/2 is past the zenith.
+    azimuth: of the beam; sight: to the target, FLU. An elevation above pi/2 is past the zenith.
 
         E = atan2(z, b),  b = x cos a - y sin a,  c = db/da
 
@@ -84,10 +87,10 @@ def best_elevation(azimuth, sight):
 
 
 @compiled
-def pointing_offset(azimuth, u, highest):
-    """Return the angle [rad] between the target and a beam at a deck azimuth [rad] and the best possible elevation.
+def pointing_offset(azimuth: Radians, u: Vector, highest: Radians) -> Radians:
+    """Return the angle between the target and a beam at a deck azimuth and the best possible elevation.
 
-    u: unit vector of the target, FLU; highest: largest elevation [rad].
+    u: unit vector of the target, FLU; highest: largest elevation.
     """
     sa, ca = math.sin(azimuth), math.cos(azimuth)
     # b, c: horizontal parts of u along and across the beam; p, q: parts of u along the beam at `highest`, and across
@@ -101,21 +104,21 @@ def pointing_offset(azimuth, u, highest):
 
 
 @compiled
-def motion_at(slew, t, target, level, highest):
-    """Return (Motion of the axes at t [s] on a slew, pointing offset from the target [rad]).
+def motion_at(slew: Slew, t: Seconds, target: Motion, level: AxisMotion, highest: Radians) -> tuple[Motion, Radians]:
+    """Return (motion of the axes at t on a slew, pointing offset from the target).
 
-    target   Motion of the target on the true deck
-    level    AxisMotion of the azimuth of the target on the levelled deck of the plan
-    highest  largest elevation [rad]
+    target   of the target on the true deck
+    level    azimuth of the target on the levelled deck of the plan
+    highest  largest elevation
 
     At its ends the slew meets the target on the true deck. In its middle it is the planned slew on the levelled deck.
     """
     # D: azimuth of the target on the true deck minus that on the levelled deck.
-    azimuth, g = azimuth_at(slew, t), true_deck_share(slew, t)
+    azimuth, share = azimuth_at(slew, t), true_deck_share(slew, t)
     D = wrap(target.azimuth.angle - level.angle)
     dD, ddD = target.azimuth.rate - level.rate, target.azimuth.acceleration - level.acceleration
-    azimuth = AxisMotion(azimuth.angle + g.angle * D, azimuth.rate + (g.rate * D + g.angle * dD),
-                         azimuth.acceleration + (g.acceleration * D + 2.0 * g.rate * dD + g.angle * ddD))
+    azimuth = AxisMotion(azimuth.angle + share.angle * D, azimuth.rate + (share.rate * D + share.angle * dD),
+                         azimuth.acceleration + (share.acceleration * D + 2.0 * share.rate * dD + share.angle * ddD))
     enu = line_of_sight(target)
     sight = LineOfSight(north_west_up(enu.u), north_west_up(enu.du), north_west_up(enu.ddu))
     elevation = best_elevation(azimuth, sight)
@@ -125,10 +128,11 @@ def motion_at(slew, t, target, level, highest):
 
 
 @compiled
-def peak_rate(D, T, v1, v2, a):
-    """Return the peak rate v [rad/s] of a slew through D [rad] in T [s]; inf if T is too short.
+def peak_rate(D: Radians, T: Seconds, v1: RadiansPerSecond, v2: RadiansPerSecond,
+              a: RadiansPerSecond2) -> RadiansPerSecond:
+    """Return the peak rate v of a slew through D in T; inf if T is too short.
 
-    v1, v2: rates at begin and end [rad/s]; a: acceleration and deceleration [rad/s2]. v is the smaller root of
+    v1, v2: rates at begin and end; a: acceleration and deceleration. v is the smaller root of
 
         D = v T - (v - v1)^2 / (2 a) - (v - v2)^2 / (2 a)
     """

@@ -1,93 +1,99 @@
 """State of the mode machine: the mode of the control unit, its reason and the pending request.
 
-Only this module writes the state. m: record of ModeState, except where a function states a view of it.
+Only this module writes the state.
 """
+
+from typing import TYPE_CHECKING
 
 from acu_tracker import modes
 from acu_tracker.modes import Mode, Reason
 from pedestal_common.compiled import compiled
+from pedestal_common.quantities import Bit, Records
 from pedestal_common.record import Record
+
+if TYPE_CHECKING:
+    from acu_tracker.params import AcuParameters
 
 
 class ModeState(Record):
     """State of the mode machine."""
-    now: int  # code of the present mode
+    now: int        # code of the present mode
     # code of modes.REASONS: why the mode was entered, a request was refused, or the receiver has no signal
     reason: int
-    pending: int  # mode that is entered as soon as its conditions hold, or NO_REQUEST
-    begins: int  # 1 until the mode sends its first command to the axes
-    table: int  # mode whose table was followed last: program, tle or sun
-    fallback: int  # mode chosen for the loss of the track
+    pending: int    # mode that is entered as soon as its conditions hold, or NO_REQUEST
+    begins: Bit     # 1 until the mode sends its first command to the axes
+    table: int      # mode whose table was followed last: program, tle or sun
+    fallback: int   # mode chosen for the loss of the track
 
 
-def initialise(m, params):
-    """Begin in standby with the initial mode of AcuParameters pending; m: view of ModeState."""
-    m['pending'] = modes.MODES.index(params.initial_mode)
-    m['table'] = Mode.PROGRAM
-    choose(m, params.fallback)
+def initialise(state: Records, params: 'AcuParameters') -> None:
+    """Begin in standby with the initial mode of the parameters pending."""
+    state['pending'] = modes.MODES.index(params.initial_mode)
+    state['table'] = Mode.PROGRAM
+    choose(state, params.fallback)
 
 
-def choose(m, name):
-    """Choose the mode after the loss of the track, by its name in modes.FALLBACK_MODES; m: view of ModeState."""
-    m['fallback'] = modes.FALLBACK_MODES[name]
+def choose(state: Records, name: str) -> None:
+    """Choose the mode after the loss of the track, by its name in modes.FALLBACK_MODES."""
+    state['fallback'] = modes.FALLBACK_MODES[name]
 
 
 @compiled
-def change(m, now, request):
+def change(state: ModeState, now: modes.Situation, request: int) -> int:
     """Run the mode machine in a Situation `now`; request: a mode or NO_REQUEST. Return the result of the request.
 
     acu_tracker/modes.py defines the results.
     """
-    mode, reason, result = modes.next_mode(m.now, request, now)
+    mode, reason, result = modes.next_mode(state.now, request, now)
     if result == modes.REQUEST_ACCEPTED:
-        m.pending = modes.NO_REQUEST
+        state.pending = modes.NO_REQUEST
     if modes.FOLLOWS_TABLE[mode]:
-        m.table = mode
+        state.table = mode
     if reason != Reason.NONE:
-        m.reason = reason
-    if mode != m.now:
-        m.now, m.begins = mode, 1
+        state.reason = reason
+    if mode != state.now:
+        state.now, state.begins = mode, 1
     return result
 
 
 @compiled
-def restart(m):
+def restart(state: ModeState) -> None:
     """Let the present mode begin again."""
-    m.begins = 1
+    state.begins = 1
 
 
 @compiled
-def mark_started(m):
+def mark_started(state: ModeState) -> None:
     """Note that the mode has commanded the axes."""
-    m.begins = 0
+    state.begins = 0
 
 
 @compiled
-def set_pending(m, request):
+def set_pending(state: ModeState, request: int) -> None:
     """Set the pending mode; request: a mode or NO_REQUEST."""
-    m.pending = request
+    state.pending = request
 
 
 @compiled
-def continue_in(m, mode):
+def continue_in(state: ModeState, mode: int) -> None:
     """Continue after a silence (a time without steps) in a mode: the mode before the silence, or STANDBY."""
-    if mode != m.now:
-        m.now, m.reason = mode, Reason.SILENCE
+    if mode != state.now:
+        state.now, state.reason = mode, Reason.SILENCE
 
 
 @compiled
-def set_outage_reason(m, reason):
+def set_outage_reason(state: ModeState, reason: int) -> None:
     """Set the reason of an outage of the receiver, or NONE without an outage.
 
     NONE replaces only a reason that this function has set.
     """
-    if (reason != Reason.NONE or m.reason == Reason.BLOCKED or m.reason == Reason.KEYHOLE
-            or m.reason == Reason.TURN):
-        m.reason = reason
+    if (reason != Reason.NONE or state.reason == Reason.BLOCKED or state.reason == Reason.KEYHOLE
+            or state.reason == Reason.TURN):
+        state.reason = reason
 
 
 @compiled
-def mark_stowed(m):
+def mark_stowed(state: ModeState) -> None:
     """Replace the reason `requested` of the mode stow by `stow pins in`: the pins have gone in."""
-    if m.reason == Reason.REQUESTED:
-        m.reason = Reason.PINS_IN
+    if state.reason == Reason.REQUESTED:
+        state.reason = Reason.PINS_IN

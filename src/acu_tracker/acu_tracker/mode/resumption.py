@@ -9,47 +9,48 @@ import math
 from acu_tracker import modes
 from acu_tracker.modes import Mode
 from pedestal_common.compiled import compiled
+from pedestal_common.quantities import Bit, Records, Seconds
 from pedestal_common.record import Record
 
 
 class Resumption(Record):
-    """mode: code of the mode before the silence; until: last stamp at which it is resumed [s], -inf if no mode is kept."""
-    mode: int
-    until: float
+    """Mode that a silence interrupted."""
+    mode: int       # code of the mode before the silence
+    until: Seconds  # last stamp at which it is resumed; -inf if no mode is kept
 
 
 DRIVE_RESTART_GAP_S = 0.3
 """Shortest silence in which the drive may have been restarted [s]; only after such a silence a mode is kept."""
 
 
-def initialise(s):
-    """Begin with no interrupted mode; s: view of Resumption."""
-    s['until'] = -math.inf
+def initialise(state: Records) -> None:
+    """Begin with no interrupted mode."""
+    state['until'] = -math.inf
 
 
 @compiled
-def mode_after(s, mode, last, stamp, resume_time):
-    """Return the mode after a silence: `mode`, or STANDBY if the silence was longer than resume_time [s].
+def mode_after(state: Resumption, mode: int, last: Seconds, stamp: Seconds, resume_time: Seconds) -> int:
+    """Return the mode after a silence: `mode`, or STANDBY if the silence was longer than resume_time.
 
-    If the drive may have been restarted in the silence, keep the mode in s. last, stamp: stamps of the steps before
-    and after the silence [s].
+    If the drive may have been restarted in the silence, keep the mode. last, stamp: stamps of the steps
+    before and after the silence.
     """
     if stamp > last + resume_time:
         return Mode.STANDBY
     if stamp - last > DRIVE_RESTART_GAP_S:
-        s.mode, s.until = mode, last + resume_time
+        state.mode, state.until = mode, last + resume_time
     return mode
 
 
 @compiled
-def is_pending(s):
+def is_pending(state: Resumption) -> bool:
     """Return True if a mode is kept."""
-    return math.isfinite(s.until)
+    return math.isfinite(state.until)
 
 
 @compiled
-def pending(s, stamp, ended, locked, request_before):
-    """Return the request that is pending at `stamp` [s]. The caller calls this function only while `is_pending`.
+def pending(state: Resumption, stamp: Seconds, ended: bool, locked: Bit, request_before: int) -> int:
+    """Return the request that is pending at `stamp`. The caller calls this function only while `is_pending`.
 
     ended           True if the mode is standby because the drive was not ready
     locked          True if autotrack can begin
@@ -58,15 +59,15 @@ def pending(s, stamp, ended, locked, request_before):
     A kept mode whose time is over is discarded. If autotrack cannot begin, `program` is requested, because `program`
     hands over to autotrack.
     """
-    if stamp > s.until:
-        s.until = -math.inf
+    if stamp > state.until:
+        state.until = -math.inf
         return modes.NO_REQUEST
     if not ended:
         return request_before
-    return Mode.PROGRAM if s.mode == Mode.AUTOTRACK and not locked else s.mode
+    return Mode.PROGRAM if state.mode == Mode.AUTOTRACK and not locked else state.mode
 
 
 @compiled
-def cancel(s):
+def cancel(state: Resumption) -> None:
     """Discard the mode that is kept."""
-    s.until = -math.inf
+    state.until = -math.inf

@@ -3,8 +3,11 @@
 The faults are uncommanded motion of an axis, a drive that repeats its angles (frozen), and divergence of the filter.
 """
 from acu_tracker.alarms import annunciator, table
+from acu_tracker.alarms.annunciator import AlarmList
+from acu_tracker.alarms.conditions import Supervision
 from acu_tracker.modes import Reason
 from pedestal_common.compiled import compiled
+from pedestal_common.quantities import Bit, Seconds
 
 UNCOMMANDED_MOTION_ALARM, FROZEN_DRIVE_ALARM, DIVERGENCE_ALARM = (
     table.ALARM_INDEX[name] for name in ('uncommanded motion', 'drive frozen', 'diverged'))
@@ -15,22 +18,22 @@ LATCHED_FAULT_BITS = 1 << UNCOMMANDED_MOTION_ALARM | 1 << FROZEN_DRIVE_ALARM | 1
 
 
 @compiled
-def latched(uncommanded, frozen, diverged):
+def latched(uncommanded: int, frozen: int, diverged: int) -> int:
     """Return the bits of the alarms whose fault waits for a reset; each argument: 1 while its fault waits."""
     return (uncommanded << UNCOMMANDED_MOTION_ALARM) | (frozen << FROZEN_DRIVE_ALARM) | (diverged << DIVERGENCE_ALARM)
 
 
 @compiled
-def axes_follow_commands(s):
-    """Return True if both axes follow their commands; s: record of conditions.Supervision.
+def axes_follow_commands(supervision: Supervision) -> bool:
+    """Return True if both axes follow their commands.
 
     While an axis does not follow its command, the target leaves the beam although the filter is right.
     """
-    return not (s.axis[0].immobile or s.axis[1].immobile)
+    return not (supervision.axis[0].immobile or supervision.axis[1].immobile)
 
 
 @compiled
-def drive_refusal(ready, uncommanded, frozen):
+def drive_refusal(ready: Bit, uncommanded: Bit, frozen: Bit) -> int:
     """Return the reason why no mode except standby may move the axes, or NONE.
 
     ready: True if the drive follows commands; uncommanded, frozen: True if uncommanded motion, or a frozen drive, is
@@ -44,8 +47,8 @@ def drive_refusal(ready, uncommanded, frozen):
 
 
 @compiled
-def reset(alarms, t):
-    """Clear the conditions of LATCHED_FAULT_BITS and reset the latched alarms at t [s].
+def reset(alarms: AlarmList, t: Seconds) -> bool:
+    """Clear the conditions of LATCHED_FAULT_BITS and reset the latched alarms at t.
 
     Return True if an alarm was latched.
     """

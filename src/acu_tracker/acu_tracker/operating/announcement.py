@@ -1,27 +1,28 @@
 """Texts for the operator on keyholes, hidden sectors and the end of the azimuth's travel; numbers for the diagnostics.
-
-h: record of lookahead.planner.Planner; unit: the unit.Acu.
 """
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from acu_tracker import modes
 from acu_tracker.lookahead import planner
 from acu_tracker.program import tables
+from pedestal_common.quantities import AnyRecord, Degrees, Floats, Radians
+
+if TYPE_CHECKING:
+    from acu_tracker.params import AcuParameters, AxisParameters
+    from acu_tracker.unit import Acu
 
 
-def keyhole(h, parameters):
-    """Return the text of acu/keyhole: the announced slew, its cancellation, or that no azimuth wrap holds the pass.
-
-    parameters: AcuParameters.
-    """
+def keyhole(lookahead: AnyRecord, parameters: 'AcuParameters') -> str:
+    """Return the text of acu/keyhole: the announced slew, its cancellation, or that no azimuth wrap holds the pass."""
     beamwidth = parameters.tracker.receiver.beamwidth
-    if h['announced_forecast'] == planner.FORECAST_NO_WRAP:
+    if lookahead['announced_forecast'] == planner.FORECAST_NO_WRAP:
         return f'keyhole ahead: no azimuth wrap holds the pass; {_at_the_end(parameters.azimuth, "")}'
-    if h['announced_forecast'] == planner.FORECAST_NONE:
+    if lookahead['announced_forecast'] == planner.FORECAST_NONE:
         return 'no keyhole ahead: the azimuth can follow the target; the announced slew is cancelled'
-    slew = h['announced']
+    slew = lookahead['announced']
     way = 'clockwise' if slew['peak'] > 0.0 else 'counter-clockwise'
     if slew['other_cost'] == math.inf:
         other = 'limits forbid the opposite direction'
@@ -31,15 +32,15 @@ def keyhole(h, parameters):
             f'target at {slew["t1"]:.1f} s, slews {abs(_deg(slew["azimuth2"] - slew["azimuth1"])):.0f} deg {way} and '
             f'meets the target at {slew["t2"]:.1f} s; expected loss {slew["loss"]:.1f} s, largest pointing '
             f'offset {_deg(slew["worst"]):.2f} deg; {other}')
-    if h['deck_motion'] > 0.25 * beamwidth:
-        text += f'; approximate, because the deck moves by {_deg(h["deck_motion"]):.2f} deg rms'
+    if lookahead['deck_motion'] > 0.25 * beamwidth:
+        text += f'; approximate, because the deck moves by {_deg(lookahead["deck_motion"]):.2f} deg rms'
     return text
 
 
-def _at_the_end(axis, when):
+def _at_the_end(axis: 'AxisParameters', when: str) -> str:
     """Return the text that describes the motion of the azimuth at the end of its travel.
 
-    axis: AxisParameters of the azimuth; when: text of the time, with a blank at its end; '' without a time.
+    axis: the azimuth; when: text of the time, with a blank at its end; '' without a time.
     """
     if axis.limits.high - axis.limits.low < 2.0 * math.pi:
         return f'{when}the azimuth stops at the end of its travel until the target is inside the travel again'
@@ -48,7 +49,7 @@ def _at_the_end(axis, when):
             'target')
 
 
-def overtravel(unit):
+def overtravel(unit: 'Acu') -> str:
     """Return the text for a program track that no azimuth wrap holds; it states when the end of travel is reached.
 
     On a ship the text has no time, because the time depends on the motion of the deck.
@@ -67,7 +68,7 @@ def overtravel(unit):
     return f'no azimuth wrap holds the whole program track: {_at_the_end(unit.parameters.azimuth, when)}'
 
 
-def reaches_end(unit):
+def reaches_end(unit: 'Acu') -> bool:
     """Return True if the azimuth will reach the end of its travel within keyhole.notice at its present rate.
 
     The function serves modes that follow a target without a table. Where a program track covers the present time, the
@@ -79,47 +80,47 @@ def reaches_end(unit):
             and outputs['time_to_limit'][0] < unit.parameters.keyhole.notice)
 
 
-def end_of_travel(unit):
+def end_of_travel(unit: 'Acu') -> str:
     """Return the text for an azimuth that will soon reach the end of its travel."""
     left = unit.parts['outputs']['time_to_limit'][0]
     return _at_the_end(unit.parameters.azimuth, f'at the present rate, in {left:.1f} s ')
 
 
-def _increasing(x, y):
-    """Return two points (2,), (2,) in increasing order of x."""
+def _increasing(x: Floats, y: Floats) -> tuple[Floats, Floats]:
+    """Return two points in increasing order of x."""
     order = np.argsort(x)
     return x[order], y[order]
 
 
-def turn(unit):
+def turn(unit: 'Acu') -> str:
     """Return the text for a turn of the azimuth that is under way."""
     guidance, reference = unit.parts['state']['guidance'], unit.parts['state']['axis'][0]['reference']
     return f'the azimuth goes round by {_deg(guidance["azimuth"] - reference["angle"]):+.0f} deg to the target'
 
 
-def hidden(h):
+def hidden(lookahead: AnyRecord) -> str:
     """Return the text of acu/blockage: begin and end [s] of the time in which the target will be hidden."""
-    begin, end = h['hidden']
+    begin, end = lookahead['hidden']
     return f'target hidden from {begin:.1f} s to {end:.1f} s'
 
 
-def numbers(h):
-    """Return [(key, text of the value)] of the forecast for the diagnostics.
+def numbers(lookahead: AnyRecord) -> list[tuple[str, str]]:
+    """Return the values (key, text) of the forecast for the diagnostics.
 
     The keys of a slew or of a hidden sector appear only if there is one.
     """
-    values = [('keyhole', planner.FORECAST_TEXTS[h['forecast']])]
-    if h['forecast'] == planner.FORECAST_KEYHOLE:
-        slew = h['slew']
+    values = [('keyhole', planner.FORECAST_TEXTS[lookahead['forecast']])]
+    if lookahead['forecast'] == planner.FORECAST_KEYHOLE:
+        slew = lookahead['slew']
         values += [('keyhole_begins_s', f'{slew["t1"]:.3f}'), ('keyhole_ends_s', f'{slew["t2"]:.3f}'),
                    ('keyhole_loss_s', f'{slew["loss"]:.3f}'), ('keyhole_worst_deg', f'{_deg(slew["worst"]):.3f}'),
                    ('keyhole_needed_deg_s', f'{_deg(slew["needed"]):.3g}'),
-                   ('deck_motion_deg', f'{_deg(h["deck_motion"]):.3f}')]
-    begin, end = h['hidden']
+                   ('deck_motion_deg', f'{_deg(lookahead["deck_motion"]):.3f}')]
+    begin, end = lookahead['hidden']
     if not math.isnan(begin):
         values += [('hidden_from_s', f'{begin:.1f}'), ('hidden_to_s', f'{end:.1f}')]
     return values
 
 
-def _deg(angle):
+def _deg(angle: Radians) -> Degrees:
     return math.degrees(angle)

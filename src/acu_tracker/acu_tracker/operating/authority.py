@@ -3,7 +3,7 @@
 While a client holds control, the control unit refuses the commands of other clients, except those that stop the
 antenna. While control is free, every client may send any command.
 """
-from pedestal_common.wire.commands import HELD_REFUSAL, Reply
+from pedestal_common.wire.commands import HELD_REFUSAL, Command, Reply
 
 CONTROL_ROLES = ('operator', 'supervisor')  # roles of a client; a supervisor may take control from another client
 
@@ -14,15 +14,15 @@ UNRESTRICTED_COMMANDS = ('standby', 'stop', 'acu/standby', 'acu/stop')
 class Authority:
     """Control of the antenna; holder: name of the client that has it, '' while control is free."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         self.holder = ''
 
-    def admit(self, command):
+    def admit(self, command: Command) -> None:
         """Raise ValueError for a Command from a client that does not hold control."""
         if self.holder and command.who != self.holder and command.verb not in (*UNRESTRICTED_COMMANDS, 'take'):
             raise ValueError(f'{HELD_REFUSAL} {self.holder}')
 
-    def take(self, who, role) -> Reply:
+    def take(self, who: str, role: str) -> Reply:
         """Give control to the client named `who`, and return the Reply.
 
         Raise ValueError if another client holds control; a supervisor takes it all the same.

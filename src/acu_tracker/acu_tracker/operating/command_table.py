@@ -3,6 +3,8 @@
 The functions at the end write the arguments of a mode into the state of the unit.
 """
 import math
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
@@ -15,10 +17,17 @@ from acu_tracker.pointing.params import PointingParameters
 from pedestal_common.graph.modes import MODE_ROWS, MODES
 from pedestal_common.graph.topics import AXES
 from pedestal_common.parameters import ParameterError, flatten
+from pedestal_common.quantities import Radians, RadiansPerSecond, Value
 from pedestal_common.wire.commands import Argument, CommandDefinition
 
+if TYPE_CHECKING:
+    from acu_tracker.unit import Acu
 
-def _of_axes(doc, low, high, unit, default=None, suffix=''):
+Arguments: TypeAlias = Mapping[str, Value]  # of a command, by name
+
+
+def _of_axes(doc: str, low: float, high: float, unit: str, default: float | None = None,
+             suffix: str = '') -> tuple[Argument, ...]:
     """Return an Argument for each axis; suffix: end of its name after the name of the axis."""
     return tuple(Argument(f'{axis}{suffix}', doc, low, high, unit, default=default) for axis in AXES)
 
@@ -77,9 +86,9 @@ ACU_COMMANDS = (
 POINTS_DOC = "named points for `preset`: 'NAME azimuth elevation; ...' [rad], deck angles; empty: none"
 
 
-def points(text) -> dict:
-    """Return {name: (azimuth, elevation) [rad]} of a text as in POINTS_DOC; raise ParameterError for a wrong text."""
-    named = {}
+def points(text: str) -> dict[str, tuple[Radians, Radians]]:
+    """Return (azimuth, elevation) by name of a text as in POINTS_DOC; raise ParameterError for a wrong text."""
+    named: dict[str, tuple[Radians, Radians]] = {}
     for part in filter(None, map(str.strip, text.split(';'))):
         name, *angles = part.split()
         try:
@@ -92,17 +101,16 @@ def points(text) -> dict:
     return named
 
 
-def _rates(arguments):
-    """Return the rates (2,) [rad/s] among the arguments of a command."""
+def _rates(arguments: Arguments) -> list[RadiansPerSecond]:
     return [arguments[f'{axis}_rate'] for axis in AXES]
 
 
-def _take_preset(unit, arguments):
+def _take_preset(unit: 'Acu', arguments: Arguments) -> None:
     """Set the direction of the mode preset: angles or a named point, and rates.
 
     Raise ValueError for an unknown point.
     """
-    angles = [arguments[axis] for axis in AXES]
+    angles: Sequence[Radians] = [arguments[axis] for axis in AXES]
     if arguments['point']:
         named = points(unit.parameters.points)
         if arguments['point'] not in named:
@@ -110,17 +118,17 @@ def _take_preset(unit, arguments):
         angles = named[arguments['point']]
     state = unit.parts['state']
     preset = state['guidance']['preset']
-    angles = np.where(np.isfinite(angles), angles, preset['angle'])
-    direction.set_moving(preset, state['stamp'], angles, _rates(arguments), arguments['moves'])
+    direction.set_moving(preset, state['stamp'], np.where(np.isfinite(angles), angles, preset['angle']),
+                         _rates(arguments), arguments['moves'])
 
 
-def _take_rate(unit, arguments):
+def _take_rate(unit: 'Acu', arguments: Arguments) -> None:
     """Set the rates of the mode rate."""
     state = unit.parts['state']
     manual.request_rates(state['guidance']['manual'], [arguments[axis] for axis in AXES], state['stamp'])
 
 
-def _take_slave(unit, arguments):
+def _take_slave(unit: 'Acu', arguments: Arguments) -> None:
     """Set the direction of the mode slave. The refraction is added to a true elevation."""
     state = unit.parts['state']
     slave = state['guidance']['slave']
@@ -129,7 +137,7 @@ def _take_slave(unit, arguments):
     unit.bend(slave.copy())
 
 
-def _take_tle(unit, arguments):
+def _take_tle(unit: 'Acu', arguments: Arguments) -> None:
     """Take the elements of the mode tle, if the command has any; raise ValueError for invalid elements."""
     if any(arguments.values()):
         unit.take_elements(*arguments.values())

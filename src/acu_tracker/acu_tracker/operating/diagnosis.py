@@ -1,5 +1,6 @@
-"""Diagnosis of the control unit on /diagnostics: a level, one line of text, and values; unit: the unit.Acu."""
+"""Diagnosis of the control unit on /diagnostics: a level, one line of text, and values."""
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -8,6 +9,11 @@ from acu_tracker.modes import Reason
 from acu_tracker.operating import announcement
 from pedestal_common.graph import layouts, topics
 from pedestal_common.node.unit import LEVEL_ERROR, LEVEL_OK, LEVEL_WARN, Diagnosis
+from pedestal_common.quantities import AnyRecord, Radians
+
+if TYPE_CHECKING:
+    from acu_tracker.params import AcuParameters
+    from acu_tracker.unit import Acu
 
 FAULT_TEXTS = {
     'uncommanded motion': 'uncommanded motion: {motion}; call acu/reset_faults once the cause is known',
@@ -34,7 +40,7 @@ INPUTS_OF_REASONS = {Reason.ENCODER_INVALID: 'encoder', Reason.ATTITUDE_INVALID:
 """{reason of a refused mode: name in NEEDED_FIELDS of the input that is invalid}."""
 
 
-def missing(unit, name):
+def missing(unit: 'Acu', name: str) -> str:
     """Return the text that names the numbers which the last message of an input lacks; '' if it lacks none.
 
     name: name of the input in NEEDED_FIELDS. In a decoded message a number is NaN if the message does not contain it
@@ -51,10 +57,10 @@ def missing(unit, name):
     return f'{topic}: {", ".join(absent)} missing' if absent else ''
 
 
-def beyond_limits(parameters, angles):
-    """Return the reason why encoder angles [rad] cannot be reached: the axes outside their limits, or else the floor.
+def beyond_limits(parameters: 'AcuParameters', angles: tuple[Radians, Radians]) -> str:
+    """Return the reason why encoder angles cannot be reached: the axes outside their limits, or else the floor.
 
-    The floor is the lowest elevation that is allowed at an azimuth. parameters: AcuParameters.
+    The floor is the lowest elevation that is allowed at an azimuth.
     """
     outside = [f'{axis} {math.degrees(angle):.2f} deg: must be {math.degrees(limits.low):.2f} to '
                f'{math.degrees(limits.high):.2f} deg'
@@ -64,7 +70,7 @@ def beyond_limits(parameters, angles):
     return ', '.join(outside) or f'elevation {elevation} is below the parameter floor at azimuth {azimuth}'
 
 
-def of(unit):
+def of(unit: 'Acu') -> Diagnosis:
     """Return the Diagnosis of the unit; its text reports the gravest finding."""
     state, outputs = unit.parts['state'], unit.parts['outputs']
     invalid = tuple(name for i, name in enumerate(signals.INVALID_INPUTS) if unit.parts['invalid'] >> i & 1)
@@ -102,8 +108,8 @@ def of(unit):
     return Diagnosis(LEVEL_WARN if outputs['coasting'] else LEVEL_OK, f'{mode} ({reason})', values)
 
 
-def _values(unit, faults, invalid):
-    """Return the values [(key, text)] of the diagnosis.
+def _values(unit: 'Acu', faults: tuple[str, ...], invalid: tuple[str, ...]) -> list[tuple[str, str]]:
+    """Return the values (key, text) of the diagnosis.
 
     faults: names of the latched faults; invalid: names of the invalid inputs.
     """
@@ -130,12 +136,12 @@ def _values(unit, faults, invalid):
             *((f'refused {mode}', why) for mode, why in unit.refusals().items())]
 
 
-def _uncommanded_motion(movement):
-    """Return the text of the measured and commanded rates; movement: view of uncommanded_motion.Envelope."""
+def _uncommanded_motion(movement: AnyRecord) -> str:
+    """Return the text of the measured and commanded rates; movement: uncommanded_motion.Envelope."""
     return ', '.join('{} {:.3g} deg/s, commanded {:.3g} to {:.3g}'.format(axis, *map(math.degrees, rates))
                      for axis, rates in zip(topics.AXES, movement['measured']))
 
 
-def _pins(code):
+def _pins(code: int) -> str:
     """Return the text of the state of the stow pins, as the drive reports it."""
     return topics.TOPIC_BY_NAME['adu/stow_pins'].texts[code] if code != topics.NO_TEXT_CODE else 'unknown'

@@ -5,18 +5,19 @@ of a table of geometric directions by the refraction, with the weather at the ti
 effect as a ramp of CHANGE_TIME_S, at most one ramp at a time, so the antenna follows without a bump. A stale reading
 is replaced by its parameter, with a ramp too.
 
-All times are stamps [s]. Numbers of the weather have the order of WEATHER_QUANTITIES.
+All times are stamps. Numbers of the weather have the order of WEATHER_QUANTITIES.
 """
 import collections
 import dataclasses
 import math
-import typing
+from typing import NamedTuple
 
 import numpy as np
 
 from acu_tracker.program.program_track import ProgramTrack
 from pedestal_common.geometry import refraction
 from pedestal_common.parameters import Parameters, choice, parameter
+from pedestal_common.quantities import Floats, Message, Pairs, Seconds, Times, Vectors3
 
 CHANGE_TIME_S = 60.0  # duration of the ramp from one weather to the next [s]
 
@@ -28,16 +29,13 @@ MAX_KNOTS = 400  # number of kept begins and ends of ramps; those of more than M
 MAX_LEAD_S = 1.0  # largest accepted lead of the stamp of a reading over the present step [s]
 
 
-class Quantity(typing.NamedTuple):
-    """A number of the weather: its name in the parameters and its range in their unit.
-
-    field: field of the message; scale: unit of the parameter in units of the message; unit: unit of the message
-    """
+class Quantity(NamedTuple):
+    """A number of the weather: its name in the parameters and its range in their unit."""
     parameter: str
     limits: tuple[float, float]
-    field: str
-    scale: float
-    unit: str
+    field: str      # of the message
+    scale: float    # unit of the parameter in units of the message
+    unit: str       # of the message
 
 
 WEATHER_QUANTITIES = {
@@ -70,35 +68,38 @@ class RefractionParameters(Parameters):
                                'parameter takes its place')
 
 
-class Reading(typing.NamedTuple):
-    """A reading of the weather station: its stamp [s] and its value in the unit of the parameter."""
-    stamp: float
-    value: float
+class Reading(NamedTuple):
+    """A reading of the weather station."""
+    stamp: Seconds
+    value: float    # in the unit of the parameter
 
 
 class Air:
     """The air by RefractionParameters and by readings.
 
     on        True if directions are corrected
-    due       stamp from which on `update` may change the weather [s]; inf: before the first reading
+    due       stamp from which on `update` may change the weather; inf: before the first reading
     revision  number of the changes of the weather
-    dropped   {(topic, reason): number of dropped readings}
+    dropped   number of dropped readings by (topic, reason)
     """
 
-    def __init__(self, parameters):
+    def __init__(self, parameters: RefractionParameters) -> None:
         self.parameters, self.on = parameters, parameters.kind != 'none'
-        self.due, self.revision = math.inf, 0
-        self.dropped = collections.Counter()
-        self._of_parameters = tuple(getattr(parameters, quantity.parameter)
-                                    for quantity in WEATHER_QUANTITIES.values())
-        self._readings, self._refused = {}, {}
+        self.due: Seconds = math.inf
+        self.revision = 0
+        self.dropped: collections.Counter[tuple[str, str]] = collections.Counter()
+        self._of_parameters: tuple[float, ...] = tuple(getattr(parameters, quantity.parameter)
+                                                       for quantity in WEATHER_QUANTITIES.values())
+        self._readings: dict[str, Reading] = {}
+        self._refused: dict[str, str] = {}
         # Begin and end of each ramp, and the weather there.
-        self._times, self._weather = [0.0], [self._of_parameters]
+        self._times: list[Seconds] = [0.0]
+        self._weather = [self._of_parameters]
 
-    def take(self, topic, stamp, message, now):
+    def take(self, topic: str, stamp: Seconds | None, message: Message, now: Seconds | None) -> None:
         """Take the message of a weather topic. A reading that cannot be used is counted, named and dropped.
 
-        stamp: of the message [s], None without one; now: stamp of the last step [s], None before the first.
+        stamp: of the message, None without one; now: stamp of the last step, None before the first.
         """
         quantity = WEATHER_QUANTITIES[topic]
         value, (low, high) = float(getattr(message, quantity.field)), quantity.limits
@@ -112,7 +113,7 @@ class Air:
             reason, refused = DROP_STALE, f'{now - stamp:.0f} s old: must be at most {self.parameters.timeout:g} s'
         elif now is not None and stamp - now > MAX_LEAD_S:
             reason, refused = DROP_FUTURE, f'{stamp - now:.1f} s in the future: must be at most {MAX_LEAD_S:g} s'
-        if refused:
+        if refused or stamp is None:
             self.dropped[topic, reason] += 1
             self._refused[topic] = refused
             return
@@ -121,12 +122,12 @@ class Air:
         if self.on and self.due == math.inf:
             self.due = -math.inf
 
-    def _reading(self, topic, now):
+    def _reading(self, topic: str, now: Seconds) -> Reading | None:
         """Return the Reading of a topic that is valid at now, else None."""
         reading = self._readings.get(topic)
         return reading if reading and now - reading.stamp <= self.parameters.timeout else None
 
-    def update(self, now):
+    def update(self, now: Seconds) -> None:
         """Begin the ramp to the present weather, if a ramp is due and the weather has changed."""
         if not self.on or now < self.due:
             return
@@ -140,12 +141,11 @@ class Air:
             self._weather = [*self._weather, before, wanted][-MAX_KNOTS:]
             self.revision += 1
 
-    def _weather_at(self, times):
-        """Return the weather (n, 3) at times (n,)."""
+    def _weather_at(self, times: Times) -> Vectors3:
         return np.column_stack([np.interp(times, self._times, column) for column in zip(*self._weather)])
 
-    def raised(self, times, angles):
-        """Return angles (n, 2) [rad] at times (n,), azimuth and true elevation, with apparent elevations.
+    def raised(self, times: Times, angles: Pairs) -> Pairs:
+        """Return angles at times, azimuth and true elevation, with apparent elevations.
 
         The rows have the weather of two row intervals before. Because two rows after the present one have a share in
         the interpolated direction, a change of the weather thus begins behind them, without a step.
@@ -157,19 +157,19 @@ class Air:
         refraction.raise_all(self._weather_at(times - min(2.0 * interval, MAX_DELAY_S)), elevations)
         return np.column_stack((angles[:, 0], elevations))
 
-    def apparent(self, track):
+    def apparent(self, track: ProgramTrack) -> ProgramTrack:
         """Return a ProgramTrack of geometric directions as apparent directions."""
         return ProgramTrack(track.times, self.raised(track.times, track.angles)) if self.on else track
 
-    def bent(self, elevations, times):
-        """Return the apparent elevations (n,) [rad] of true elevations (n,) [rad] at times (n,)."""
+    def bent(self, elevations: Floats, times: Times) -> Floats:
+        """Return the apparent elevations of true elevations [rad] at times."""
         if not self.on:
             return elevations
         apparent = np.array(elevations, float)
         refraction.raise_all(self._weather_at(times), apparent)
         return apparent
 
-    def problems(self, now):
+    def problems(self, now: Seconds) -> list[str]:
         """Return texts on the weather that cannot be used at now; [] if all is well or nothing is corrected."""
         if not self.on:
             return []
@@ -177,7 +177,7 @@ class Air:
                  for topic, reading in self._readings.items() if self._reading(topic, now) is None]
         return [*(f'{topic}: dropped {text}' for topic, text in self._refused.items()), *stale]
 
-    def diagnostic_values(self, now):
+    def diagnostic_values(self, now: Seconds) -> list[tuple[str, str]]:
         """Return the values for the diagnostics [(key, text)]; [] if nothing is corrected.
 
         The values are the refractivity in use, and for each quantity its last value with its origin and the counts of

@@ -13,7 +13,8 @@ start_time.
 import dataclasses
 import datetime
 import math
-import typing
+from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 
@@ -27,6 +28,7 @@ from pedestal_common.geometry.orbit import TargetError
 from pedestal_common.graph import topics
 from pedestal_common.graph.steps import NS_PER_SECOND, SECONDS_PER_DAY
 from pedestal_common.parameters import ParameterError, Parameters, flag, group, parameter, text
+from pedestal_common.quantities import Floats, Nanoseconds, Pairs, Seconds, Times, Vectors3
 from pedestal_common.reproducible import arctan2
 from pedestal_common.sky import bodies
 
@@ -51,7 +53,7 @@ class PredictionParameters(Parameters):
     earth_orientation: EarthOrientationParameters = group(EarthOrientationParameters)
     station: StationParameters = group(StationParameters)
 
-    def check(self):
+    def check(self) -> None:
         """Raise ParameterError for invalid elements or an invalid time."""
         try:
             if self.line_1 or self.line_2 or self.omm:
@@ -62,58 +64,53 @@ class PredictionParameters(Parameters):
             raise ParameterError(str(error)) from None
 
 
-class Predicted(typing.NamedTuple):
-    """A predicted table.
-
-    track   the table; without rows if there is none
-    reason  Reason.NONE, or why there is no table
-    since   stamp from which the table is valid [s]
-    until   stamp at which the table must be replaced [s]
-    """
-    track: ProgramTrack
-    reason: int
-    since: float = -math.inf
-    until: float = math.inf
+class Predicted(NamedTuple):
+    """A predicted table."""
+    track: ProgramTrack     # without rows if there is no table
+    reason: int             # Reason.NONE, or why there is no table
+    since: Seconds = -math.inf      # stamp from which the table is valid
+    until: Seconds = math.inf       # stamp at which the table must be replaced
 
 
 class Predictor:
     """Predictions by PredictionParameters.
 
-    epoch  UTC of stamp 0 [ns since 1970]; 0: unknown, then only the parameter start_time can give it
-    air    the air.Air by which a target is above the horizon or not
+    epoch  UTC of stamp 0; 0: unknown, then only the parameter start_time can give it
+    air    the air by which a target is above the horizon or not
 
     Raise ParameterError for a file of the earth's orientation that cannot be read.
     """
 
-    def __init__(self, parameters, epoch=0, air=None):
+    def __init__(self, parameters: PredictionParameters, epoch: Nanoseconds = 0, air: Air | None = None) -> None:
         self.parameters, self.epoch = parameters, epoch
         self.air = air or Air(RefractionParameters())
         self._orientation = earth_orientation.load(parameters.earth_orientation)
         self._satellite = (orbit.satellite(parameters) if parameters.line_1 or parameters.omm else None)
 
-    def with_elements(self, line_1, line_2, omm):
+    def with_elements(self, line_1: str, line_2: str, omm: str) -> 'Predictor':
         """Return a Predictor with other elements: a TLE, or an OMM in JSON. Raise ValueError if they are invalid."""
         if bool(line_1 or line_2) == bool(omm):
             raise ValueError('elements: must be line_1 and line_2, or omm')
         return Predictor(dataclasses.replace(self.parameters, line_1=line_1, line_2=line_2, omm=omm), self.epoch,
                          self.air)
 
-    def with_epoch(self, epoch):
-        """Return a Predictor with another UTC of stamp 0 [ns since 1970]."""
+    def with_epoch(self, epoch: Nanoseconds) -> 'Predictor':
+        """Return a Predictor with another UTC of stamp 0."""
         return Predictor(self.parameters, epoch, self.air)
 
     @property
-    def number(self):
+    def number(self) -> str:
         """Catalogue number of the satellite."""
+        assert self._satellite is not None      # a command for another satellite has just been taken
         return self._satellite.number
 
     @property
-    def _utc_known(self):
+    def _utc_known(self) -> bool:
         """True if the UTC of the stamps is known. In lockstep only the parameter start_time gives it."""
         return self.parameters.start_time != '' or self.epoch > 0
 
-    def satellite(self, stamp) -> Predicted:
-        """Return the Predicted of the satellite for a stamp [s]."""
+    def satellite(self, stamp: Seconds) -> Predicted:
+        """Return the Predicted of the satellite for a stamp."""
         if self._satellite is None or not self._utc_known:
             return Predicted(NO_TRACK, Reason.NO_ELEMENTS if self._utc_known else Reason.NO_UTC)
         interval = max(round(2.0 * math.pi * 60.0 / self._satellite.no_kozai / ROWS_PER_ORBIT, 1), 1.0)
@@ -121,14 +118,14 @@ class Predictor:
             return Predicted(NO_TRACK, Reason.TOO_OLD, stamp, stamp + TABLE_ROW_COUNT * interval)
         return self._table(self._satellite_angles, stamp, interval)
 
-    def sun(self, stamp) -> Predicted:
-        """Return the Predicted of the sun for a stamp [s]."""
+    def sun(self, stamp: Seconds) -> Predicted:
+        """Return the Predicted of the sun for a stamp."""
         if not self._utc_known:
             return Predicted(NO_TRACK, Reason.NO_UTC)
         return self._table(self._sun_angles, stamp, SUN_ROW_INTERVAL_S)
 
-    def diagnostic_values(self, stamp):
-        """Return the values for the diagnostics [(key, text)] at a stamp [s].
+    def diagnostic_values(self, stamp: Seconds) -> list[tuple[str, str]]:
+        """Return the values for the diagnostics (key, text) at a stamp.
 
         The values are azimuth and elevation of the sun, if UTC is known, the file of the earth's orientation and its
         values, if any, and the elements of the satellite, if any.
@@ -138,8 +135,8 @@ class Predictor:
         return [*((f'sun_{axis}_deg', f'{angle:.2f}') for axis, angle in zip(topics.AXES, sun_now)),
                 *self._orientation_values(stamp), *((line, getattr(self.parameters, line)) for line in lines)]
 
-    def _orientation_values(self, stamp):
-        """Return the values of the earth's orientation for the diagnostics [(key, text)] at a stamp [s]."""
+    def _orientation_values(self, stamp: Seconds) -> list[tuple[str, str]]:
+        """Return the values of the earth's orientation for the diagnostics (key, text) at a stamp."""
         if self._orientation is None:
             return []
         if not self._utc_known:
@@ -150,15 +147,15 @@ class Predictor:
                 *((f'pole_{axis}_arcsec', f'{angle / earth_orientation.ARCSECOND_RAD:.3f}')
                   for axis, angle in zip('xy', pole))]
 
-    def problems(self, stamp):
-        """Return texts on the inaccurate orientation of the earth at a stamp [s]; [] if all is well."""
+    def problems(self, stamp: Seconds) -> list[str]:
+        """Return texts on the inaccurate orientation of the earth at a stamp; [] if all is well."""
         if self._orientation is None or not self._utc_known:
             return []
         text = self._orientation.problem(self._mjd(stamp), self.parameters.earth_orientation.oldest)
         return [f'earth_orientation: {text}'] if text else []
 
-    def refusal_details(self, mode, reason, stamp):
-        """Return details of the reason for which a mode is refused at a stamp [s]; '' if there are none."""
+    def refusal_details(self, mode: int, reason: int, stamp: Seconds) -> str:
+        """Return details of the reason for which a mode is refused at a stamp; '' if there are none."""
         if reason == Reason.NO_UTC:
             return 'set `prediction.start_time`'
         if reason == Reason.TOO_OLD:
@@ -170,8 +167,8 @@ class Predictor:
             return f'next rise at {orbit.iso(*self._julian(rises))}'
         return ''
 
-    def _julian(self, stamp):
-        """Return (Julian day, fraction) of a stamp [s]."""
+    def _julian(self, stamp: Seconds) -> tuple[float, float]:
+        """Return (Julian day, fraction) of a stamp."""
         start = self.parameters.start_time
         begin = (orbit.instant('start_time', start) if start else
                  datetime.datetime(1970, 1, 1) + datetime.timedelta(microseconds=self.epoch
@@ -179,45 +176,46 @@ class Predictor:
         julian, fraction = orbit.julian_date(begin)
         return julian, fraction + stamp / SECONDS_PER_DAY
 
-    def _age(self, stamp):
-        """Return the time [days] from the epoch of the elements to a stamp [s]."""
+    def _age(self, stamp: Seconds) -> float:
+        """Return the time [days] from the epoch of the elements to a stamp."""
+        assert self._satellite is not None      # the caller has elements
         julian, fraction = self._julian(stamp)
         return julian - self._satellite.jdsatepoch + fraction - self._satellite.jdsatepochF
 
-    def _mjd(self, stamp):
-        """Return the modified Julian date of a stamp [s]."""
+    def _mjd(self, stamp: Seconds) -> float:
+        """Return the modified Julian date of a stamp."""
         julian, fraction = self._julian(stamp)
         return julian - MJD_ZERO_JULIAN_DATE + fraction
 
-    def _to_fixed(self, julian, fractions):
-        """Return the rotations (n, 3, 3) of orbit.earth_fixed at the Julian dates julian + fractions (n,)."""
+    def _to_fixed(self, julian: float, fractions: Floats) -> Floats:
+        """Return the rotations (n, 3, 3) of orbit.earth_fixed at the Julian dates julian + fractions."""
         if self._orientation is None:
             return orbit.earth_fixed(julian, fractions)
         return orbit.earth_fixed(julian, fractions, *self._orientation.at(julian - MJD_ZERO_JULIAN_DATE + fractions))
 
-    def _satellite_angles(self, times):
-        """Return azimuth and true elevation (n, 2) [rad] of the satellite at stamps (n,) [s]; raise TargetError."""
+    def _satellite_angles(self, times: Times) -> Pairs:
+        """Return azimuth and true elevation [rad] of the satellite at stamps; raise TargetError."""
         julian, fraction = self._julian(0.0)
         fractions = fraction + times / SECONDS_PER_DAY
         return _angles(orbit.seen(self._satellite, self.parameters.station, julian, fractions,
                                   self._to_fixed(julian, fractions), self.parameters.light_time))
 
-    def _sun_angles(self, times):
-        """Return azimuth and true elevation (n, 2) [rad] of the sun at stamps (n,) [s]."""
+    def _sun_angles(self, times: Times) -> Pairs:
+        """Return azimuth and true elevation [rad] of the sun at stamps."""
         julian, fraction = self._julian(0.0)
         fractions = fraction + times / SECONDS_PER_DAY
         return _angles(bodies.seen('sun', self.parameters.station, julian, fractions,
                                    self._to_fixed(julian, fractions)))
 
-    def sun_angles(self, times):
-        """Return azimuth and apparent elevation (n, 2) [rad] of the sun at stamps (n,) [s]."""
+    def sun_angles(self, times: Times) -> Pairs:
+        """Return azimuth and apparent elevation [rad] of the sun at stamps."""
         return self.air.raised(times, self._sun_angles(times))
 
-    def _table(self, angles_at, stamp, interval):
-        """Return the Predicted for a stamp [s].
+    def _table(self, angles_at: Callable[[Times], Pairs], stamp: Seconds, interval: Seconds) -> Predicted:
+        """Return the Predicted for a stamp.
 
-        angles_at: function of times (n,) [s] that returns the angles (n, 2) [rad], with the true elevation; interval:
-        time between two rows [s].
+        angles_at: function of times that returns the angles [rad], with the true elevation; interval: time between
+        two rows.
         """
         times = np.floor(stamp) - TABLE_LEAD_TIME_S + interval * np.arange(TABLE_ROW_COUNT)
         try:
@@ -232,8 +230,8 @@ class Predictor:
         return Predicted(ProgramTrack(times, angles), Reason.NONE, float(times[0]),
                          float(times[down[-1] if down.size else late[-1]]))
 
-    def _next_rise(self, angles_at, stamp):
-        """Return the stamp [s] at which the target next rises after a stamp, accurate to a second.
+    def _next_rise(self, angles_at: Callable[[Times], Pairs], stamp: Seconds) -> Seconds:
+        """Return the stamp at which the target next rises after a stamp, accurate to a second.
 
         The result is NaN without a rise within RISE_SEARCH_SPAN_S. angles_at: as in _table.
         """
@@ -249,7 +247,7 @@ class Predictor:
         return times[i] - RISE_SEARCH_STEP_S * elevation[i] / (elevation[i + 1] - elevation[i])
 
 
-def _angles(enu):
-    """Return azimuth and elevation (n, 2) [rad] of ENU positions (n, 3)."""
+def _angles(enu: Vectors3) -> Pairs:
+    """Return azimuth and elevation [rad] of ENU positions."""
     east, north, up = enu.T
     return np.stack((arctan2(east, north), arctan2(up, np.hypot(east, north))), axis=-1)

@@ -4,9 +4,10 @@ The interpolation is cubic (Hermite). The slope at a row is that of a parabola t
 Therefore the rate is continuous. The predicted tables of a satellite and the sun have the same type.
 """
 import math
-import typing
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from acu_tracker.geometry.azimuth_wrap import Travel
 from acu_tracker.geometry.motion import AxisMotion, Motion, angles, normalised, north_west_up
@@ -15,20 +16,17 @@ from acu_tracker.modes import Reason
 from pedestal_common.compiled import compiled, separate
 from pedestal_common.geometry.interval import interval
 from pedestal_common.geometry.line_of_sight import earth_direction, wrap
+from pedestal_common.quantities import Pairs, Radians, RadiansPerSecond, Seconds, Times
 
 MAX_PROGRAM_ROWS = 100_000  # largest number of rows of a program
 STEEP_ELEVATION_RAD = math.radians(80.0)
 """Elevation above which the unit vector is interpolated instead of the angles [rad]."""
 
 
-class ProgramTrack(typing.NamedTuple):
-    """A table of directions.
-
-    times   (n,) [s], increasing; n = 0: no program
-    angles  (n, 2): azimuth and elevation in the earth frame [rad]
-    """
-    times: np.ndarray
-    angles: np.ndarray
+class ProgramTrack(NamedTuple):
+    """A table of directions in the earth frame."""
+    times: Times    # increasing; without a row: no program
+    angles: Pairs   # azimuth and elevation [rad]
 
 
 NO_TRACK = ProgramTrack(np.zeros(0), np.zeros((0, 2)))  # ProgramTrack without a row
@@ -38,8 +36,8 @@ class ProgramTrackError(ValueError):
     """A table that cannot be followed; the message names row, value and allowed range."""
 
 
-def checked(times, angles):
-    """Return the ProgramTrack of times (n,) [s] and angles (n, 2), azimuth and elevation [rad].
+def checked(times: ArrayLike, angles: ArrayLike) -> ProgramTrack:
+    """Return the ProgramTrack of times [s] and angles (n, 2), azimuth and elevation [rad].
 
     Raise ProgramTrackError for a table that cannot be followed.
     """
@@ -63,8 +61,8 @@ def checked(times, angles):
 
 
 @compiled
-def status(program, t):
-    """Return NONE if the program covers t [s], otherwise the reason (of modes.REASONS)."""
+def status(program: ProgramTrack, t: Seconds) -> int:
+    """Return NONE if the program covers t, otherwise the reason (of modes.REASONS)."""
     if len(program.times) < 2:
         return Reason.NO_PROGRAM
     if t < program.times[0]:
@@ -73,8 +71,8 @@ def status(program, t):
 
 
 @compiled
-def _difference(program, i, axis):
-    """Return the change of an angle from row i to the next row [rad]; axis: 0 azimuth, 1 elevation.
+def _difference(program: ProgramTrack, i: int, axis: int) -> Radians:
+    """Return the change of an angle from row i to the next row; axis: 0 azimuth, 1 elevation.
 
     The azimuth changes the short way round.
     """
@@ -83,8 +81,8 @@ def _difference(program, i, axis):
 
 
 @compiled
-def _slope(program, i, axis):
-    """Return the rate of an angle at row i [rad/s], from the parabola through this row and its neighbours.
+def _slope(program: ProgramTrack, i: int, axis: int) -> RadiansPerSecond:
+    """Return the rate of an angle at row i, from the parabola through this row and its neighbours.
 
     At the first and the last row it is the parabola through the nearest three rows.
     """
@@ -99,8 +97,8 @@ def _slope(program, i, axis):
 
 
 @compiled
-def _hermite(y0, d, m0, m1, x, T):
-    """Return the AxisMotion of the cubic polynomial on an interval of T [s].
+def _hermite(y0: float, d: float, m0: float, m1: float, x: float, T: Seconds) -> AxisMotion:
+    """Return the motion of the cubic polynomial on an interval of T.
 
     y0, d   value at the begin of the interval, and its change to the end
     m0, m1  slopes at the begin and at the end, times T
@@ -112,8 +110,8 @@ def _hermite(y0, d, m0, m1, x, T):
 
 
 @compiled
-def interpolated(program, t, axis):
-    """Return the AxisMotion of one axis at t [s], interpolated; axis: 0 azimuth, 1 elevation."""
+def interpolated(program: ProgramTrack, t: Seconds, axis: int) -> AxisMotion:
+    """Return the motion of one axis at t, interpolated; axis: 0 azimuth, 1 elevation."""
     times = program.times
     i = interval(times, t)
     T = times[i + 1] - times[i]
@@ -122,13 +120,13 @@ def interpolated(program, t, axis):
 
 
 @compiled
-def _component(program, i, axis):
+def _component(program: ProgramTrack, i: int, axis: int) -> float:
     """Return a component of the unit vector at row i; axis: 0 east, 1 north, 2 up."""
     return earth_direction(program.angles[i, 0], program.angles[i, 1])[axis]
 
 
 @compiled
-def _component_slope(program, i, axis):
+def _component_slope(program: ProgramTrack, i: int, axis: int) -> float:
     """Return the rate of a component of the unit vector at row i [1/s], computed as in _slope."""
     times = program.times
     m = min(max(i, 1), len(times) - 2)
@@ -140,8 +138,8 @@ def _component_slope(program, i, axis):
 
 
 @compiled
-def _interpolated_component(program, i, t, axis):
-    """Return (component of the unit vector, its rate, its acceleration) at t [s] between rows i and i + 1."""
+def _interpolated_component(program: ProgramTrack, i: int, t: Seconds, axis: int) -> AxisMotion:
+    """Return (component of the unit vector, its rate, its acceleration) at t between rows i and i + 1."""
     times = program.times
     T = times[i + 1] - times[i]
     y0 = _component(program, i, axis)
@@ -150,8 +148,8 @@ def _interpolated_component(program, i, t, axis):
 
 
 @separate
-def motion_at(program, t):
-    """Return the Motion in earth angles at t [s].
+def motion_at(program: ProgramTrack, t: Seconds) -> Motion:
+    """Return the motion in earth angles at t.
 
     Between two rows above STEEP_ELEVATION_RAD the unit vector is interpolated, not the angles. The reason is that near
     the zenith the azimuth may change by any amount from row to row.
@@ -167,16 +165,16 @@ def motion_at(program, t):
 
 
 @compiled
-def direction(program, t):
-    """Return the ENU unit Vector at t [s]."""
+def direction(program: ProgramTrack, t: Seconds) -> Vector:
+    """Return the ENU unit vector at t."""
     motion = motion_at(program, t)
     e, n, u = earth_direction(motion.azimuth.angle, motion.elevation.angle)
     return Vector(e, n, u)
 
 
 @compiled
-def azimuth_travel(program, t):
-    """Return the Travel of the azimuth from t [s] until the end of the program, relative to its value at t."""
+def azimuth_travel(program: ProgramTrack, t: Seconds) -> Travel:
+    """Return the Travel of the azimuth from t until the end of the program, relative to its value at t."""
     first = interval(program.times, t)
     here = interpolated(program, t, 0).angle - program.angles[first, 0]
     at, below, above = 0.0, 0.0, 0.0

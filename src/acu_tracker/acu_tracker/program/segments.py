@@ -4,12 +4,14 @@ A segment is one table. Two segments without a gap between them are joined to on
 are missing. A turnaround is the motion of the axes from the last row of one segment to the first row of the next.
 """
 import math
-import typing
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
 from acu_tracker.program.program_track import NO_TRACK, ProgramTrack, ProgramTrackError, checked
 from pedestal_common.graph.topics import AXES
+from pedestal_common.quantities import Pairs, RadiansPerSecond, RadiansPerSecond2, Seconds, Times
 
 MAX_GAP_INTERVALS = 3.0
 """Longest time between two segments that counts as no gap, in row intervals; the two segments are then joined.
@@ -23,34 +25,29 @@ class TurnaroundError(ProgramTrackError):
     """Error of a segment whose first row the axes cannot reach in time; the message names axis, value and limit."""
 
 
-class DuePiece(typing.NamedTuple):
-    """The piece that is due at a stamp.
-
-    piece   the table of the piece
-    in_gap  True if the stamp is between the end of the piece before and the beginning of this piece, where rows are
-            missing
-    until   end of this piece, from which on the next piece is due [s]; inf: no next piece
-    """
+class DuePiece(NamedTuple):
+    """The piece that is due at a stamp."""
     piece: ProgramTrack
+    # True if the stamp is between the end of the piece before and the beginning of this piece, where rows are missing
     in_gap: bool
-    until: float
+    until: Seconds  # end of this piece, from which on the next piece is due; inf: no next piece
 
 
 class Segments:
     """The pieces of a program track, in order of time; inside a piece there is no gap.
 
-    limits: (rate [rad/s], acceleration [rad/s2]) of each axis, which a turnaround must not exceed.
+    limits: (rate, acceleration) of each axis, which a turnaround must not exceed.
     """
 
-    def __init__(self, limits):
+    def __init__(self, limits: Sequence[tuple[RadiansPerSecond, RadiansPerSecond2]]) -> None:
         self._limits = limits
-        self._pieces = []
+        self._pieces: list[ProgramTrack] = []
 
-    def append(self, times, angles, now, followed):
+    def append(self, times: Times, angles: Pairs, now: Seconds, followed: bool) -> None:
         """Take a segment; for a wrong one raise ProgramTrackError and change nothing.
 
         times, angles  of the segment, as in program_track.checked
-        now            present stamp [s]
+        now            present stamp
         followed       True if a mode follows the track; then turnarounds are checked
 
         A segment that begins at `now` or before is a new program and replaces all pieces. A later segment replaces the
@@ -71,7 +68,7 @@ class Segments:
                 new = checked(np.append(last.times, new.times), np.vstack((last.angles, new.angles)))
         self._pieces = [*kept, new]
 
-    def _check_turnaround(self, before, after):
+    def _check_turnaround(self, before: ProgramTrack, after: ProgramTrack) -> None:
         """Raise TurnaroundError if an axis would exceed its limits on the way from one segment to the next.
 
         The mean rate and the mean acceleration on this way are compared with the limits.
@@ -90,8 +87,8 @@ class Segments:
                 raise TurnaroundError(f'turnaround too fast: {axis} {math.degrees(acceleration):.4g} deg/s2; must be '
                                       f'at most {math.degrees(max_acceleration):.4g} deg/s2')
 
-    def at(self, t):
-        """Return the DuePiece at t [s]: the first piece that has not ended, or the last piece."""
+    def at(self, t: Seconds) -> DuePiece:
+        """Return the DuePiece at t: the first piece that has not ended, or the last piece."""
         for number, piece in enumerate(self._pieces):
             if t < piece.times[-1] or number + 1 == len(self._pieces):
                 more = number + 1 < len(self._pieces)
@@ -99,8 +96,8 @@ class Segments:
         return DuePiece(NO_TRACK, False, math.inf)
 
 
-def _rows(piece, begin, end):
-    """Return the rows of a piece that are kept: from three rows before `begin` [s] to the last row before `end` [s].
+def _rows(piece: ProgramTrack, begin: Seconds, end: Seconds) -> ProgramTrack:
+    """Return the rows of a piece that are kept: from three rows before `begin` to the last row before `end`.
 
     If the piece ends before `begin`, its last three rows are kept. The slope at a row follows from this row and its
     two neighbours. Three rows before `begin` therefore keep the path at `begin` unchanged, and the last three rows of
@@ -111,13 +108,12 @@ def _rows(piece, begin, end):
     return ProgramTrack(piece.times[first:last], piece.angles[first:last])
 
 
-def _last_interval(piece):
-    """Return the time [s] between the last two rows of a piece."""
+def _last_interval(piece: ProgramTrack) -> Seconds:
     return piece.times[-1] - piece.times[-2]
 
 
-def _rate(piece, row, i):
-    """Return the mean rate [rad/s] of axis i from a row of a piece to the next row."""
+def _rate(piece: ProgramTrack, row: int, i: int) -> RadiansPerSecond:
+    """Return the mean rate of axis i from a row of a piece to the next row."""
     distance = piece.angles[row + 1, i] - piece.angles[row, i]
     distance = math.remainder(distance, 2.0 * math.pi) if i == 0 else distance
     return distance / (piece.times[row + 1] - piece.times[row])

@@ -2,20 +2,26 @@
 
 `unit.Acu` keeps the Tables up to date; the law of the control unit reads them.
 """
-import collections
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from acu_tracker import modes
 from acu_tracker.program.program_track import NO_TRACK, ProgramTrack
 from pedestal_common.compiled import compiled
+from pedestal_common.quantities import Radians, Seconds
 
 TABLE_MODES = tuple(row for row in modes.MODE_ROWS if row.table)
 """Rows of modes.MODE_ROWS of the modes that follow a table."""
 
-Tables = collections.namedtuple('Tables', [row.name for row in TABLE_MODES])  # type: ignore[misc]  # a field per row
-"""One ProgramTrack for each mode that follows a table, the program first."""
+
+class Tables(NamedTuple):
+    """A table for each mode that follows one, in the order of TABLE_MODES."""
+    program: ProgramTrack
+    tle: ProgramTrack
+    sun: ProgramTrack
+
 
 NO_TABLES = Tables(*(NO_TRACK for _ in TABLE_MODES))  # tables without a row
 
@@ -23,8 +29,8 @@ TABLE_INDEX = tuple(TABLE_MODES.index(row) if row.table else 0 for row in modes.
 """Index in Tables of the table of each mode; 0, the program, for a mode that follows none."""
 
 
-def shifted(track, offset):
-    """Return a ProgramTrack with an offset (time [s], azimuth, elevation [rad]) added to each row.
+def shifted(track: ProgramTrack, offset: tuple[Seconds, Radians, Radians]) -> ProgramTrack:
+    """Return a ProgramTrack with an offset (time, azimuth, elevation) added to each row.
 
     The shifted elevations are limited to the zenith.
     """
@@ -37,6 +43,6 @@ def shifted(track, offset):
 
 
 @compiled
-def of_mode(tables, mode):
+def of_mode(tables: Tables, mode: int) -> ProgramTrack:
     """Return the table that a mode follows; for a mode that follows no table, return the program."""
     return tables[TABLE_INDEX[mode]]
