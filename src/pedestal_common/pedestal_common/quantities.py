@@ -43,6 +43,7 @@ Vector3: TypeAlias = Annotated[Floats, (3,)]
 Quaternion: TypeAlias = Annotated[Floats, (4,)]     # x, y, z, w
 Matrix3: TypeAlias = Annotated[Floats, (3, 3)]
 Xyz: TypeAlias = tuple[float, float, float]         # a vector in a law, in place of an array
+Xyzw: TypeAlias = tuple[float, float, float, float]     # a quaternion in a law, in place of an array
 Pairs: TypeAlias = Annotated[Floats, '(n, 2)']
 Vectors3: TypeAlias = Annotated[Floats, '(n, 3)']
 Quaternions: TypeAlias = Annotated[Floats, '(n, 4)']
