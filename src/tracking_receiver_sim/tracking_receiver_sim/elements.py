@@ -7,8 +7,8 @@ import datetime
 import json
 import pathlib
 import re
-import typing
 from collections.abc import Callable, Iterator
+from typing import NamedTuple
 from xml.parsers import expat
 
 from pedestal_common.geometry import omm, orbit
@@ -31,14 +31,14 @@ FIRST_SATELLITE_YEAR = 57
 TLE_EPOCH_COLUMNS = slice(18, 32)  # columns of the epoch in line 1 of a TLE
 
 
-class Elements(typing.NamedTuple):
+class Elements(NamedTuple):
     """Elements of a satellite."""
     name: str
     values: dict[str, str]  # {field of LeoPassParameters (line_1, line_2, omm): text}
     remark: str = ''        # the set that was chosen from a history, and values that were missing
 
 
-class Satellite(typing.NamedTuple):
+class Satellite(NamedTuple):
     """One set of elements of a satellite in a file."""
     line: int                       # first line in the file
     name: str
