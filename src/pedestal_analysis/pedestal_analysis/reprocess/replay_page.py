@@ -13,7 +13,7 @@ import numpy as np
 from pedestal_common.graph.steps import NS_PER_SECOND
 from pedestal_common.wire import commands, messages, records
 from pedestal_operator import remote_node
-from pedestal_operator.antenna import POINTING_TOPIC, Antenna
+from pedestal_operator.antenna import POINTING_TOPIC
 from pedestal_operator.page import page_log, page_sky, page_state
 from pedestal_operator.page.page_log import Log
 from pedestal_operator.page.page_passes import UpcomingPasses
@@ -37,7 +37,7 @@ LIST_TOPICS = ('acu/alarms', 'acu/program_track', 'diagnostics', 'acu/command_re
 """Topics of other kinds that the page shows."""
 
 
-class Recording(Antenna):
+class Recording(page_state.PageAntenna):
     """A recording with the interface of a live Antenna: it has the newest messages at a position in the recording.
 
     bag: bag.Bag of one beam. position: time since the first joint state [s]; length: length of the recording [s].
