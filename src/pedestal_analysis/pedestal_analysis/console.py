@@ -20,10 +20,9 @@ if typing.TYPE_CHECKING:    # these imports are slow, and most verbs need none o
     from rich import progress
     from rich.console import JustifyMethod
 
-    from pedestal_analysis.results.intervals import Row
     from pedestal_analysis.results.results import Result, Values
     from pedestal_analysis.trials.solve import Tried
-    from pedestal_common.quantities import Seconds
+    from pedestal_common.quantities import Row, Seconds
 
     _Columns: typing.TypeAlias = Iterable[progress.ProgressColumn]
 

@@ -19,14 +19,13 @@ from pedestal_analysis.report.figures import (
     new_panels,
 )
 from pedestal_analysis.results import tracking
-from pedestal_analysis.results.intervals import Row
 from pedestal_analysis.trials import statistics
 from pedestal_analysis.trials.comparison import Sides
 from pedestal_analysis.trials.plan import Plan
 from pedestal_analysis.trials.table import Table
 from pedestal_bringup.loop import memory_recording
 from pedestal_common.graph import nodes
-from pedestal_common.quantities import Floats
+from pedestal_common.quantities import Floats, Row
 
 HISTOGRAM_RESULTS = ('pointing_rms_deg', 'pointing_max_deg', 'azimuth_following_rms_deg',
                      'elevation_following_rms_deg', 'lock_time_s', 'loss_s', 'azimuth_nis_mean', 'azimuth_nees_mean',

@@ -9,10 +9,9 @@ from collections.abc import Iterator
 import numpy as np
 
 from pedestal_analysis.reprocess import recompute
-from pedestal_analysis.results.intervals import Row
 from pedestal_analysis.results.results import row
 from pedestal_common.graph import nodes
-from pedestal_common.quantities import Nanoseconds
+from pedestal_common.quantities import Nanoseconds, Row
 from pedestal_common.wire import records
 from pedestal_hardware.monopulse import blocks, sigmf
 from pedestal_hardware.monopulse.params import MonopulseParameters

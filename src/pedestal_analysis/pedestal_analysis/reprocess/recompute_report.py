@@ -12,12 +12,11 @@ from pedestal_analysis.reprocess import difference, recompute, what_if
 from pedestal_analysis.reprocess.difference import Output
 from pedestal_analysis.reprocess.recompute import FedRecording, Recomputed
 from pedestal_analysis.results import tracking
-from pedestal_analysis.results.intervals import Row
 from pedestal_analysis.results.results import row
 from pedestal_common import parameters
 from pedestal_common.graph import topics
 from pedestal_common.graph.steps import NS_PER_SECOND
-from pedestal_common.quantities import Json, Message, Stamps
+from pedestal_common.quantities import Json, Message, Row, Stamps
 from pedestal_common.wire import commands, messages, records
 from pedestal_recording.verify import steps_before
 from pedestal_recording.writer import Writer

@@ -4,16 +4,14 @@ The trials and the studies use this module.
 """
 import math
 from collections.abc import Callable
-from typing import TypeAlias, TypeVar
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import stdtrit
 
-from pedestal_common.quantities import Floats, Json
+from pedestal_common.quantities import Estimate, Floats, Row
 
-Estimate: TypeAlias = tuple[float, float, float]    # value, low and high end of its confidence interval
-Row: TypeAlias = dict[str, Json]    # row of a --json file, see `row`
 _P = TypeVar('_P')      # part of the runs
 
 CONFIDENCE_LEVEL = 0.95  # confidence level of the interval of a mean [-]

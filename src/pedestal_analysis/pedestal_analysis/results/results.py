@@ -30,8 +30,8 @@ from pedestal_analysis.results import (
     sensor_frame,
     tracking,
 )
-from pedestal_analysis.results.intervals import Row
 from pedestal_analysis.results.tracking import DEG_PER_RAD, known_rms, largest
+from pedestal_common.quantities import Row
 from pedestal_recording.recording import Recording
 
 Values: TypeAlias = dict[str, tuple[float, str]]    # {name of a result: (value, unit)}
