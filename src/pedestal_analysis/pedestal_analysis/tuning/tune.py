@@ -104,7 +104,7 @@ class RecordedSource:
     criterion_name, unit, kept = 'negative log-likelihood of an error', '', 'on the reserved pieces'
 
     def __init__(self, path):
-        self.recording = recompute.Recording(path)
+        self.recording = recompute.FedRecording(path)
         self.params = recompute.parameters_of(self.recording, 'acu')
         self.of_beams = self.recording.bag.beam != ''
         done = recompute.recompute(self.recording, 'acu', self.params)

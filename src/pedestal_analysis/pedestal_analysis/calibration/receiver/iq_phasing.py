@@ -170,7 +170,7 @@ def opened(options, changes):
     the same scenario and the same changes.
     """
     if options.bag is not None:
-        recording = recompute.Recording(options.bag)
+        recording = recompute.FedRecording(options.bag)
         bag, source, epoch = recording.bag, str(options.bag), recording.bag.start
         parameters = _of_three_channels(iq.parameters_of(recording), source)
     else:
