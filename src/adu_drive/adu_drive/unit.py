@@ -16,7 +16,7 @@ from pedestal_common.compiled import compiled
 from pedestal_common.graph import nodes, topics
 from pedestal_common.injection import schedule, table
 from pedestal_common.injection.simulated import Simulated
-from pedestal_common.node.unit import LEVEL_ERROR, LEVEL_OK, LEVEL_WARN, Diagnosis, joined
+from pedestal_common.node.unit import LEVEL_ERROR, LEVEL_OK, LEVEL_WARN, Diagnosis
 from pedestal_common.quantities import AnyRecord, Bit, Floats, Nanoseconds, Records, Seconds, Stamps, Vector3
 from pedestal_common.record import Record
 from pedestal_common.wire.commands import Reply
@@ -237,13 +237,11 @@ def law_of_lanes(drives: DriveRecord, stamp: Nanoseconds, inputs: Records, outpu
 @functools.lru_cache(1)
 def _initial(parameters: AduNodeParameters) -> Records:
     """Return the DriveRecord (1,) of a drive before its first step, cached for trials with the same drive."""
-    link = Link.zeros()
-    link['stamp'] = link['command_stamp'] = link['truth_stamp'] = NO_STAMP
-    link['timeout'] = round(parameters.command_timeout * parameters.period * 1e9)
-    link['period'] = round(parameters.period * 1e9)
-    record = joined(DriveRecord.dtype, state=drive_unit.initial_state(parameters),
-                    constants=drive_unit.constants(parameters),
-                    link=link, schedule=schedule.empty())
+    link = Link.of(stamp=NO_STAMP, command_stamp=NO_STAMP, truth_stamp=NO_STAMP,
+                   timeout=round(parameters.command_timeout * parameters.period * 1e9),
+                   period=round(parameters.period * 1e9))
+    record = DriveRecord.of(state=drive_unit.initial_state(parameters), constants=drive_unit.constants(parameters),
+                            link=link, schedule=schedule.empty())
     drive_unit.read(*(record[0][name] for name in ('state', 'constants', 'outputs')))
     return record
 

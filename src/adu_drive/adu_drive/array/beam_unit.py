@@ -13,7 +13,7 @@ from adu_drive.array import electronic_beam
 from adu_drive.params import BeamParameters
 from pedestal_common.compiled import compiled
 from pedestal_common.graph import nodes, topics
-from pedestal_common.node.unit import LEVEL_ERROR, LEVEL_OK, LEVEL_WARN, Diagnosis, joined
+from pedestal_common.node.unit import LEVEL_ERROR, LEVEL_OK, LEVEL_WARN, Diagnosis
 from pedestal_common.quantities import AnyRecord, Bit, Floats, Nanoseconds, Records, Stamps
 from pedestal_common.record import Record
 from pedestal_common.wire.records import NO_STAMP
@@ -111,11 +111,10 @@ class Beam(AngleDrive):
     def __init__(self, parameters: BeamParameters, reads: Iterable[str]) -> None:
         super().__init__(parameters, reads)
         p = parameters
-        switches = Switches.zeros()
-        switches['wanted'], switches['stamp'] = 1, NO_STAMP
+        switches = Switches.of(wanted=1, stamp=NO_STAMP)
         constants = electronic_beam.constants(p.period, p.transport_delay, p.command_timeout * p.period)
-        self.memory = Memory(joined(UnitRecord.dtype, constants=constants, switches=switches,
-                                    state=electronic_beam.initial_state(p.initial_azimuth, p.initial_elevation)))
+        state = electronic_beam.initial_state(p.initial_azimuth, p.initial_elevation)
+        self.memory = Memory(UnitRecord.of(constants=constants, switches=switches, state=state))
         electronic_beam.read(self.parts['state'], self.parts['outputs'])
 
     @property
