@@ -8,16 +8,13 @@ pins may move only in the phase `disabled`. Overcurrent, and a stop that takes t
 the brakes at once.
 """
 import math
-import typing
+from typing import Protocol
 
-from adu_drive import stow_pins
+from adu_drive import axis, stow_pins
 from adu_drive.controller import faults
 from pedestal_common.compiled import compiled
 from pedestal_common.graph import topics
 from pedestal_common.quantities import Bit
-
-if typing.TYPE_CHECKING:    # drive_unit imports this module
-    from adu_drive import axis, drive_unit
 
 PHASES = ('enabled', 'stopping', 'engaging brakes', 'disabled', 'releasing brakes')
 PHASE_ENABLED, PHASE_STOPPING, PHASE_ENGAGING_BRAKES, PHASE_DISABLED, PHASE_RELEASING_BRAKES = range(len(PHASES))
@@ -50,20 +47,43 @@ of the fault words of azimuth and elevation."""
 STANDSTILL_RATE_RAD_S = 1e-3  # load rate below which an axis counts as standing [rad/s]
 
 
+class State(Protocol):
+    """Part of drive_unit.State that this module reads and changes."""
+    azimuth: axis.State
+    elevation: axis.State
+    phase: int
+    age: int
+    wanted: Bit
+    emergency: Bit
+    applied: Bit
+    brake_age: int
+    pins: stow_pins.State
+
+
+class Constants(Protocol):
+    """Part of drive_unit.Constants that this module reads."""
+    azimuth: axis.Constants
+    elevation: axis.Constants
+    pins: stow_pins.Constants
+    engage_periods: int
+    release_periods: int
+    stop_periods: int
+
+
 @compiled
-def tripped(state: 'drive_unit.State') -> bool:
+def tripped(state: State) -> bool:
     """Return True if an axis has a fault that stops the drive."""
     return faults.stops(state.azimuth.faults) or faults.stops(state.elevation.faults)
 
 
 @compiled
-def permitted(state: 'drive_unit.State') -> Bit:
+def permitted(state: State) -> Bit:
     """Return True if the drive may follow commands."""
     return state.wanted and not state.emergency and not tripped(state) and stow_pins.pins_out(state.pins)
 
 
 @compiled
-def condition(state: 'drive_unit.State') -> int:
+def condition(state: State) -> int:
     """Return the code of adu/state. It changes with every change of `state_text`.
 
     Codes 0 to 3 are topics.ENABLED_STATES: bit 0 and bit 1 stand for an azimuth and an elevation with one motor.
@@ -94,13 +114,13 @@ def state_text(condition: int) -> str:
 
 
 @compiled
-def is_moving(axis: 'axis.State', constants: 'axis.Constants') -> bool:
+def is_moving(axis: axis.State, constants: axis.Constants) -> bool:
     """Return True if an axis turns by its motor encoders."""
     return abs(axis.motor_1.measured + axis.motor_2.measured) * constants.per_2N > STANDSTILL_RATE_RAD_S
 
 
 @compiled
-def _next(state: 'drive_unit.State', constants: 'drive_unit.Constants', ready: bool) -> int:
+def _next(state: State, constants: Constants, ready: bool) -> int:
     """Return the phase of the next period. ready: True if the amplifiers of the motors are on."""
     allowed = permitted(state)
     if faults.removes_torque(state.azimuth.faults) or faults.removes_torque(state.elevation.faults):
@@ -123,7 +143,7 @@ def _next(state: 'drive_unit.State', constants: 'drive_unit.Constants', ready: b
 
 
 @compiled
-def _advance_pins(state: 'drive_unit.State', constants: 'drive_unit.Constants', wanted: int) -> None:
+def _advance_pins(state: State, constants: Constants, wanted: int) -> None:
     """Advance the stow pins by a period. They move while the drive is disabled. wanted: code of acu/stow_pins."""
     az, el, c = state.azimuth, state.elevation, constants
     stow_pins.command_pins(state.pins, c.pins, wanted,
@@ -135,7 +155,7 @@ def _advance_pins(state: 'drive_unit.State', constants: 'drive_unit.Constants', 
 
 
 @compiled
-def advance(state: 'drive_unit.State', constants: 'drive_unit.Constants', pins: int, ready: bool) -> bool:
+def advance(state: State, constants: Constants, pins: int, ready: bool) -> bool:
     """Advance the phase by a control period. Return True if the brakes grip.
 
     pins: code of acu/stow_pins; ready: True if the amplifiers of the motors are on.
@@ -152,7 +172,7 @@ def advance(state: 'drive_unit.State', constants: 'drive_unit.Constants', pins: 
 
 
 @compiled
-def request(state: 'drive_unit.State', constants: 'drive_unit.Constants', what: int) -> int:
+def request(state: State, constants: Constants, what: int) -> int:
     """Execute a request between two periods. Return REPLY_ACCEPTED or the code of a refusal.
 
     what: a code of REQUEST_CODES. The request takes effect in the next period. Faults and emergency stop can be reset

@@ -17,6 +17,7 @@ SPEED_LOOP_PERIOD_S = 0.5e-3  # period of the speed loop, five periods of the cu
 PLANT_PERIOD_S = 50e-6  # step of the simulated plant, half a period of the current loop [s]
 MAX_TRANSPORT_DELAY_S = 0.1  # longest transport delay [s]
 BRAKING_REACTION_TIME_S = 0.01  # reaction time of the speed loop before an axis brakes [s]
+BEAM_RING_SIZE = 512  # largest number of commands to a beam of an array within its delay
 DEFAULT_BUFFER_MARGIN_RAD = math.radians(2.0)  # default distance from the emergency switch to the buffer [rad]
 
 
@@ -26,6 +27,13 @@ def whole_speed_periods(name: str, value: Seconds) -> int:
     if abs(value / SPEED_LOOP_PERIOD_S - periods) > 1e-6:
         raise ParameterError(f'{name} = {value:g} s: must be a multiple of {SPEED_LOOP_PERIOD_S:g} s (the speed loop)')
     return periods
+
+
+def check_delay(period: Seconds, transport_delay: Seconds) -> None:
+    """Raise ParameterError if the commands within the delay do not fit into the ring."""
+    if transport_delay >= (BEAM_RING_SIZE - 1) * period:
+        raise ParameterError(f'transport_delay = {transport_delay:g} s: must be below {BEAM_RING_SIZE - 1} periods of '
+                             f'{period:g} s')
 
 
 def mesh_inertia(motor: KilogramMeters2, ratio: float, load: KilogramMeters2) -> KilogramMeters2:
@@ -499,5 +507,4 @@ class BeamParameters(RunParameters):
         if abs(periods - round(periods)) > 1e-6:
             raise ParameterError(f'transport_delay = {self.transport_delay:g} s: must be a multiple of the period '
                                  f'{self.period:g} s')
-        from adu_drive.array import electronic_beam  # imported here because only the array needs numba
-        electronic_beam.check_delay(self.period, self.transport_delay)
+        check_delay(self.period, self.transport_delay)

@@ -6,13 +6,12 @@ models the closed-loop period of that paper.
 """
 from typing import Annotated
 
+from adu_drive.params import BEAM_RING_SIZE, check_delay
 from pedestal_common.compiled import compiled
-from pedestal_common.parameters import ParameterError
 from pedestal_common.quantities import Bit, Floats, Ints, Nanoseconds, Pair, Radians, Records, Seconds
 from pedestal_common.record import Record
 from pedestal_common.wire.records import NO_STAMP
 
-BEAM_RING_SIZE = 512  # largest number of commands within the delay
 MAX_COMMAND_ANGLE_RAD = 1e3  # largest valid angle of a command [rad]; a command beyond it, infinite or NaN is ignored
 
 
@@ -46,13 +45,6 @@ class Outputs(Record):
     stale: Bit                      # 1 if the newest valid command was older than the timeout at t_k, or missing
     # 1 if the command of this step was invalid or not newer than the previous one; the beam stays
     invalid_command: Bit
-
-
-def check_delay(period: Seconds, transport_delay: Seconds) -> None:
-    """Raise ParameterError if the commands within the delay do not fit into the ring."""
-    if transport_delay >= (BEAM_RING_SIZE - 1) * period:
-        raise ParameterError(f'transport_delay = {transport_delay:g} s: must be below {BEAM_RING_SIZE - 1} periods of '
-                             f'{period:g} s')
 
 
 def constants(period: Seconds, transport_delay: Seconds, timeout: Seconds) -> Records:
