@@ -3,7 +3,6 @@
 Such a drive has no brakes. Two switches in its record determine its state: `wanted`, which clients request, and
 `emergency`, a latched emergency stop.
 """
-import typing
 
 from pedestal_common.graph import topics
 from pedestal_common.node.unit import Unit
@@ -39,7 +38,7 @@ class AngleDrive(Unit):
         """Return the age of the command in a step: one period."""
         return self.parameters.period
 
-    def encode(self, topic: str, code: int) -> typing.Any:
+    def encode(self, topic: str, code: int) -> str:
         """Return the text of a code of adu/state."""
         return self.STATE_TEXTS[code]
 

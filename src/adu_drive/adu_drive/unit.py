@@ -17,7 +17,7 @@ from pedestal_common.graph import nodes, topics
 from pedestal_common.injection import schedule, table
 from pedestal_common.injection.simulated import Simulated
 from pedestal_common.node.unit import LEVEL_ERROR, LEVEL_OK, LEVEL_WARN, Diagnosis
-from pedestal_common.quantities import AnyRecord, Bit, Floats, Nanoseconds, Records, Seconds, Stamps, Vector3
+from pedestal_common.quantities import AnyRecord, Bit, Floats, Message, Nanoseconds, Records, Seconds, Stamps, Vector3
 from pedestal_common.record import Record
 from pedestal_common.wire.commands import Reply
 from pedestal_common.wire.records import NO_STAMP
@@ -292,7 +292,7 @@ class Adu(Simulated):
         azimuth, elevation = (float(o[axis]['position']) for axis in topics.AXES)
         return state_file.PlantState(azimuth, elevation, bool(enabled), pinned)
 
-    def encode(self, topic: str, code: int) -> typing.Any:
+    def encode(self, topic: str, code: int) -> str | Message:
         """Return the text of a code of adu/state, or of another topic as in Unit."""
         return drive_state.state_text(code) if topic == DRIVE_STATE_TOPIC else super().encode(topic, code)
 
