@@ -88,7 +88,7 @@ def load_inertia_change(drive, elevation):
     """Return the inertia [kg m2] about azimuth at an elevation [rad] less the parameter azimuth.load.inertia."""
     if drive.elevating.about_beam <= 0.0:
         return 0.0
-    bodies = gimbal.constants(drive)
+    bodies = gimbal.constants(drive)[0]
     s, k = np.sin(elevation), np.cos(elevation)
     about = np.array((-s, 0.0, -k))
     return float(about @ bodies['I'] @ about + bodies['J_yoke'] - drive.azimuth.load.inertia)
