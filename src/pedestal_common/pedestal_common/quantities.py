@@ -1,5 +1,5 @@
 """Types of numbers and arrays: what a number means, its unit or its shape. numba and Python ignore both; a reader and
-mypy do not. Three types at the end stand for data without a declared type.
+mypy do not. The types at the end stand for data without a declared type.
 
 `Radians` is a float, `Pairs` is an array of floats of shape (n, 2). A shape such as `Vector3` also gives the size of
 an array in a record (record.Record).
@@ -48,9 +48,12 @@ Quaternions: TypeAlias = Annotated[Floats, '(n, 4)']
 Times: TypeAlias = Annotated[Floats, '(n,) s']
 Stamps: TypeAlias = Annotated[Ints, '(n,) ns']
 
+Estimate: TypeAlias = tuple[float, float, float]    # a value, and the low and the high end of its confidence interval
+
 _R = TypeVar('_R')
 BothAxes: TypeAlias = Annotated[Sequence[_R], (2,)]     # a record of each axis: azimuth, elevation
 
 AnyRecord: TypeAlias = Any  # a record whose fields depend on data, as those of a node depend on its topics
 Message: TypeAlias = Any    # a ROS message, whose class is made by ROS without types
 Json: TypeAlias = Any       # what a JSON or YAML file holds; the code that takes a value from it checks the value
+Row: TypeAlias = dict[str, Any]     # of the rows of a --json file, see pedestal_analysis.results.intervals.row
