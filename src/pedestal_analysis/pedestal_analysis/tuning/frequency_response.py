@@ -119,8 +119,8 @@ The peak is half of the value at which the teeth lose contact with the bias torq
 class Response:
     """Measured frequency response of a loop.
 
-    In a speed loop the lowest frequency of a crossover is that of the structure on a free axis: at the frequency of
-    the structure on locked motors the dish holds the axis, and |L| falls below 1 long before the crossover.
+    In a speed loop the lowest frequency of a crossover is that of the structure on a free axis. At the frequency of
+    the structure on locked motors the dish holds the axis. There |L| falls below 1 long before the crossover.
     """
     frequency: Floats       # (n,) [Hz]
     open_loop: Complexes    # (n,) open loop L [-]
