@@ -108,7 +108,6 @@ def _batch(plan: Plan) -> list[list[Json]]:
 
 
 def _batch_size(plan: Plan) -> int:
-    """Return the number of trials of a plan in a batch."""
     return max(MIN_BATCH_TRIALS, side_by_side.max_parallel_trials(plan.scenario(0), MEASURED_TOPICS))
 
 

@@ -171,7 +171,6 @@ class Search:
         return f'{table_prefix(self._wanted.key)}{value!r}'
 
     def _tried(self, value: float, table: Table) -> Tried:
-        """Return the Tried of a value from the table.Table of its trials."""
         name = next(name for name in table.results if self._aim.result in (name, nodes.plain(name)))
         values = table.column(name)
         known = np.isfinite(values)

@@ -135,7 +135,6 @@ class Table:
                 raise self._damage(line, f'{name} = {cell!r:.60}: must be a number, or empty for no result')
 
     def _damage(self, line: int, text: str) -> TableError:
-        """Return the error of a damaged line."""
         return TableError(f'{self.file}: line {line}: {text}; mend the line, or delete the file to run its trials '
                           'again')
 

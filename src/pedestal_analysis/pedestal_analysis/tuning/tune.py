@@ -220,7 +220,6 @@ _Params = TypeVar('_Params', bound=parameters.Parameters)
 
 
 def _with_filter(params: AcuParameters, axis: str, changed: FilterParameters) -> AcuParameters:
-    """Return the parameters with another filter of an axis."""
     return dataclasses.replace(params, **{axis: dataclasses.replace(getattr(params, axis), filter=changed)})
 
 

@@ -79,7 +79,6 @@ def identify(parts: Iterable[tuple[Motion, Floats]], friction: Estimates, gravit
 
 
 def _rigid(rows: Floats) -> Estimates:
-    """Return the estimate `inertia` of a rigid structure."""
     return jackknife(('inertia',), interleaved(rows), lambda kept: _solved(np.concatenate(kept))[:1])
 
 
