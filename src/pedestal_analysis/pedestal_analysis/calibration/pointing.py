@@ -83,11 +83,11 @@ def rows(found: Calibration) -> list[Row]:
     of_terms = [estimated(CASE_NAME, name, (value, value - width, value + width), terms.TERM_BY_NAME[name].unit, count)
                 for name, value, width in zip(fitted.names, fitted.values, half)]
     residuals = fitted.residuals
-    measured = {'raw_rms_deg': rms(found.offsets.values), 'residual_rms_deg': rms(residuals),
-                'residual_cross_elevation_rms_deg': rms(residuals[:, 0]), 'residual_elevation_rms_deg':
-                rms(residuals[:, 1]),
-                'leave_one_out_rms_deg': rms(fitted.left_out),
-                'model_error_deg': fit.model_error(fitted.names, fitted.covariance, found.offsets.directions)}
+    measured: dict[str, float] = {
+        'raw_rms_deg': rms(found.offsets.values), 'residual_rms_deg': rms(residuals),
+        'residual_cross_elevation_rms_deg': rms(residuals[:, 0]), 'residual_elevation_rms_deg': rms(residuals[:, 1]),
+        'leave_one_out_rms_deg': rms(fitted.left_out),
+        'model_error_deg': fit.model_error(fitted.names, fitted.covariance, found.offsets.directions)}
     return [*of_terms, *(row(CASE_NAME, name, value, 'deg') for name, value in measured.items()),
             row(CASE_NAME, 'condition', fitted.condition), row(CASE_NAME, 'points', count)]
 

@@ -30,7 +30,7 @@ from acu_tracker.estimation.filters.kinds import FILTER_KINDS
 from acu_tracker.estimation.params import FilterParameters, UkfParameters
 from acu_tracker.modes import Mode
 from acu_tracker.params import AcuParameters
-from acu_tracker.unit import RANGE_TOPIC, Acu
+from acu_tracker.unit import RANGE_TOPIC
 from pedestal_analysis import console
 from pedestal_analysis.reprocess import recompute, what_if
 from pedestal_analysis.results import identification
@@ -42,6 +42,7 @@ from pedestal_bringup.scenario.scenario import Scenario
 from pedestal_common import parameters
 from pedestal_common.graph import layouts, topics
 from pedestal_common.graph.steps import NS_PER_SECOND
+from pedestal_common.node.unit import Unit
 from pedestal_common.quantities import Floats, Json, Pair, Pairs, Records
 from pedestal_common.text_files import parameter_file
 from pedestal_common.wire import records
@@ -104,7 +105,9 @@ class RecordedSource:
 
     def __init__(self, path: pathlib.Path) -> None:
         self.recording = recompute.Recording(path)
-        self.params = recompute.parameters_of(self.recording, 'acu')
+        params = recompute.parameters_of(self.recording, 'acu')
+        assert isinstance(params, AcuParameters)
+        self.params = params
         self.of_beams = self.recording.bag.beam != ''
         done = recompute.recompute(self.recording, 'acu', self.params)
         self.feed = done.feed
@@ -130,7 +133,7 @@ class RecordedSource:
         """
         return np.array([layouts.of_filter(steps, name) for name in ('innovation', 'innovation_sigma', 'nis')])
 
-    def _run(self, params: AcuParameters) -> tuple[Acu, Records]:
+    def _run(self, params: AcuParameters) -> tuple[Unit, Records]:
         """Return (unit of the control unit, its outputs at each step (n,))."""
         unit = recompute.unit_of(self.recording, 'acu', params)
         return unit, recompute.compute(self.recording, unit, self.feed, requests=self.requests)[0]
@@ -149,8 +152,8 @@ class RecordedSource:
         pointing = {}
         for name in ESTIMATE_ERRORS:
             if name in numbers:
-                [value], unit = numbers[name]
-                pointing[name] = value, unit
+                [value], of_value = numbers[name]
+                pointing[name] = value, of_value
         return Score(searched=_mean(-density[self.searched]), kept=_mean(-density[self.reserved]),
                      nis=_mean(nis[self.reserved]), pointing=pointing)
 

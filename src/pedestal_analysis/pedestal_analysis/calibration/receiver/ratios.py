@@ -60,25 +60,25 @@ def at_points(samples: Samples, spans: Pairs) -> Complexes:
     Raises OffsetError for a point without samples or without lock.
     """
     unit = iq.unit_of(samples.parameters)
-    sums, first, last = [_Sums() for _ in spans], None, None
+    sums = [_Sums() for _ in spans]
+    ends: tuple[Nanoseconds, Nanoseconds] | None = None
     for block in iq.steps(unit, samples.file, samples.epoch):
-        first, last = block.middle if first is None else first, block.middle
+        ends = ends[0] if ends else block.middle, block.middle
         t = (block.middle - samples.epoch) / NS_PER_SECOND
         k = int(np.searchsorted(spans[:, 0], t, side='right')) - 1
         if k >= 0 and t <= spans[k, 1]:
             sums[k].put(unit)
     for found, span in zip(sums, spans):
-        _check(found, span, samples, (first, last))
+        _check(found, span, samples, ends)
     return np.array([found.products / (found.power - found.noise) for found in sums])
 
 
-def _check(found: _Sums, span: Pair, samples: Samples,
-           ends: tuple[Nanoseconds, Nanoseconds] | tuple[None, None]) -> None:
+def _check(found: _Sums, span: Pair, samples: Samples, ends: tuple[Nanoseconds, Nanoseconds] | None) -> None:
     """Raise OffsetError for the sums of a point without samples or lock. ends: UTC of the first and the last step of
     the samples, None without a step."""
     place, expected = f'{span[0]:.1f} to {span[1]:.1f} s', (span[1] - span[0]) / samples.parameters.period
     if found.steps < (1.0 - offsets.MAX_MISSING_SHARE) * expected:
-        covered = ('holds no whole step' if ends[0] is None else
+        covered = ('holds no whole step' if ends is None else
                    f'holds samples from {sigmf.text_of(ends[0])} to {sigmf.text_of(ends[1])}')
         raise offsets.OffsetError(f'samples are missing at {place}: {samples.file.meta} {covered}, and time 0 of the '
                                   f'recording is {sigmf.text_of(samples.epoch)}; both must be of the same run')
