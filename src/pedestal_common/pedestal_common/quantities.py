@@ -49,7 +49,6 @@ Times: TypeAlias = Annotated[Floats, '(n,) s']
 Stamps: TypeAlias = Annotated[Ints, '(n,) ns']
 
 Estimate: TypeAlias = tuple[float, float, float]    # a value, and the low and the high end of its confidence interval
-Row: TypeAlias = dict[str, Any]     # row of a --json file, see pedestal_analysis.results.intervals.row
 
 _R = TypeVar('_R')
 BothAxes: TypeAlias = Annotated[Sequence[_R], (2,)]     # a record of each axis: azimuth, elevation
@@ -57,3 +56,4 @@ BothAxes: TypeAlias = Annotated[Sequence[_R], (2,)]     # a record of each axis:
 AnyRecord: TypeAlias = Any  # a record whose fields depend on data, as those of a node depend on its topics
 Message: TypeAlias = Any    # a ROS message, whose class is made by ROS without types
 Json: TypeAlias = Any       # what a JSON or YAML file holds; the code that takes a value from it checks the value
+Row: TypeAlias = dict[str, Any]     # of the rows of a --json file, see pedestal_analysis.results.intervals.row
