@@ -10,6 +10,7 @@ import pathlib
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from pedestal_analysis.calibration import (
     collect,
@@ -83,7 +84,7 @@ def rows(found: Calibration) -> list[Row]:
     of_terms = [estimated(CASE_NAME, name, (value, value - width, value + width), terms.TERM_BY_NAME[name].unit, count)
                 for name, value, width in zip(fitted.names, fitted.values, half)]
     residuals = fitted.residuals
-    measured: dict[str, float] = {
+    measured: dict[str, ArrayLike] = {
         'raw_rms_deg': rms(found.offsets.values), 'residual_rms_deg': rms(residuals),
         'residual_cross_elevation_rms_deg': rms(residuals[:, 0]), 'residual_elevation_rms_deg': rms(residuals[:, 1]),
         'leave_one_out_rms_deg': rms(fitted.left_out),
