@@ -21,7 +21,7 @@ from pedestal_analysis.calibration.predicted import PredictionError
 from pedestal_analysis.results import tracking
 from pedestal_common.geometry.line_of_sight import wrap
 from pedestal_common.quantities import Floats, Pair, Pairs, Seconds, Times
-from pedestal_recording.bag import Bag
+from pedestal_recording.recording import Recording
 
 WINDOW_S = 8.0  # length of the part of a recording whose mean is one offset [s]
 DEFAULT_POINTS = 10  # default number of offsets from one recording
@@ -41,7 +41,7 @@ class Point(NamedTuple):
     offset: Pair        # cross-elevation and elevation [deg]
 
 
-def points(bag: Bag, tracks: Sequence[ProgramTrack], count: int = DEFAULT_POINTS) -> tuple[Times, Pairs, Pairs]:
+def points(bag: Recording, tracks: Sequence[ProgramTrack], count: int = DEFAULT_POINTS) -> tuple[Times, Pairs, Pairs]:
     """Return (times, directions [deg], offsets [deg]) of at most `count` points of a recording.
 
     tracks: predicted.programs. The points are in the middle of equal parts of the steps in settled autotrack. Raises
@@ -92,7 +92,7 @@ def listed(kind: str, table: Iterable[Floats]) -> list[Point]:
     return [Point(kind, *one) for one in zip(*table)]
 
 
-def every_point(bag: Bag, count: int = DEFAULT_POINTS) -> list[Point]:
+def every_point(bag: Recording, count: int = DEFAULT_POINTS) -> list[Point]:
     """Return the points of the passes and scans of a recording.
 
     count: largest number of points from autotrack. Raises CollectError.

@@ -18,7 +18,7 @@ from pedestal_common.graph.modes import MODE_ROWS
 from pedestal_common.parameters import ParameterError
 from pedestal_common.quantities import Json, Pairs, Quaternions, Texts, Times
 from pedestal_common.wire import messages
-from pedestal_recording.bag import Bag
+from pedestal_recording.recording import Recording
 
 PROGRAM_TOPIC, S_PER_NS = 'acu/program_track', 1e-9
 TABLE_MODES = tuple(row.name for row in MODE_ROWS if row.table)  # modes that follow a table
@@ -48,7 +48,7 @@ def _on_deck(attitude: Quaternions, angles: Pairs) -> None:
         angles[k, 0], angles[k, 1] = line_of_sight.angles(*line_of_sight.to_deck(mat_ed, e, n, u))
 
 
-def programs(bag: Bag) -> list[ProgramTrack]:
+def programs(bag: Recording) -> list[ProgramTrack]:
     """Return the program tracks of a recording in the order of their messages, as the control unit followed them.
 
     Refraction is a part of them if the recorded control unit adds it.
@@ -67,7 +67,7 @@ def programs(bag: Bag) -> list[ProgramTrack]:
     return [air.apparent(track) for track in found]
 
 
-def _of_acu(bag: Bag) -> dict[str, Json]:
+def _of_acu(bag: Recording) -> dict[str, Json]:
     """Return the recorded parameters {name: value} of the control unit."""
     return bag.configuration['parameters'].get('acu', {})
 
@@ -82,7 +82,7 @@ def of_programs(tracks: Iterable[ProgramTrack], t: Times) -> Pairs:
     return out
 
 
-def _satellite(bag: Bag, predictor: Predictor, t: Times) -> Pairs:
+def _satellite(bag: Recording, predictor: Predictor, t: Times) -> Pairs:
     """Return the directions [rad] of the satellite of the mode tle, by the elements in force at each time."""
     changes = [(-np.inf, predictor)]
     for time, command, reply in tracking.replies(bag, 'acu/command_result'):
@@ -104,7 +104,7 @@ def _satellite(bag: Bag, predictor: Predictor, t: Times) -> Pairs:
     return out
 
 
-def followed(bag: Bag, modes: Texts, tracks: Sequence[ProgramTrack]) -> Texts:
+def followed(bag: Recording, modes: Texts, tracks: Sequence[ProgramTrack]) -> Texts:
     """Return the mode of the table that the control unit followed last at each step.
 
     Before the first table, the program track is expected, and without one the satellite of the mode tle.
@@ -115,7 +115,7 @@ def followed(bag: Bag, modes: Texts, tracks: Sequence[ProgramTrack]) -> Texts:
     return np.where(last < 0, first, modes[last])
 
 
-def on_deck(bag: Bag, t: Times, tracks: Sequence[ProgramTrack], modes: Texts) -> Pairs:
+def on_deck(bag: Recording, t: Times, tracks: Sequence[ProgramTrack], modes: Texts) -> Pairs:
     """Return the predicted deck angles [rad] at the steps; NaN where nothing is predicted.
 
     tracks: of `programs`; modes: of the steps. Raises PredictionError for predictions that need more than the

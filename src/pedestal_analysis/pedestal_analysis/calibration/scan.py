@@ -24,7 +24,7 @@ from pedestal_analysis.calibration.predicted import PredictionError
 from pedestal_analysis.results import tracking
 from pedestal_common.geometry.line_of_sight import wrap
 from pedestal_common.quantities import Floats, Pair, Pairs, Radians, Texts, Times
-from pedestal_recording.bag import Bag
+from pedestal_recording.recording import Recording
 
 MIN_LEVELS = 5  # smallest number of levels of a scan
 MIN_LEVEL_SHARE = 0.2  # smallest level that is fitted, as a share of the highest; further out a beam is no Gaussian
@@ -80,7 +80,7 @@ class Dwell(NamedTuple):
     elevation: Radians
 
 
-def scans(bag: Bag, t: Times, modes: Texts) -> list[list[Dwell]]:
+def scans(bag: Recording, t: Times, modes: Texts) -> list[list[Dwell]]:
     """Return the scans of a recording, each with its dwells in the order of time.
 
     t, modes: of the steps. A scan ends with a dwell that no command ends within MAX_DWELL_S, or with a change of the
@@ -118,7 +118,7 @@ def at_rest(dwell: Dwell) -> slice:
     return slice(dwell.last - max(round(DWELL_SHARE * (dwell.last - dwell.first)), 1), dwell.last)
 
 
-def points(bag: Bag, tracks: Sequence[ProgramTrack]) -> tuple[Times, Pairs, Pairs, Pairs]:
+def points(bag: Recording, tracks: Sequence[ProgramTrack]) -> tuple[Times, Pairs, Pairs, Pairs]:
     """Return (times, directions, offsets, sigmas) of the scans of a recording, all except the times [deg].
 
     tracks: predicted.programs. Raises ScanError without a scan, or for a scan that gives no offset.

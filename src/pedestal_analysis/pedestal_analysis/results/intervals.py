@@ -35,7 +35,7 @@ def interval(values: ArrayLike) -> Estimate:
     return mean, mean - half, mean + half
 
 
-def pseudo_values(parts: list[_P], statistic: Callable[[list[_P]], float]) -> Floats:
+def pseudo_values(parts: list[_P], statistic: Callable[[list[_P]], float | Floats]) -> Floats:
     """Return values for `interval` of a statistic that is taken over all runs together, such as an rms.
 
     parts: n about equal parts of the runs. The method is Tukey's jackknife (Efron and

@@ -49,7 +49,7 @@ QUANTITIES = {
 class Identified:
     """Result of a calibration of the drive. The dictionaries have the names of the axes as keys, except `changes`."""
     source: str                         # names of the recordings
-    recordings: Sequence[twin.Recording]
+    recordings: Sequence[twin.DriveRecording]
     first: dict[str, Estimates]         # before the correction by the twin
     found: dict[str, Estimates]         # in the order of QUANTITIES
     maps: dict[str, Pairs]              # error of the load encoder [rad] over the angle [rad], empty without a turn
@@ -60,7 +60,7 @@ class Identified:
     after: Errors                       # of the twin with `changes`
 
 
-def calibrate(recordings: Sequence[twin.Recording], source: str) -> Identified:
+def calibrate(recordings: Sequence[twin.DriveRecording], source: str) -> Identified:
     """Return the result of a calibration; source: names of the recordings. Raises ValueError."""
     found, maps = {}, {}
     first, corrected = twin.estimated(recordings)
@@ -85,7 +85,7 @@ def calibrate(recordings: Sequence[twin.Recording], source: str) -> Identified:
                       twin.torque_errors(recordings, changes))
 
 
-def _chosen(recordings: Sequence[twin.Recording], found: Mapping[str, Estimates],
+def _chosen(recordings: Sequence[twin.DriveRecording], found: Mapping[str, Estimates],
             identified: Mapping[str, float]) -> tuple[dict[str, float], dict[str, set[str]], Errors, Errors]:
     """Return (changes, kept, before, identified) of an Identified; identified: {parameter: value} of adu.
 
@@ -220,7 +220,7 @@ def write_plan(chosen: Scenario, given: str, path: pathlib.Path) -> list[str]:
             f'    {run} --param adu.azimuth.bias.schedule=off --param adu.elevation.bias.schedule=off --bag drive_2']
 
 
-def in_memory(name: str, overrides: Sequence[str]) -> list[twin.Recording]:
+def in_memory(name: str, overrides: Sequence[str]) -> list[twin.DriveRecording]:
     """Return two runs of a scenario in memory, the second without bias torque.
 
     name: of the scenario; overrides: changed parameters 'node.key=value', the true values of the simulated drive.
@@ -240,7 +240,7 @@ def in_memory(name: str, overrides: Sequence[str]) -> list[twin.Recording]:
     return found
 
 
-def of_bags(paths: Iterable[pathlib.Path]) -> list[twin.Recording]:
+def of_bags(paths: Iterable[pathlib.Path]) -> list[twin.DriveRecording]:
     """Return what a calibration takes from recordings. Raises ValueError for recordings of different drives."""
     found, first = [], None
     for path in paths:

@@ -12,7 +12,7 @@ from scipy.ndimage import gaussian_filter1d
 from adu_drive.params import AxisParameters
 from pedestal_analysis.results import tracking
 from pedestal_common.quantities import Floats, Pairs, Times
-from pedestal_recording.bag import Bag
+from pedestal_recording.recording import Recording
 
 SMOOTHING_S = 0.012  # standard deviation of the Gaussian of the smoothing filter [s]
 MOVING_RATE_RAD_S = 2e-4  # least rate of a moving axis [rad/s]
@@ -50,7 +50,7 @@ class Motion:
         return axis.gear_train.ratio * self.mesh_torque(axis).sum(1)
 
 
-def read(bag: Bag, name: str, axis: AxisParameters) -> Motion:
+def read(bag: Recording, name: str, axis: AxisParameters) -> Motion:
     """Return the motion of the axis `name` in a recording. Raises MotionError."""
     missing = [topic for topic in ('joint_states', 'adu/motor_states') if topic not in bag.topics]
     if missing:

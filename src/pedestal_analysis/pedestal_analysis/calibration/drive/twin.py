@@ -21,7 +21,7 @@ from pedestal_analysis.results import identification, tracking
 from pedestal_common.graph.topics import AXES
 from pedestal_common.parameters import as_dict, build
 from pedestal_common.quantities import Estimate, Floats, Json, KilogramMeters2, Pair, Pairs, Radians, Vectors3
-from pedestal_recording.bag import Bag
+from pedestal_recording.recording import Recording
 
 PARAMETER_NAMES = {
     'inertia': 'load.inertia', 'viscous': 'load.viscous', 'unbalance': 'load.unbalance',
@@ -43,7 +43,7 @@ Errors: TypeAlias = dict[str, float]  # {axis: error of the torques of a twin [-
 
 
 @dataclasses.dataclass(frozen=True)
-class Recording:
+class DriveRecording:
     """What a calibration of the drive takes from a recording."""
     drive: AduParameters
     motions: dict[str, Motion]  # {axis: its motion}
@@ -52,7 +52,7 @@ class Recording:
     start: Pair                 # encoder angles at the first step [rad]
 
 
-def read(bag: Bag, drive: AduParameters) -> Recording:
+def read(bag: Recording, drive: AduParameters) -> DriveRecording:
     """Return what a calibration takes from a recording of one beam. Raises MotionError."""
     if 'ship/imu/data' in bag.topics:
         raise motion_data.MotionError('the recording is of a ship, whose motion moves the axes too')
@@ -66,10 +66,10 @@ def read(bag: Bag, drive: AduParameters) -> Recording:
     # Before the first command of the control unit the drive holds its angles.
     commands = np.nan_to_num(tracking.on_grid(bag, joints['t'], 'acu/rate_command', columns))
     start = np.array([joints[f'{name}.position'][0] for name in AXES])
-    return Recording(drive, motions, commands[:, :2].copy(), commands[:, 2:].copy(), start)
+    return DriveRecording(drive, motions, commands[:, :2].copy(), commands[:, 2:].copy(), start)
 
 
-def replayed(recording: Recording, changes: Mapping[str, float]) -> dict[str, Motion]:
+def replayed(recording: DriveRecording, changes: Mapping[str, float]) -> dict[str, Motion]:
     """Return {axis: motion} of the twin of a recording; changes: {parameter: value} of adu that replace its values."""
     drive = changed(recording.drive, changes)
     zero = np.array([getattr(drive, name).encoder.error.zero for name in AXES])
@@ -103,7 +103,7 @@ def constant_rates(motion: Motion, load: Floats, found: Estimates) -> Vectors3:
     return estimates.plateaus(motion, load - mode.inertia_torque(motion, found))
 
 
-def estimate(recordings: Sequence[Recording], motions: Sequence[Motion], name: str,
+def estimate(recordings: Sequence[DriveRecording], motions: Sequence[Motion], name: str,
              flexible: bool = True) -> Estimates:
     """Return the estimates of an axis. Raises ValueError, which names too few motions.
 
@@ -124,7 +124,7 @@ def estimate(recordings: Sequence[Recording], motions: Sequence[Motion], name: s
     return found
 
 
-def estimated(recordings: Sequence[Recording]) -> tuple[dict[str, Estimates], dict[str, Estimates]]:
+def estimated(recordings: Sequence[DriveRecording]) -> tuple[dict[str, Estimates], dict[str, Estimates]]:
     """Return {axis: first estimates} and {axis: corrected estimates}. Raises ValueError."""
     true = {name: [recording.motions[name] for recording in recordings] for name in AXES}
     first = {name: estimate(recordings, true[name], name) for name in AXES}
@@ -163,7 +163,7 @@ def estimated(recordings: Sequence[Recording]) -> tuple[dict[str, Estimates], di
     return first, corrected
 
 
-def extra_inertia(recordings: Sequence[Recording]) -> dict[str, KilogramMeters2]:
+def extra_inertia(recordings: Sequence[DriveRecording]) -> dict[str, KilogramMeters2]:
     """Return {axis: inertia} that the elevating part adds to load.inertia at the elevation of the motions."""
     elevation = float(np.median(recordings[0].motions['elevation'].theta))
     return {'azimuth': load_inertia_change(recordings[0].drive, elevation), 'elevation': 0.0}
@@ -179,7 +179,7 @@ def _moved(value: float, first: float, low: float, high: float, rattling: bool) 
     return value, value + scale * (low - first) - more, value + scale * (high - first) + more
 
 
-def parameters(recordings: Sequence[Recording], values: Mapping[str, Mapping[str, float]]) -> dict[str, float]:
+def parameters(recordings: Sequence[DriveRecording], values: Mapping[str, Mapping[str, float]]) -> dict[str, float]:
     """Return the parameters {name: value} of adu for the estimates {axis: {name: value}} from recordings."""
     drive, extra = recordings[0].drive, extra_inertia(recordings)
     found: dict[str, float] = {}
@@ -196,7 +196,7 @@ def parameters(recordings: Sequence[Recording], values: Mapping[str, Mapping[str
     return found
 
 
-def torque_errors(recordings: Sequence[Recording], changes: Mapping[str, float]) -> Errors:
+def torque_errors(recordings: Sequence[DriveRecording], changes: Mapping[str, float]) -> Errors:
     """Return the rms difference of the torques of recording and twin, over the rms torque of the recording.
 
     changes: {parameter: value} of adu for the twin. Only moving steps count.

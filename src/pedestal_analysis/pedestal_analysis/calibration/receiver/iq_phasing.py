@@ -24,7 +24,7 @@ from pedestal_common.graph import nodes
 from pedestal_common.quantities import Complexes, Floats, Json, Pair, Pairs, Radians, Row
 from pedestal_hardware.monopulse import sigmf
 from pedestal_hardware.monopulse.params import THREE_CHANNELS, MonopulseParameters
-from pedestal_recording.bag import Bag
+from pedestal_recording.recording import Recording
 
 ELEMENT_NAMES = ('x_from_x', 'x_from_e'), ('e_from_x', 'e_from_e')
 """Names of the elements of the calibration matrix, by row and column."""
@@ -65,7 +65,7 @@ class IqPhasing:
         return (self.multiplied(self.in_force).real @ self.of_unit.T, self.multiplied(self.slopes.matrix).real)
 
 
-def calibrate(bag: Bag, source: str, samples: ratios.Samples, recorded: bool) -> IqPhasing:
+def calibrate(bag: Recording, source: str, samples: ratios.Samples, recorded: bool) -> IqPhasing:
     """Return the result for a recording of one beam and its samples. Raises OffsetError and MatrixError.
 
     recorded: True if the errors in the bag were made of these samples.
@@ -158,7 +158,7 @@ def content(found: IqPhasing) -> dict[str, Json]:
             'verified': phasing.passed(found), 'parameters': parameters(found)}
 
 
-def opened(options: argparse.Namespace, changes: Sequence[str]) -> tuple[Bag, str, ratios.Samples]:
+def opened(options: argparse.Namespace, changes: Sequence[str]) -> tuple[Recording, str, ratios.Samples]:
     """Return (recording, its name, samples) of the options of the verb. Raises ValueError.
 
     changes: texts 'node.key=value' of a scenario. Its samples are those of `pedestal simulate receiver --output` with

@@ -18,7 +18,7 @@ import numpy as np
 from pedestal_analysis.calibration import predicted
 from pedestal_analysis.results import beam_direction, mode_pointing, tracking
 from pedestal_common.quantities import Bools, DecibelHertz, Floats, Pair, Pairs, Radians, Seconds, Times, Vectors3
-from pedestal_recording.bag import Bag
+from pedestal_recording.recording import Recording
 
 CIRCLE_BEAMWIDTHS, CIRCLE_TOLERANCE_BEAMWIDTHS = 0.2, 0.03
 """Radius of the circle on which the matrix is verified, and its tolerance [beamwidths]."""
@@ -57,7 +57,7 @@ class Points:
         return ~self.circle & (np.hypot(*self.offsets.T) <= MAX_OFFSET_BEAMWIDTHS)
 
 
-def read(bag: Bag) -> Points:
+def read(bag: Recording) -> Points:
     """Return the points of a recording of one beam. Raises OffsetError."""
     missing = [name for name in ('joint_states', 'tracking_receiver/angle_error') if name not in bag.topics]
     if missing:
@@ -85,7 +85,7 @@ def read(bag: Bag) -> Points:
     return _checked(Points(spans, means, errors, sigma, level, _circle(radius)))
 
 
-def _from_beacon(bag: Bag, t: Times, beam: Pairs) -> tuple[Pairs, bool]:
+def _from_beacon(bag: Recording, t: Times, beam: Pairs) -> tuple[Pairs, bool]:
     """Return (offsets [rad] of the beacon from the beam, True if the place of the beacon is not known yet).
 
     The offsets are NaN outside the modes preset and program; beam: directions [rad].

@@ -17,7 +17,7 @@ from pedestal_analysis.calibration.receiver import matrix, offsets, phasing_page
 from pedestal_analysis.results import intervals, tracking
 from pedestal_analysis.results.intervals import estimated, row
 from pedestal_common.quantities import Floats, Json, Pair, Row
-from pedestal_recording.bag import Bag
+from pedestal_recording.recording import Recording
 
 if typing.TYPE_CHECKING:
     from pedestal_analysis.calibration.receiver.iq_phasing import IqPhasing
@@ -45,7 +45,7 @@ class Phasing:
         return -self.slopes.matrix @ self.slopes.null
 
 
-def calibrate(bag: Bag, source: str) -> Phasing:
+def calibrate(bag: Recording, source: str) -> Phasing:
     """Return the result for a recording of one beam. Raises OffsetError and MatrixError."""
     points = offsets.read(bag)
     slopes = matrix.fit(points.offsets[points.fitted], points.errors[points.fitted])
@@ -156,7 +156,7 @@ def content(found: Phasing) -> dict[str, Json]:
             'faults': matrix.faults(found.slopes), 'verified': passed(found), 'parameters': parameters(found)}
 
 
-def main(bag: Bag, source: str, options: argparse.Namespace) -> tuple[list[str], dict[str, Json], bool]:
+def main(bag: Recording, source: str, options: argparse.Namespace) -> tuple[list[str], dict[str, Json], bool]:
     """Calibrate a recording, write the files of the options of the verb, and return (lines, content, verified).
 
     Raises ValueError.

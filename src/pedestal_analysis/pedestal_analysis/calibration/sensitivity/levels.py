@@ -18,7 +18,7 @@ from pedestal_analysis.calibration import scan
 from pedestal_analysis.results import tracking
 from pedestal_common.quantities import Degrees, Floats, Hertz, Pairs
 from pedestal_common.text_files import columns, csv_table
-from pedestal_recording.bag import Bag
+from pedestal_recording.recording import Recording
 
 OFFSET_RANGE_DEG, LEVEL_RANGE_DB = (-30.0, 30.0), (-300.0, 300.0)  # ranges of the offsets and of the levels in a file
 MAX_FOLLOWING_BEAMWIDTHS = 0.1  # largest following error of an antenna at rest [beamwidths]
@@ -74,7 +74,7 @@ def read(path: pathlib.Path, elevation: Degrees | None = None) -> Levels:
                   math.nan, str(path))
 
 
-def of_recording(bag: Bag, source: str) -> Levels:
+def of_recording(bag: Recording, source: str) -> Levels:
     """Return the levels of a recording of one beam; source: its name. Raises LevelError."""
     if 'ship/imu/data' in bag.topics:
         raise LevelError('the recording is of a ship; its offsets contain the attitude of the deck')
