@@ -14,9 +14,13 @@ FILES = {'.'.join(path.relative_to(package).with_suffix('').parts).removesuffix(
 
 
 def imported(path):
-    """Return the names of our modules that a file imports, inside functions too."""
-    names = set()
-    for node in ast.walk(ast.parse(path.read_text())):
+    """Return the names of our modules that a file imports, inside functions too; not those that only mypy imports."""
+    names, tree = set(), ast.parse(path.read_text())
+    unseen = {id(line) for node in ast.walk(tree) if isinstance(node, ast.If)
+              and ast.unparse(node.test) == 'TYPE_CHECKING' for line in node.body}
+    for node in ast.walk(tree):
+        if id(node) in unseen:
+            continue
         if isinstance(node, ast.Import):
             names.update(alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):

@@ -5,7 +5,7 @@ estimates the line of sight from the INS, otherwise the one from the antenna (`l
 this module.
 """
 import math
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -27,12 +27,14 @@ from acu_tracker.geometry.deck_reference import ZERO_VECTOR, Attitude
 from acu_tracker.geometry.encoders import Pointing
 from acu_tracker.geometry.motion import LineOfSight, Motion, angles, earth_angles, line_of_sight
 from acu_tracker.geometry.vector import Rotation, Vector, rotated, rotation
-from acu_tracker.params import SharedParameters
 from acu_tracker.signals import Inputs
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry import line_of_sight as pointing
 from pedestal_common.quantities import Bit, Meters, Radians, RadiansPerSecond, Records, Seconds
 from pedestal_common.record import Record
+
+if TYPE_CHECKING:
+    from acu_tracker.params import SharedParameters
 
 
 class Target(Record):
@@ -59,8 +61,8 @@ def initialise(record: Records) -> None:
 
 
 @compiled
-def _measured_direction(target: Target, params: SharedParameters, mat_ed: Rotation, distance: Meters, azimuth: Radians,
-                        elevation: Radians) -> tuple[Radians, Radians]:
+def _measured_direction(target: Target, params: 'SharedParameters', mat_ed: Rotation, distance: Meters,
+                        azimuth: Radians, elevation: Radians) -> tuple[Radians, Radians]:
     """Return (azimuth, elevation) of a measured direction in the frame of the filter.
 
     mat_ed              rotation deck -> earth
@@ -97,7 +99,7 @@ def _measured_rates(target: Target, deck: Attitude, inputs: Inputs,
 
 
 @compiled
-def take(target: Target, params: SharedParameters, constants: tracker.Constants, deck: DeckAttitude, inputs: Inputs,
+def take(target: Target, params: 'SharedParameters', constants: tracker.Constants, deck: DeckAttitude, inputs: Inputs,
          at: Pointing, measured: tuple[Radians, Radians], restart_gap: Seconds) -> tuple[int, Innovation]:
     """Filter an error of the receiver. Return (its outcome, the innovation).
 
@@ -163,7 +165,7 @@ def earth_outlook(target: Target, constants: tracker.Constants, t: Seconds) -> L
 
 
 @compiled
-def on_deck(target: Target, params: SharedParameters, deck: DeckAttitude, t: Seconds, source: Source) -> Motion:
+def on_deck(target: Target, params: 'SharedParameters', deck: DeckAttitude, t: Seconds, source: Source) -> Motion:
     """Return the Motion in deck angles at t."""
     if not source.framed:
         return attitude.on_deck(deck, params, t, source.motion)
@@ -187,7 +189,7 @@ def on_levelled_deck(target: Target, level: Rotation, source: Source) -> Motion:
 
 
 @compiled
-def read(target: Target, params: SharedParameters, constants: tracker.Constants, deck: DeckAttitude,
+def read(target: Target, params: 'SharedParameters', constants: tracker.Constants, deck: DeckAttitude,
          t: Seconds) -> Estimate:
     """Return the Estimate at t in earth angles, as seen from the antenna."""
     framed, variances = tracker.read(target.tracker, constants, t)

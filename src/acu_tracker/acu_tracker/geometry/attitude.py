@@ -5,14 +5,13 @@ w, dw: angular rate [rad/s] and angular acceleration [rad/s2] of the deck, FLU; 
 since the last sample.
 """
 import math
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from acu_tracker.geometry import attitude_error, attitude_jump, deck_reference
 from acu_tracker.geometry.deck_reference import ZERO_VECTOR, Attitude
 from acu_tracker.geometry.history import HISTORY_LENGTH, History, bracket, push
 from acu_tracker.geometry.motion import Motion, angles, line_of_sight
 from acu_tracker.geometry.vector import Rotation, Vector, turn
-from acu_tracker.params import SharedParameters
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry.line_of_sight import ASHORE_ATTITUDE
 from pedestal_common.geometry.quaternion import product
@@ -29,6 +28,9 @@ from pedestal_common.quantities import (
     Vector3,
 )
 from pedestal_common.record import Record
+
+if TYPE_CHECKING:
+    from acu_tracker.params import SharedParameters
 
 
 class AttitudeHistory(History):
@@ -137,7 +139,7 @@ def _correct_jump(deck: DeckAttitude, row: int, last: int, T: Seconds) -> None:
 
 
 @compiled
-def take(deck: DeckAttitude, params: SharedParameters, t_k: Seconds, stamp: Seconds, q: Quaternion, w: Vector3,
+def take(deck: DeckAttitude, params: 'SharedParameters', t_k: Seconds, stamp: Seconds, q: Quaternion, w: Vector3,
          aligning: Bit) -> int:
     """Take a measured quaternion q and rate w [rad/s] into the history; return SAMPLE_INVALID, SAMPLE_REPEATED or
     SAMPLE_NEW.
@@ -183,7 +185,7 @@ def take(deck: DeckAttitude, params: SharedParameters, t_k: Seconds, stamp: Seco
 
 
 @compiled
-def at(deck: DeckAttitude, params: SharedParameters, t: Seconds) -> tuple[bool, Attitude]:
+def at(deck: DeckAttitude, params: 'SharedParameters', t: Seconds) -> tuple[bool, Attitude]:
     """Return (True if the attitude at t is known, the Attitude deck -> earth, of NaN if it is unknown).
 
     The attitude is interpolated between two samples, or predicted from the last sample for at most attitude_timeout.
@@ -215,7 +217,7 @@ def at(deck: DeckAttitude, params: SharedParameters, t: Seconds) -> tuple[bool, 
 
 
 @compiled
-def on_deck(deck: DeckAttitude, params: SharedParameters, t: Seconds, motion: Motion) -> Motion:
+def on_deck(deck: DeckAttitude, params: 'SharedParameters', t: Seconds, motion: Motion) -> Motion:
     """Return the Motion in deck angles at t of a Motion in earth angles.
 
     Ashore, or without a known attitude, return the Motion unchanged.

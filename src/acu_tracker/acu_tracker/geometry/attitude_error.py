@@ -4,10 +4,14 @@ The INS may publish these statistics on ins/error; otherwise parameters define t
 the noise to the variance of each measured direction. Tilt stands for roll and for pitch.
 """
 
-from acu_tracker.estimation.params import AttitudeModelParameters
+from typing import TYPE_CHECKING
+
 from pedestal_common.compiled import compiled
 from pedestal_common.quantities import Bit, Pair, Radians2, Vector3
 from pedestal_common.record import Record
+
+if TYPE_CHECKING:
+    from acu_tracker.estimation.params import AttitudeModelParameters
 
 
 class AttitudeError(Record):
@@ -38,7 +42,7 @@ def take(error: AttitudeError, noise: Vector3, walk: Vector3) -> bool:
 
 @compiled
 def expected(error: AttitudeError,
-             model: AttitudeModelParameters) -> tuple[tuple[Radians2, Radians2], tuple[float, float]]:
+             model: 'AttitudeModelParameters') -> tuple[tuple[Radians2, Radians2], tuple[float, float]]:
     """Return ((noise of tilt, of heading), (walk of tilt, of heading) [rad2/s]).
 
     The parameters `model` are used if the INS published no statistics. The slow errors of these parameters are

@@ -14,7 +14,7 @@ j: number of a model in the bank.
 """
 import math
 from collections.abc import Sequence
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 
@@ -23,7 +23,6 @@ from acu_tracker.estimation.filters.kalman import Gaussian, PreviousAngle, Symme
 from acu_tracker.estimation.filters.kinds import FILTER_KINDS
 from acu_tracker.estimation.filters.measurement import AxisInnovation, AxisMeasurement, AxisVariances
 from acu_tracker.estimation.filters.motion_models import COLUMN_NAMES
-from acu_tracker.estimation.params import FilterParameters
 from acu_tracker.geometry.motion import AxisMotion
 from pedestal_common.compiled import compiled
 from pedestal_common.quantities import (
@@ -39,6 +38,9 @@ from pedestal_common.quantities import (
     Times,
 )
 from pedestal_common.record import Record
+
+if TYPE_CHECKING:
+    from acu_tracker.estimation.params import FilterParameters
 
 BANK_SIZE = len(COLUMN_NAMES)  # largest number of models in a bank
 
@@ -83,6 +85,9 @@ class Filter(Record):
     drift_variance_rate: float
 
 
+FILTER = Filter.dtype  # a law cannot call Filter.zeros
+
+
 class Estimate(Record):
     """One row of the result of `estimates`.
 
@@ -100,7 +105,7 @@ class Estimate(Record):
     mu: Annotated[Floats, (BANK_SIZE,)]     # probability of each of COLUMN_NAMES; NaN for a model not in the bank
 
 
-def constants(params: FilterParameters, noise_bandwidth: Hertz = 0.0) -> Records:
+def constants(params: 'FilterParameters', noise_bandwidth: Hertz = 0.0) -> Records:
     """Return the constants (1,).
 
     noise_bandwidth: bandwidth of the noise of the measured angle; 0: white noise.
@@ -351,7 +356,7 @@ def estimates(constants: Records, t: Times, y: Floats, R: Floats, y_rate: Floats
     The filter starts at the first angle; earlier rows are NaN. The filter ignores an angle that is NaN or whose stamp
     does not advance. The row of such an angle is the prediction from the last accepted angle.
     """
-    states = Filter.zeros()
+    states = np.zeros(1, FILTER)
     state, model = states[0], constants[0]
     state.mu[:] = last = math.nan
     state.count = model.count

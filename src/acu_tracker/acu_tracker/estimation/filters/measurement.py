@@ -4,13 +4,15 @@ The angles are those of the frame of the filter. In each pair of axes index 0 is
 innovation and its variance, or its covariance for several numbers.
 """
 import math
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
-from acu_tracker.estimation.params import ReceiverModelParameters
 from acu_tracker.geometry.motion import Motion
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry.line_of_sight import wrap
 from pedestal_common.quantities import DecibelHertz, Meters, Radians, Radians2, RadiansPerSecond, Seconds
+
+if TYPE_CHECKING:
+    from acu_tracker.estimation.params import ReceiverModelParameters
 
 
 class AxisMeasurement(NamedTuple):
@@ -72,7 +74,7 @@ NO_INNOVATION = Innovation((_NONE, _NONE), math.nan, math.nan)  # innovation of 
 
 @compiled
 def error_variance(cross_elevation: Radians, elevation: Radians, cn0_dbhz: DecibelHertz,
-                   receiver: ReceiverModelParameters) -> Radians2:
+                   receiver: 'ReceiverModelParameters') -> Radians2:
     """Return the variance of a receiver error (cross_elevation, elevation) at a C/N0.
 
     The variance is the sum of a floor and of thermal noise, which grows with the distance from the axis of the beam.

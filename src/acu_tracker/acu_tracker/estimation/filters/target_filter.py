@@ -14,20 +14,22 @@ Measured rates go to the axis filters only. The prior fields of a filter hold it
 """
 import math
 from collections.abc import Sequence
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 
 from acu_tracker.estimation.filters import axes_filter, axis_filter, unscented
 from acu_tracker.estimation.filters.kinds import FILTER_KINDS
 from acu_tracker.estimation.filters.measurement import AxisInnovation, Estimate, Innovation, Measurement, with_rate
-from acu_tracker.estimation.params import FilterParameters, UkfParameters
 from acu_tracker.geometry.motion import AxisMotion, Motion
 from acu_tracker.geometry.vector import Rotation
 from pedestal_common.compiled import compiled, separate
 from pedestal_common.geometry.line_of_sight import wrap
 from pedestal_common.quantities import Bit, BothAxes, Floats, Hertz, Ints, Radians, RadiansPerSecond, Records, Seconds
 from pedestal_common.record import Record
+
+if TYPE_CHECKING:
+    from acu_tracker.estimation.params import FilterParameters, UkfParameters
 
 
 class Constants(Record):
@@ -48,7 +50,7 @@ class Filter(Record):
     predicted: Seconds
 
 
-def constants(ukf: UkfParameters, axes: Sequence[FilterParameters], noise_bandwidth: Hertz) -> Records:
+def constants(ukf: 'UkfParameters', axes: 'Sequence[FilterParameters]', noise_bandwidth: Hertz) -> Records:
     """Return the constants (1,).
 
     axes             parameters of the filters of both axes

@@ -20,12 +20,11 @@ is then positive for every geometry.
 j: number of the mode, 0 CV, 1 CA.
 """
 import math
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from acu_tracker.estimation.filters import imm, motion_models
 from acu_tracker.estimation.filters.measurement import AxisInnovation, AxisVariances, Estimate, Innovation, Measurement
 from acu_tracker.estimation.filters.motion_models import MotionModelRecord
-from acu_tracker.estimation.params import UkfParameters
 from acu_tracker.geometry.motion import Motion, line_of_sight, motion_of_position
 from acu_tracker.geometry.vector import Rotation, Vector, dot, rotated, times
 from pedestal_common.compiled import assign, compiled
@@ -45,6 +44,9 @@ from pedestal_common.quantities import (
     Vector3,
 )
 from pedestal_common.record import Record
+
+if TYPE_CHECKING:
+    from acu_tracker.estimation.params import UkfParameters
 
 N = 9  # number of states n
 MODE_MODELS = motion_models.MODEL_CV, motion_models.MODEL_CA
@@ -83,7 +85,7 @@ class Constants(Record):
     initial_acceleration: MetersPerSecond2      # standard deviation of the acceleration at the start
 
 
-def constants(params: UkfParameters) -> Records:
+def constants(params: 'UkfParameters') -> Records:
     """Return the constants (1,)."""
     c = Constants.zeros()
     c['models']['kind'] = MODE_MODELS
