@@ -10,7 +10,7 @@ An error signal with the wrong sign, with rotated axes or with a gain three time
 its target. Then m becomes large before the beam leaves the target, and it is still large when the signal is lost. In
 this case autotrack must not coast on the wrong estimate.
 
-The detected divergence is latched: it stays until a reset. s: record of Divergence.
+The detected divergence is latched: it stays until a reset.
 """
 
 from acu_tracker.estimation.filters.measurement import Innovation
@@ -60,7 +60,7 @@ def take(state: Divergence, innovation: Innovation) -> None:
 
 
 @compiled
-def diverges(state: Divergence, without_signal: bool) -> bool:
+def diverges(state: Divergence, without_signal: Bit) -> bool:
     """Return True if the filter has diverged.
 
     without_signal: True if the filter coasts, and no known cause explains the loss of the signal.

@@ -84,13 +84,10 @@ def _measured_direction(target: Target, params: 'SharedParameters', mat_ed: Rota
 @compiled
 def _measured_rates(target: Target, deck: Attitude, inputs: Inputs,
                     at: Pointing) -> tuple[RadiansPerSecond, RadiansPerSecond]:
-    """Return (azimuth rate, elevation rate) [rad/s] of the target in the frame of the filter.
+    """Return (azimuth rate, elevation rate) of the target in the frame of the filter.
 
-    The rates are the sum of the rates of the antenna and of the receiver error.
-
-    deck   Attitude of the deck when the error was measured
-    u      record of signals.Inputs.dtype
-    at     Pointing of the antenna when the error was measured
+    The rates are the sum of the rates of the antenna and of the receiver error. deck, at: attitude of the deck and
+    direction of the antenna when the error was measured.
     """
     n = pointing.displaced_motion(at.A, at.E, at.dA, at.dE, inputs.cross_elevation, inputs.elevation,
                                   inputs.error_rate[0], inputs.error_rate[1])

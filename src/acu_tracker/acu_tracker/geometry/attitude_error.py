@@ -29,7 +29,7 @@ def take(error: AttitudeError, noise: Vector3, walk: Vector3) -> bool:
     """Adopt the statistics that the INS published; return False, without a change, if a number is out of range.
 
     noise  1-sigma of the noise of roll, pitch and heading [rad]
-    walk   1-sigma (3,) of their random walk [rad/sqrt(s)]
+    walk   1-sigma of their random walk [rad/sqrt(s)]
     """
     for i in range(3):
         if not (0.0 <= noise[i] <= MAX_ATTITUDE_NOISE and 0.0 <= walk[i] <= MAX_ATTITUDE_NOISE):

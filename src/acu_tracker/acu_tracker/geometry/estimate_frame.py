@@ -72,7 +72,7 @@ def verticals(frame: Frame, azimuth: Radians, elevation: Radians) -> tuple[float
 
     The first vector points to growing azimuth, the second to growing elevation. In the frame of the earth their
     components along the earth's vertical are 0 and cos(elevation). `measurement.attitude_variances` needs these
-    components to separate the errors of heading and tilt. azimuth, elevation: angles of the direction in the frame .
+    components to separate the errors of heading and tilt. azimuth, elevation: angles of the direction in the frame.
     """
     # z: the earth's vertical, as components in the frame.
     s, c, z = math.sin(azimuth), math.cos(azimuth), frame.mat[2]

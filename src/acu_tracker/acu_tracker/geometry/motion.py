@@ -19,12 +19,10 @@ class AxisMotion(NamedTuple):
     acceleration: RadiansPerSecond2
 
 
-
 class Motion(NamedTuple):
     """Motion of both axes; motion[0] is azimuth, motion[1] elevation."""
     azimuth: AxisMotion
     elevation: AxisMotion
-
 
 
 class LineOfSight(NamedTuple):

@@ -16,7 +16,6 @@ class Vector(NamedTuple):
     z: float
 
 
-
 class Rotation(NamedTuple):
     """Matrix of a rotation: its rows."""
     x: Vector

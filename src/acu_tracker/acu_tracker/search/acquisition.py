@@ -181,7 +181,6 @@ def begin_acquire(state: Acquisition, t: Seconds) -> None:
 
 @compiled
 def _enter(state: Acquisition, phase: int, t: Seconds) -> None:
-    """Begin a phase of acquire at t."""
     state.phase, state.since, state.place_number = phase, t, 0
 
 

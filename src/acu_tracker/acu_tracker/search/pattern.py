@@ -44,7 +44,6 @@ class Area(NamedTuple):
     speed: RadiansPerSecond     # of the beam along its path
 
 
-
 class Point(NamedTuple):
     """Offset of the beam from the expected place in two directions, and its rates.
 

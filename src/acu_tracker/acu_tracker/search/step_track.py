@@ -50,7 +50,6 @@ def start(state: StepTrack, t: Seconds, x: Radians, e: Radians) -> None:
 
 @compiled
 def _enter(state: StepTrack, phase: int, t: Seconds) -> None:
-    """Begin a phase at t."""
     state.phase, state.since, state.sum, state.samples = phase, t, 0.0, 0
 
 

@@ -57,7 +57,6 @@ class Instants(NamedTuple):
     dt: Seconds     # time since the step before
 
 
-
 class Feedback(NamedTuple):
     """Feedback of one axis at t_k."""
     y: Radians              # angle of the encoder
@@ -66,7 +65,6 @@ class Feedback(NamedTuple):
     V: RadiansPerSecond     # rate at which the motion of the deck moves the deck angle of a fixed target
     closed: bool            # True if a beam closes its own loop on the receiver error
     ends: ends.Ends         # present ends of the travel
-
 
 
 class Command(NamedTuple):
@@ -197,7 +195,7 @@ def _steer(axis: AxisLoop, params: 'AxisParameters', target: AxisMotion, feedbac
         reference.put(r, target)
     else:
         r.angle, r.rate = beam_loop.step(int(b.form), r.angle, r.rate, feedback.error, b.alpha, beta, T,
-                                          compensation)
+                                         compensation)
     low, high = feedback.ends
     angle_limited = not low <= r.angle <= high
     if angle_limited:

@@ -85,7 +85,7 @@ class Filter(Record):
     drift_variance_rate: float
 
 
-FILTER = Filter.dtype  # a law cannot call Filter.zeros
+FILTER_TYPE = Filter.dtype  # a law cannot call Filter.zeros
 
 
 class Estimate(Record):
@@ -121,7 +121,7 @@ def constants(params: 'FilterParameters', noise_bandwidth: Hertz = 0.0) -> Recor
 
 @compiled
 def _put(x: Floats, p: Floats, j: int, gaussian: Gaussian) -> None:
-    """Write to row j of x (n, 3) and of p (n, 6)."""
+    """Write a Gaussian to row j of x (n, 3) and of p (n, 6)."""
     x[j, 0], x[j, 1], x[j, 2] = gaussian.x
     P = gaussian.P
     p[j, 0], p[j, 1], p[j, 2], p[j, 3], p[j, 4], p[j, 5] = P.p11, P.p12, P.p13, P.p22, P.p23, P.p33
@@ -356,7 +356,7 @@ def estimates(constants: Records, t: Times, y: Floats, R: Floats, y_rate: Floats
     The filter starts at the first angle; earlier rows are NaN. The filter ignores an angle that is NaN or whose stamp
     does not advance. The row of such an angle is the prediction from the last accepted angle.
     """
-    states = np.zeros(1, FILTER)
+    states = np.zeros(1, FILTER_TYPE)
     state, model = states[0], constants[0]
     state.mu[:] = last = math.nan
     state.count = model.count

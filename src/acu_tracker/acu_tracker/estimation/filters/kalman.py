@@ -31,12 +31,10 @@ class Symmetric(NamedTuple):
     p33: float
 
 
-
 class Gaussian(NamedTuple):
     """Estimate of one axis."""
     x: AxisMotion   # mean (x1, x2, x3)
     P: Symmetric    # covariance
-
 
 
 class Transition(NamedTuple):
@@ -44,7 +42,6 @@ class Transition(NamedTuple):
     f13: float      # [s2]
     f23: Seconds
     f33: float      # [-]
-
 
 
 class PreviousAngle(NamedTuple):
@@ -77,7 +74,7 @@ def predicted_covariance(P: Symmetric, F: Transition, Q: Symmetric, T: Seconds) 
 
 @compiled
 def past(gaussian: Gaussian, F: Transition, T: Seconds) -> PreviousAngle:
-    """Return the PreviousAngle for a prediction over T [s]: (c1, c2, c3) = F P H'.
+    """Return the PreviousAngle for a prediction over T: (c1, c2, c3) = F P H'.
 
     gaussian: estimate at the last measurement; F: transition over T.
     """

@@ -23,14 +23,12 @@ class AxisMeasurement(NamedTuple):
     rate_variance: float        # [rad2/s2]
 
 
-
 class Measurement(NamedTuple):
     """Measurement of the target at one instant."""
     stamp: Seconds
     axis: tuple[AxisMeasurement, AxisMeasurement]
     range: Meters           # NaN if it was not measured
     range_variance: float   # [m2]
-
 
 
 class AxisInnovation(NamedTuple):
@@ -45,7 +43,6 @@ class AxisInnovation(NamedTuple):
     rate_chi_square: float  # NIS of angle and rate together, minus chi_square [-]
 
 
-
 class Innovation(NamedTuple):
     """Innovation of a measurement. A number is NaN if there was no measurement or no prediction of it."""
     axis: tuple[AxisInnovation, AxisInnovation]
@@ -53,13 +50,11 @@ class Innovation(NamedTuple):
     range_S: float      # its variance [m2]
 
 
-
 class AxisVariances(NamedTuple):
     """Variances of an angle and its rate."""
     p11: Radians2   # variance of the angle
     p12: float      # covariance of angle and rate [rad2/s]
     p22: float      # variance of the rate [rad2/s2]
-
 
 
 class Estimate(NamedTuple):

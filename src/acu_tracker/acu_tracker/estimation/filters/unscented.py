@@ -227,7 +227,7 @@ def _measured(east: Meters, north: Meters, up: Meters) -> tuple[Radians, Radians
 def _transformed(x: Floats, p: Floats, z: Vector3, s: Matrix3, g: Floats, d: Floats) -> None:
     """Compute the expected measurement of a mode from its prediction x, p by the unscented transform.
 
-    z  result: expected measurement (3,): azimuth, elevation, range
+    z  result: expected measurement: azimuth, elevation, range
     s  result: its covariance (3, 3), without the noise of the measurement
     g  result: its covariance (9, 3) with X
     d  scratch: measurements (2, 3, 3) of the points at +L_k and -L_k, relative to that of the centre point
@@ -350,7 +350,7 @@ def correct(state: State, measurement: Measurement) -> None:
     """
     for j in range(2):
         state.weights[j] = _corrected(state, j, measurement.axis[0].angle, measurement.axis[1].angle,
-                                       measurement.range)
+                                      measurement.range)
     imm.weigh(state.mu_prior, state.weights, 2, state.mu)
 
 
