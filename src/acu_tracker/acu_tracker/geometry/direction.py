@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from acu_tracker.geometry.motion import AxisMotion, Motion
 from pedestal_common.compiled import compiled
-from pedestal_common.quantities import Pair, Pairs, Radians, Records, Seconds, Times
+from pedestal_common.quantities import Floats, Pair, Pairs, Records, Seconds, Times
 from pedestal_common.record import Record
 
 
@@ -40,8 +40,9 @@ def moved(record: Records, times: Times) -> Pairs:
     return record['angle'] + np.minimum(times - record['stamp'], record['moves'])[:, np.newaxis] * record['rate']
 
 
-def set_chord(record: Records, axis: int, begins: Seconds, ends: Seconds, angles: tuple[Radians, Radians]) -> None:
-    """Move an axis along a straight line: its angles are `angles` [rad] at the times `begins` and `ends`.
+def set_chord(record: Records, axis: int, begins: Seconds, ends: Seconds, angles: Floats) -> None:
+    """Move an axis along a straight line: its angles are `angles` (2,) [rad] at the times `begins` and
+    `ends`.
 
     axis: 0 azimuth, 1 elevation. Both times lie at or after the stamp.
     """
