@@ -14,13 +14,12 @@ FILES = {'.'.join(path.relative_to(package).with_suffix('').parts).removesuffix(
 
 
 def imported(path):
-    """Return the names of our modules that a file imports, inside functions too; not those that only mypy imports."""
+    """Return the names of our modules that a file imports, inside functions too, but not those for types alone."""
     names, tree = set(), ast.parse(path.read_text())
-    unseen = {id(line) for node in ast.walk(tree) if isinstance(node, ast.If)
-              and ast.unparse(node.test) == 'TYPE_CHECKING' for line in node.body}
-    for node in ast.walk(tree):
-        if id(node) in unseen:
-            continue
+    for_types = {node for block in ast.walk(tree)
+                 if isinstance(block, ast.If) and ast.unparse(block.test).endswith('TYPE_CHECKING')
+                 for one in block.body for node in ast.walk(one)}
+    for node in set(ast.walk(tree)) - for_types:
         if isinstance(node, ast.Import):
             names.update(alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
