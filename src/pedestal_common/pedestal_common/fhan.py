@@ -2,10 +2,11 @@
 import math
 
 from pedestal_common.compiled import compiled
+from pedestal_common.quantities import Seconds
 
 
 @compiled
-def fhan(x1, x2, r, h0):
+def fhan(x1: float, x2: float, r: float, h0: Seconds) -> float:
     """Return the acceleration u, between -r and r, that brings x1'' = u to rest at x1 = 0 in the shortest time.
 
     x1: error, in any unit; x2: its rate [unit/s]; r: largest acceleration [unit/s2]; h0: time [s] that sets the size

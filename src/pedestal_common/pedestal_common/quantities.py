@@ -1,5 +1,5 @@
 """Types of numbers and arrays: what a number means, its unit or its shape. numba and Python ignore both; a reader and
-mypy do not. Three types at the end stand for data without a declared type.
+mypy do not. Four types at the end stand for data without a declared type.
 
 `Radians` is a float, `Pairs` is an array of floats of shape (n, 2). A shape such as `Vector3` also gives the size of
 an array in a record (record.Record).
@@ -36,6 +36,7 @@ Amperes: TypeAlias = Annotated[float, 'A']
 Volts: TypeAlias = Annotated[float, 'V']
 Decibels: TypeAlias = Annotated[float, 'dB']
 DecibelHertz: TypeAlias = Annotated[float, 'dB-Hz']  # C/N0
+Days: TypeAlias = Annotated[float, 'd']
 Bit: TypeAlias = int                                # 0 or 1; a record has no bool
 
 Pair: TypeAlias = Annotated[Floats, (2,)]           # azimuth and elevation, or cross-elevation and elevation
@@ -45,8 +46,11 @@ Matrix3: TypeAlias = Annotated[Floats, (3, 3)]
 Pairs: TypeAlias = Annotated[Floats, '(n, 2)']
 Vectors3: TypeAlias = Annotated[Floats, '(n, 3)']
 Quaternions: TypeAlias = Annotated[Floats, '(n, 4)']
+Rotations: TypeAlias = Annotated[Floats, '(n, 3, 3)']
 Times: TypeAlias = Annotated[Floats, '(n,) s']
 Stamps: TypeAlias = Annotated[Ints, '(n,) ns']
+Direction: TypeAlias = tuple[Radians, Radians]     # azimuth and elevation, of a law
+Vector: TypeAlias = tuple[float, float, float]      # x, y, z, of a law
 
 _R = TypeVar('_R')
 BothAxes: TypeAlias = Annotated[Sequence[_R], (2,)]     # a record of each axis: azimuth, elevation
@@ -54,3 +58,4 @@ BothAxes: TypeAlias = Annotated[Sequence[_R], (2,)]     # a record of each axis:
 AnyRecord: TypeAlias = Any  # a record whose fields depend on data, as those of a node depend on its topics
 Message: TypeAlias = Any    # a ROS message, whose class is made by ROS without types
 Json: TypeAlias = Any       # what a JSON or YAML file holds; the code that takes a value from it checks the value
+Value: TypeAlias = Any      # of a parameter or of an argument of a command, whose declaration states the type

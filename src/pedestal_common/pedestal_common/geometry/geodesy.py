@@ -6,6 +6,7 @@ import math
 import numpy as np
 
 from pedestal_common.parameters import Parameters, parameter
+from pedestal_common.quantities import Degrees, Floats, Matrix3, Meters, Radians, Vector3
 from pedestal_common.reproducible import cos, sin
 
 EARTH_RADIUS_M, EARTH_FLATTENING = 6378137.0, 1.0 / 298.257223563
@@ -30,7 +31,7 @@ class StationParameters(Parameters):
     height: float = parameter(500.0, -500.0, 9000.0, 'm', 'height above the ellipsoid')
 
 
-def geocentric(latitude, longitude, height):
+def geocentric(latitude: Radians | Floats, longitude: Radians | Floats, height: Meters | Floats) -> Floats:
     """Return earth-fixed x, y, z [m], (..., 3), of WGS84 latitude, longitude [rad] and height [m], arrays or
     numbers."""
     # e2: eccentricity squared; N: radius of curvature in the prime vertical.
@@ -41,7 +42,7 @@ def geocentric(latitude, longitude, height):
                      (N * (1.0 - e2) + height) * sin(latitude)], axis=-1)
 
 
-def station_frame(station):
+def station_frame(station: StationParameters) -> tuple[Vector3, Matrix3]:
     """Return the earth-fixed position (3,) [m] of a station, and the rotation (3, 3) earth-fixed -> ENU. station:
     StationParameters."""
     latitude, longitude = math.radians(station.latitude_deg), math.radians(station.longitude_deg)
@@ -51,7 +52,8 @@ def station_frame(station):
     return geocentric(latitude, longitude, station.height), to_enu
 
 
-def destination(latitude_deg, longitude_deg, bearing, distance):
+def destination(latitude_deg: Degrees, longitude_deg: Degrees, bearing: Radians,
+                distance: Meters) -> tuple[Degrees, Degrees]:
     """Return (latitude, longitude) [deg] of the place at a distance [m] and a bearing [rad, clockwise from north].
 
     The place is on the great circle that leaves the first place with this bearing. Because the earth is taken as a

@@ -11,6 +11,10 @@ import typing
 from collections.abc import Collection, Iterable
 
 from pedestal_common.graph.topics import REALTIME_RATES, TOPIC_BY_NAME, TOPICS
+from pedestal_common.parameters import Parameters
+
+if typing.TYPE_CHECKING:
+    from pedestal_common.node.unit import Unit
 
 MAX_BEAMS = 16  # largest number of beams of an electronic array
 REPLAY_NODE = 'replay'  # name of the node that replays a recording to the other nodes
@@ -56,16 +60,16 @@ class Node(typing.NamedTuple):
         """Name of its executable in that package."""
         return self.module.rpartition('.')[2]
 
-    def parameters_type(self) -> type[typing.Any]:
+    def parameters_type(self) -> type[Parameters]:
         """Return its parameter dataclass."""
         return _named(self.parameters)
 
-    def unit_type(self) -> type[typing.Any]:
+    def unit_type(self) -> 'type[Unit]':
         """Return the class of its unit."""
         return _named(self.unit)
 
 
-def _named(path: str) -> typing.Any:
+def _named(path: str) -> type:
     module, _, name = path.partition(':')
     return getattr(importlib.import_module(module), name)
 

@@ -16,7 +16,7 @@ import numpy as np
 from pedestal_common.compiled import compiled
 from pedestal_common.graph.steps import NS_PER_SECOND
 from pedestal_common.injection import table
-from pedestal_common.quantities import Floats
+from pedestal_common.quantities import Floats, Nanoseconds, Records, Seconds
 from pedestal_common.record import Record
 from pedestal_common.wire.records import NO_STAMP
 
@@ -39,7 +39,7 @@ class Schedule(Record):
     row: Annotated[Sequence[Fault], (MAX_ACTIVE_FAULTS,)]
 
 
-def empty() -> np.ndarray:
+def empty() -> Records:
     """Return Schedule (1,) before the first step, without a fault."""
     made = Schedule.zeros()
     made['stamp'] = NO_STAMP
@@ -47,20 +47,20 @@ def empty() -> np.ndarray:
 
 
 @compiled
-def pending(schedule, stamp):
+def pending(schedule: Schedule, stamp: Nanoseconds) -> bool:
     """Return True if the law of the step of a stamp [ns] must check the rows."""
     schedule.stamp = stamp
     return schedule.pending != 0
 
 
 @compiled
-def begin(schedule):
+def begin(schedule: Schedule) -> None:
     """Begin a check of the rows: no fault is known to be in force."""
     schedule.pending = 0
 
 
 @compiled
-def in_force(schedule, row, stamp):
+def in_force(schedule: Schedule, row: Fault, stamp: Nanoseconds) -> bool:
     """Return True if a row is in force in the step of a stamp [ns]. A new row is in force from this step."""
     if row.used == 0:
         return False
@@ -73,7 +73,7 @@ def in_force(schedule, row, stamp):
     return True
 
 
-def add(schedule, code, values, duration):
+def add(schedule: np.void, code: int, values: Sequence[float], duration: Seconds) -> None:
     """Add a fault to a Schedule, in force from the next step for a duration [s]. Raise ValueError where no row
     is free."""
     free = np.flatnonzero(schedule['row']['used'] == 0)
@@ -86,7 +86,7 @@ def add(schedule, code, values, duration):
     schedule['pending'] = 1
 
 
-def clear(schedule):
+def clear(schedule: np.void) -> None:
     """End all faults from the next step."""
     schedule['row']['used'] = 0
     schedule['pending'] = 1
