@@ -76,6 +76,7 @@ class Parameters:
         """
 
 
+AnyParameters: typing.TypeAlias = typing.Any    # instance of a parameter class that the node determines
 _P = typing.TypeVar('_P', bound=Parameters)
 _F = typing.TypeVar('_F', bound=Callable[..., object])
 

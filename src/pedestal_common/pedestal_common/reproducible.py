@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from pedestal_common.quantities import Floats, Matrix3, Vectors3
+from pedestal_common.quantities import Complexes, Floats, Matrix3, Vectors3
 
 sin, cos, exp, arccos, arctan2, power = (np.vectorize(function, otypes=[float]) for function in (
     math.sin, math.cos, math.exp, math.acos, math.atan2, math.pow))
@@ -27,7 +27,7 @@ def geomspace(first: float, last: float, n: int) -> Floats:
     return first * power(last / first, np.arange(n) / (n - 1))
 
 
-def solution(A, b) -> list:
+def solution(A: Floats | Complexes, b: Floats | Complexes) -> list[complex]:
     """Return the solution x of A x = b, by Gauss's elimination with the largest pivot of each column.
 
     A: (n, n), real or complex; b: (n,).

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Mapping
 import numpy as np
 
 from pedestal_common.graph import nodes, topics
-from pedestal_common.parameters import Parameters, as_dict
+from pedestal_common.parameters import AnyParameters, Parameters, as_dict
 from pedestal_common.quantities import DType, Message, Nanoseconds, Records, Seconds, Stamps, Value
 from pedestal_common.wire import commands, messages, records
 from pedestal_common.wire.commands import Reply
@@ -63,7 +63,7 @@ class Unit(typing.Protocol):
     # steps at once and therefore omits them
     MOMENTARY: tuple[str, ...] = ()
 
-    parameters: typing.Any          # instance of the parameter class of NODE, which differs from unit to unit
+    parameters: AnyParameters       # of the parameter class of NODE
     reads: tuple[str, ...]          # topics that it reads in its graph, a part of NODE.reads
     writes: tuple[str, ...]         # topics that it writes with these parameters, a part of NODE.writes
     # all data that a step reads or changes, except inputs and outputs. The array `record` (1,) holds the records of

@@ -10,6 +10,8 @@ A change beyond MIN_CLOCK_STEP_NS is a step of the system's clock and is reporte
 set to the system's clock. After a step back, t runs slower than the system's clock, because otherwise a stamp would
 occur twice. Meanwhile t is ahead of the time of nodes that start later, by `ahead`; a restart of this node ends this.
 """
+from pedestal_common.quantities import Nanoseconds
+
 MAX_SLEW_RATE = 500e-6  # largest rate of change of the offset, equal to that of adjtime(3) [s/s]
 
 MIN_CLOCK_STEP_NS = 10_000_000
@@ -24,12 +26,12 @@ class Utc:
     lead of this time over the system's clock [ns]
     """
 
-    def __init__(self, steady, system):
+    def __init__(self, steady: Nanoseconds, system: Nanoseconds) -> None:
         self._offset = self._system_offset = system - steady
         self._steady = steady
         self.steps = self.last_step = 0
 
-    def at(self, steady, system) -> int:
+    def at(self, steady: Nanoseconds, system: Nanoseconds) -> Nanoseconds:
         """Return UTC [ns] at a pair of readings. If the steady clock went back, the last time is returned again."""
         elapsed = max(steady - self._steady, 0)
         self._steady += elapsed
@@ -45,6 +47,6 @@ class Utc:
         return self._steady + self._offset
 
     @property
-    def ahead(self):
+    def ahead(self) -> Nanoseconds:
         """Lead of this time over the system's clock [ns]."""
         return self._offset - self._system_offset

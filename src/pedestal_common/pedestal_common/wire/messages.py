@@ -6,7 +6,7 @@ bytes of earlier messages. The serialiser of rosbags writes zeros there. rosbags
 time.
 """
 import struct
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from rosbags.typesys import Stores, get_typestore
@@ -156,7 +156,8 @@ def _imu(row: topics.Topic) -> Message:
                linear_acceleration=vector3(), linear_acceleration_covariance=np.zeros(9))
 
 
-_TEMPLATES = {'sensor_msgs/msg/JointState': _joint_state, 'trajectory_msgs/msg/JointTrajectory': _joint_trajectory,
+_TEMPLATES: dict[str, Callable[[topics.Topic], Message]] = {
+              'sensor_msgs/msg/JointState': _joint_state, 'trajectory_msgs/msg/JointTrajectory': _joint_trajectory,
               'geometry_msgs/msg/Vector3Stamped': _vector3_stamped, 'sensor_msgs/msg/Range': _range,
               'nav_msgs/msg/Odometry': _odometry, 'sensor_msgs/msg/Imu': _imu,
               'sensor_msgs/msg/FluidPressure': lambda row: FluidPressure(header=header(row.frame), fluid_pressure=0.0,
