@@ -13,9 +13,6 @@ from collections.abc import Collection, Iterable
 from pedestal_common.graph.topics import REALTIME_RATES, TOPIC_BY_NAME, TOPICS
 from pedestal_common.parameters import Parameters
 
-if typing.TYPE_CHECKING:
-    from pedestal_common.node.unit import Unit
-
 MAX_BEAMS = 16  # largest number of beams of an electronic array
 REPLAY_NODE = 'replay'  # name of the node that replays a recording to the other nodes
 DRIVE_NODE = 'adu'  # name of the node that owns the time
@@ -64,7 +61,7 @@ class Node(typing.NamedTuple):
         """Return its parameter dataclass."""
         return _named(self.parameters)
 
-    def unit_type(self) -> 'type[Unit]':
+    def unit_type(self) -> type[typing.Any]:    # a Unit, which this package must not import
         """Return the class of its unit."""
         return _named(self.unit)
 

@@ -14,7 +14,7 @@ import sys
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from types import FrameType
-from typing import NoReturn, TextIO, TypeVar
+from typing import TYPE_CHECKING, NoReturn, TextIO, TypeVar
 
 import rclpy
 from rcl_interfaces.msg import (
@@ -27,6 +27,7 @@ from rclpy.clock import Clock, ClockType
 from rclpy.duration import Duration
 from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValueException
 from rclpy.executors import Executor
+from rclpy.impl.rcutils_logger import RcutilsLogger
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.publisher import Publisher
@@ -149,6 +150,10 @@ class Shell(Node):
         self.utc = utc.Utc(*readings())
         self._epoch = 0 if self.graph.lockstep else self.graph.start or None
         self.listeners: list[TopicSubscriber[Message]] = []
+
+    if TYPE_CHECKING:
+        def get_logger(self) -> RcutilsLogger:
+            """Return the logger of the node; rclpy does not state its type."""
 
     def _place(self, name: str) -> tuple[str, str]:
         """Return (namespace of the graph, prefix of this node's beam in the graph), each with a '/' at its end. The

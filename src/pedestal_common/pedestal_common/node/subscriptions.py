@@ -55,7 +55,8 @@ def subscribe(node: 'Shell', link: nodes.Link, ros_name: str, take: Take, role: 
     latched subscriber does not match a volatile publisher. Where topics.Qos has `unlatched` there is therefore a
     second, volatile subscription. A latched publisher matches both; the second copy of its message is dropped.
     """
-    def open_with(profile: QoSProfile, callback: Take, events: SubscriptionEventCallbacks | None = None) -> Subscription:
+    def open_with(profile: QoSProfile, callback: Take,
+                  events: SubscriptionEventCallbacks | None = None) -> Subscription:
         return node.create_subscription(middleware.message_class(link.type), ros_name,
                                         two_argument_callback(callback), profile, event_callbacks=events, raw=True)
     latched = middleware.qos(link.rate, role)

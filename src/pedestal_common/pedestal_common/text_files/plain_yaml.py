@@ -6,7 +6,6 @@ parameter file, because rcl refuses them. Where aliases are accepted, MAX_VALUES
 few lines can therefore not stand for billions of values.
 """
 import re
-import typing
 from collections.abc import Iterable
 
 import yaml
@@ -14,6 +13,11 @@ import yaml
 from pedestal_common.quantities import Json
 from pedestal_common.text_files import files
 from pedestal_common.text_files.files import FilePath
+
+try:
+    from yaml import CSafeLoader as _Base
+except ImportError:     # PyYAML without libyaml
+    from yaml import SafeLoader as _Base
 
 MAX_YAML_BYTES = 2_000_000
 """Largest size of a file [bytes]. The largest known file, all parameters of an array of 16 beams, has a tenth of
@@ -24,8 +28,6 @@ MAX_DEPTH, MAX_VALUES = 20, 200_000
 
 _TAG = 'tag:yaml.org,2002:'
 _PLAIN = ('null', 'bool', 'int', 'float', 'str', 'seq', 'map')
-_Base: typing.Any = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
-"""Loader of PyYAML in C, or in Python where libyaml is missing."""
 
 
 class _Loader(_Base):
