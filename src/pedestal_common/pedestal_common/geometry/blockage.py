@@ -41,7 +41,7 @@ def sectors(text: str) -> Floats:
 
 @compiled
 def blocked(table: Floats, azimuth: Radians, elevation: Radians) -> bool:
-    """Return True if a direction, in deck angles [rad], is in a hidden sector; False if an angle is NaN. table: from
+    """Return True if a direction, in deck angles, is in a hidden sector; False if an angle is NaN. table: from
     `sectors`."""
     for i in range(MAX_SECTORS):
         low, high, top = table[i, 0], table[i, 1], table[i, 2]

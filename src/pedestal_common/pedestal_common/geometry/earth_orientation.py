@@ -44,20 +44,16 @@ class EarthOrientationParameters(Parameters):
 
 
 def _date(mjd: Days) -> str:
-    """Return an MJD as text, YYYY-MM-DD."""
     return datetime.date.fromordinal(MJD_ZERO_ORDINAL + math.floor(mjd)).isoformat()
 
 
 class EarthOrientation:
-    """The rows of a file.
-
-    name           name of the file, without its folder
-    mjd            MJD of the rows (n,), increasing
-    measured_until MJD of the last measured row
-    """
+    """The rows of a file."""
 
     def __init__(self, name: str, mjd: Floats, values: Vectors3, measured_until: Days) -> None:
-        self.name, self.mjd, self.measured_until = name, mjd, measured_until
+        self.name = name                        # of the file, without its folder
+        self.mjd = mjd                          # of the rows, increasing
+        self.measured_until = measured_until    # MJD of the last measured row
         x, y, ut1 = values.T
         self._pole = ARCSECOND_RAD * np.column_stack((x, y))
         # A leap second raises UT1 - UTC by 1 s from one row to the next.
@@ -65,19 +61,19 @@ class EarthOrientation:
         self._ut1 = ut1 - self._leaps
 
     def at(self, mjd: Floats) -> tuple[Times, Pairs]:
-        """Return (UT1 - UTC (n,) [s], polar motion x, y (n, 2) [rad]) at UTC as MJD (n,)."""
+        """Return (UT1 - UTC, polar motion x, y [rad]) at UTC as MJD (n,)."""
         row = np.clip(np.searchsorted(self.mjd, mjd, side='right') - 1, 0, None)
         pole = np.column_stack([np.interp(mjd, self.mjd, column) for column in self._pole.T])
         return np.interp(mjd, self.mjd, self._ut1) + self._leaps[row], pole
 
     def age(self, mjd: Days) -> Days:
-        """Return the time [d] from the last measured row to an MJD, 0 before that row."""
+        """Return the time from the last measured row to an MJD, 0 before that row."""
         return max(mjd - self.measured_until, 0.0)
 
     def problem(self, mjd: Days, oldest: Days) -> str:
         """Return the reason why the values at an MJD are inaccurate, with the values used instead; '' for good values.
 
-        oldest: largest age of the last measured row without a problem [d].
+        oldest: largest age of the last measured row without a problem.
         """
         first, last = self.mjd[0], self.mjd[-1]
         if mjd < first:
@@ -100,7 +96,7 @@ class EarthOrientation:
 
 
 def load(parameters: EarthOrientationParameters) -> EarthOrientation | None:
-    """Return the EarthOrientation of EarthOrientationParameters, None without a file. Raises ParameterError."""
+    """Return the EarthOrientation of the file of the parameters, None without a file. Raises ParameterError."""
     if not parameters.file:
         return None
     try:

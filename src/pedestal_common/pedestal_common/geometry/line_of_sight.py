@@ -1,6 +1,6 @@
 """Line-of-sight geometry: directions in the frames of beam, deck and earth.
 
-All angles are in rad. The docstring of the package pedestal_common defines the frames. Symbols:
+The docstring of the package pedestal_common defines the frames. Symbols:
 
     b, c, e         components of a vector along the beam, in cross-elevation and in elevation
     db, dc, de      time derivatives of b, c, e
@@ -56,7 +56,7 @@ def earth_direction(azimuth: Radians, elevation: Radians) -> Vector:
 
 @compiled
 def to_earth(mat_ed: Matrix3, x: float, y: float, z: float) -> Vector:
-    """Return a deck vector (FLU) in ENU; mat_ed (3, 3) rotates deck -> earth."""
+    """Return a deck vector (FLU) in ENU; mat_ed rotates deck -> earth."""
     return (mat_ed[0, 0] * x + mat_ed[0, 1] * y + mat_ed[0, 2] * z,
             mat_ed[1, 0] * x + mat_ed[1, 1] * y + mat_ed[1, 2] * z,
             mat_ed[2, 0] * x + mat_ed[2, 1] * y + mat_ed[2, 2] * z)
@@ -96,10 +96,9 @@ def offsets(azimuth: Radians, elevation: Radians, x: float, y: float, z: float) 
 @compiled
 def offset_rates(beam: Direction, beam_rate: tuple[RadiansPerSecond, RadiansPerSecond], r: Vector,
                  v: Vector) -> tuple[RadiansPerSecond, RadiansPerSecond]:
-    """Return the time derivative of `offsets`, (d dX/dt, d dE/dt) [rad/s].
+    """Return the time derivative of `offsets`, (d dX/dt, d dE/dt).
 
-    beam: (azimuth, elevation) [rad]
-    beam_rate: rates of these angles [rad/s]
+    beam, beam_rate: angles of the beam and their rates
     r: vector of the direction, of any length, in the frame of these angles; v: time derivative of r
     """
     azimuth, elevation = beam
@@ -144,10 +143,10 @@ def displaced_motion(azimuth: Radians, elevation: Radians, azimuth_rate: Radians
                      elevation_rate: RadiansPerSecond, cross_elevation: Radians, elevation_error: Radians,
                      cross_elevation_rate: RadiansPerSecond,
                      elevation_error_rate: RadiansPerSecond) -> tuple[float, float, float, float, float, float]:
-    """Return the unit vector of the direction at an offset from the beam, and its time derivative [1/s]: six floats.
+    """Return the unit vector of the direction at an offset from the beam, and its time derivative [1/s].
 
-    The first four arguments are the angles of the beam and their rates, the others the offset (dX, dE) and its rates
-    [rad, rad/s]. The vectors are FLU for deck angles, north-west-up for earth angles. See `offsets`, `offset_rates`.
+    The first four arguments are the angles of the beam and their rates, the others the offset (dX, dE) and its rates.
+    The vectors are FLU for deck angles, north-west-up for earth angles. See `offsets`, `offset_rates`.
     """
     theta2 = cross_elevation * cross_elevation + elevation_error * elevation_error
     theta = math.sqrt(theta2)
@@ -179,7 +178,7 @@ def rows(qx: float, qy: float, qz: float, qw: float) -> tuple[Vector, Vector, Ve
 
 @compiled
 def rotation(qx: float, qy: float, qz: float, qw: float, mat: Matrix3) -> None:
-    """Fill mat (3, 3) with the rotation of a unit quaternion (x, y, z, w)."""
+    """Fill mat with the rotation of a unit quaternion (x, y, z, w)."""
     x, y, z = rows(qx, qy, qz, qw)
     mat[0, 0], mat[0, 1], mat[0, 2] = x
     mat[1, 0], mat[1, 1], mat[1, 2] = y
@@ -202,5 +201,5 @@ ASHORE_ATTITUDE = (0.0, 0.0, math.sqrt(0.5), math.sqrt(0.5))
 
 
 def ashore_matrix() -> Matrix3:
-    """Return mat_ed (3, 3) of a pedestal ashore."""
+    """Return mat_ed of a pedestal ashore."""
     return np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])

@@ -107,11 +107,11 @@ def satellite(leo_pass: Elements) -> Satellite:
 
 def earth_fixed(julian: float, fractions: Floats, ut1_offset: Seconds | Times = 0.0,
                 pole: Pairs | None = None) -> Rotations:
-    """Return rotations (n, 3, 3) from TEME, the frame of SGP4 (true equator and mean equinox of date), to the
+    """Return rotations from TEME, the frame of SGP4 (true equator and mean equinox of date), to the
     earth-fixed frame.
 
-    The times are the Julian dates julian + fractions (n,), in UTC. ut1_offset: UT1 - UTC [s], one or (n,); pole: polar
-    motion x, y (n, 2) [rad], None for the pole of TEME.
+    The times are the Julian dates julian + fractions (n,), in UTC. ut1_offset: UT1 - UTC; pole: polar motion x, y
+    [rad], None for the pole of TEME.
     """
     theta = gstime(julian) + SIDEREAL_RATE * (SECONDS_PER_DAY * fractions + ut1_offset)
     c, s = cos(theta), sin(theta)
@@ -126,10 +126,10 @@ def earth_fixed(julian: float, fractions: Floats, ut1_offset: Seconds | Times = 
 
 
 def apparent(fixed: Vectors3, origin: Vector3) -> Vectors3:
-    """Return the vectors (n, 3) [m] to the places at which an observer sees targets, earth-fixed.
+    """Return the vectors [m] to the places at which an observer sees targets, earth-fixed.
 
-    fixed: positions (n, 3) [m] of the targets when the light left them, turned with the earth to its arrival; origin:
-    position (3,) [m] of the observer. The observer moves with the earth, which adds the diurnal aberration.
+    fixed: positions [m] of the targets when the light left them, turned with the earth to its arrival; origin:
+    position [m] of the observer. The observer moves with the earth, which adds the diurnal aberration.
     """
     relative = fixed - origin
     travel = np.sqrt(np.einsum('ni,ni->n', relative, relative)) / SPEED_OF_LIGHT_M_S
@@ -137,7 +137,7 @@ def apparent(fixed: Vectors3, origin: Vector3) -> Vectors3:
 
 
 def _teme(satrec: Satellite, julian: float, fractions: Floats) -> tuple[Vectors3, Vectors3]:
-    """Return position and velocity (n, 3) [km, km/s] of a satellite in TEME; arguments as in `enu`. Raises
+    """Return position and velocity [km, km/s] of a satellite in TEME; arguments as in `enu`. Raises
     TargetError."""
     error, position, velocity = satrec.sgp4_array(np.full(len(fractions), julian), fractions)
     if error.any():
@@ -149,10 +149,9 @@ def _teme(satrec: Satellite, julian: float, fractions: Floats) -> tuple[Vectors3
 
 def enu(satrec: Satellite, station: StationParameters, julian: float, fraction: float, times: Times,
         ut1_offset: Seconds | Times = 0.0) -> tuple[Vectors3, Vectors3]:
-    """Return position [m] and velocity against the earth [m/s] of a satellite, each (n, 3), ENU of a station.
+    """Return position [m] and velocity against the earth [m/s] of a satellite, ENU of a station.
 
-    satrec: from `satellite`; station: StationParameters; times: (n,) [s] after the Julian date julian + fraction, UTC;
-    ut1_offset: UT1 - UTC [s]. Raises TargetError where SGP4 fails.
+    times: after the Julian date julian + fraction, UTC; ut1_offset: UT1 - UTC. Raises TargetError where SGP4 fails.
     """
     fractions = fraction + times / SECONDS_PER_DAY
     position, velocity = _teme(satrec, julian, fractions)
@@ -165,9 +164,8 @@ def enu(satrec: Satellite, station: StationParameters, julian: float, fraction: 
 
 def seen(satrec: Satellite, station: StationParameters, julian: float, fractions: Floats, to_fixed: Rotations,
          light_time: bool) -> Vectors3:
-    """Return the vectors (n, 3) [m], ENU of a station, in which a satellite is seen without refraction.
+    """Return the vectors [m], ENU of a station, in which a satellite is seen without refraction.
 
-    satrec, station  as in `enu`
     julian, fractions, to_fixed  the Julian dates julian + fractions (n,) in UTC, and `earth_fixed` at these times
     light_time       True to include the travel time of the wave
 

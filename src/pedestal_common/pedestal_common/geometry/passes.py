@@ -30,25 +30,18 @@ MAX_RUN_S = float(SECONDS_PER_DAY)  # largest duration of a run [s]
 
 
 class Pass(typing.NamedTuple):
-    """Pass of a satellite.
-
-        rise, set                   UTC as datetime; None if it is more than MAX_PASS_DAYS outside the search
-        top                         UTC of the highest elevation, the culmination
-        rise_azimuth, set_azimuth   [deg]; NaN without rise or set
-        elevation                   highest elevation [deg]
-        begin                       UTC of the beginning of the search
-    """
-    rise: datetime.datetime | None
-    top: datetime.datetime
-    set: datetime.datetime | None
-    rise_azimuth: float
-    elevation: float
-    set_azimuth: float
-    begin: datetime.datetime
+    """Pass of a satellite; times are in UTC."""
+    rise: datetime.datetime | None      # None if it is more than MAX_PASS_DAYS outside the search
+    top: datetime.datetime              # time of the highest elevation, the culmination
+    set: datetime.datetime | None       # as `rise`
+    rise_azimuth: Degrees               # NaN without rise
+    elevation: Degrees                  # highest elevation
+    set_azimuth: Degrees                # NaN without set
+    begin: datetime.datetime            # beginning of the search
 
     @property
-    def duration(self) -> float:
-        """Time from rise to set [s], infinite without a rise or a set."""
+    def duration(self) -> Seconds:
+        """Time from rise to set, infinite without a rise or a set."""
         return (self.set - self.rise).total_seconds() if self.rise and self.set else math.inf
 
     @property
@@ -64,10 +57,10 @@ class Pass(typing.NamedTuple):
 
 def passes_after(satrec: Satellite, station: StationParameters, begin: datetime.datetime,
                  days: Days = SEARCH_DAYS) -> list[Pass]:
-    """Return the passes that are under way at `begin` (datetime, UTC) or rise within `days` after it.
+    """Return the passes that are under way at `begin` (UTC) or rise within `days` after it.
 
-    A pass below MIN_CULMINATION_DEG is left out, except one that is longer than a run. satrec: as of orbit.satellite;
-    station: StationParameters. Raises TargetError if the satellite does not rise, or if SGP4 ends.
+    A pass below MIN_CULMINATION_DEG is left out, except one that is longer than a run. Raises TargetError if the
+    satellite does not rise, or if SGP4 ends.
     """
     julian, fraction = orbit.julian_date(begin)
 
@@ -115,7 +108,7 @@ def passes_after(satrec: Satellite, station: StationParameters, begin: datetime.
 
 
 def _until_below(elevation: Callable[[Times], Floats], start: Seconds, step: Seconds) -> tuple[Times, Floats]:
-    """Return (times [s], elevations [deg]) after `start` [s], in steps [s], up to the first below the horizon.
+    """Return (times, elevations [deg]) after `start`, in steps, up to the first below the horizon.
 
     A negative step goes back in time. The series ends at most MAX_PASS_DAYS away, or where SGP4 fails. elevation:
     function of times, which returns elevations.
@@ -147,7 +140,7 @@ def search_start(satrec: Satellite, now: datetime.datetime) -> tuple[datetime.da
 
 
 def chosen_pass(satrec: Satellite, station: StationParameters, which: str, now: datetime.datetime) -> Pass:
-    """Return the pass that `which` names. now: datetime, UTC. Raises TargetError.
+    """Return the pass that `which` names. now: UTC. Raises TargetError.
 
     The values of `which` are:
 

@@ -64,27 +64,27 @@ FACTORS = ('p9', 'p12')  # terms that are factors [-]; the others are angles [ra
 
 
 class Terms(Record, align=False):
-    """The values of TERMS by name [rad; -]."""
-    p1: float
-    p3: float
-    p4: float
-    p5: float
-    p6: float
-    p7: float
-    p8: float
+    """Terms by name; p9 and p12 are factors."""
+    p1: Radians
+    p3: Radians
+    p4: Radians
+    p5: Radians
+    p6: Radians
+    p7: Radians
+    p8: Radians
     p9: float
-    p11: float
+    p11: Radians
     p12: float
-    p13: float
-    p14: float
-    p15: float
-    p16: float
-    p17: float
-    p18: float
-    p19: float
-    p20: float
-    p21: float
-    p22: float
+    p13: Radians
+    p14: Radians
+    p15: Radians
+    p16: Radians
+    p17: Radians
+    p18: Radians
+    p19: Radians
+    p20: Radians
+    p21: Radians
+    p22: Radians
 
 
 TERMS = tuple(Terms.__annotations__)  # names of the terms
@@ -111,7 +111,7 @@ NEWTON_STEPS = 6
 
 
 def model(terms: Mapping[str, float]) -> Records:
-    """Return the record (1,) of a model; terms: {name: value [rad, -]}, 0 for the others of TERMS."""
+    """Return the PointingModel (1,) of {name: term}; the others of TERMS are 0."""
     unknown = sorted(set(terms) - set(TERMS))
     if unknown:
         raise ValueError(f'term {unknown[0]}: must be one of {", ".join(TERMS)}')
@@ -122,7 +122,7 @@ def model(terms: Mapping[str, float]) -> Records:
 
 @compiled
 def put(model: PointingModel, terms: Floats) -> None:
-    """Set a model to the values of TERMS (20,) [rad, -]."""
+    """Set a model to the values (20,) of TERMS."""
     p, zero = model.p, True
     for i in range(len(terms)):
         model.terms[i] = terms[i]
@@ -188,20 +188,19 @@ def _elevation_terms(p: Terms, e: Radians) -> tuple[Radians, float, float]:
 
 @compiled
 def _leaning(model: PointingModel, x: float, y: float, z: float) -> Vector:
-    """Return a vector (x, y, z) of the elevating part in the frame of the yoke, whose elevation axis leans."""
+    """Return a vector of the elevating part in the frame of the yoke, whose elevation axis leans."""
     return x, model.cos_lean * y + model.sin_lean * z, model.cos_lean * z - model.sin_lean * y
 
 
 @compiled
 def _to_deck(T: Matrix3, x: float, y: float, z: float) -> Vector:
-    """Return a vector after the rotation T (3, 3)."""
     return (T[0, 0] * x + T[0, 1] * y + T[0, 2] * z, T[1, 0] * x + T[1, 1] * y + T[1, 2] * z,
             T[2, 0] * x + T[2, 1] * y + T[2, 2] * z)
 
 
 @compiled
 def _from_deck(T: Matrix3, v: Vector) -> Vector:
-    """Return a vector v (x, y, z) after the inverse of the rotation T (3, 3)."""
+    """Return a vector v after the inverse of the rotation T."""
     x, y, z = v
     return (T[0, 0] * x + T[1, 0] * y + T[2, 0] * z, T[0, 1] * x + T[1, 1] * y + T[2, 1] * z,
             T[0, 2] * x + T[1, 2] * y + T[2, 2] * z)
@@ -210,9 +209,9 @@ def _from_deck(T: Matrix3, v: Vector) -> Vector:
 @compiled
 def direction_motion(model: PointingModel, A: Radians, E: Radians, A_dot: RadiansPerSecond,
                      E_dot: RadiansPerSecond) -> tuple[Direction, tuple[RadiansPerSecond, RadiansPerSecond]]:
-    """Return ((azimuth, elevation) [rad], their rates [rad/s]) of the beam on the sky.
+    """Return ((azimuth, elevation), their rates) of the beam on the sky.
 
-    A, E, A_dot, E_dot: angles [rad] and rates [rad/s] of the encoders. Among azimuths whole turns apart, the result is
+    A, E, A_dot, E_dot: angles and rates of the encoders. Among azimuths whole turns apart, the result is
     nearest to the azimuth of the axis. If the beam is past the zenith, the elevation is above 90 deg.
     """
     a, e = A - model.p.p1, E - model.p.p7
@@ -241,7 +240,7 @@ def direction_motion(model: PointingModel, A: Radians, E: Radians, A_dot: Radian
 
 @compiled
 def direction_of(model: PointingModel, A: Radians, E: Radians) -> Direction:
-    """Return (azimuth, elevation) [rad] of the beam on the sky; A, E: angles of the encoders [rad]."""
+    """Return the direction of the beam on the sky; A, E: angles of the encoders."""
     if model.exact:
         return A, E
     on_sky, _ = direction_motion(model, A, E, 0.0, 0.0)
@@ -253,7 +252,7 @@ def _angle_rates(x: float, y: float, v: Vector, w: Vector, level: float) -> tupl
     """Return the first and second time derivative of the azimuth of a vector.
 
     x, y   components of the vector; level: x^2 + y^2, limited from below
-    v, w   first and second derivative of the vector (x, y, z)
+    v, w   first and second derivative of the vector
     """
     rate = (y * v[0] - x * v[1]) / level
     return rate, (y * w[0] - x * w[1] - 2.0 * rate * (x * v[0] + y * v[1])) / level
@@ -262,7 +261,7 @@ def _angle_rates(x: float, y: float, v: Vector, w: Vector, level: float) -> tupl
 @compiled
 def _axis_motion(model: PointingModel, u: Vector, v: Vector, w: Vector,
                  plunged: bool) -> tuple[AxisMotion, AxisMotion, bool]:
-    """Return ((azimuth, rate, acceleration), (the same of the elevation), reachable) after steps 3 to 7 are undone.
+    """Return (motion of the azimuth, that of the elevation, reachable) after steps 3 to 7 are undone.
 
     The arguments are those of encoder_motion. The azimuth is in no particular turn.
     """
@@ -303,11 +302,9 @@ def encoder_motion(model: PointingModel, u: Vector, v: Vector, w: Vector, plunge
                    near: Radians) -> tuple[AxisMotion, AxisMotion, bool]:
     """Return the motion of the encoders that keeps the beam on a moving direction, and whether the beam reaches it.
 
-    u, v, w   unit vector of the direction on the sky (x, y, z), FLU, and its first and second time derivative
+    u, v, w   unit vector of the direction on the sky, FLU, and its first and second time derivative
     plunged   True if the axes point to the direction over the zenith
-    near      azimuth near which the azimuth of the axis is chosen [rad]
-
-    The motion is ((azimuth, rate, acceleration), (the same of the elevation)) [rad, rad/s, rad/s2].
+    near      azimuth near which the azimuth of the axis is chosen
     """
     (azimuth, a_dot, a_ddot), (elevation, e_dot, e_ddot), reachable = _axis_motion(model, u, v, w, plunged)
     azimuth = near + wrap(azimuth - near)
@@ -331,9 +328,9 @@ def encoder_motion(model: PointingModel, u: Vector, v: Vector, w: Vector, plunge
 
 @compiled
 def encoder_of(model: PointingModel, azimuth: Radians, elevation: Radians) -> tuple[Radians, Radians, bool]:
-    """Return (A, E, reachable): the angles of the encoders [rad] at which the beam points to a direction on the sky.
+    """Return (A, E, reachable): the angles of the encoders at which the beam points to a direction on the sky.
 
-    azimuth, elevation   of the direction [rad]; above 90 deg the axes point over the zenith
+    azimuth, elevation   of the direction; above 90 deg the axes point over the zenith
     reachable            False if the beam cannot point to the direction; A, E then belong to the nearest one
 
     The azimuth of the axis is the one nearest to `azimuth`, which counts revolutions.

@@ -15,23 +15,14 @@ from pedestal_common.quantities import Bools, Floats, Pairs, Records
 
 
 class Field(typing.NamedTuple):
-    """Group of numbers of a message.
-
-    name        name of the field in a record
-    path        path of its numbers in the message, a pattern whose group 1 is the component
-    components  values of group 1, in the order of the record; None: the indices of Topic.names
-    column      name of a column, with {} for the component (or the name of the joint)
-    unit        unit of the numbers where the topic gives none
-    tolerance   largest accepted difference between recorded and recomputed numbers, in that unit
-    recorded    True if the field is part of the records of the graph's topics
-    """
-    name: str
-    path: str
-    components: tuple[str, ...] | None
-    column: str
-    unit: str = ''
-    tolerance: float = 1e-9
-    recorded: bool = True
+    """Group of numbers of a message."""
+    name: str                           # of the field in a record
+    path: str                           # of its numbers in the message, a pattern whose group 1 is the component
+    components: tuple[str, ...] | None  # values of group 1, in the order of the record; None: indices of Topic.names
+    column: str                         # name of a column, with {} for the component (or the name of the joint)
+    unit: str = ''                      # of the numbers where the topic gives none
+    tolerance: float = 1e-9             # largest accepted difference of recorded and recomputed numbers, in that unit
+    recorded: bool = True               # the field is part of the records of the graph's topics
 
 
 _XYZ, _XYZW = ('x', 'y', 'z'), ('x', 'y', 'z', 'w')
@@ -143,9 +134,9 @@ _JOINTS = {'sensor_msgs/msg/JointState': 'name', 'trajectory_msgs/msg/JointTraje
 class Column(typing.NamedTuple):
     """One number of a topic's messages."""
     name: str
-    field: str
+    field: str          # name of its Field
     unit: str
-    tolerance: float
+    tolerance: float    # as in Field
 
 
 def fields(topic: str) -> tuple[Field, ...]:
@@ -201,7 +192,7 @@ def unit(topic: str, type_name: str, column: str) -> str:
 
 
 def of_filter(steps: Records, name: str) -> Pairs:
-    """Return one number of the filters of both axes, (n, 2), from records (n,) with the topic acu/filter.
+    """Return one number of the filters of both axes from records (n,) with the topic acu/filter.
 
     name: key of topics.FILTER_UNITS.
     """

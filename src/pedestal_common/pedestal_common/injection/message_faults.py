@@ -11,34 +11,28 @@ import numpy as np
 
 from pedestal_common.compiled import compiled
 from pedestal_common.injection import table
-from pedestal_common.quantities import Floats, Nanoseconds
+from pedestal_common.quantities import Bit, Floats, Nanoseconds
 from pedestal_common.record import Record
 
 MAX_HELD_NUMBERS = 32  # largest number of values that a node freezes: the size of `held`
 
 
 class MessageFault(Record):
-    """Record of the message faults of a node that are in force.
-
-    drop, freeze, nan    1 while in force
-        held                 numbers of the first frozen step; holds: 1 once they are stored
-        sigma, seed          1 sigma of white noise, in the unit of the numbers, 0 for none; its seed
-    """
-    drop: int
-    freeze: int
-    nan: int
-    holds: int
-    held: Annotated[Floats, (MAX_HELD_NUMBERS,)]
-    sigma: float
-    seed: int
+    """Message faults of a node that are in force."""
+    drop: Bit       # 1 while in force
+    freeze: Bit     # the same
+    nan: Bit        # the same
+    holds: Bit      # 1 once the numbers of the first frozen step are stored
+    held: Annotated[Floats, (MAX_HELD_NUMBERS,)]    # these numbers
+    sigma: float    # 1 sigma of white noise, in the unit of the numbers, 0 for none
+    seed: int       # of the noise
 
 
 @compiled
 def clear(faults: MessageFault) -> None:
     """End every fault of the message. Afterwards `apply` sets the faults that are still in force.
 
-    e: MessageFault of the node. e.holds becomes 1 if the step before had a freeze: a freeze that continues then
-    uses the same held numbers.
+    `holds` becomes 1 if the step before had a freeze: a freeze that continues then uses the same held numbers.
     """
     faults.holds = faults.freeze
     faults.drop, faults.freeze, faults.nan, faults.sigma = 0, 0, 0, 0.0
@@ -53,7 +47,7 @@ def codes(node: str) -> tuple[int, ...]:
 def apply(faults: MessageFault, codes: tuple[int, ...], fault: int, values: Floats) -> None:
     """Apply a fault if it is one of `codes`; other faults change nothing here.
 
-    e: as in `clear`; codes: result of the function `codes`; fault: code of the fault; values: its arguments.
+    codes: result of the function `codes`; fault: code of the fault; values: its arguments.
     """
     drop, freeze, nan, noise = codes
     if fault == drop:
@@ -70,7 +64,7 @@ def apply(faults: MessageFault, codes: tuple[int, ...], fault: int, values: Floa
 def numbers(faults: MessageFault, values: Floats, first: int) -> None:
     """Freeze values (n,) or make them NaN, in place, as the faults in force require.
 
-    e.held stores the values from its element `first` on; first + n must be at most MAX_HELD_NUMBERS.
+    `held` stores the values from its element `first` on; first + n must be at most MAX_HELD_NUMBERS.
     """
     for i in range(len(values)):
         if faults.freeze != 0:
@@ -102,7 +96,7 @@ def _uniform(seed: int, stamp: Nanoseconds, i: int) -> float:
 
 @compiled
 def noise(faults: MessageFault, stamp: Nanoseconds, i: int) -> float:
-    """Return the white noise of number i of a message: e.sigma times a standard normal number (Box and Muller 1958).
-    stamp: of the step [ns]."""
+    """Return the white noise of number i of a message: sigma times a standard normal number (Box and Muller 1958).
+    stamp: of the step."""
     u, v = _uniform(faults.seed, stamp, 2 * i), _uniform(faults.seed, stamp, 2 * i + 1)
     return faults.sigma * math.sqrt(-2.0 * math.log(u)) * math.cos(2.0 * math.pi * v)

@@ -12,17 +12,15 @@ from pedestal_common.wire.records import NO_STAMP
 class Simulated(Unit):
     """Unit of simulated equipment. Its record has a field `schedule` (schedule.Schedule), which its law reads.
     Its parameters have the field `inject`.
-
-    FAULTS_OF    node of table.INJECTED_FAULTS whose faults it has; '': its own node
     """
-    FAULTS_OF = ''
+    FAULTS_OF = ''      # node of table.INJECTED_FAULTS whose faults it has; '': its own node
 
     @property
     def _faulty(self) -> str:
         return self.FAULTS_OF or self.NODE.name
 
     def schedule(self) -> list[tuple[Nanoseconds, Command]]:
-        """Return [(at [ns], Command)] of the parameter `inject`."""
+        """Return the commands of the parameter `inject` with their times."""
         return table.scheduled_commands(self._faulty, self.parameters.inject)
 
     def execute(self, command: Command, arguments: Mapping[str, Value]) -> Reply:

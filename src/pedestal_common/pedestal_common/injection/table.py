@@ -137,7 +137,7 @@ def code(node: str, name: str) -> int:
 
 
 def scheduled_commands(node: str, text: str) -> list[tuple[Nanoseconds, Command]]:
-    """Return [(at [ns], Command)] of the parameter `inject` of a node, in order of time. Raise ParameterError for a
+    """Return the commands of the parameter `inject` of a node with their times, in order. Raise ParameterError for a
     text that is no schedule."""
     return schedule('inject', text, INJECT_COMMANDS[node])
 

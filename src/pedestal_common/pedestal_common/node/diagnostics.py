@@ -43,7 +43,7 @@ class Diagnostics:
             node.every(DIAGNOSTICS_PERIOD_S, self._publish_now)
 
     def publish(self, stamp: Nanoseconds) -> None:
-        """Publish the diagnostics in lockstep, with the stamp of a step [ns]."""
+        """Publish the diagnostics in lockstep, with the stamp of a step."""
         self._send(self._diagnose(), stamp)
 
     def publish_urgent(self) -> bool:

@@ -90,7 +90,7 @@ def stop_on_signals() -> None:
 
 
 def readings() -> tuple[Nanoseconds, Nanoseconds]:
-    """Return a pair of readings (steady clock, system clock) [ns]. The pair is read again, at most twice, if more than
+    """Return a pair of readings (steady clock, system clock). The pair is read again, at most twice, if more than
     0.1 ms passed between the two readings."""
     for _ in range(3):
         steady, system = time.monotonic_ns(), time.time_ns()
@@ -102,8 +102,7 @@ def readings() -> tuple[Nanoseconds, Nanoseconds]:
 def node_of(info: TopicEndpointInfo, root: str = '/') -> str:
     """Return the name in the graph of the node that owns a publisher or subscriber, 'beam_2/acu' for example.
 
-    info: rclpy's TopicEndpointInfo of the publisher or subscriber; root: namespace of the graph, with a '/' at its
-    end.
+    info: of the publisher or subscriber; root: namespace of the graph, with a '/' at its end.
     """
     return f'{info.node_namespace.rstrip("/")}/{info.node_name}'.removeprefix(root)
 
@@ -228,12 +227,12 @@ class Shell(Node):
         return link, self._root + link.name if self.beam else link.name
 
     def clock(self) -> tuple[Nanoseconds, Nanoseconds]:
-        """Return (time of the steady clock, UTC) now [ns]."""
+        """Return (time of the steady clock, UTC) now."""
         steady, system = readings()
         return steady, self.utc.at(steady, system)
 
     def epoch(self, stamp: Nanoseconds) -> Nanoseconds:
-        """Return the stamp [ns] at which the time of the units is 0.
+        """Return the stamp at which the time of the units is 0.
 
         In lockstep this is 0. In realtime it is the parameter `graph.start`. If that is 0, it is the beginning of the
         UTC day of the first `stamp`.
@@ -254,7 +253,7 @@ class Shell(Node):
                take: Callable[[_M, bool], None]) -> None:
         """Subscribe to a topic of the graph, and call take(message, after_gap) for every message.
 
-        decode(CDR bytes) returns (stamp [ns] or None, message). It raises ValueError for bytes that are no such
+        decode(CDR bytes) returns (stamp or None, message). It raises ValueError for bytes that are no such
         message. In lockstep such bytes from a node of the graph end this node. In all other cases they are dropped, as
         are the messages that a PublisherGate refuses. after_gap: True if messages may be missing before this message.
         """
@@ -295,7 +294,7 @@ class Shell(Node):
                     lambda message, after_gap: take(message))
 
     def every(self, period: Seconds, function: Callable[[], object]) -> Timer:
-        """Return a timer that calls a function at a period of the steady wall clock [s]."""
+        """Return a timer that calls a function at a period of the steady wall clock."""
         return self.create_timer(period, self._guarded(function), clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def _guarded(self, function: Callable[..., object]) -> Callable[..., None]:
@@ -311,7 +310,7 @@ class Shell(Node):
         return call
 
     def diagnose_with(self, diagnose: Diagnose) -> None:
-        """Publish the diagnostics that diagnose() returns, (level, message, [(key, value text)]).
+        """Publish the diagnostics that diagnose() returns.
 
         In lockstep they are published at every whole second of the drive's time. In realtime they are published once a
         second of the wall clock, and in `diagnose_now`.
@@ -324,7 +323,7 @@ class Shell(Node):
         return self.diagnostics is not None and not self.graph.lockstep and self.diagnostics.publish_urgent()
 
     def begin_step(self, stamp: Nanoseconds) -> None:
-        """Note the stamp t_k [ns] of a step, before any message of the step is published. In lockstep the first call
+        """Note the stamp t_k of a step, before any message of the step is published. In lockstep the first call
         waits for the graph, and diagnostics are published at every whole second. In realtime there is no wait."""
         self._stamp = stamp
         if not self._started:

@@ -49,9 +49,9 @@ def two_argument_callback(function: Take) -> Callable[..., None]:
 
 
 def subscribe(node: 'Shell', link: nodes.Link, ros_name: str, take: Take, role: str) -> list[Subscription]:
-    """Return the subscriptions of a node in realtime to the topic of a nodes.Link, named ros_name in ROS.
+    """Return the subscriptions of a node in realtime to the topic of a link, named ros_name in ROS.
 
-    The subscriptions call take(CDR bytes, rclpy's message info) once for each message. role: `read` or `recorded`. A
+    The subscriptions call `take` once for each message. role: `read` or `recorded`. A
     latched subscriber does not match a volatile publisher. Where topics.Qos has `unlatched` there is therefore a
     second, volatile subscription. A latched publisher matches both; the second copy of its message is dropped.
     """
@@ -77,7 +77,7 @@ def subscribe(node: 'Shell', link: nodes.Link, ros_name: str, take: Take, role: 
 
 
 def foreign_publishers(node: 'Shell', link: nodes.Link, ros_name: str) -> list[str] | None:
-    """Return the names of the nodes that publish a topic and are no publisher of its nodes.Link.
+    """Return the names of the nodes that publish a topic and are no publisher of its link.
 
     Return None if no node of the graph publishes the link. A node before its discovery counts, because it may be
     foreign.
@@ -90,12 +90,12 @@ def foreign_publishers(node: 'Shell', link: nodes.Link, ros_name: str) -> list[s
 class SoleNumbers:
     """Check of the sequence numbers of a topic in lockstep: those of the publisher in the graph rise by 1.
 
-    node: the shell.Shell that subscribes; link: nodes.Link of the topic, named ros_name in ROS
-    next: number of the next message, None if any number may follow
+    node: the node that subscribes; link: the topic, named ros_name in ROS; first: as `next`
     """
 
     def __init__(self, node: 'Shell', link: nodes.Link, ros_name: str, first: int | None = None) -> None:
-        self._node, self._link, self._ros_name, self.next = node, link, ros_name, first
+        self._node, self._link, self._ros_name = node, link, ros_name
+        self.next = first       # number of the next message, None if any number may follow
 
     def is_next(self, number: int | None) -> bool:
         """Return True if a message with this number follows the last one. A middleware without numbers has None."""
@@ -151,8 +151,7 @@ class TopicSubscriber(Generic[_M]):
     """Subscriber to one topic, which passes the messages that its PublisherGate accepts to take(message, True after a
     gap).
 
-    node: the shell.Shell that subscribes; link: nodes.Link of the topic, named ros_name in ROS; decode: see
-    PublisherGate
+    node: the node that subscribes; link: the topic, named ros_name in ROS; decode: see PublisherGate
     """
 
     def __init__(self, node: 'Shell', link: nodes.Link, ros_name: str,
@@ -224,7 +223,7 @@ class TopicSubscriber(Generic[_M]):
 
     def finding(self, now: Nanoseconds) -> tuple[int, str] | None:
         """Return (level, text) for the diagnostics, about messages dropped within DROP_REPORT_NS; None without any.
-        now: steady clock [ns]."""
+        now: steady clock."""
         gate = self.gate
         if gate.dropped_at is None or now - gate.dropped_at > DROP_REPORT_NS:
             return None

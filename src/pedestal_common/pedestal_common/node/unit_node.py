@@ -31,8 +31,8 @@ SETTLING_POLL_S = 0.001  # time after which the messages queued at start-up coun
 
 @dataclasses.dataclass
 class LastText:
-    """Last published text of a text topic: its code, the text, and the function that publishes the next text."""
-    publish: Callable[[bytes], None]
+    """Last published text of a text topic."""
+    publish: Callable[[bytes], None]    # publishes the next text
     code: int = topics.NO_TEXT_CODE
     text: object = ''
 
@@ -70,7 +70,7 @@ class Port:
         return self.prefix + topic if topic in nodes.BEAM_TOPICS else topic
 
     def step(self, stamp: Nanoseconds, values: Mapping[str, records.Decoded | None]) -> None:
-        """Make the step of a stamp [ns]. values: {topic: (stamp [ns], numbers), or None if no message arrived}.
+        """Make the step of a stamp. values: {topic: its message, or None if no message arrived}.
 
         The unit receives stamps that count from the epoch (Shell.epoch), so that times in seconds keep their
         resolution as floating-point numbers.
@@ -261,7 +261,7 @@ class UnitNode(shell.Shell):
     def follow(self, trigger: str, latencies: Mapping[str, Seconds]) -> None:
         """Subscribe to the inputs of the steps, match the messages of each step (see Steps), and `answer` each step.
 
-        trigger: topic that begins a step; latencies: {other topic: age of its data at the step [s]}. In lockstep a
+        trigger: topic that begins a step; latencies: {other topic: age of its data at the step}. In lockstep a
         step whose inputs are absent for graph.deadline ends the node with the names of the silent publishers.
         """
         self.steps = Steps(trigger, {name: round(latency * NS_PER_SECOND) for name, latency in latencies.items()},
@@ -342,7 +342,7 @@ class UnitNode(shell.Shell):
             self._settling = self.every(SETTLING_POLL_S, self._settle)
 
     def answer(self, stamp: Nanoseconds, values: Mapping[str, records.Decoded | None]) -> None:
-        """Answer the step of a stamp [ns]. values: {topic: (stamp, numbers) or None}."""
+        """Answer the step of a stamp. values: as in Port.step."""
         for port in self.ports:
             port.step(stamp, values)
         self.begin_step(stamp)
@@ -443,7 +443,7 @@ class UnitNode(shell.Shell):
 
 
 def decoding(decoder: records.Decoder) -> Callable[[bytes], tuple[Nanoseconds, records.Decoded]]:
-    """Return decode(CDR bytes) -> (stamp [ns], result of the Decoder), for Shell.reader."""
+    """Return the function that decodes CDR bytes, for Shell.reader."""
     decoded = decoder.decoded
 
     def decode(data: bytes) -> tuple[Nanoseconds, records.Decoded]:

@@ -111,7 +111,7 @@ class PublisherGate(Generic[_M]):
     def _admit(self, stream: Stream | None, now: Nanoseconds) -> bool:
         """Return True if a message is of the active publisher, else drop the message.
 
-        A publisher that may take over becomes active first. stream: Stream of the message, None if it is unclear.
+        A publisher that may take over becomes active first. stream: of the message, None if it is unclear.
         """
         if stream is not None and stream is self.active and self._may_be_another(stream, now):
             self.active = None
@@ -163,7 +163,7 @@ class PublisherGate(Generic[_M]):
         return free
 
     def _other_active(self, stream: Stream, now: Nanoseconds) -> list[Stream]:
-        """Return the streams except `stream` that had a message within SILENCE_LIMIT_NS before now [ns]."""
+        """Return the streams except `stream` that had a message within SILENCE_LIMIT_NS before now."""
         return [other for other in self.streams.streams
                 if other is not stream and now - other.arrival < SILENCE_LIMIT_NS]
 

@@ -68,7 +68,7 @@ class Stream:
         return gap == 1 or 0 < gap <= self.growth(source - self.source) + self.owed
 
     def growth(self, elapsed: Nanoseconds) -> float:
-        """Return the largest growth of its numbers in a time [ns]."""
+        """Return the largest growth of its numbers in a time."""
         return NUMBER_SLACK + 2.0 * elapsed / (self.interval or DEFAULT_INTERVAL_NS)
 
     def near(self, other: 'Stream') -> bool:
@@ -122,7 +122,7 @@ class Streams:
         self._previous = -ACTIVE_LIMIT_NS
 
     def of(self, number: int, source: Nanoseconds, now: Nanoseconds) -> Stream | None:
-        """Return the Stream of a message, a new one where it continues none; None where it may be of several. number:
+        """Return the stream of a message, a new one where it continues none; None where it may be of several. number:
         its sequence number; source: time of sending, now: time of arrival."""
         previous, self._previous = self._previous, now
         recent = [stream for stream in self.streams if previous - stream.arrival < RECENT_LIMIT_NS]
@@ -147,7 +147,7 @@ class Streams:
         return None if stream.unclear else stream
 
     def several(self, now: Nanoseconds) -> bool:
-        """Return True if more than one of the streams is active at the time now [ns]."""
+        """Return True if more than one of the streams is active now."""
         return sum(now - stream.arrival < ACTIVE_LIMIT_NS for stream in self.streams) > 1
 
     def _silent(self, number: int, source: Nanoseconds) -> list[Stream]:

@@ -20,19 +20,16 @@ MAX_SLEW_RATE this change takes 20 s."""
 
 
 class Utc:
-    """UTC that never goes back. steady, system: the first pair of readings of the two clocks [ns].
-
-    steps: number of steps of the system's clock; last_step: size of the last step [ns, forward is positive]; ahead:
-    lead of this time over the system's clock [ns]
-    """
+    """UTC that never goes back. steady, system: the first pair of readings of the two clocks."""
 
     def __init__(self, steady: Nanoseconds, system: Nanoseconds) -> None:
         self._offset = self._system_offset = system - steady
         self._steady = steady
-        self.steps = self.last_step = 0
+        self.steps = 0          # number of steps of the system's clock
+        self.last_step = 0      # size of the last step [ns], forward is positive
 
     def at(self, steady: Nanoseconds, system: Nanoseconds) -> Nanoseconds:
-        """Return UTC [ns] at a pair of readings. If the steady clock went back, the last time is returned again."""
+        """Return UTC at a pair of readings. If the steady clock went back, the last time is returned again."""
         elapsed = max(steady - self._steady, 0)
         self._steady += elapsed
         jump = system - steady - self._system_offset
@@ -48,5 +45,5 @@ class Utc:
 
     @property
     def ahead(self) -> Nanoseconds:
-        """Lead of this time over the system's clock [ns]."""
+        """Lead of this time over the system's clock."""
         return self._offset - self._system_offset

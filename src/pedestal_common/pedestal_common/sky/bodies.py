@@ -16,7 +16,7 @@ NODE_INTERVAL_S = 1800.0
 
 
 def seen(body: str, station: StationParameters, julian: float, fractions: Floats, to_fixed: Rotations) -> Vectors3:
-    """Return the vectors (n, 3) [m], ENU of a station, in which a body of POSITIONS is seen without refraction.
+    """Return the vectors [m], ENU of a station, in which a body of POSITIONS is seen without refraction.
 
     julian, fractions, to_fixed: the Julian dates julian + fractions (n,) in UTC, and orbit.earth_fixed at these times.
     """

@@ -134,28 +134,26 @@ def opened(path: FilePath, bare: Sequence[str] = ()) -> Iterator['Table']:
 class Table:
     """The rows of a CSV text as dictionaries {name of the column: cell}, without the blanks around a cell.
 
-        fieldnames      names of the columns, without the blanks around them
-        head_line       line of the names in the file
-        line_num        line of the last row
-        bare            names of the columns for a text without names: its first line is a row with as many cells
+    bare: names of the columns for a text without names: its first line is a row with as many cells.
     """
 
     def __init__(self, path: FilePath, content: str, bare: Sequence[str] = ()) -> None:
         self.path = path
         lines = io.StringIO(content, newline='')
         before, begin, separator = _beginning(lines)
-        self.line_num = self.head_line = len(before) + 1
+        self.head_line = len(before) + 1    # line of the names in the file
+        self.line_num = self.head_line      # line of the last row
         sample = ''.join([begin, *itertools.islice(lines, SNIFFED_LINES)])
         lines.seek(sum(map(len, before)))
         self.separator = separator or _separator(begin, sample)
         self._rows = csv.reader(lines, delimiter=self.separator, skipinitialspace=True)
-        # _passed: lines before the table; _decimal: {decimal sign: first cell with it}; _again: a first line that is a
-        # row and not names, which the iteration yields again.
-        self._passed = len(before)
+        self._passed = len(before)      # lines before the table
+        # {decimal sign: line, column and text of its first cell}
         self._decimal: dict[str, tuple[int, str, str]] = {}
+        # a first line that is a row and not names, which the iteration yields again
         self._again: list[str] | None = None
         first = self._cells() or []
-        self.fieldnames = tuple(first)
+        self.fieldnames = tuple(first)      # names of the columns, without the blanks around them
         if _is_row(first):
             names = _names_above(before, self.separator, bare) if before else []
             if len(names) == len(first) and not _is_row(names):
@@ -185,8 +183,7 @@ class Table:
         return None
 
     def column(self, quantity: _columns.Quantity, required: bool = True, without: str = '') -> _columns.Column | None:
-        """Return the columns.Column of a columns.Quantity. None if there is none and it is not required. Raises
-        TableError.
+        """Return the column of a quantity; None if there is none and it is not required. Raises TableError.
 
         without: name of a column that is not considered, '' for none.
         """
@@ -210,7 +207,7 @@ class Table:
         return f'{_columns.listed(self.fieldnames)} (separator {self.separator!r})'
 
     def number(self, column: _columns.Column, cell: str | None, low: float, high: float) -> float:
-        """Return the number in a cell of a columns.Column, in the unit of its quantity. Raises TableError.
+        """Return the number in a cell of a column, in the unit of its quantity. Raises TableError.
 
         cell: None if the row ends before the column; low, high: allowed range, in the unit of the quantity.
         """
@@ -304,7 +301,7 @@ def _is_number(cell: str) -> bool:
 
 
 def require(table: Table, names: Iterable[str]) -> None:
-    """Raise TableError where a Table lacks one of these columns."""
+    """Raise TableError where a table lacks one of these columns."""
     for name in names:
         if name not in table.fieldnames:
             raise table.missing(name)

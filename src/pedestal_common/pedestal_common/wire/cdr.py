@@ -26,23 +26,18 @@ PADDING_LIMIT_BYTES = 4  # the padding that DDS adds behind a message is always 
 
 
 class Places:
-    """Places in one message, given as CDR bytes of a type. Raises ValueError when the bytes are no such message.
-
-    numbers     [(path of the number in the message, its first byte, dtype)]
-    texts       {path: text}
-    fixed       [(start, stop)] of the bytes that must be equal in another message, so that its numbers are at these
-                places
-    stop        end of the message
-    """
+    """Places in one message, given as CDR bytes of a type. Raises ValueError when the bytes are no such message."""
 
     def __init__(self, data: bytes, type_name: str) -> None:
         if len(data) < CDR_HEADER_BYTES:
             raise ValueError(f'{len(data)} bytes are no {type_name}')
         self.data = data
         self.order = '<' if data[1] & 1 else '>'     # the header states the order of the bytes
-        self.stop = CDR_HEADER_BYTES
+        self.stop = CDR_HEADER_BYTES        # end of the message
+        # (path of the number in the message, its first byte, dtype)
         self.numbers: list[tuple[str, int, str]] = []
-        self.texts: dict[str, str] = {}
+        self.texts: dict[str, str] = {}     # {path: text}
+        # (start, stop) of the bytes that must be equal in another message, so that its numbers are at these places
         self.fixed = [(0, CDR_HEADER_BYTES)]
         try:
             self._fields(type_name, '')

@@ -92,7 +92,7 @@ class Definition(typing.Protocol):
 def values(definitions: Iterable[Definition], command: Command) -> dict[str, Value]:
     """Return {argument: number or text} of a Command, with the defaults of left-out arguments. Raises ValueError.
 
-    definitions: CommandDefinitions of the node, one of which must have the name of the command.
+    definitions: of the node; one of them must have the name of the command.
     """
     definition = next((row for row in definitions if row.name == command.verb), None)
     if definition is None:
@@ -174,7 +174,7 @@ def reply_message(command: Command, reply: Reply) -> Message:
 
 
 def of_reply(status: Message) -> tuple[Command, Reply]:
-    """Return (Command, Reply) of a DiagnosticStatus on a topic of replies. Raises ValueError."""
+    """Return what a DiagnosticStatus on a topic of replies holds. Raises ValueError."""
     rest = [value for value in status.values if value.key not in RESERVED_KEYS]
     result = {value.key: value.value for value in status.values if value.key in RESERVED_KEYS}
     if set(result) != set(RESERVED_KEYS):
@@ -197,7 +197,8 @@ def parsed(text: str) -> Command:
 
 
 def schedule(name: str, text: str, definitions: Iterable[Definition]) -> list[tuple[Nanoseconds, Command]]:
-    """Return [(at [ns], Command)] of the schedule in the parameter `name`, in order of time. Raises ParameterError."""
+    """Return the commands of the schedule in the parameter `name` with their times, in order. Raises ParameterError.
+    """
     due = []
     for part in filter(None, (part.strip() for part in text.split(';'))):
         at, _, rest = part.partition(' ')

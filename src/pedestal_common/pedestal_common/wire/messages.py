@@ -77,8 +77,7 @@ def nanoseconds(stamp: Message) -> Nanoseconds:
 
 
 def stamp_of(data: bytes) -> Nanoseconds:
-    """Return the stamp [ns] in the CDR bytes of a message that begins with a stamp. Raises ValueError for other
-    bytes."""
+    """Return the stamp in the CDR bytes of a message that begins with a stamp. Raises ValueError for other bytes."""
     if len(data) >= CDR_HEADER_BYTES + _STAMP.size:
         seconds, nanosec = _STAMP.unpack_from(data, CDR_HEADER_BYTES)
         if seconds >= 0 and nanosec < 1_000_000_000:
@@ -93,7 +92,7 @@ def put_stamp(stamp: Message, ns: Nanoseconds) -> None:
 
 
 def since(message: Message, epoch: Nanoseconds) -> Message:
-    """Change the stamp in the header of a message so that it counts from an epoch [ns]; a stamp 0 stays 0. Return the
+    """Change the stamp in the header of a message so that it counts from an epoch; a stamp 0 stays 0. Return the
     message."""
     stamp = nanoseconds(message.header.stamp)
     put_stamp(message.header.stamp, stamp - epoch if stamp else 0)

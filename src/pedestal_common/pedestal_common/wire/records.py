@@ -34,7 +34,7 @@ def _type(topic: str) -> str | DType:
     if is_text(topic):
         return 'i8'
     sizes = [(field.name, 'f8', (len(field.components or row.names),)) for field in layouts.fields(topic)]
-    return np.dtype([('stamp', 'i8'), *sizes])
+    return np.dtype([('stamp', 'i8'), *sizes])      # no Record, because the tables of topics and layouts determine it
 
 
 def of(*names: str) -> DType:
@@ -75,11 +75,7 @@ def code_of(topic: str, text: str) -> int:
 
 class _Shape:
     """Places of the columns of a topic, found in one message, and valid for messages that differ only in their
-    numbers.
-
-    fields: [(index of the column, first byte, dtype)]; reader: the Struct that reads these numbers at once. marks:
-    [(columns, [(Struct, first byte)], function absent)] of layouts.no_data.
-    """
+    numbers."""
 
     def __init__(self, topic: str, data: bytes) -> None:
         type_name = topics.TOPIC_BY_NAME[topic].type
@@ -88,6 +84,7 @@ class _Shape:
         self.size = places.stop
         # Bytes that another message must have too, so that its numbers are at the same places.
         self.guard = [(start, stop, bytes(data[start:stop])) for start, stop in _joined(places.fixed)]
+        # (index of the column, first byte, dtype)
         self.fields = [(index[name], start, dtype) for path, start, dtype in places.numbers
                       if (name := layouts.column(type_name, path, places.texts)) in index]
         self.in_order = [column for column, _, _ in self.fields] == list(range(len(index)))
@@ -96,7 +93,8 @@ class _Shape:
         for _, start, dtype in self.fields:
             form += f'{start - at}x{_FORMATS[dtype[1:]]}'
             at = start + int(dtype[2:])
-        self.reader = struct.Struct(form)
+        self.reader = struct.Struct(form)       # reads these numbers at once
+        # (columns, [(Struct, first byte)], function absent) of layouts.no_data
         self.marks = [([index[name] for name in names if name in index],
                        [(struct.Struct(dtype[0] + _FORMATS[dtype[1:]]), start) for start, dtype in where], absent)
                       for names, where, absent in layouts.no_data(type_name, places.numbers, places.texts)]
@@ -108,7 +106,7 @@ class _Shape:
 
 
 def _joined(fixed: Iterable[tuple[int, int]]) -> list[tuple[int, int]]:
-    """Return a list of (start, stop) in which adjacent ranges are merged."""
+    """Return ranges (start, stop), of which adjacent ones are merged."""
     joined: list[tuple[int, int]] = []
     for start, stop in sorted(fixed):
         if joined and joined[-1][1] == start:
@@ -134,7 +132,7 @@ def _runs(fields: Iterable[tuple[int, int, str]]) -> list[tuple[slice, np.dtype[
 
 
 class Decoder:
-    """Reader of the messages of one stamped topic. record: (1,), whose field of this topic `put` fills."""
+    """Reader of the messages of one stamped topic. record: (1,); `put` fills its field of this topic."""
 
     def __init__(self, topic: str, record: Records) -> None:
         self.topic = topic
@@ -143,7 +141,7 @@ class Decoder:
         self._stamp, self._numbers = record[topic]['stamp'], numbers(record, topic)[0]
 
     def decoded(self, data: bytes) -> Decoded:
-        """Return (stamp [ns], numbers (columns,)) of CDR bytes. A number is NaN if the message does not contain it, or
+        """Return the stamp and the numbers of CDR bytes. A number is NaN if the message does not contain it, or
         marks it as no data (layouts.NO_DATA_MARKS). Raises ValueError for bytes that are no message of the topic's
         type, and for an invalid stamp."""
         if not self._shape.fits(data):
@@ -194,11 +192,11 @@ class Encoder:
 
     def encoded(self, epoch: Nanoseconds = 0) -> bytes:
         """Return the CDR bytes of the message with the numbers of the record. Its stamp is that of the record plus the
-        epoch [ns]."""
+        epoch."""
         return self.bytes_of(self._stamp.item() + epoch, self._numbers)
 
     def bytes_of(self, stamp: Nanoseconds, values: Floats) -> bytes:
-        """Return the CDR bytes of the message with a stamp [ns] and numbers (columns,)."""
+        """Return the CDR bytes of the message with a stamp and numbers (columns,)."""
         _STAMP.pack_into(self._buffer, messages.CDR_HEADER_BYTES, *divmod(stamp, 1_000_000_000))
         for columns, view in self._views:
             view[:] = values[columns]
