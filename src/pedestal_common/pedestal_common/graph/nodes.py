@@ -11,7 +11,7 @@ import typing
 from collections.abc import Collection, Iterable
 
 from pedestal_common.graph.topics import REALTIME_RATES, TOPIC_BY_NAME, TOPICS
-from pedestal_common.parameters import Parameters
+from pedestal_common.parameters import AnyParameters
 
 MAX_BEAMS = 16  # largest number of beams of an electronic array
 REPLAY_NODE = 'replay'  # name of the node that replays a recording to the other nodes
@@ -44,7 +44,7 @@ class Node(typing.NamedTuple):
         """Name of its executable in that package."""
         return self.module.rpartition('.')[2]
 
-    def parameters_type(self) -> type[Parameters]:
+    def parameters_type(self) -> type[AnyParameters]:
         """Return its parameter dataclass."""
         return _named(self.parameters)
 

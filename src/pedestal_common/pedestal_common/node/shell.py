@@ -14,7 +14,7 @@ import sys
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from types import FrameType
-from typing import TYPE_CHECKING, NoReturn, TextIO, TypeVar
+from typing import TYPE_CHECKING, NoReturn, Protocol, TextIO, TypeVar
 
 import rclpy
 from rcl_interfaces.msg import (
@@ -46,7 +46,6 @@ from pedestal_common.node.subscriptions import (
     subscribe,
     two_argument_callback,
 )
-from pedestal_common.node.unit import Unit
 from pedestal_common.quantities import Json, Message, Nanoseconds, Seconds, Value
 from pedestal_common.realtime import utc
 from pedestal_common.wire import messages
@@ -68,6 +67,15 @@ EXPECTED_ERRORS = (parameters.ParameterError, GraphError, ValueError, OSError, I
 """Errors that end a node with one line; any other error is a defect and shows its traceback."""
 
 _M = TypeVar('_M')      # a decoded message
+
+
+class Unprepared(Protocol):
+    """What has laws to compile: a unit."""
+
+    def prepare(self) -> None:
+        """Compile them."""
+
+
 _stop: list[bool] = []  # not empty after SIGINT or SIGTERM
 _compiling: list[bool] = []  # not empty while the process compiles, which a signal may interrupt
 
@@ -341,7 +349,7 @@ class Shell(Node):
         """Treat the next step as the first step."""
         self._started, self._stamp, self._next_second = False, 0, 0
 
-    def prepare(self, unit: Unit) -> None:
+    def prepare(self, unit: Unprepared) -> None:
         """Compile the laws of a unit, which takes half a minute and more when they are not cached. Raises Stopped
         after a signal."""
         _compiling.append(True)

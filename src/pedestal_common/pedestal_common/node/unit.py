@@ -35,8 +35,8 @@ class Diagnosis(typing.NamedTuple):
     values: list[tuple[str, str]]   # (key, text)
 
 
-def joined(record_type: DType, **parts: Records) -> Records:
-    """Return a record (1,) whose fields are these parts, {name: record (1,)}."""
+def joined(record_type: DType, **parts: Records | int) -> Records:
+    """Return a record (1,) whose fields are these parts: records (1,) or numbers."""
     record = np.zeros(1, record_type)
     for name, part in parts.items():
         record[name] = part

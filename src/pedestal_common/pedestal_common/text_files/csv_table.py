@@ -13,7 +13,7 @@ import pathlib
 import re
 import typing
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import BinaryIO, TextIO
+from typing import BinaryIO, Literal, TextIO, overload
 
 import numpy as np
 
@@ -181,6 +181,13 @@ class Table:
                     map(str.strip, cells)) and set(''.join(cells)) != {'*'}:
                 return [cell.strip() for cell in cells]
         return None
+
+    @overload
+    def column(self, quantity: _columns.Quantity, required: Literal[True] = True,
+               without: str = '') -> _columns.Column: ...
+
+    @overload
+    def column(self, quantity: _columns.Quantity, required: bool, without: str = '') -> _columns.Column | None: ...
 
     def column(self, quantity: _columns.Quantity, required: bool = True, without: str = '') -> _columns.Column | None:
         """Return the column of a quantity; None if there is none and it is not required. Raises TableError.
