@@ -38,21 +38,22 @@ Amperes: TypeAlias = Annotated[float, 'A']
 Volts: TypeAlias = Annotated[float, 'V']
 Decibels: TypeAlias = Annotated[float, 'dB']
 DecibelHertz: TypeAlias = Annotated[float, 'dB-Hz']  # C/N0
+Days: TypeAlias = Annotated[float, 'd']
 Bit: TypeAlias = int                                # 0 or 1; a record has no bool
 
 Pair: TypeAlias = Annotated[Floats, (2,)]           # azimuth and elevation, or cross-elevation and elevation
 Vector3: TypeAlias = Annotated[Floats, (3,)]
 Quaternion: TypeAlias = Annotated[Floats, (4,)]     # x, y, z, w
-ThreeFloats: TypeAlias = tuple[float, float, float]
-FourFloats: TypeAlias = tuple[float, float, float, float]   # a quaternion x, y, z, w
 Matrix3: TypeAlias = Annotated[Floats, (3, 3)]
 Xyz: TypeAlias = tuple[float, float, float]         # a vector in a law, in place of an array
 Xyzw: TypeAlias = tuple[float, float, float, float]     # a quaternion in a law, in place of an array
 Pairs: TypeAlias = Annotated[Floats, '(n, 2)']
 Vectors3: TypeAlias = Annotated[Floats, '(n, 3)']
 Quaternions: TypeAlias = Annotated[Floats, '(n, 4)']
+Rotations: TypeAlias = Annotated[Floats, '(n, 3, 3)']
 Times: TypeAlias = Annotated[Floats, '(n,) s']
 Stamps: TypeAlias = Annotated[Ints, '(n,) ns']
+Direction: TypeAlias = tuple[Radians, Radians]     # azimuth and elevation, of a law
 
 Estimate: TypeAlias = tuple[float, float, float]    # a value, and the low and the high end of its confidence interval
 

@@ -18,14 +18,14 @@ from pedestal_common.geometry.quaternion import product
 from pedestal_common.quantities import (
     Bit,
     Floats,
-    FourFloats,
     Quaternion,
     Radians,
     RadiansPerSecond,
     RadiansPerSecond2,
     Seconds,
-    ThreeFloats,
     Vector3,
+    Xyz,
+    Xyzw,
 )
 from pedestal_common.record import Record
 
@@ -93,7 +93,7 @@ def rotation_angle(w: RadiansPerSecond, dw: RadiansPerSecond2, T: Seconds) -> Ra
 
 
 @compiled
-def rotated(q: FourFloats | Quaternion, r: ThreeFloats) -> FourFloats:
+def rotated(q: Xyzw | Quaternion, r: Xyz) -> Xyzw:
     """Return the quaternion (x, y, z, w) of a deck that had the attitude q and rotated by the vector r [rad].
 
     r is in FLU. The result is q (x) exp(r/2); (x) is the product of quaternions.

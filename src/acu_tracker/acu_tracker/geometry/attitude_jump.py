@@ -16,7 +16,7 @@ import math
 
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry.quaternion import product
-from pedestal_common.quantities import Bit, FourFloats, Quaternion, Radians, Seconds
+from pedestal_common.quantities import Bit, Quaternion, Radians, Seconds, Xyzw
 from pedestal_common.record import Record
 
 
@@ -37,13 +37,13 @@ JUMP_DECAY_RATE_RAD_S = 1e-3
 
 
 @compiled
-def conjugate(q: FourFloats) -> FourFloats:
+def conjugate(q: Xyzw) -> Xyzw:
     """Return the inverse of a unit quaternion."""
     return -q[0], -q[1], -q[2], q[3]
 
 
 @compiled
-def _half_angle(q: FourFloats | Quaternion) -> Radians:
+def _half_angle(q: Xyzw | Quaternion) -> Radians:
     """Return half of the angle of a unit quaternion, 0 to pi / 2."""
     return math.atan2(math.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2]), abs(q[3]))
 
@@ -67,7 +67,7 @@ def _decay(jump: AttitudeJump, T: Seconds) -> None:
 
 
 @compiled
-def jump_corrected(jump: AttitudeJump, predicted: FourFloats, measured: FourFloats, T: Seconds) -> FourFloats:
+def jump_corrected(jump: AttitudeJump, predicted: Xyzw, measured: Xyzw, T: Seconds) -> Xyzw:
     """Return the corrected quaternion b_k of a measured quaternion q_k.
 
     predicted: p_k; measured: q_k; T: time since the sample before.

@@ -31,11 +31,11 @@ NLC (11)    u0 = v3 + w_c^2 (v1 - z1) + 2 w_c (v2 - z2). This is fhan with h1 = 
 import math
 
 from pedestal_common.compiled import compiled
-from pedestal_common.quantities import Radians, RadiansPerSecond, RadiansPerSecond2, Seconds, ThreeFloats, Vector3
+from pedestal_common.quantities import Radians, RadiansPerSecond, RadiansPerSecond2, Seconds, Vector3, Xyz
 
 
 @compiled
-def observer_gains(w_o: RadiansPerSecond, w_s: RadiansPerSecond, h: Seconds) -> ThreeFloats:
+def observer_gains(w_o: RadiansPerSecond, w_s: RadiansPerSecond, h: Seconds) -> Xyz:
     """Return (l1 [-], l2 [1/s], l3 [1/s2]) that put the three poles of the observer at p = exp(-w_o h).
 
     w_o, w_s: poles of the observer and of the drive's rate loop; h: step of the observer.

@@ -12,7 +12,7 @@ alpha-beta-gamma filter that of Kalata.
 import math
 
 from pedestal_common.compiled import compiled
-from pedestal_common.quantities import Seconds, ThreeFloats
+from pedestal_common.quantities import Seconds, Xyz
 
 
 @compiled
@@ -31,6 +31,6 @@ def kalata(alpha: float) -> tuple[float, float]:
 
 
 @compiled
-def gain(alpha: float, beta: float, gamma: float, T: Seconds) -> ThreeFloats:
+def gain(alpha: float, beta: float, gamma: float, T: Seconds) -> Xyz:
     """Return (k1 [-], k2 [1/s], k3 [1/s2]), the gains on angle, rate and acceleration for measurements T apart."""
     return (alpha, beta / T, gamma / (2.0 * T * T))

@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 from acu_tracker.geometry.motion import AxisMotion
 from pedestal_common.compiled import compiled
-from pedestal_common.quantities import Radians, Radians2, RadiansPerSecond, Seconds, ThreeFloats
+from pedestal_common.quantities import Radians, Radians2, RadiansPerSecond, Seconds, Xyz
 
 
 class Symmetric(NamedTuple):
@@ -133,7 +133,7 @@ def update_rate(gaussian: Gaussian, nu: RadiansPerSecond, R: float) -> Gaussian:
 
 
 @compiled
-def update_with_gain(gaussian: Gaussian, nu: Radians, R: Radians2, K: ThreeFloats) -> Gaussian:
+def update_with_gain(gaussian: Gaussian, nu: Radians, R: Radians2, K: Xyz) -> Gaussian:
     """Return the Gaussian after a measured angle of variance R with the innovation nu, by a given gain K.
 
     K = (k1, k2, k3) [-, 1/s, 1/s2]. The new P is (1 - K H) P (1 - K H)' + K R K' (form of Joseph), written out.

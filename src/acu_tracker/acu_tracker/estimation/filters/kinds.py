@@ -11,7 +11,7 @@ import numpy as np
 from acu_tracker.estimation.filters import constant_gain, motion_models
 from acu_tracker.estimation.filters.motion_models import MODEL_NAMES, MODEL_ROWS
 from pedestal_common.parameters import ParameterError
-from pedestal_common.quantities import Records, Seconds, ThreeFloats
+from pedestal_common.quantities import Records, Seconds, Xyz
 
 if TYPE_CHECKING:
     from acu_tracker.estimation.params import FilterParameters
@@ -26,7 +26,7 @@ class Bank(NamedTuple):
     models: Records         # (count,) of motion_models.MotionModelRecord
     dwell: Seconds = 0.0    # mean time for which one of several models holds
     # alpha, beta, gamma of a filter of constant gain [-]; alpha is 0 for a Kalman filter
-    gains: ThreeFloats = (0.0, 0.0, 0.0)
+    gains: Xyz = (0.0, 0.0, 0.0)
 
 
 class Kind(NamedTuple):

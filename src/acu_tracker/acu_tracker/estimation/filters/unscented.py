@@ -40,8 +40,8 @@ from pedestal_common.quantities import (
     Radians,
     Records,
     Seconds,
-    ThreeFloats,
     Vector3,
+    Xyz,
 )
 from pedestal_common.record import Record
 
@@ -389,7 +389,7 @@ def expected(state: State) -> Motion:
 
 
 @compiled
-def _projected(p: Floats, g: ThreeFloats, h: ThreeFloats, v: ThreeFloats) -> AxisVariances:
+def _projected(p: Floats, g: Xyz, h: Xyz, v: Xyz) -> AxisVariances:
     """Return the variances of a coordinate and its rate, both linearised.
 
     The coordinate is g x, its rate h x + v dx; x, dx: position and velocity with the covariance p.
