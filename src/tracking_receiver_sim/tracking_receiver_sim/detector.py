@@ -13,6 +13,8 @@ import math
 from collections import namedtuple
 
 from pedestal_common.compiled import compiled
+from pedestal_common.quantities import Bit, Nanoseconds, Radians, Seconds
+from pedestal_common.record import Record
 from tracking_receiver_sim import smoothing
 from tracking_receiver_sim.monopulse import detect
 from tracking_receiver_sim.smoothing import SMOOTHING_KINDS
@@ -20,28 +22,37 @@ from tracking_receiver_sim.smoothing import SMOOTHING_KINDS
 MIN_POWER_OVER_NOISE = 0.01
 """Smallest ratio of carrier power to noise power in one sample that the C/N0 estimate reports (-20 dB)."""
 
-STATE_FIELDS = (
-    ('agc_power', 'f8'), ('level_power', 'f8'),
-    ('smooth_cross_elevation', smoothing.Smoother.dtype), ('smooth_elevation', smoothing.Smoother.dtype),
-    ('locked', 'i8'), ('timer_ns', 'i8'))
-"""Fields of the state.
 
-    agc_power, level_power  sum power / noise power, smoothed for the gain and for the C/N0
-    smooth_...          smoothers of both errors
-    timer_ns            time for which the level has been past the level that changes the lock
-"""
+class State(Record):
+    """State of the detector."""
+    agc_power: float                            # sum power / noise power, smoothed for the gain
+    level_power: float                          # sum power / noise power, smoothed for the C/N0
+    smooth_cross_elevation: smoothing.Smoother
+    smooth_elevation: smoothing.Smoother
+    locked: Bit
+    timer_ns: Nanoseconds                       # time for which the level has been past that which changes the lock
 
-CONSTANTS_FIELDS = (
-    ('angle_scale', 'f8'), ('full_scale', 'f8'), ('samples', 'i8'), ('tau', 'f8'), ('agc_gain', 'f8'),
-    ('level_gain', 'f8'), ('smoothing', 'i8'), ('smoothing_gain', 'f8'), ('smoothing_samples', 'i8'),
-    ('acquire_power', 'f8'), ('lose_power', 'f8'), ('acquire_ns', 'i8'), ('lose_ns', 'i8'))
-"""Fields of the constants.
 
-    angle_scale         theta3 / k_m with the k_m that the receiver assumes [rad]
-    samples, tau        samples of one step, time of a sample [s]
-    agc_gain, level_gain    share of the way to its input that a filter moves in a sample
-    acquire_power, lose_power   carrier power / noise power in one sample at the levels that change the lock
-"""
+class Constants(Record):
+    """Constants of the detector. A gain is the share of the way to its input that a filter moves in a sample."""
+    angle_scale: Radians        # theta3 / k_m with the k_m that the receiver assumes
+    full_scale: Radians         # largest error
+    samples: int                # of one step
+    tau: Seconds                # time of a sample
+    agc_gain: float
+    level_gain: float
+    smoothing: int              # index of SMOOTHING_KINDS
+    smoothing_gain: float       # 1/n of the recursion
+    smoothing_samples: int      # length of the moving average
+    acquire_power: float        # carrier power / noise power in one sample above which the receiver gains lock
+    lose_power: float           # carrier power / noise power in one sample below which it loses lock
+    acquire_ns: Nanoseconds
+    lose_ns: Nanoseconds
+
+
+STATE_FIELDS, CONSTANTS_FIELDS = ([(name, record.dtype[name]) for name in record.dtype.names or ()]
+                                  for record in (State, Constants))
+"""Fields of both, for records that hold them among others."""
 
 Voltages = namedtuple('Voltages', 's_real s_imag x_real x_imag e_real e_imag')
 """Voltages of one sample: sum, cross-elevation difference, elevation difference."""
