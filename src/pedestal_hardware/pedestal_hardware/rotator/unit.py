@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 import numpy as np
 
 from adu_drive.angle_drive import DRIVE_STATE_TOPIC, EMERGENCY_STOP_TEXT, ENABLED_TEXT, REFERENCE_TOPIC, AngleDrive
+from adu_drive.params import RunParameters
 from pedestal_common.compiled import compiled
 from pedestal_common.graph import nodes, topics
 from pedestal_common.graph.modes import MODES
@@ -17,7 +18,6 @@ from pedestal_common.quantities import AnyRecord, Bit, Degrees, Nanoseconds, Pai
 from pedestal_common.record import Record
 from pedestal_common.wire.records import NO_STAMP
 from pedestal_hardware.rotator import set_point
-from pedestal_hardware.rotator_params import RotatorParameters
 
 if TYPE_CHECKING:
     from pedestal_hardware.rotator.line import Measurement
@@ -105,14 +105,13 @@ def laws(memory: Memory, stamps: Stamps, inputs: Records, outputs: Records) -> N
 
 
 class Rotator(AngleDrive):
-    """A rotator."""
-    parameters: RotatorParameters
+    """A rotator, of a RotatorParameters."""
     memory: Memory
     NODE, LAWS, STATE_TEXTS = nodes.ROTATOR_DRIVE, {Memory: (law, laws)}, STATE_TEXTS
 
-    def __init__(self, parameters: RotatorParameters, reads: Iterable[str]) -> None:
+    def __init__(self, parameters: RunParameters, reads: Iterable[str]) -> None:
         super().__init__(parameters, reads)
-        p = parameters
+        p = self.parameters
         constants = set_point.Constants.zeros()
         constants['timeout_ns'] = p.timeout_ns
         constants['dead_band'], constants['resolution'] = math.radians(p.dead_band), math.radians(p.step_deg)
