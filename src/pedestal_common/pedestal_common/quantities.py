@@ -1,5 +1,5 @@
 """Types of numbers and arrays: what a number means, its unit or its shape. numba and Python ignore both; a reader and
-mypy do not. Three types at the end stand for data without a declared type.
+mypy do not. Four types at the end stand for data without a declared type.
 
 `Radians` is a float, `Pairs` is an array of floats of shape (n, 2). A shape such as `Vector3` also gives the size of
 an array in a record (record.Record).
@@ -54,3 +54,4 @@ BothAxes: TypeAlias = Annotated[Sequence[_R], (2,)]     # a record of each axis:
 AnyRecord: TypeAlias = Any  # a record whose fields depend on data, as those of a node depend on its topics
 Message: TypeAlias = Any    # a ROS message, whose class is made by ROS without types
 Json: TypeAlias = Any       # what a JSON or YAML file holds; the code that takes a value from it checks the value
+Value: TypeAlias = Any      # of a parameter or of an argument of a command, whose declaration states the type

@@ -85,12 +85,16 @@ def true_bias(drive: AnyMemory, truth: Truth) -> None:
 
 
 @overload(true_bias)
-def _true_bias(drive: types.NamedTupleClass, truth: types.Type) -> Callable[[AnyMemory, Truth], None]:
+def _true_bias(drive: AnyMemory, truth: Truth) -> Callable[[AnyMemory, Truth], None]:
+    # numba gives the types of the arguments, and wants equal annotations of all three functions.
     def of_axes(drive: AnyMemory, truth: Truth) -> None:
         outputs = drive.record[0].outputs
         truth.bias[0], truth.bias[1] = outputs.azimuth.bias, outputs.elevation.bias
 
-    return {drive_unit.Memory: of_axes, beam_unit.Memory: lambda drive, truth: None}[drive.instance_class]
+    def of_beam(drive: AnyMemory, truth: Truth) -> None:
+        return
+
+    return {drive_unit.Memory: of_axes, beam_unit.Memory: of_beam}[drive.instance_class]
 
 
 template(true_bias)

@@ -3,7 +3,6 @@
 The thread of the reader publishes. A lock keeps it apart from the diagnostics, which the executor publishes.
 """
 import threading
-from typing import Any
 
 from pedestal_common.graph import nodes
 from pedestal_common.node import shell
@@ -15,7 +14,6 @@ from pedestal_hardware.lines.reader import LineReader
 class LineNode(shell.Shell):
     """Node of a device that sends lines. Its parameters have the field `silence`, the longest time between two
     published messages that is no error [s]."""
-    parameters: Any                 # of the subclass
 
     def __init__(self, module: str) -> None:
         row = nodes.of_executable(module)

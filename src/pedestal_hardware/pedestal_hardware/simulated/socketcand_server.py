@@ -9,7 +9,6 @@ import socket
 import threading
 import time
 from collections.abc import Iterable, Sequence
-from typing import Any
 
 import can
 
@@ -32,8 +31,8 @@ def _text(cob: int, data: bytes | bytearray) -> bytes:
 class SocketcandServer(can.BusABC):
     """End of the bus for the simulated drives, at a TCP port on 127.0.0.1."""
 
-    def __init__(self, port: int, **kwargs: Any) -> None:  # those of can.BusABC, of any type
-        super().__init__(f'127.0.0.1:{port}', **kwargs)
+    def __init__(self, port: int) -> None:
+        super().__init__(f'127.0.0.1:{port}')
         self._can_protocol = can.CanProtocol.CAN_20
         self._listener = socket.create_server(('127.0.0.1', port))
         self._received: list[can.Message] = []
