@@ -147,7 +147,7 @@ def _measure_motor(motor: AnyRecord, constants: AnyRecord, angle: Radians, speed
                    torque: NewtonMeters) -> None:
     """Write the measured motion and torque of a motor into its state."""
     motor.theta, motor.measured = angle, speed
-    motor.count = encoder.counts(angle, constants.per_rad)
+    motor.count = int(encoder.counts(angle, constants.per_rad))
     motor.i_q = torque * constants.per_K_t_hat
     motor.heat = thermal.load(motor.heat, torque, constants.per_rated, constants.heat_gain)
 

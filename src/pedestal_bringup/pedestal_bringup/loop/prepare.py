@@ -73,8 +73,7 @@ def _compile_loop(name: str, count: int) -> tuple[str, Seconds]:
 def compile_cold(units: Iterable[tuple[str, ...]], loops: Iterable[tuple[str, int]]) -> None:
     """Compile the laws that are not cached, and print a line for each unit and closed loop. units: rows of
     COMPILED_UNITS; loops: rows of COMPILED_LOOPS."""
-    # numba makes the variables of its configuration when it is imported.
-    if numba.config.DISABLE_JIT:  # type: ignore[attr-defined]  # for a debugger: there is nothing to compile
+    if vars(numba.config)['DISABLE_JIT']:      # for a debugger: there is nothing to compile
         return
     units = [part for part in units if not is_compiled(_unit_of_scenario(*part))]
     loops = [part for part in loops if not _loop_done(*part).exists()]

@@ -522,8 +522,8 @@ def _narrow(sections: Sections, header: ScenarioParameters) -> tuple[str, ...]:
     for section in [section for section in sections if nodes.plain(section) == 'acu']:
         for axis, (end, drive_end, inward) in itertools.product(topics.AXES, LIMIT_ENDS):
             own, of_drive = f'{axis}.limits.{end}', f'{axis}.limits.{drive_end}'
-            wide = _values_of(sections, section).get(own, acu_defaults[own])
-            narrow = sections['adu'].get(of_drive, drive_defaults[of_drive])
+            wide: Value = _values_of(sections, section).get(own, acu_defaults[own])
+            narrow: Value = sections['adu'].get(of_drive, drive_defaults[of_drive])
             if inward * (narrow - wide) > 0.0:
                 sections[section][own] = narrow
                 notes.append(f'{section}.{own} = {wide:g} rad is wider than the travel of the drive: '
@@ -535,8 +535,9 @@ def _target(name: str, receiver_values: Mapping[str, Value],
             header_values: Mapping[str, Value]) -> 'TargetParameters':
     """Return the target parameters of the section `tracking_receiver`."""
     iq = header_values.get('receiver', 'simulated') != 'simulated'
-    return _checked(name, 'tracking_receiver', nodes.row('tracking_receiver', iq=iq).parameters_type(),
-                    receiver_values).target
+    receiver: AnyParameters = _checked(name, 'tracking_receiver',
+                                       nodes.row('tracking_receiver', iq=iq).parameters_type(), receiver_values)
+    return receiver.target
 
 
 def _derive_from_flight(name: str, receiver_values: dict[str, Value],
@@ -606,12 +607,12 @@ def _share_parameters(name: str, sections: Sections, header: ScenarioParameters,
                             'ins.error_told = false')
     if header.iq:
         # The error of a block of samples has the stamp of its middle, and arrives one step after its end.
-        receiver = _checked(name, 'tracking_receiver', nodes.MONOPULSE_RECEIVER.parameters_type(),
-                            _values_of(sections, 'tracking_receiver'))
-        latency = (IQ_LATENCY_STEPS + 0.5 * (receiver.steps_per_error - 1)) * receiver.period
+        of_iq: AnyParameters = _checked(name, 'tracking_receiver', nodes.MONOPULSE_RECEIVER.parameters_type(),
+                                        _values_of(sections, 'tracking_receiver'))
+        latency = (IQ_LATENCY_STEPS + 0.5 * (of_iq.steps_per_error - 1)) * of_iq.period
         sections['acu'].setdefault('receiver_latency', latency)
-        if receiver.feed.scanned:
-            _share_scan(name, receiver, latency, sections['acu'])
+        if of_iq.feed.scanned:
+            _share_scan(name, of_iq, latency, sections['acu'])
     if header.servo:
         for key, value in SIMULATED_BUS.items():
             if sections['adu'].get(key, value) != value:
@@ -627,8 +628,9 @@ def _share_parameters(name: str, sections: Sections, header: ScenarioParameters,
         from tracking_receiver_sim import receiver
         sections['tracking_receiver'].setdefault('receiver.beam', 'held')
         for prefix in nodes.prefixes(header.graph_beams):
-            tracking = _checked(name, f'{prefix}tracking_receiver', nodes.row('tracking_receiver').parameters_type(),
-                                _values_of(sections, f'{prefix}tracking_receiver'))
+            tracking: AnyParameters = _checked(
+                name, f'{prefix}tracking_receiver', nodes.row('tracking_receiver').parameters_type(),
+                _values_of(sections, f'{prefix}tracking_receiver'))
             for key, value in (('age', receiver.age(tracking, tracking.period)),
                                ('beam_age', receiver.beam_age(tracking, tracking.period))):
                 if f'tracker.receiver.{key}' not in sections['acu']:

@@ -27,6 +27,7 @@ from pedestal_common.quantities import (
     Radians,
     Records,
     Stamps,
+    Value,
 )
 from pedestal_common.wire.commands import Command, Reply
 from pedestal_hardware.monopulse import feed
@@ -191,7 +192,7 @@ class SimulatedIq(Simulated):
             self.turn = None
         return samples
 
-    def execute(self, command: Command, arguments: dict[str, object]) -> Reply:
+    def execute(self, command: Command, arguments: Mapping[str, Value]) -> Reply:
         """Inject a fault; see Simulated. Raises ValueError for a fault of messages, which samples do not have, and for
         a fault of differences in a conical scan."""
         kind = self.parameters.feed.kind

@@ -1,7 +1,7 @@
 """Unit of the simulated drives: plant, injected faults and adu/truth, without bus and without ROS."""
 import dataclasses
 import typing
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from pedestal_common.graph import nodes, topics
 from pedestal_common.injection import schedule, table
 from pedestal_common.injection.simulated import Simulated
 from pedestal_common.node.unit import LEVEL_OK, LEVEL_WARN, Diagnosis, joined
-from pedestal_common.quantities import Records
+from pedestal_common.quantities import Records, Value
 from pedestal_common.wire.commands import Command, Reply
 from pedestal_common.wire.records import NO_STAMP
 from pedestal_hardware import cia402, commissioning, errors, pdo
@@ -74,7 +74,7 @@ class SimulatedDrives(Simulated):
         law.report(self.memory.record, self.reports)
         return self.reports
 
-    def execute(self, command: Command, arguments: dict[str, object]) -> Reply:
+    def execute(self, command: Command, arguments: Mapping[str, Value]) -> Reply:
         """Inject a fault; see Simulated. Raises ValueError for a fault of messages, which a bus does not have."""
         if command.verb not in (*PLANT_FAULTS, table.CLEAR_COMMAND.name):
             raise ValueError(f'{command.verb}: simulated drives have the faults {", ".join(PLANT_FAULTS)}')
