@@ -6,7 +6,7 @@ one sample is C/N0 divided by the sample rate.
 """
 import math
 import typing
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 
