@@ -11,7 +11,7 @@ import sys
 import time
 from collections.abc import Mapping, Sequence
 
-from adu_drive.timekeeper_node import Timekeeper
+from adu_drive.timekeeper_node import Received, Timekeeper
 from pedestal_common.node import shell
 from pedestal_common.quantities import Nanoseconds
 from pedestal_hardware.rotator.line import Line
@@ -37,7 +37,7 @@ class RotatorNode(Timekeeper):
         self.line.start()
         super().begin()
 
-    def _make(self, stamp: Nanoseconds, values: Mapping[str, object]) -> None:
+    def _make(self, stamp: Nanoseconds, values: Mapping[str, Received]) -> None:
         """Make a step with the newest measurement, and send its set-point."""
         unit, line = self.unit, self.line
         assert line is not None

@@ -25,8 +25,6 @@ An axis has the number 0 (azimuth) or 1 (elevation), its drives and motors have 
 import math
 from typing import Annotated, TypeAlias
 
-import numpy as np
-
 from adu_drive import axis, drive_state, drive_unit
 from adu_drive import unit as adu_unit
 from adu_drive.controller import encoder, faults, travel
@@ -128,12 +126,15 @@ class Scales(Record):
     follow_gain: float              # share of the way that `followed` moves in a period
 
 
-# The types of state and constants follow from data, see drive_unit.
-DRIVE_RECORD_DTYPE = np.dtype([('state', drive_unit.State), ('constants', drive_unit.Constants),
-                               ('inputs', drive_unit.Inputs.dtype), ('outputs', drive_unit.Outputs.dtype),
-                               ('link', adu_unit.Link.dtype), ('drives', Drives.dtype), ('scales', Scales.dtype)],
-                              align=True)
-"""All data of the node."""
+class ServoRecord(Record):
+    """All data of the node."""
+    state: drive_unit.State
+    constants: drive_unit.Constants
+    inputs: drive_unit.Inputs
+    outputs: drive_unit.Outputs
+    link: adu_unit.Link
+    drives: Drives
+    scales: Scales
 
 
 @compiled
@@ -143,7 +144,7 @@ def _lost_bit(motor: int) -> int:
 
 
 @compiled
-def _measure_motor(motor: AnyRecord, constants: AnyRecord, angle: Radians, speed: RadiansPerSecond,
+def _measure_motor(motor: axis.MotorState, constants: axis.MotorConstants, angle: Radians, speed: RadiansPerSecond,
                    torque: NewtonMeters) -> None:
     """Write the measured motion and torque of a motor into its state."""
     motor.theta, motor.measured = angle, speed
@@ -153,7 +154,7 @@ def _measure_motor(motor: AnyRecord, constants: AnyRecord, angle: Radians, speed
 
 
 @compiled
-def _copy_motor(motor: AnyRecord, other: AnyRecord) -> None:
+def _copy_motor(motor: axis.MotorState, other: axis.MotorState) -> None:
     """Write the motion of the other motor of the axis into the state of a motor that reports nothing."""
     motor.theta, motor.measured, motor.count, motor.i_q = other.theta, other.measured, other.count, 0.0
 
@@ -173,7 +174,7 @@ def _note_reports(drives: Drives) -> None:
 
 
 @compiled
-def _measure_axis(of_axis: AnyRecord, constants: AnyRecord, drives: Drives, scales: Scales, number: int) -> None:
+def _measure_axis(of_axis: axis.State, constants: axis.Constants, drives: Drives, scales: Scales, number: int) -> None:
     """Write the measured values of an axis into its state.
 
     The load encoder is wired to the drive of motor 1. While this drive is lost, the angle of the axis follows from
@@ -242,7 +243,7 @@ def _moves_out(commanded: RadiansPerSecond, measured: RadiansPerSecond) -> bool:
 
 
 @compiled
-def _note_faults(of_axis: AnyRecord, drives: Drives, scales: Scales, number: int, phase: int) -> None:
+def _note_faults(of_axis: axis.State, drives: Drives, scales: Scales, number: int, phase: int) -> None:
     """Set the faults of an axis that its drives report."""
     for motor in range(2):
         drive = 2 * number + motor
@@ -278,7 +279,7 @@ def _note_faults(of_axis: AnyRecord, drives: Drives, scales: Scales, number: int
 
 
 @compiled
-def _is_up(of_axis: AnyRecord, drives: Drives, number: int, periods: int) -> bool:
+def _is_up(of_axis: axis.State, drives: Drives, number: int, periods: int) -> bool:
     """Return True if every drive of an axis that is not lost is enabled by a report of at most this age."""
     for motor in range(2):
         drive = 2 * number + motor
@@ -289,7 +290,7 @@ def _is_up(of_axis: AnyRecord, drives: Drives, number: int, periods: int) -> boo
 
 
 @compiled
-def _goal(state: AnyRecord, of_axis: AnyRecord, drives: Drives, scales: Scales, drive: int) -> int:
+def _goal(state: drive_unit.State, of_axis: axis.State, drives: Drives, scales: Scales, drive: int) -> int:
     """Return the goal of a drive in the present phase, one of cia402.GOALS."""
     if of_axis.faults & _lost_bit(drive % 2) or faults.removes_torque(of_axis.faults):
         return cia402.GOAL_OFF
@@ -307,8 +308,8 @@ def _goal(state: AnyRecord, of_axis: AnyRecord, drives: Drives, scales: Scales, 
 
 
 @compiled
-def _demanded_torque(state: AnyRecord, of_axis: AnyRecord, constants: AnyRecord, drives: Drives, scales: Scales,
-                     drive: int) -> NewtonMeters:
+def _demanded_torque(state: drive_unit.State, of_axis: axis.State, constants: axis.Constants, drives: Drives,
+                     scales: Scales, drive: int) -> NewtonMeters:
     """Return the torque in the command of a drive: torque offset, or target torque in a drive in the mode of torque.
     """
     number, motor = drive // 2, drive % 2
@@ -326,7 +327,7 @@ def _demanded_torque(state: AnyRecord, of_axis: AnyRecord, constants: AnyRecord,
 
 
 @compiled
-def _controlword(state: AnyRecord, drives: Drives, drive: int, goal: int) -> int:
+def _controlword(state: drive_unit.State, drives: Drives, drive: int, goal: int) -> int:
     """Return the controlword that leads a drive to its goal: it resets a fault, or holds the motor where no law
     controls it."""
     if drives.reset_left[drive] and drives.state[drive] == cia402.State.FAULT:
@@ -340,8 +341,8 @@ def _controlword(state: AnyRecord, drives: Drives, drive: int, goal: int) -> int
 
 
 @compiled
-def _command_drive(state: AnyRecord, of_axis: AnyRecord, constants: AnyRecord, drives: Drives, scales: Scales,
-                   drive: int, alive: bool, kept: bool) -> None:
+def _command_drive(state: drive_unit.State, of_axis: axis.State, constants: axis.Constants, drives: Drives,
+                   scales: Scales, drive: int, alive: bool, kept: bool) -> None:
     """Write the command of a drive: controlword, target velocity, torque.
 
     alive: True if the axis is under control; kept: True if the torque keeps its last value. Otherwise the command is
@@ -359,7 +360,7 @@ def _command_drive(state: AnyRecord, of_axis: AnyRecord, constants: AnyRecord, d
 
 
 @compiled
-def _keep_rate(of_axis: AnyRecord, constants: AnyRecord, drives: Drives, scales: Scales, number: int) -> None:
+def _keep_rate(of_axis: axis.State, constants: axis.Constants, drives: Drives, scales: Scales, number: int) -> None:
     """Advance the angle of an axis by a period without reports, and keep its rate, reduced before an end of travel."""
     drives.angle[number] += of_axis.rate / scales.per_period
     angle = drives.angle[number]
@@ -375,8 +376,8 @@ def _whole(x: float, largest: float) -> int:
 
 
 @compiled
-def _control_axis(state: AnyRecord, of_axis: AnyRecord, constants: AnyRecord, drives: Drives, scales: Scales,
-                  number: int) -> None:
+def _control_axis(state: drive_unit.State, of_axis: axis.State, constants: axis.Constants, drives: Drives,
+                  scales: Scales, number: int) -> None:
     """Compute the commands of both drives of an axis with the speed loop of adu_drive."""
     motor_1, motor_2 = of_axis.motor_1, of_axis.motor_2
     first, second = 2 * number, 2 * number + 1
@@ -419,8 +420,8 @@ def _control_axis(state: AnyRecord, of_axis: AnyRecord, constants: AnyRecord, dr
 def control(records: Records, stamp: Nanoseconds, messages: AnyRecord) -> None:
     """Compute the commands of the drives from their last reports and the messages of the step before.
 
-    records: (1,) of DRIVE_RECORD_DTYPE. A record itself as argument would cost 90 us, because numba would examine all
-    its fields in each call. stamp: time of the coming exchange.
+    records: ServoRecords (1,). A record itself as argument would cost 90 us, because numba would examine all its
+    fields in each call. stamp: time of the coming exchange.
     """
     record = records[0]
     state, constants, inputs, outputs = record.state, record.constants, record.inputs, record.outputs

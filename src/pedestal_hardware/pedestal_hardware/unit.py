@@ -25,7 +25,7 @@ DRIVE_LABELS = tuple(f'{axis} motor {i}' for axis in topics.AXES for i in (1, 2)
 
 class Memory(typing.NamedTuple):
     """Memory of the node."""
-    record: Records         # (1,) of servo_drives.DRIVE_RECORD_DTYPE
+    record: Records         # servo_drives.ServoRecord (1,)
 
 
 def _scales(params: ServoDriveParameters) -> Records:
@@ -81,7 +81,7 @@ class ServoDrives(adu_unit.Adu):
         link['period'] = round(parameters.period * 1e9)
         at_rest = dataclasses.replace(parameters, initially_enabled=False)
         self.memory = Memory(joined(
-            servo_drives.DRIVE_RECORD_DTYPE, state=drive_unit.initial_state(at_rest), constants=_constants(parameters),
+            servo_drives.ServoRecord.dtype, state=drive_unit.initial_state(at_rest), constants=_constants(parameters),
             link=link, drives=drives, scales=_scales(parameters)))
         for i, axis in enumerate(topics.AXES):
             for gain in ('K_p', 'K_iT'):

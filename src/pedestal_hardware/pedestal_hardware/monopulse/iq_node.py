@@ -13,6 +13,7 @@ from pedestal_common.graph.nodes import MONOPULSE_RECEIVER
 from pedestal_common.graph.steps import NS_PER_SECOND
 from pedestal_common.node import shell, unit_node
 from pedestal_common.quantities import Message, Nanoseconds
+from pedestal_common.wire import records
 from pedestal_hardware.monopulse import sinks
 from pedestal_hardware.monopulse.iq_unit import SimulatedIq
 from pedestal_hardware.monopulse.params import MonopulseParameters
@@ -68,7 +69,7 @@ class IqNode(unit_node.UnitNode):
             self.sink.send(self.unit.samples(count), self.number, self.sent)
             self.number, self.sent = self.number + count, self.sent + round(count * NS_PER_SECOND / rate)
 
-    def answer(self, stamp: Nanoseconds, values: Mapping[str, object]) -> None:
+    def answer(self, stamp: Nanoseconds, values: Mapping[str, records.Decoded | None]) -> None:
         """Answer a step, then send its samples."""
         self.noise.cancel()
         super().answer(stamp, values)

@@ -29,6 +29,7 @@ from pedestal_common.quantities import (
     Stamps,
     Value,
 )
+from pedestal_common.record import Record
 from pedestal_common.wire.commands import Command, Reply
 from pedestal_hardware.monopulse import feed
 from pedestal_hardware.monopulse.blocks import Samples
@@ -41,14 +42,18 @@ SIGNAL_FAULTS = {THREE_CHANNELS: ('fade', 'wrong_slope', 'phase_180'),
                  ONE_CHANNEL: ('fade', 'wrong_slope', 'phase_180'), CONICAL_SCAN: ('fade',)}
 """{kind of a feed: injected faults of the receiver that its samples can have}. A conical scan has no differences."""
 
-IQ_RECORD_DTYPE = np.dtype([
-    ('state', receiver.State), ('constants', receiver.Constants), ('inputs', receiver.Inputs.dtype),
-    ('outputs', receiver.Outputs.dtype),
-    ('row', 'i8'),          # of `normals` for the next step
-    ('schedule', schedule.Schedule.dtype), ('injected', injected.Injected.dtype),
-    ('closing', 'f8'),      # rate of the distance of the target [m/s], positive away, NaN without a target
-    ('feed', feed.Feed.dtype)], align=True)
-"""All data of the unit, with the records of the simulated receiver."""
+
+class IqRecord(Record):
+    """All data of the unit, with the records of the simulated receiver."""
+    state: receiver.State
+    constants: receiver.Constants
+    inputs: receiver.Inputs
+    outputs: receiver.Outputs
+    row: int                    # of `normals` for the next step
+    schedule: schedule.Schedule
+    injected: injected.Injected
+    closing: MetersPerSecond    # rate of the distance of the target, positive away, NaN without a target
+    feed: feed.Feed
 
 
 class Memory(typing.NamedTuple):
@@ -57,7 +62,7 @@ class Memory(typing.NamedTuple):
     A row of the voltages belongs to an integral of three channels, and to a sample of a scanned feed, whose second
     channel is its reference.
     """
-    record: Records         # (1,) of IQ_RECORD_DTYPE
+    record: Records         # IqRecord (1,)
     breaks: Floats          # track of the target, see target.Target
     coefficients: Floats
     normals: Floats         # (steps, n), noise of the scintillation
@@ -154,7 +159,7 @@ class SimulatedIq(Simulated):
         constants = receiver.constants(p, p.period, self.target)
         constants['first_scintillation_normal'] = 0
         count = receiver.normals_per_step(p) - receiver.NORMALS_PER_SAMPLE * p.receiver.samples_per_step
-        record = joined(IQ_RECORD_DTYPE, state=receiver.initial_state(), constants=constants,
+        record = joined(IqRecord.dtype, state=receiver.initial_state(), constants=constants,
                         schedule=schedule.empty(), injected=injected.initial(constants), feed=feed.record(p))
         record['inputs']['mat_ed'] = line_of_sight.ashore_matrix()
         rows = p.block if p.feed.scanned else p.receiver.samples_per_step

@@ -9,20 +9,18 @@ import pedestal_common.entry  # noqa: F401
 import sys
 import threading
 from collections.abc import Callable, Sequence
-from typing import TypeAlias
 
 from pedestal_common.graph.nodes import DRIVE_NODE
 from pedestal_common.node import shell, unit_node
 from pedestal_common.node.unit_node import Port
-from pedestal_common.quantities import Message, Nanoseconds
+from pedestal_common.quantities import Message
+from pedestal_common.wire import records
 from pedestal_common.wire.records import NO_STAMP
 from pedestal_hardware.bus import BusError
 from pedestal_hardware.params import START_KEY, ServoDriveParameters
 from pedestal_hardware.simulated import law
 from pedestal_hardware.simulated.unit import SimulatedDrives
 from pedestal_hardware.unit import DRIVE_LABELS
-
-StampedNumbers: TypeAlias = tuple[Nanoseconds, Sequence[float]]     # of a message
 
 POLL_S = 0.002  # longest time between two steps of the plant [s]
 
@@ -38,7 +36,7 @@ class DrivesNode(unit_node.UnitNode):
     def __init__(self) -> None:
         self.lock = threading.Lock()        # held while the unit steps or takes a command
         self.ending = False
-        self.newest: dict[str, StampedNumbers] = {}
+        self.newest: dict[str, records.Decoded] = {}
         self.served: threading.Thread | None = None
         super().__init__('pedestal_hardware.simulated.drives_node')
 
@@ -81,8 +79,8 @@ class DrivesNode(unit_node.UnitNode):
                         if self.unit.parts['tick'] != NO_STAMP:
                             self.unit.parts['tick'] += earlier // law.TICK_NS
 
-    def _newest_receiver(self, name: str) -> Callable[[StampedNumbers, bool], None]:
-        def take(message: StampedNumbers, _: bool) -> None:
+    def _newest_receiver(self, name: str) -> Callable[[records.Decoded, bool], None]:
+        def take(message: records.Decoded, _: bool) -> None:
             self.newest[name] = message
         return take
 

@@ -5,9 +5,8 @@ of both motors of an axis hang on one relay, which the brake outputs of both dri
 one of them does.
 """
 import math
-from typing import TYPE_CHECKING
-
-import numpy as np
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Annotated, TypeAlias
 
 from adu_drive import axis, drive_unit, injected
 from adu_drive import unit as adu_unit
@@ -61,16 +60,25 @@ class Drive(Record):
     sum: NewtonMeters       # integral part
 
 
-# The own fields come first. Numba takes a record that begins with the fields of the drive unit for its subtype, and
-# warns about it. The types of state and constants follow from data, see drive_unit.
-DRIVES_RECORD_DTYPE = np.dtype([
-    ('drive', Drive.dtype, (pdo.DRIVE_COUNT,)),
-    ('tick', 'i8'),         # number of the last period of the speed loops
-    ('period', 'i8'),       # time between two synchronisations [ns]
-    ('state', drive_unit.State), ('constants', drive_unit.Constants), ('inputs', drive_unit.Inputs.dtype),
-    ('outputs', drive_unit.Outputs.dtype), ('link', adu_unit.Link.dtype), ('schedule', schedule.Schedule.dtype),
-    ('injected', injected.DriveInjected.dtype)], align=True)
-"""All data of the simulated drives."""
+FourDrives: TypeAlias = Annotated[Sequence[Drive], (pdo.DRIVE_COUNT,)]
+
+
+class DrivesRecord(Record):
+    """All data of the simulated drives.
+
+    The own fields come first. Numba takes a record that begins with the fields of the drive unit for its subtype, and
+    warns about it.
+    """
+    drive: FourDrives
+    tick: int               # number of the last period of the speed loops
+    period: Nanoseconds     # time between two synchronisations
+    state: drive_unit.State
+    constants: drive_unit.Constants
+    inputs: drive_unit.Inputs
+    outputs: drive_unit.Outputs
+    link: adu_unit.Link
+    schedule: schedule.Schedule
+    injected: injected.DriveInjected
 
 
 @compiled
@@ -199,7 +207,7 @@ def _grips(first: Drive, second: Drive, engage_ticks: int, release_ticks: int) -
 
 
 @compiled
-def _drive_motor(drive: Drive, motor: AnyRecord, constants: AnyRecord, lost: Bit, engage_ticks: int,
+def _drive_motor(drive: Drive, motor: axis.MotorState, constants: axis.MotorConstants, lost: Bit, engage_ticks: int,
                  release_ticks: int) -> None:
     """Run one period of a drive with its motor. lost: 1 for the fault `motor_loss`."""
     axis.read_motor_sensors(motor, constants)
@@ -214,7 +222,7 @@ def _drive_motor(drive: Drive, motor: AnyRecord, constants: AnyRecord, lost: Bit
 
 
 @compiled
-def _drive_axis(unit: AnyRecord, of_axis: AnyRecord, constants: AnyRecord, number: int) -> None:
+def _drive_axis(unit: DrivesRecord, of_axis: axis.State, constants: axis.Constants, number: int) -> None:
     """Run one period of the drives and of the plant of an axis."""
     first, second = unit.drive[2 * number], unit.drive[2 * number + 1]
     engage = unit.constants.engage_periods * unit.constants.speed_ticks
@@ -227,12 +235,12 @@ def _drive_axis(unit: AnyRecord, of_axis: AnyRecord, constants: AnyRecord, numbe
 
 @compiled
 def advance(records: Records, now: Nanoseconds) -> None:
-    """Advance drives and plant to a time, at most by MAX_CATCH_UP_TICKS. records: (1,) of DRIVES_RECORD_DTYPE."""
+    """Advance drives and plant to a time, at most by MAX_CATCH_UP_TICKS. records: DrivesRecords (1,)."""
     _advance(records[0], now)
 
 
 @compiled
-def _advance(unit: AnyRecord, now: Nanoseconds) -> None:
+def _advance(unit: DrivesRecord, now: Nanoseconds) -> None:
     state, constants = unit.state, unit.constants
     due = now // TICK_NS
     if unit.tick == NO_STAMP:

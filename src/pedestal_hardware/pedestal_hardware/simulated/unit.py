@@ -29,7 +29,7 @@ ALIGNED_REPORT_DTYPE = np.dtype([(name, 'i8') for name in pdo.REPORT_FIELDS])
 
 class Memory(typing.NamedTuple):
     """Memory of the simulated drives."""
-    record: Records         # (1,) of law.DRIVES_RECORD_DTYPE
+    record: Records         # law.DrivesRecord (1,)
 
 
 class SimulatedDrives(Simulated):
@@ -45,7 +45,7 @@ class SimulatedDrives(Simulated):
         link['truth_stamp'] = NO_STAMP
         at_rest = dataclasses.replace(parameters, initially_enabled=False)
         self.memory = Memory(joined(
-            law.DRIVES_RECORD_DTYPE, state=drive_unit.initial_state(at_rest),
+            law.DrivesRecord.dtype, state=drive_unit.initial_state(at_rest),
             constants=drive_unit.constants(parameters), link=link, schedule=schedule.empty(),
             injected=injected.DriveInjected.zeros()))
         self.parts['tick'], self.parts['period'] = NO_STAMP, round(parameters.period * 1e9)

@@ -17,6 +17,8 @@ from acu_tracker.estimation.params import TrackerParameters
 from acu_tracker.geometry.motion import AxisMotion, Motion
 from pedestal_common.compiled import compiled
 
+ESTIMATE_TYPE, UNSCENTED_TYPE = axis_filter.Estimate.dtype, unscented.State.dtype
+
 MEASUREMENT_PERIOD_S = 0.01  # time between measurements in all studies of filters [s]
 
 INITIAL_RATE_SIGMA_RAD_S = TrackerParameters().initial_rate
@@ -162,10 +164,10 @@ def _add_unscented_runs(c, T, truth, measured, rate_variance, sums):
     c: constants of the filter. truth: AxisMotion of arrays (n,). rate_variance: at the start [rad2/s2].
     """
     R, R_range = measured.R, measured.R_range
-    out = axis_filter.Estimate.zeros()
+    out = np.zeros(1, ESTIMATE_TYPE)
     o = out[0]
     for run in range(len(measured.azimuth)):
-        state = unscented.State.zeros()
+        state = np.zeros(1, UNSCENTED_TYPE)
         s = state[0]
         for k in range(len(truth.angle)):
             A, E, r = measured.azimuth[run, k], measured.elevation[run, k], measured.ranges[run, k]
