@@ -36,8 +36,11 @@ TYPES = ('f8', 'f4')
 
 
 def environment(folder, cache):
-    """Of a process that has the law cache in the folder `cache`."""
-    return {**os.environ, 'NUMBA_CACHE_DIR': str(cache),
+    """Of a process that has the law cache in the folder `cache`, and that reads each module from its source.
+
+    A .pyc file is valid for a source of the same length and the same second; an edit by a test may change neither.
+    """
+    return {**os.environ, 'NUMBA_CACHE_DIR': str(cache), 'PYTHONDONTWRITEBYTECODE': '1',
             'PYTHONPATH': os.pathsep.join([str(folder), *filter(None, sys.path)])}
 
 
