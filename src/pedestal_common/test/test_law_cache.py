@@ -96,6 +96,7 @@ def test_a_bad_file_is_compiled_anew(cache, change):
     assert (done.stdout, done.returncode) == (RESULT, 0) and len(done.stderr.splitlines()) <= 1
 
 
+@pytest.mark.thorough
 def test_a_file_under_the_name_of_another_is_never_taken_for_it(cache):
     """The file of each law gets the content of the next one of its form."""
     found = files(cache)
