@@ -497,7 +497,7 @@ def _do_all(output):
         if verb not in ('replay', 'rerun', 'tune'):
             with open(os.devnull, 'w') as sink, contextlib.redirect_stdout(sink):
                 cli.main([verb.split(',')[0], *arguments])
-    load('pedestal_analysis.reprocess.replay', 'pedestal_analysis.tuning.tune', 'pedestal_bringup.graph.graph')
+    load('pedestal_workbench.again.replay', 'pedestal_workbench.tuning.tune', 'pedestal_bringup.graph.graph')
 
 
 def load(*modules):

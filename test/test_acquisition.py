@@ -3,8 +3,8 @@ import numpy as np
 import pytest
 
 from acu_tracker.modes import Mode
-from pedestal_analysis.trials.cases import Case
 from pedestal_studies.system import acquisition as study
+from pedestal_workbench.trials.cases import Case
 
 
 def run(name, seed, duration=None, **parameters):

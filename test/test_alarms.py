@@ -5,7 +5,7 @@ import pytest
 
 from acu_tracker.alarms import report, table
 from acu_tracker.modes import Mode
-from pedestal_analysis.console import EXIT_FAILED_RUN
+from pedestal.console import EXIT_FAILED_RUN
 from pedestal_bringup.loop import closed_loop
 from pedestal_bringup.scenario import scenario
 from pedestal_recording import bag as bags

@@ -10,9 +10,6 @@ import numpy as np
 import pytest
 from shared import PEDESTAL
 
-from pedestal_analysis.report.page import write as write_report
-from pedestal_analysis.reprocess import difference, recompute
-from pedestal_analysis.results import tracking
 from pedestal_bringup.loop import closed_loop
 from pedestal_bringup.scenario import scenario
 from pedestal_common.wire import messages
@@ -20,6 +17,9 @@ from pedestal_recording import bag as bags
 from pedestal_recording import export
 from pedestal_recording.bag import load
 from pedestal_recording.verify import verify
+from pedestal_results import tracking
+from pedestal_results.report.page import write as write_report
+from pedestal_workbench.again import difference, recompute
 
 pytestmark = pytest.mark.thorough
 

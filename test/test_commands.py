@@ -4,7 +4,7 @@ import re
 import pytest
 from shared import PEDESTAL
 
-from pedestal_analysis.console import EXIT_FAILED_RUN
+from pedestal.console import EXIT_FAILED_RUN
 from pedestal_bringup.loop import closed_loop
 from pedestal_bringup.scenario import scenario
 from pedestal_common.wire import commands, messages

@@ -6,7 +6,6 @@ import pytest
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import SetParameters
 
-from pedestal_analysis.results import consistency, tracking
 from pedestal_bringup.loop import closed_loop
 from pedestal_bringup.scenario import scenario
 from pedestal_common.graph import layouts, topics
@@ -14,6 +13,7 @@ from pedestal_recording import bag as bags
 from pedestal_recording import export
 from pedestal_recording.bag import load
 from pedestal_recording.verify import verify
+from pedestal_results import consistency, tracking
 
 SECONDS = 5.0
 PARAMS = ['acu.tracker.lock_count=20', 'tracking_receiver.receiver.rate.measured=true',

@@ -18,8 +18,8 @@ import sys
 sys.path.insert(0, sys.argv[1])
 import hostile_files
 hostile_files.load('pedestal_recording.verify', 'pedestal_recording.recover', 'pedestal_recording.export',
-                   'pedestal_analysis.reprocess.rerun', 'pedestal_bringup.graph.graph',
-                   'pedestal_bringup.graph.operator_servers', 'pedestal_analysis.results.results')
+                   'pedestal_workbench.again.rerun', 'pedestal_bringup.graph.graph',
+                   'pedestal_bringup.graph.operator_servers', 'pedestal_results.results')
 chosen = hostile_files.CRAFTED if sys.argv[3] == 'crafted' else [None] * 24
 names = [name for name in chosen if not name or not name.startswith(('track', 'elements'))]
 for file, verb, wrong, _, _ in hostile_files.attack(sys.argv[2], names[::4], verbs=sys.argv[4:]):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pedestal_analysis.console import EXIT_FAILED_RUN
+from pedestal.console import EXIT_FAILED_RUN
 from pedestal_bringup.loop import closed_loop
 from pedestal_bringup.scenario import scenario
 from pedestal_common.wire import commands, messages

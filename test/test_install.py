@@ -26,6 +26,7 @@ EXECUTABLES = {
                           'live_node': 'pedestal_operator.live_node:main',
                           'rotctld_node': 'pedestal_operator.rotctld_node:main'},
     'pedestal_recording': {'recorder_node': 'pedestal_recording.recorder_node:main'},
+    'pedestal_results': {},
     'pedestal_hardware': {'drive_node': 'pedestal_hardware.drive_node:main',
                           'iq_node': 'pedestal_hardware.monopulse.iq_node:main',
                           'monopulse_receiver_node': 'pedestal_hardware.monopulse.monopulse_receiver_node:main',
@@ -34,7 +35,7 @@ EXECUTABLES = {
                           'rotator_node': 'pedestal_hardware.rotator_node:main',
                           'simulated_drives_node': 'pedestal_hardware.simulated.drives_node:main'},
     'pedestal_bringup': {},
-    'pedestal_analysis': {},
+    'pedestal_workbench': {},
     'pedestal_studies': {},
     'pedestal': {'pedestal': 'pedestal.cli:main'},
 }

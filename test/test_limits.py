@@ -78,7 +78,7 @@ def test_tests_that_send_signals_pass_in_the_background():
     """Where a shell ignores SIGINT, and nohup SIGHUP, for all processes below."""
     done = subprocess.run(['nohup', 'sh', '-c', 'trap "" INT; exec "$@"', 'sh', sys.executable, '-m', 'pytest',
                            '--numprocesses', '1', '-p', 'no:cacheprovider', '-k', 'stopped_while_it_imports',
-                           'src/pedestal_analysis/test/test_console.py'],
+                           'src/pedestal/test/test_console.py'],
                           cwd=HOME, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=120.0)
     assert done.returncode == 0 and '3 passed' in done.stdout, done.stdout + done.stderr
 

@@ -8,9 +8,8 @@ import pytest
 
 from pedestal import cli
 from pedestal.verbs.antenna import ask
-from pedestal_analysis.report import tdm
-from pedestal_analysis.results import beam_direction, tracking
 from pedestal_recording import bag as bags
+from pedestal_results import beam_direction, tdm, tracking
 
 TERMS = {'p1': 0.1, 'p4': 0.05, 'p7': -0.1}
 """Errors of the pedestal [deg], and the model that corrects them."""

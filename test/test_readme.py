@@ -13,9 +13,9 @@ import pytest
 
 import pedestal
 from pedestal import cli, samples
-from pedestal_analysis.console import EXIT_DISTURBED
-from pedestal_analysis.trials import plan as trial_plans
+from pedestal.console import EXIT_DISTURBED
 from pedestal_bringup.scenario import scenario
+from pedestal_workbench.trials import plan as trial_plans
 
 pytestmark = pytest.mark.every_case
 

@@ -8,8 +8,6 @@ import pytest
 from rosbags.rosbag2 import StoragePlugin, Writer
 from shared import PEDESTAL
 
-from pedestal_analysis.reprocess import difference, recompute, recompute_report
-from pedestal_analysis.results import results, tracking
 from pedestal_common.graph import nodes as graph
 from pedestal_common.graph import topics
 from pedestal_common.wire import messages
@@ -18,6 +16,8 @@ from pedestal_recording import bag as bags
 from pedestal_recording.bag import load
 from pedestal_recording.verify import verify
 from pedestal_recording.writer import Writer as BagWriter
+from pedestal_results import results, tracking
+from pedestal_workbench.again import difference, recompute, recompute_report
 
 REFERENCES = pathlib.Path(__file__).parent.parent / 'bags' / 'reference'
 EXACT = ('--absolute', '0', '--relative', '0')
@@ -203,7 +203,7 @@ def test_a_changed_parameter_is_reported_old_against_new(runs, pedestal, tmp_pat
 
 def test_the_numbers_of_a_recording_and_of_a_late_estimate(runs):
     """Those of the recording are what its run said; the recorded estimate, delayed by 20 ms, lags 20 ms more."""
-    from pedestal_analysis.reprocess import what_if
+    from pedestal_workbench.again import what_if
     recording = recompute.FedRecording(runs['leo'].bag)
     old = {name: recording.output(name) for name in OUTPUTS}
     late = difference.Output(old[ESTIMATE].stamps[4:], old[ESTIMATE].values[:-4])

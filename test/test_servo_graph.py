@@ -4,9 +4,9 @@ import json
 import numpy as np
 import pytest
 
-from pedestal_analysis.trials.cases import Case
 from pedestal_recording import bag as bags
 from pedestal_studies.papers import servo
+from pedestal_workbench.trials.cases import Case
 
 pytestmark = pytest.mark.thorough
 

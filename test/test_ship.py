@@ -12,13 +12,13 @@ import pynmea2
 import pytest
 
 from acu_tracker.modes import Mode
-from pedestal_analysis.reprocess import difference, recompute
-from pedestal_analysis.results import isolation, known_attitude, results, tracking
 from pedestal_bringup.loop import closed_loop
 from pedestal_bringup.scenario import scenario
 from pedestal_common.graph import layouts
 from pedestal_common.wire import messages
 from pedestal_recording import bag as bags
+from pedestal_results import isolation, known_attitude, results, tracking
+from pedestal_workbench.again import difference, recompute
 from ship_motion_sim.sea import motion
 from tracking_receiver_sim import target
 

@@ -7,7 +7,7 @@ import pytest
 
 from acu_tracker import modes
 from acu_tracker.alarms.table import ALARM_NAMES
-from pedestal_analysis.console import EXIT_FAILED_RUN
+from pedestal.console import EXIT_FAILED_RUN
 from pedestal_bringup.loop import closed_loop
 from pedestal_bringup.scenario import scenario
 from pedestal_common.wire import commands, messages

@@ -6,9 +6,9 @@ import shlex
 import numpy as np
 import pytest
 
-from pedestal_analysis.trials import ensemble, monte_carlo
-from pedestal_analysis.trials.plan import plan
 from pedestal_bringup.scenario import scenario
+from pedestal_workbench.trials import ensemble, monte_carlo
+from pedestal_workbench.trials.plan import plan
 
 pytestmark = pytest.mark.thorough
 

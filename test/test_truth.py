@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from adu_drive.plant import structure
-from pedestal_analysis.results import tracking
 from pedestal_bringup.loop import closed_loop
 from pedestal_bringup.scenario import scenario
 from pedestal_recording import bag as bags
+from pedestal_results import tracking
 
 SHARE, FREQUENCY = 0.5, 8.0
 SWINGS = (f'adu.azimuth.structure.inertia_share={SHARE}', f'adu.azimuth.structure.frequency={FREQUENCY}',

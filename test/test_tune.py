@@ -8,13 +8,13 @@ import pytest
 import yaml
 from rcl_interfaces.srv import GetParameters
 
-from pedestal_analysis.reprocess import recompute
-from pedestal_analysis.tuning import tune
 from pedestal_bringup.scenario import scenario
 from pedestal_common import parameters
 from pedestal_common.graph import topics
 from pedestal_recording import bag as bags
 from pedestal_recording.writer import Writer
+from pedestal_workbench.again import recompute
+from pedestal_workbench.tuning import tune
 
 BAG = pathlib.Path(__file__).parent.parent / 'bags' / 'reference' / 'uav_flyby'
 

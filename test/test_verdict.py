@@ -4,16 +4,15 @@ import json
 
 import pytest
 
-from pedestal import cli, stop
-from pedestal_analysis import console
-from pedestal_analysis.results import results, verdict
+from pedestal import cli, console, stop
 from pedestal_recording import bag as bags
+from pedestal_results import results, verdict
 
 RUNS = {'tripped': ('leo_pass', ('adu.azimuth.faults.overspeed=0.02',),
                     'tracked 0 %: drive fault azimuth overspeed at'),
         'no target': ('uav_flyby', ('acu.initial_mode=standby',), 'no target was to be tracked: standby 100 %')}
 """{word: (scenario, changes, text)} of a run that failed and one that did not; the others are in test_verdict.py of
-pedestal_analysis."""
+pedestal_results."""
 SECONDS = 5.0
 
 

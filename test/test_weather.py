@@ -2,11 +2,11 @@
 are named."""
 import pytest
 
-from pedestal_analysis.reprocess import recompute
 from pedestal_bringup.scenario import scenario
 from pedestal_common.parameters import build
 from pedestal_common.wire import messages
 from pedestal_recording import bag as bags
+from pedestal_workbench.again import recompute
 
 pytestmark = pytest.mark.thorough
 

@@ -12,15 +12,15 @@ from acu_tracker import modes
 from acu_tracker.alarms import table as alarms
 from acu_tracker.estimation.filters.kinds import FILTER_KINDS
 from adu_drive.controller import faults
-from pedestal_analysis import console
-from pedestal_analysis.reprocess import what_if
-from pedestal_analysis.results import results
+from pedestal import console
 from pedestal_bringup.scenario import scenario
 from pedestal_common import parameters
 from pedestal_common.graph import nodes, topics
 from pedestal_common.injection.table import INJECTED_FAULTS
+from pedestal_results import results
 from pedestal_studies.numbers import published
 from pedestal_studies.rigs.fault_expectations import FAULT_EXPECTATIONS
+from pedestal_workbench.again import what_if
 
 GENERATED_PAGES = ('README.md', *(f'docs/{name}.md' for name in (
     'acquisition', 'budget', 'faults', 'graph', 'measured', 'operating', 'papers', 'parameters', 'studies', 'tools',

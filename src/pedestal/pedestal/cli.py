@@ -17,7 +17,7 @@ import sys
 import types
 from collections.abc import Sequence
 
-from pedestal_analysis.console import STDOUT_PATH
+from pedestal.console import STDOUT_PATH
 from pedestal_common.parameters import ParameterError, did_you_mean
 
 VERBS = {'run': 'antenna', 'scenarios': 'design', 'samples': 'design', 'new': 'design', 'parameters': 'design',

@@ -8,10 +8,10 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from pedestal.scenario import Scenario
-from pedestal_analysis.trials import comparison, ensemble, monte_carlo, statistics
-from pedestal_analysis.trials import plan as plans
-from pedestal_analysis.trials import table as tables
 from pedestal_common.quantities import Floats, Ints, Row
+from pedestal_workbench.trials import comparison, ensemble, monte_carlo, statistics
+from pedestal_workbench.trials import plan as plans
+from pedestal_workbench.trials import table as tables
 
 
 def trials(scenario: Scenario, runs: int = 100, vary: Mapping[str, str] | None = None, *, sobol: bool = False,

@@ -5,8 +5,8 @@ import functools
 import typing
 from collections.abc import Callable
 
-from pedestal_analysis.report import run_data, run_figures
 from pedestal_common.parameters import did_you_mean
+from pedestal_results.report import run_data, run_figures
 
 if typing.TYPE_CHECKING:
     from matplotlib.axes import Axes

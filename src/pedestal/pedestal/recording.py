@@ -13,12 +13,12 @@ import numpy as np
 
 from pedestal.panels import draw
 from pedestal.scenario import Scenario
-from pedestal_analysis.report import run_data
-from pedestal_analysis.results import results, tracking
-from pedestal_analysis.results import verdict as verdicts
 from pedestal_bringup.loop import memory_recording
 from pedestal_common.graph import layouts
 from pedestal_recording import bag as bags
+from pedestal_results import results, tracking
+from pedestal_results import verdict as verdicts
+from pedestal_results.report import run_data
 
 if typing.TYPE_CHECKING:
     from matplotlib.axes import Axes

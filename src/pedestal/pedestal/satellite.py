@@ -5,10 +5,10 @@ import math
 import pathlib
 import typing
 
-from pedestal_analysis import console
-from pedestal_analysis.report.subject import place
+from pedestal import console
 from pedestal_common.geometry import orbit, passes
 from pedestal_common.geometry.orbit import TargetError
+from pedestal_results.report.subject import place
 from tracking_receiver_sim import elements
 
 if typing.TYPE_CHECKING:

@@ -15,9 +15,9 @@ import pytest
 
 import pedestal
 from pedestal import panels
-from pedestal_analysis.results import results
 from pedestal_common.graph import topics
 from pedestal_recording import bag
+from pedestal_results import results
 
 ROOT = pathlib.Path(__file__).parents[3]
 REFERENCES = ROOT / 'bags' / 'reference'

@@ -6,9 +6,9 @@ import pytest
 
 from adu_drive import drive_unit, lanes
 from adu_drive import unit as adu_unit
-from pedestal_analysis.trials import ensemble
 from pedestal_bringup.loop import closed_loop, side_by_side
 from pedestal_bringup.scenario import scenario
+from pedestal_workbench.trials import ensemble
 
 CHANGES = (
     (), ('adu.azimuth.load.inertia=170', 'adu.transport_delay=0.003'),

@@ -169,6 +169,11 @@ def as_dict(instance: Parameters, prefix: str = '') -> dict[str, Value]:
     return {prefix + name: read(instance) for name, read in _readers(type(instance))}
 
 
+def option_of(name: str) -> str:
+    """Return the option of a name in the namespace of argparse: --params-file for params_file."""
+    return f'--{name.replace("_", "-")}'
+
+
 def did_you_mean(name: str, known: Iterable[str]) -> str:
     """Return ' did you mean ...?' with the known name most like an unknown name; '' without a similar name."""
     near = difflib.get_close_matches(name, list(known), n=1)

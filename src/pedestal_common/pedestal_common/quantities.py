@@ -64,5 +64,5 @@ AnyRecord: TypeAlias = Any  # a record whose fields depend on data, as those of 
 Message: TypeAlias = Any    # a ROS message, whose class is made by ROS without types
 Json: TypeAlias = Any       # what a JSON or YAML file holds; the code that takes a value from it checks the value
 Value: TypeAlias = Any      # of a parameter or of an argument of a command, whose declaration states the type
-Row: TypeAlias = dict[str, Any]     # of the rows of a --json file, see pedestal_analysis.results.intervals.row
+Row: TypeAlias = dict[str, Any]     # of the rows of a --json file, see pedestal_results.intervals.row
 Table: TypeAlias = dict[str, Any]   # {column: Floats} with a row per message of a topic; a column of texts is a list

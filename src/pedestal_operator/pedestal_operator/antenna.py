@@ -1,6 +1,6 @@
 """Common interface to the last messages of an antenna, for the programs of the operator.
 
-The antenna is a running graph (remote_node.Remote), or a recording (pedestal_analysis.reprocess.replay_page).
+The antenna is a running graph (remote_node.Remote), or a recording (pedestal_workbench.again.replay_page).
 """
 import abc
 import math

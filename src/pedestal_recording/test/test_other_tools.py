@@ -9,10 +9,10 @@ from mcap.reader import make_reader
 from mcap.writer import CompressionType, IndexType, Writer
 
 from pedestal import cli
-from pedestal_analysis.results import results
 from pedestal_recording import bag
 from pedestal_recording.recover import recover
 from pedestal_recording.verify import verify
+from pedestal_results import results
 
 REFERENCE = pathlib.Path(__file__).parents[3] / 'bags' / 'reference' / 'leo_pass'
 BARE = {'index_types': IndexType.NONE, 'repeat_channels': False, 'repeat_schemas': False, 'use_statistics': False,

@@ -3,7 +3,7 @@
 The antenna stands ashore and in still air. The plant is the drive with motors, gears and load.
 
   bode      frequency response of the current, speed and position loops, each axis by itself; measured by
-            pedestal_analysis/tuning/frequency_response.py
+            pedestal_workbench/tuning/frequency_response.py
   servo     response to a step of STEP_SIZE_RAD, to a sine of SINE_AMPLITUDE_RAD at SINE_FREQUENCY_HZ, and to a gust.
             The gust is a step of wind torque: GUST_TORQUE_SHARE times the largest torque of both motors on the load.
             The response is the true angle of the dish
@@ -14,15 +14,15 @@ import math
 
 import numpy as np
 
-from pedestal_analysis.report.figures import FILTERED_COLOUR, INK_COLOUR, TRUTH_COLOUR, new_panels
-from pedestal_analysis.results import tracking
-from pedestal_analysis.results.intervals import row
-from pedestal_analysis.trials.cases import Case
-from pedestal_analysis.tuning import loops
 from pedestal_common.graph.topics import AXES
+from pedestal_results import tracking
+from pedestal_results.intervals import row
+from pedestal_results.report.figures import FILTERED_COLOUR, INK_COLOUR, TRUTH_COLOUR, new_panels
 from pedestal_studies.rigs import drawing, metrics
 from pedestal_studies.rigs.rows import Result
 from pedestal_studies.system import bode
+from pedestal_workbench.trials.cases import Case
+from pedestal_workbench.tuning import loops
 
 STEP_SIZE_RAD, SINE_AMPLITUDE_RAD, SINE_FREQUENCY_HZ, GUST_TORQUE_SHARE = 0.02, 0.02, 0.1, 0.2
 """Size of the step [rad]; amplitude [rad] and frequency [Hz] of the sine; torque of the gust over the largest torque

@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from pedestal_analysis.results import results, tracking
 from pedestal_bringup.loop import closed_loop
 from pedestal_bringup.scenario import scenario
+from pedestal_results import results, tracking
 from pedestal_studies.papers import phased_array
 from pedestal_studies.rigs.angle_loop import PaperLoop
 

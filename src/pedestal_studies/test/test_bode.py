@@ -13,13 +13,13 @@ import numpy as np
 import pytest
 
 from adu_drive.params import AduParameters
-from pedestal_analysis.results import tracking
-from pedestal_analysis.tuning import antenna_from_data_sheet, loops
-from pedestal_analysis.tuning import frequency_response as frequency
-from pedestal_analysis.tuning.data_sheet_format import DataSheet
 from pedestal_bringup.scenario import scenario
 from pedestal_common.parameters import as_dict, build
+from pedestal_results import tracking
 from pedestal_studies.system import bode
+from pedestal_workbench.tuning import antenna_from_data_sheet, loops
+from pedestal_workbench.tuning import frequency_response as frequency
+from pedestal_workbench.tuning.data_sheet_format import DataSheet
 
 CURRENT_PERIOD, SPEED_PERIOD = 1e-4, 5e-4
 RUN_STEP, FINE_STEP = 0.5 * CURRENT_PERIOD, CURRENT_PERIOD / frequency.SUB_STEP_COUNT

@@ -2,12 +2,12 @@
 import numpy as np
 import pytest
 
-from pedestal_analysis.calibration import distribution, exact
 from pedestal_bringup.loop import memory_recording
 from pedestal_bringup.scenario import scenario
 from pedestal_bringup.scenario.program import Plan
 from pedestal_common.geometry.line_of_sight import wrap
 from pedestal_studies.system import calibration
+from pedestal_workbench.calibration import distribution, exact
 
 
 @pytest.mark.parametrize('azimuth, elevation', [(-1.2, 0.2), (2.0, 1.2)])

@@ -8,7 +8,7 @@ import pytest
 from acu_tracker.estimation.filters import axis_filter
 from acu_tracker.estimation.params import FilterParameters
 from adu_drive.params import AduParameters
-from pedestal_analysis.results.intervals import missed
+from pedestal_results.intervals import missed
 from pedestal_studies.numbers import claims, published
 from pedestal_studies.papers import alignment, backlash, servo
 from pedestal_studies.rigs import feedforward_loop as loop

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
-from pedestal_analysis.report import figures
+from pedestal_results.report import figures
 from pedestal_studies.rigs import drawing
 
 T = np.linspace(0.1, 1.0, 50)

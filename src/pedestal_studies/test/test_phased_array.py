@@ -7,7 +7,7 @@ import pytest
 from scipy import linalg
 
 from acu_tracker.estimation.filters.constant_gain import benedict_bordner
-from pedestal_analysis.results import intervals, tracking
+from pedestal_results import intervals, tracking
 from pedestal_studies.papers import phased_array
 from pedestal_studies.papers.phased_array import instants, settled
 from pedestal_studies.rigs import drawing, metrics

@@ -5,8 +5,8 @@ import math
 
 import pytest
 
-from pedestal_analysis.tuning import loops
 from pedestal_studies import plant_studies
+from pedestal_workbench.tuning import loops
 
 
 def values(path):

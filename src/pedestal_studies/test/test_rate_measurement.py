@@ -6,7 +6,7 @@ import pytest
 from scipy.linalg import expm, solve_discrete_are
 
 from acu_tracker.estimation.filters import axis_filter
-from pedestal_analysis.results import intervals
+from pedestal_results import intervals
 from pedestal_studies.papers import rate_measurement as study
 from pedestal_studies.rigs import drawing, metrics
 

@@ -80,7 +80,7 @@ def test_two_loops_fight_at_rest_where_one_does_not(studied):
 
 @pytest.mark.thorough
 def test_what_misses_its_target_is_marked(done):
-    from pedestal_analysis.results.intervals import missed
+    from pedestal_results.intervals import missed
     _, folder, result = done
     rows = json.loads((folder / 'rows.json').read_text())['rows']
     assert result.stdout.count('MISSED') == sum(map(missed, rows))

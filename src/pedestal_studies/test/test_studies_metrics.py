@@ -6,10 +6,10 @@ import pytest
 import yaml
 from scipy import stats
 
-from pedestal_analysis.results import intervals, tracking
-from pedestal_analysis.trials import cases
+from pedestal_results import intervals, tracking
 from pedestal_studies.papers import alignment
 from pedestal_studies.rigs import metrics
+from pedestal_workbench.trials import cases
 
 T = np.arange(0.0, 3.0, 1e-4)
 

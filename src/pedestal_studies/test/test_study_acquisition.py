@@ -8,7 +8,7 @@ from scipy.stats import binomtest
 
 from acu_tracker.modes import Mode
 from acu_tracker.search.pattern import PATTERN_SPIRAL, PATTERN_SQUARE, SEARCH_PATTERNS
-from pedestal_analysis.results.intervals import missed
+from pedestal_results.intervals import missed
 from pedestal_studies.system import acquisition as study
 
 

@@ -4,15 +4,15 @@ import math
 import numpy as np
 import pytest
 
-from pedestal_analysis.results import tracking
-from pedestal_analysis.results.intervals import missed
-from pedestal_analysis.trials import monte_carlo
 from pedestal_bringup.loop import closed_loop
 from pedestal_bringup.scenario import scenario
 from pedestal_bringup.scenario.program import Plan
 from pedestal_common.parameters import as_dict, build
+from pedestal_results import tracking
+from pedestal_results.intervals import missed
 from pedestal_studies.system import budget as study
 from pedestal_studies.system.scenarios import MemoryRecording
+from pedestal_workbench.trials import monte_carlo
 from tracking_receiver_sim import target
 from tracking_receiver_sim.path import arrival
 

@@ -4,10 +4,10 @@ import pathlib
 import numpy as np
 import pytest
 
-from pedestal_analysis.results import results
 from pedestal_bringup.loop import memory_recording
 from pedestal_bringup.scenario import scenario
 from pedestal_recording import bag
+from pedestal_results import results
 from pedestal_studies.system import scenarios as study
 
 REFERENCES = pathlib.Path(__file__).parents[3] / 'bags' / 'reference'

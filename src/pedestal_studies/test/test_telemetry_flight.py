@@ -6,7 +6,7 @@ import pytest
 from scipy.interpolate import CubicSpline
 from scipy.linalg import expm
 
-from pedestal_analysis.results import intervals
+from pedestal_results import intervals
 from pedestal_studies.papers import telemetry_flight as study
 from pedestal_studies.rigs import drawing
 

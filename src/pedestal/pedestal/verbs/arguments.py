@@ -7,7 +7,8 @@ import types
 import typing
 from collections.abc import Iterable, Mapping
 
-from pedestal_analysis import console
+from pedestal import console
+from pedestal_common.parameters import option_of
 
 if typing.TYPE_CHECKING:
     from pedestal_operator.remote_node import RemoteSession
@@ -138,7 +139,7 @@ def add_workers(parser: argparse.ArgumentParser) -> None:
     workers.add_argument('--workers', type=int, metavar='N', help='number of processes for the runs; default: one per '
                          'core')
     workers.add_argument('--scheduler', metavar='ADDRESS', help="address of a Dask cluster for the runs, for example "
-                         "tcp://host:8786; needs pip install 'pedestal_analysis[cluster]' on this machine and the "
+                         "tcp://host:8786; needs pip install 'pedestal_workbench[cluster]' on this machine and the "
                          "pedestal packages on the cluster")
 
 
@@ -159,7 +160,7 @@ def check_recording(options: argparse.Namespace) -> None:
     """Raise ValueError for parameters with --bag, whose run is over."""
     for name in ('param', 'params_file'):
         if options.bag is not None and getattr(options, name):
-            raise ValueError(f'{console.option_of(name)}: has no effect with --bag')
+            raise ValueError(f'{option_of(name)}: has no effect with --bag')
 
 
 def recording(options: argparse.Namespace) -> 'tuple[Recording, str]':
@@ -188,7 +189,7 @@ def refuse_unused(options: argparse.Namespace, names: Iterable[str], other: str)
     """Raise ValueError for a given option that has no effect with the option `other`; names: those options."""
     for name in names:
         if getattr(options, name) is not None:
-            raise ValueError(f'{console.option_of(name)}: has no effect with {console.option_of(other)}')
+            raise ValueError(f'{option_of(name)}: has no effect with {option_of(other)}')
 
 
 def check_result_files(options: argparse.Namespace, *more: str) -> None:
@@ -197,12 +198,12 @@ def check_result_files(options: argparse.Namespace, *more: str) -> None:
     console.check_json(options.json)
     new = ('output', 'report', *more)
     for name in new:
-        check_new_file(console.option_of(name), getattr(options, name))
+        check_new_file(option_of(name), getattr(options, name))
     paths = [(name, path) for name, given in vars(options).items()
              for path in (given if isinstance(given, list) else [given]) if isinstance(path, pathlib.Path)]
     for (name, path), (other, same) in itertools.combinations(paths, 2):
         if {name, other} & {*new, 'json'} and path.resolve() == same.resolve():
-            raise ValueError(f'{console.option_of(name)} {path}: is also the file of {console.option_of(other)}')
+            raise ValueError(f'{option_of(name)} {path}: is also the file of {option_of(other)}')
 
 
 def check_new_file(option: str, path: pathlib.Path | None) -> None:

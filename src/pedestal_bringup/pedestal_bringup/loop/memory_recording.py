@@ -1,5 +1,5 @@
 """Recording without a file: a run of the closed loop, kept in memory, with the methods of bag.Bag that
-pedestal_analysis uses. Trials and studies compute their results from it."""
+pedestal_results uses. Trials and studies compute their results from it."""
 import functools
 from collections.abc import Iterator
 

@@ -18,14 +18,14 @@ from acu_tracker.geometry.motion import AxisMotion, Motion
 from adu_drive import axis, drive_unit, lanes
 from adu_drive import unit as adu_unit
 from adu_drive.params import AduParameters
-from pedestal_analysis.results.results import row
-from pedestal_analysis.trials import ensemble
 from pedestal_bringup.loop import closed_loop, side_by_side
 from pedestal_bringup.scenario import scenario
 from pedestal_common.compiled import compiled
 from pedestal_common.parameters import build
+from pedestal_results.results import row
 from pedestal_studies.bench import solve_ivp_axis
 from pedestal_studies.bench.table import best_of, show
+from pedestal_workbench.trials import ensemble
 
 CORE_DURATION_S, TRIAL_DURATION_S = 20.0, 10.0  # simulated durations of the closed loop and of a trial [s]
 SHORT_RUN_STEPS, SHORT_RUN_COUNT = 40, 100

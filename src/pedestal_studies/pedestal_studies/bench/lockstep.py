@@ -14,11 +14,11 @@ import tempfile
 
 import numpy as np
 
-from pedestal_analysis.results.results import row
 from pedestal_bringup.graph import graph
 from pedestal_bringup.scenario import scenario
 from pedestal_bringup.scenario.program import Plan
 from pedestal_recording import bag
+from pedestal_results.results import row
 from pedestal_studies.bench import bare_ring
 from pedestal_studies.bench.table import show
 

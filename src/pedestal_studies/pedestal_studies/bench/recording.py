@@ -11,13 +11,13 @@ import sys
 import tempfile
 import time
 
-from pedestal_analysis.reprocess import recompute, replay
-from pedestal_analysis.results.results import row
 from pedestal_common.wire import messages
 from pedestal_recording import bag
 from pedestal_recording.verify import verify
+from pedestal_results.results import row
 from pedestal_studies.bench.lockstep import graph_run
 from pedestal_studies.bench.table import best_of, show
+from pedestal_workbench.again import recompute, replay
 
 ROUND_COUNT = 3  # number of measurements of recompute, of which the median counts
 BAG_DURATION_S = 30.0  # simulated duration of the run whose bag is used [s]

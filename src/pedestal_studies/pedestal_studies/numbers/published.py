@@ -13,9 +13,9 @@ import pathlib
 import sys
 
 import pedestal_studies
-from pedestal_analysis import console
-from pedestal_analysis.results.intervals import missed
-from pedestal_analysis.trials import monte_carlo
+from pedestal import console
+from pedestal_results import row_text
+from pedestal_results.intervals import missed
 from pedestal_studies.numbers import claims
 from pedestal_studies.papers import (
     alignment,
@@ -31,6 +31,7 @@ from pedestal_studies.papers import (
 from pedestal_studies.rigs.feedforward_loop import REVERSAL_S_BY_AXIS
 from pedestal_studies.rigs.profiles import PROFILES
 from pedestal_studies.system import acquisition, budget, filter_families, filters
+from pedestal_workbench.trials import monte_carlo
 
 ROWS_FILE = 'docs/rows.json'  # file of the rows in a checkout
 
@@ -111,8 +112,8 @@ def write(rows, root='.'):
 
 def _cells(row):
     """Return the texts of a row: value with unit, interval, number of runs."""
-    value = f'{console.number(row["value"])} {row["unit"].removeprefix("-")}'.strip()
-    return value, console.interval(row), str(row.get('runs', ''))
+    value = f'{row_text.number(row["value"])} {row["unit"].removeprefix("-")}'.strip()
+    return value, row_text.interval(row), str(row.get('runs', ''))
 
 
 def _target_text(row):
@@ -129,7 +130,7 @@ def _spread(row):
     """
     half = 0.5 * (row['ci_high'] - row['ci_low']) if 'runs' in row else 0.0
     if half <= 1e-9 * abs(row['value']):
-        return console.number(row['value'])
+        return row_text.number(row['value'])
     decimals = max(0, 1 - math.floor(math.log10(half)))
     return f'{row["value"]:.{decimals}f} +- {half:.{decimals}f}'
 
@@ -239,7 +240,7 @@ def alignment_speed_numbers(rows):
 def matrix_table(rows):
     """Return the table of the matrices of paper 004's proof of stability, in seconds, with rank and condition."""
     lines = [(name, '; '.join(' '.join(f'{value:.4g}' for value in line) for line in matrix),
-              *(console.number(rows['telemetry-flight', name, metric]['value'])
+              *(row_text.number(rows['telemetry-flight', name, metric]['value'])
                 for metric in ('rank', 'condition', 'condition_in_seconds')))
              for name, (matrix, _) in telemetry_flight.matrices().items()]
     return ('matrix', 'rows of the matrix, in seconds', 'rank', 'condition, time in T',

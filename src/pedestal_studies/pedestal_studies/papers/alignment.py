@@ -22,7 +22,12 @@ from collections import namedtuple
 
 import numpy as np
 
-from pedestal_analysis.report.figures import (
+from pedestal_common.compiled import compiled
+from pedestal_common.geometry.line_of_sight import to_deck
+from pedestal_common.geometry.quaternion import product
+from pedestal_results import tracking
+from pedestal_results.intervals import pseudo_values, row
+from pedestal_results.report.figures import (
     FILTERED_COLOUR,
     INK_COLOUR,
     MOTOR_1_COLOUR,
@@ -31,14 +36,9 @@ from pedestal_analysis.report.figures import (
     TRUTH_COLOUR,
     new_panels,
 )
-from pedestal_analysis.results import tracking
-from pedestal_analysis.results.intervals import pseudo_values, row
-from pedestal_analysis.trials import monte_carlo
-from pedestal_common.compiled import compiled
-from pedestal_common.geometry.line_of_sight import to_deck
-from pedestal_common.geometry.quaternion import product
 from pedestal_studies.rigs import drawing
 from pedestal_studies.rigs.rows import Result
+from pedestal_workbench.trials import monte_carlo
 from ship_motion_sim import imu
 from ship_motion_sim.navigation import navigator
 from ship_motion_sim.params import (

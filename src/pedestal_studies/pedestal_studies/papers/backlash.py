@@ -19,14 +19,14 @@ import math
 
 import numpy as np
 
-from pedestal_analysis.report.figures import FILTERED_COLOUR, INK_COLOUR, RAW_COLOUR, TRUTH_COLOUR, new_panels
-from pedestal_analysis.results import tracking
-from pedestal_analysis.results.intervals import row
-from pedestal_analysis.trials import cases
-from pedestal_analysis.trials.cases import Case
+from pedestal_results import tracking
+from pedestal_results.intervals import row
+from pedestal_results.report.figures import FILTERED_COLOUR, INK_COLOUR, RAW_COLOUR, TRUTH_COLOUR, new_panels
 from pedestal_studies.papers import servo
 from pedestal_studies.rigs import drawing, metrics
 from pedestal_studies.rigs.rows import Result
+from pedestal_workbench.trials import cases
+from pedestal_workbench.trials.cases import Case
 
 STANDSTILL_START_S = 2.0  # time after a step from which the standstill is evaluated [s]
 REVERSAL_AMPLITUDE_RAD = 0.05  # amplitude of the sine of the reversals [rad]

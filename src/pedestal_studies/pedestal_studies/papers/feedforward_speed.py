@@ -19,15 +19,15 @@ autotrack_percent                         share of the runs that stay in autotra
 """
 import numpy as np
 
-from pedestal_analysis.report.figures import FILTERED_COLOUR, MOTOR_1_COLOUR, RAW_COLOUR, TRUTH_COLOUR, new_panels
-from pedestal_analysis.results import tracking
-from pedestal_analysis.results.intervals import row
-from pedestal_analysis.trials import monte_carlo
+from pedestal_results import tracking
+from pedestal_results.intervals import row
+from pedestal_results.report.figures import FILTERED_COLOUR, MOTOR_1_COLOUR, RAW_COLOUR, TRUTH_COLOUR, new_panels
 from pedestal_studies.papers import imm_feedforward
 from pedestal_studies.rigs import drawing, feedforward_loop
 from pedestal_studies.rigs.feedforward_loop import METRIC_UNITS, MISS_DELAY_STEPS, REVERSAL_S_BY_AXIS, Source
 from pedestal_studies.rigs.profiles import S_MOTION_RATE_RAD_S
 from pedestal_studies.rigs.rows import Result
+from pedestal_workbench.trials import monte_carlo
 
 DEFAULT_RUNS, BATCH_RUNS = 50, 10  # runs of each case, with independent noise; runs that one worker makes at a time
 

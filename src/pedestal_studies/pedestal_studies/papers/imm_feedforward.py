@@ -26,7 +26,10 @@ import numpy as np
 from acu_tracker.estimation.filters.motion_models import MODEL_NAMES
 from acu_tracker.estimation.params import FilterParameters
 from acu_tracker.modes import Mode
-from pedestal_analysis.report.figures import (
+from pedestal_common.parameters import as_dict
+from pedestal_results import tracking
+from pedestal_results.intervals import row
+from pedestal_results.report.figures import (
     FILTERED_COLOUR,
     INK_COLOUR,
     MOTOR_1_COLOUR,
@@ -35,10 +38,6 @@ from pedestal_analysis.report.figures import (
     TRUTH_COLOUR,
     new_panels,
 )
-from pedestal_analysis.results import tracking
-from pedestal_analysis.results.intervals import row
-from pedestal_analysis.trials import cases, monte_carlo
-from pedestal_common.parameters import as_dict
 from pedestal_studies.rigs import drawing, feedforward_loop, metrics, profiles
 from pedestal_studies.rigs.feedforward_loop import (
     METRIC_UNITS,
@@ -54,6 +53,7 @@ from pedestal_studies.rigs.feedforward_loop import (
     statistics,
 )
 from pedestal_studies.rigs.rows import Result
+from pedestal_workbench.trials import cases, monte_carlo
 
 DEFAULT_RUNS = 50  # runs of each case, with independent noise
 

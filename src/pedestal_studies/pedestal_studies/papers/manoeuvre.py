@@ -10,7 +10,8 @@ import math
 
 import numpy as np
 
-from pedestal_analysis.report.figures import (
+from pedestal_results.intervals import row
+from pedestal_results.report.figures import (
     FILTERED_COLOUR,
     INK_COLOUR,
     MOTOR_1_COLOUR,
@@ -18,10 +19,9 @@ from pedestal_analysis.report.figures import (
     TRUTH_COLOUR,
     new_panels,
 )
-from pedestal_analysis.results.intervals import row
-from pedestal_analysis.trials import monte_carlo
 from pedestal_studies.rigs import drawing, ensemble, feedforward_loop, profiles
 from pedestal_studies.rigs.rows import Result
+from pedestal_workbench.trials import monte_carlo
 
 DEFAULT_RUNS = 200  # runs of the motion; the paper has 50
 BATCH_RUNS, NOISE_SEED = 25, 1  # runs of one batch; seed of their noise

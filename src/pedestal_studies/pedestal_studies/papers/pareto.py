@@ -14,7 +14,8 @@ import math
 
 import numpy as np
 
-from pedestal_analysis.report.figures import (
+from pedestal_results.intervals import row
+from pedestal_results.report.figures import (
     FILTERED_COLOUR,
     INK_COLOUR,
     MOTOR_1_COLOUR,
@@ -23,11 +24,10 @@ from pedestal_analysis.report.figures import (
     TRUTH_COLOUR,
     new_panels,
 )
-from pedestal_analysis.results.intervals import row
-from pedestal_analysis.trials import monte_carlo
 from pedestal_studies.rigs import drawing, feedforward_loop
 from pedestal_studies.rigs.feedforward_loop import Source
 from pedestal_studies.rigs.rows import Result
+from pedestal_workbench.trials import monte_carlo
 
 DEFAULT_RUNS = 50  # runs of each tuning, as many as in the paper
 LOOP_AXIS = 'azimuth'  # axis of all runs

@@ -19,10 +19,8 @@ import math
 
 import numpy as np
 
-from pedestal_analysis.results.intervals import row
-from pedestal_analysis.results.tracking import interval_start_error, rms
-from pedestal_analysis.trials import monte_carlo
-from pedestal_analysis.trials.cases import Case
+from pedestal_results.intervals import row
+from pedestal_results.tracking import interval_start_error, rms
 from pedestal_studies.rigs import phased_array_figures as figures
 from pedestal_studies.rigs.angle_loop import (
     GRID_STEP_S,
@@ -35,6 +33,8 @@ from pedestal_studies.rigs.angle_loop import (
 )
 from pedestal_studies.rigs.metrics import crossings, overshoot_percent, peak
 from pedestal_studies.rigs.rows import Result
+from pedestal_workbench.trials import monte_carlo
+from pedestal_workbench.trials.cases import Case
 from tracking_receiver_sim import receiver
 from tracking_receiver_sim.params import ReceiverParameters
 

@@ -25,7 +25,10 @@ import numpy as np
 from acu_tracker.estimation.filters import axis_filter
 from acu_tracker.estimation.filters.measurement import AxisMeasurement
 from acu_tracker.estimation.params import FilterParameters
-from pedestal_analysis.report.figures import (
+from pedestal_common.compiled import compiled
+from pedestal_results import tracking
+from pedestal_results.intervals import row
+from pedestal_results.report.figures import (
     FILTERED_COLOUR,
     INK_COLOUR,
     MOTOR_2_COLOUR,
@@ -33,13 +36,10 @@ from pedestal_analysis.report.figures import (
     TRUTH_COLOUR,
     new_panels,
 )
-from pedestal_analysis.results import tracking
-from pedestal_analysis.results.intervals import row
-from pedestal_analysis.trials import monte_carlo
-from pedestal_common.compiled import compiled
 from pedestal_studies.rigs import drawing, ensemble, profiles
 from pedestal_studies.rigs.ensemble import MEASUREMENT_PERIOD_S as T
 from pedestal_studies.rigs.rows import Result
+from pedestal_workbench.trials import monte_carlo
 
 DEFAULT_RUNS = 40  # number of flybys
 ANGLE_SIGMA_RAD = math.radians(0.03)  # noise of a measured angle [rad]

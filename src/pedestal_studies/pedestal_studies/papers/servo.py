@@ -18,7 +18,9 @@ import math
 
 import numpy as np
 
-from pedestal_analysis.report.figures import (
+from pedestal_results import tracking
+from pedestal_results.intervals import row
+from pedestal_results.report.figures import (
     FILTERED_COLOUR,
     INK_COLOUR,
     MOTOR_1_COLOUR,
@@ -27,12 +29,10 @@ from pedestal_analysis.report.figures import (
     TRUTH_COLOUR,
     new_panels,
 )
-from pedestal_analysis.results import tracking
-from pedestal_analysis.results.intervals import row
-from pedestal_analysis.trials import cases
-from pedestal_analysis.trials.cases import Case
 from pedestal_studies.rigs import drawing, metrics
 from pedestal_studies.rigs.rows import Result
+from pedestal_workbench.trials import cases
+from pedestal_workbench.trials.cases import Case
 
 STEP_SIZE_RAD = 0.174  # step of figure 5 [rad]
 SINE_AMPLITUDE_RAD = 0.87  # amplitude of figure 6 [rad]

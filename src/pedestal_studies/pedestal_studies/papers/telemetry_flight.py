@@ -26,15 +26,15 @@ import math
 import numpy as np
 
 from acu_tracker.estimation.filters import motion_models
-from pedestal_analysis.report.figures import FILTERED_COLOUR, INK_COLOUR, RAW_COLOUR, new_panels
-from pedestal_analysis.results import tracking
-from pedestal_analysis.results.intervals import row
-from pedestal_analysis.trials import monte_carlo
 from pedestal_common.graph.topics import AXES
+from pedestal_results import tracking
+from pedestal_results.intervals import row
+from pedestal_results.report.figures import FILTERED_COLOUR, INK_COLOUR, RAW_COLOUR, new_panels
 from pedestal_studies.papers.rate_measurement import ALPHA, ANGLE_SIGMA_RAD, differenced_rate, filtered
 from pedestal_studies.rigs import drawing, ensemble
 from pedestal_studies.rigs.ensemble import MEASUREMENT_PERIOD_S
 from pedestal_studies.rigs.rows import Result
+from pedestal_workbench.trials import monte_carlo
 
 DEFAULT_RUNS, NOISE_SEED = 40, 1  # number of flights; seed of their noise
 BATCH_RUNS = 5  # flights that one worker makes at a time

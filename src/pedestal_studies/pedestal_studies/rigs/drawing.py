@@ -1,7 +1,7 @@
 """Figures of the studies: sheets of panels in one style, saved as PNG and, on request, as a vector file."""
 import matplotlib
 
-from pedestal_analysis.report import figures
+from pedestal_results.report import figures
 
 
 def legend(figure):

@@ -26,12 +26,12 @@ from acu_tracker.estimation.filters import axis_filter
 from acu_tracker.estimation.filters.measurement import AxisMeasurement
 from acu_tracker.estimation.params import FilterParameters
 from acu_tracker.servo import feedforward
-from pedestal_analysis.results import tracking
-from pedestal_analysis.trials import monte_carlo
 from pedestal_common.compiled import compiled
+from pedestal_results import tracking
 from pedestal_studies.rigs import ensemble, metrics, profiles
 from pedestal_studies.rigs.ensemble import MEASUREMENT_PERIOD_S as T
 from pedestal_studies.rigs.profiles import S_MOTION_RATE_RAD_S, S_MOTION_STROKE_RAD
+from pedestal_workbench.trials import monte_carlo
 
 MISS_DELAY_STEPS = 4  # delay d of a miss, in T
 MISS_SIGMA_RAD = math.radians(0.02)  # noise of a miss [rad]

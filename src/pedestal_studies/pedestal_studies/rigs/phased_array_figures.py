@@ -4,7 +4,7 @@ S0, S1 and S2 are the kinds of smoothing in the receiver, see SMOOTHING_TITLES.
 """
 import numpy as np
 
-from pedestal_analysis.report.figures import (
+from pedestal_results.report.figures import (
     FILTERED_COLOUR,
     INK_COLOUR,
     MOTOR_1_COLOUR,

@@ -17,11 +17,11 @@ from scipy.stats import beta
 from acu_tracker.modes import Mode
 from acu_tracker.search.params import SearchParameters
 from acu_tracker.search.pattern import PATTERN_SPIRAL, PATTERN_SQUARE, SEARCH_PATTERNS
-from pedestal_analysis.report.figures import FILTERED_COLOUR, new_panels
-from pedestal_analysis.results.intervals import CONFIDENCE_LEVEL, row
-from pedestal_analysis.trials import monte_carlo
-from pedestal_analysis.trials.cases import Case
+from pedestal_results.intervals import CONFIDENCE_LEVEL, row
+from pedestal_results.report.figures import FILTERED_COLOUR, new_panels
 from pedestal_studies.rigs.rows import Result
+from pedestal_workbench.trials import monte_carlo
+from pedestal_workbench.trials.cases import Case
 
 DEFAULT_RUNS, FIRST_SEED = 100, 1  # runs of each case; seed of the first run
 BATCH_RUNS = 5  # runs that one worker makes at a time

@@ -1,6 +1,6 @@
 """Frequency response of the current, speed and position loops, measured by multisine on the simulated plant.
 
-A multisine is a sum of sines of many frequencies. With it pedestal_analysis/tuning/frequency_response.py measures the
+A multisine is a sum of sines of many frequencies. With it pedestal_workbench/tuning/frequency_response.py measures the
 open loop L. The dashed line of a figure is the open loop for which the gains were designed. Sampling, delay and
 elasticity cause the difference between the design and the measurement. The open loops of the design are
 
@@ -17,7 +17,9 @@ import numpy as np
 
 from acu_tracker.params import AcuParameters
 from adu_drive.params import AduParameters
-from pedestal_analysis.report.figures import (
+from pedestal_common.graph.topics import AXES
+from pedestal_results.intervals import row
+from pedestal_results.report.figures import (
     FILTERED_COLOUR,
     INK_COLOUR,
     MOTOR_1_COLOUR,
@@ -26,12 +28,10 @@ from pedestal_analysis.report.figures import (
     TRUTH_COLOUR,
     new_panels,
 )
-from pedestal_analysis.results.intervals import row
-from pedestal_analysis.tuning import frequency_response as frequency
-from pedestal_common.graph.topics import AXES
 from pedestal_studies.papers import servo
 from pedestal_studies.rigs import drawing
 from pedestal_studies.rigs.rows import Result
+from pedestal_workbench.tuning import frequency_response as frequency
 
 
 def controller(name):

@@ -17,15 +17,15 @@ import typing
 
 import numpy as np
 
-from pedestal_analysis.report.figures import new_panels
-from pedestal_analysis.results import tracking
-from pedestal_analysis.results.intervals import pseudo_values, row
-from pedestal_analysis.trials import monte_carlo
 from pedestal_bringup.loop import closed_loop
 from pedestal_bringup.scenario import scenario
 from pedestal_common.graph import topics
 from pedestal_common.parameters import defaults
+from pedestal_results import tracking
+from pedestal_results.intervals import pseudo_values, row
+from pedestal_results.report.figures import new_panels
 from pedestal_studies.rigs.rows import Result
+from pedestal_workbench.trials import monte_carlo
 
 SCENARIO_NAME = 'station_real'  # scenario of all runs, in which all terms are on
 DEFAULT_RUNS, FIRST_SEED = 30, 1  # runs of the random terms; seed of the first run

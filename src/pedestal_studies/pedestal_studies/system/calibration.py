@@ -23,16 +23,16 @@ import math
 
 import numpy as np
 
-from pedestal_analysis.calibration import collect, pointing, predicted, scan
-from pedestal_analysis.calibration.terms import DEFAULT_TERMS
-from pedestal_analysis.report.figures import new_panels
-from pedestal_analysis.results.intervals import row
-from pedestal_analysis.results.tracking import rms
-from pedestal_analysis.trials import monte_carlo
 from pedestal_bringup.loop import closed_loop, memory_recording
 from pedestal_bringup.scenario import scenario
 from pedestal_bringup.scenario.program import Plan
+from pedestal_results.intervals import row
+from pedestal_results.report.figures import new_panels
+from pedestal_results.tracking import rms
 from pedestal_studies.rigs.rows import Result
+from pedestal_workbench.calibration import collect, pointing, predicted, scan
+from pedestal_workbench.calibration.terms import DEFAULT_TERMS
+from pedestal_workbench.trials import monte_carlo
 
 SCENARIO_NAME, SCAN_SCENARIO_NAME = 'station_new', 'station_sun'  # scenario of the passes, and of the scans of the sun
 DEFAULT_RUNS, FIRST_SEED = 30, 1  # number of runs; seed of the first run

@@ -1,7 +1,7 @@
 """Consistency of the default target filter, second by second after its start.
 
 NEES is the squared error of angle and rate over the covariance that the filter states, against the direction that
-sensors without noise would measure (`pedestal_analysis.results.consistency`). A consistent filter has 2. A larger
+sensors without noise would measure (`pedestal_results.consistency`). A consistent filter has 2. A larger
 value means that the filter is too sure. Cases are scenarios; a metric nees_AXIS_T_s is the mean of one second about
 T [s] after the first estimate of the filter.
 """
@@ -9,15 +9,15 @@ import functools
 
 import numpy as np
 
-from pedestal_analysis.report.figures import FILTERED_COLOUR, TRUTH_COLOUR, new_panels
-from pedestal_analysis.results import consistency, tracking
-from pedestal_analysis.results.intervals import row
-from pedestal_analysis.trials import monte_carlo
-from pedestal_analysis.trials.cases import Case
 from pedestal_bringup.loop import memory_recording
 from pedestal_common.graph.topics import AXES
+from pedestal_results import consistency, tracking
+from pedestal_results.intervals import row
+from pedestal_results.report.figures import FILTERED_COLOUR, TRUTH_COLOUR, new_panels
 from pedestal_studies.rigs import drawing
 from pedestal_studies.rigs.rows import Result
+from pedestal_workbench.trials import monte_carlo
+from pedestal_workbench.trials.cases import Case
 
 DEFAULT_RUNS, FIRST_SEED = 100, 1  # runs of each case; seed of the first run
 BATCH_RUNS = 5  # runs that one worker makes at a time

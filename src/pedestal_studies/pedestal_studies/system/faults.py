@@ -24,12 +24,12 @@ from scipy.spatial.transform import Rotation
 from acu_tracker.alarms import report
 from acu_tracker.alarms.table import ALARM_NAMES
 from acu_tracker.program.prediction import Predictor
-from pedestal_analysis.report.figures import FILTERED_COLOUR, INK_COLOUR, RAW_COLOUR, new_panels
-from pedestal_analysis.results.intervals import missed, row
 from pedestal_bringup.loop import closed_loop
 from pedestal_bringup.scenario import scenario
 from pedestal_common.graph.modes import MODES
 from pedestal_common.injection import table
+from pedestal_results.intervals import missed, row
+from pedestal_results.report.figures import FILTERED_COLOUR, INK_COLOUR, RAW_COLOUR, new_panels
 from pedestal_studies.rigs.fault_expectations import FAULT_EXPECTATIONS
 from pedestal_studies.rigs.rows import Result
 from tracking_receiver_sim.params import LeoPassParameters

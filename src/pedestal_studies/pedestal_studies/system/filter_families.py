@@ -20,14 +20,14 @@ import math
 import numpy as np
 
 from acu_tracker.estimation.params import FilterParameters
-from pedestal_analysis.report.figures import FILTERED_COLOUR, INK_COLOUR, RAW_COLOUR, new_panels
-from pedestal_analysis.results import tracking
-from pedestal_analysis.results.intervals import row
-from pedestal_analysis.trials import monte_carlo
-from pedestal_analysis.tuning import parameter_search
+from pedestal_results import tracking
+from pedestal_results.intervals import row
+from pedestal_results.report.figures import FILTERED_COLOUR, INK_COLOUR, RAW_COLOUR, new_panels
 from pedestal_studies.rigs import ensemble, profiles, window_filter
 from pedestal_studies.rigs.rows import Result
 from pedestal_studies.system import filters
+from pedestal_workbench.trials import monte_carlo
+from pedestal_workbench.tuning import parameter_search
 
 DEFAULT_RUNS, BATCH_RUNS = 100, 25  # runs of each case; runs that one worker makes at a time
 NOISE = filters.NOISE_CASES[filters.SHOWN_NOISE]  # noise of the measured angle

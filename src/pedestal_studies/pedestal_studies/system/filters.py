@@ -2,7 +2,7 @@
 
 Cases are <profile>/<filter>/<noise>. A profile is a target motion of rigs/profiles.py, whose angle is measured at 100
 Hz. Every filter except UNTUNED_FILTERS is tuned for each profile and noise. The tuning minimises the angle rms over
-TUNING_RUNS records of other seeds (pedestal_analysis/tuning/parameter_search.py).
+TUNING_RUNS records of other seeds (pedestal_workbench/tuning/parameter_search.py).
 
 imm             IMM with its default parameters
 imm-manoeuvre   IMM that expects a manoeuvre at any time
@@ -18,21 +18,15 @@ import numpy as np
 
 from acu_tracker.estimation.filters.kinds import FILTER_KINDS
 from acu_tracker.estimation.params import FilterParameters, UkfParameters
-from pedestal_analysis.report.figures import (
-    FILTERED_COLOUR,
-    INK_COLOUR,
-    RAW_COLOUR,
-    TRUTH_COLOUR,
-    new_panels,
-)
-from pedestal_analysis.report.filter_figures import MODEL_COLOURS
-from pedestal_analysis.results.intervals import row
-from pedestal_analysis.trials import monte_carlo
-from pedestal_analysis.tuning import parameter_search
 from pedestal_common.parameters import build
+from pedestal_results.intervals import row
+from pedestal_results.report.figures import FILTERED_COLOUR, INK_COLOUR, RAW_COLOUR, TRUTH_COLOUR, new_panels
+from pedestal_results.report.filter_figures import MODEL_COLOURS
 from pedestal_studies.rigs import drawing, ensemble, profiles
 from pedestal_studies.rigs.ensemble import Noise
 from pedestal_studies.rigs.rows import Result
+from pedestal_workbench.trials import monte_carlo
+from pedestal_workbench.tuning import parameter_search
 
 DEFAULT_RUNS = 200  # runs of each case
 BATCH_RUNS = 25  # runs that one worker makes at a time

@@ -9,14 +9,14 @@ import math
 
 import numpy as np
 
-from pedestal_analysis.report.figures import FILTERED_COLOUR, INK_COLOUR, RAW_COLOUR, new_panels
-from pedestal_analysis.results import results, tracking
-from pedestal_analysis.results.intervals import row
-from pedestal_analysis.trials import monte_carlo
-from pedestal_analysis.trials.cases import Case
 from pedestal_bringup.loop.memory_recording import MemoryRecording
+from pedestal_results import results, tracking
+from pedestal_results.intervals import row
+from pedestal_results.report.figures import FILTERED_COLOUR, INK_COLOUR, RAW_COLOUR, new_panels
 from pedestal_studies.rigs import drawing
 from pedestal_studies.rigs.rows import Result
+from pedestal_workbench.trials import monte_carlo
+from pedestal_workbench.trials.cases import Case
 
 DEFAULT_RUNS, FIRST_SEED = 40, 1  # runs of each case; seed of the first run
 BATCH_RUNS = 5  # runs that one worker makes at a time
@@ -58,7 +58,7 @@ CASE_METRICS = {
     'ship_overhead': ('loss_s', 'keyhole_loss_predicted_s', 'loss_to_predicted'),
     'ship_align_and_track': (*ALIGNMENT_METRICS, *TRACKING_METRICS), 'uav_flyby': (*TRACKING_METRICS, *NOISE_METRICS),
     'uav_flyby-60m': (*TRACKING_METRICS, *NOISE_METRICS)}
-"""{case: names of its results}, of pedestal_analysis/results/results.py or of `extra_results`."""
+"""{case: names of its results}, of pedestal_results/results.py or of `extra_results`."""
 
 SHIP_CASES = ('ship_pass', 'ship_pass-late', 'ship_pass_ss6')
 """Cases whose pointing is compared with the pointing of leo_pass."""

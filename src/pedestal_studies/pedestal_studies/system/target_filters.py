@@ -18,16 +18,16 @@ import tempfile
 
 import numpy as np
 
-from pedestal_analysis.report.figures import FILTERED_COLOUR, new_panels
-from pedestal_analysis.results import tracking
-from pedestal_analysis.results.intervals import row
-from pedestal_analysis.trials import monte_carlo
-from pedestal_analysis.trials.cases import Case
 from pedestal_bringup.loop import memory_recording
+from pedestal_results import tracking
+from pedestal_results.intervals import row
+from pedestal_results.report.figures import FILTERED_COLOUR, new_panels
 from pedestal_studies.rigs import hard_targets
 from pedestal_studies.rigs.hard_targets import HARD_TARGETS
 from pedestal_studies.rigs.rows import Result
 from pedestal_studies.system.filters import MANOEUVRE_PARAMETERS
+from pedestal_workbench.trials import monte_carlo
+from pedestal_workbench.trials.cases import Case
 
 DEFAULT_RUNS, FIRST_SEED = 30, 1  # runs of each case; seed of the first run
 BATCH_RUNS = 5  # runs that one worker makes at a time

@@ -12,9 +12,8 @@ import sys
 import typing
 from collections.abc import Collection
 
-from pedestal import stop
+from pedestal import console, stop
 from pedestal.verbs import arguments
-from pedestal_analysis import console
 from pedestal_common import parameters
 
 __doc__ += console.exit_codes()
@@ -81,9 +80,9 @@ def main(options: argparse.Namespace) -> int:
         print(line)
     outcome = graph.run(plan, bag, console.progress_of_run(chosen.header.duration), servers)
     # Because these modules import scipy, which takes half a second, the verb loads them after the run.
-    from pedestal_analysis.results import results, tracking, verdict
     from pedestal_recording.bag import read
     from pedestal_recording.verify import verify
+    from pedestal_results import results, tracking, verdict
     if outcome.stopped:
         print(f'pedestal: stopped; the recorded part is in {bag}', file=sys.stderr)
         if not outcome.recorder.get('messages'):

@@ -10,14 +10,14 @@ from pedestal.verbs import arguments
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add file of the rows and the options of a client."""
-    from pedestal_analysis import console
+    from pedestal import console
     console.add_json(parser)
     arguments.add_remote(parser, commands=False)
 
 
 def main(options: argparse.Namespace) -> int:
     """Wait for the state of the control unit and print it. Return the exit code."""
-    from pedestal_analysis import console
+    from pedestal import console
     from pedestal_operator import state
     console.check_json(options.json)
     with arguments.remote(options) as session:

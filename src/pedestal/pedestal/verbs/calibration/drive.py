@@ -13,8 +13,8 @@ keeps its nominal values if the twin fits the recording at least as well with th
 import argparse
 import pathlib
 
+from pedestal import console
 from pedestal.verbs import arguments
-from pedestal_analysis import console
 
 UNUSED_OPTIONS = {'bag': ('plan',), 'plan': ('output', 'report', 'json')}
 """{option: options that have no effect with it}."""
@@ -37,7 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(options: argparse.Namespace) -> int:
     """Plan or identify, write the files and print the result. Return exit code 0, or EXIT_FAILED_RUN."""
-    from pedestal_analysis.calibration.drive import identified
+    from pedestal_workbench.calibration.drive import identified
     for name, unused in UNUSED_OPTIONS.items():
         if getattr(options, name):
             arguments.refuse_unused(options, unused, name)

@@ -13,8 +13,8 @@ A term whose sigma exceeds its value is dropped. The leave-one-out rms is the cr
 import argparse
 import pathlib
 
+from pedestal import console
 from pedestal.verbs import arguments
-from pedestal_analysis import console
 
 UNUSED_OPTIONS = {'offsets': ('scenario', 'points', 'collected'), 'bag': ('scenario',),
                   'plan': ('terms', 'form', 'antenna', 'date', 'report', 'points', 'collected', 'json')}
@@ -50,7 +50,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(options: argparse.Namespace) -> int:
     """Fit or plan, write the files and print the result. Return exit code 0."""
-    from pedestal_analysis.calibration import plan, pointing
+    from pedestal_workbench.calibration import plan, pointing
     source = next(name for name in UNUSED_OPTIONS if getattr(options, name) is not None)
     arguments.refuse_unused(options, UNUSED_OPTIONS[source], source)
     arguments.check_result_files(options, 'collected')

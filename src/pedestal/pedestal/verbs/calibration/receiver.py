@@ -17,8 +17,8 @@ is that of `pedestal simulate receiver --output FILE` with the same scenario and
 import argparse
 import pathlib
 
+from pedestal import console
 from pedestal.verbs import arguments
-from pedestal_analysis import console
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -39,11 +39,11 @@ def main(options: argparse.Namespace) -> int:
     """Calibrate, write the files and print the result. Return exit code 0, or EXIT_FAILED_RUN if not verified."""
     arguments.check_result_files(options)
     if options.iq is not None:
-        from pedestal_analysis.calibration.receiver import iq_phasing
+        from pedestal_workbench.calibration.receiver import iq_phasing
         arguments.check_recording(options)
         printed, content, verified = iq_phasing.main(options, arguments.changes(options))
     else:
-        from pedestal_analysis.calibration.receiver import phasing
+        from pedestal_workbench.calibration.receiver import phasing
         printed, content, verified = phasing.main(*arguments.recording(options), options)
     print('\n'.join(printed))
     console.write_json(options.json, content)

@@ -14,8 +14,8 @@ Y factor, corrected for the size of the source (ITU-R S.733).
 import argparse
 import pathlib
 
+from pedestal import console
 from pedestal.verbs import arguments
-from pedestal_analysis import console
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -36,7 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(options: argparse.Namespace) -> int:
     """Measure, write the files and print the result. Return exit code 0."""
-    from pedestal_analysis.calibration.sensitivity import sensitivity
+    from pedestal_workbench.calibration.sensitivity import sensitivity
     arguments.check_result_files(options)
     printed, content = sensitivity.main(options)
     print('\n'.join(printed))

@@ -2,7 +2,7 @@
 import argparse
 import importlib
 
-from pedestal_analysis import console
+from pedestal import console
 from pedestal_common.quantities import Json
 from pedestal_studies import bench
 

@@ -7,19 +7,19 @@ import argparse
 import pathlib
 import shlex
 
-from pedestal_analysis import console
 from pedestal_common import parameters
+from pedestal_common.parameters import option_of
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the file and the numbers of the data sheet."""
-    from pedestal_analysis.tuning.data_sheet_format import DataSheet
+    from pedestal_workbench.tuning.data_sheet_format import DataSheet
     parser.add_argument('file', type=pathlib.Path, metavar='FILE.yaml', help='new scenario file')
     for name, field in parameters.flatten(DataSheet):
         unit = field.metadata.get('unit')
         allowed = ', '.join(field.metadata.get('options', ()))
         described = f'{field.metadata["doc"]}{f": {allowed}" if allowed else ""}; default: {field.default}'
-        parser.add_argument(console.option_of(name), type=field.type, default=field.default,
+        parser.add_argument(option_of(name), type=field.type, default=field.default,
                             metavar=unit.upper().replace(' ', '') if unit else 'SCENARIO' if allowed else 'RATIO',
                             help=described.replace('%', '%%'))
 
@@ -27,8 +27,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def main(options: argparse.Namespace) -> int:
     """Write the file. Return exit code 0. Raises ValueError for a wrong value, FileExistsError for an
     existing file."""
-    from pedestal_analysis.tuning import antenna_from_data_sheet
-    from pedestal_analysis.tuning.data_sheet_format import DataSheet
+    from pedestal_workbench.tuning import antenna_from_data_sheet
+    from pedestal_workbench.tuning.data_sheet_format import DataSheet
     if options.file.suffix not in ('.yaml', '.yml'):
         raise ValueError(f'{options.file}: must end in .yaml or .yml')
     if options.file.exists():
@@ -37,7 +37,7 @@ def main(options: argparse.Namespace) -> int:
         sheet = DataSheet(**{name: getattr(options, name) for name, _ in parameters.flatten(DataSheet)})
     except parameters.ParameterError as error:
         name, equals, rest = str(error).partition(' = ')
-        raise ValueError(f'{console.option_of(name)}{equals}{rest}') from None
+        raise ValueError(f'{option_of(name)}{equals}{rest}') from None
     content, remarks = antenna_from_data_sheet.new(sheet, options.file.stem, options.command)
     options.file.write_text(content)
     print(*remarks, sep='\n', end='\n' if remarks else '')

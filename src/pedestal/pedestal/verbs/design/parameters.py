@@ -2,7 +2,7 @@
 import argparse
 from collections.abc import Mapping
 
-from pedestal_analysis import console
+from pedestal import console
 from pedestal_common.quantities import Json
 
 

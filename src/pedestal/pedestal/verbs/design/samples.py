@@ -5,7 +5,7 @@ Writes flight.csv, ship.csv, iss.tle and my_antenna.yaml. If one of these files 
 import argparse
 import pathlib
 
-from pedestal_analysis import console
+from pedestal import console
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -1,7 +1,7 @@
 """list the scenarios that come with this package"""
 import argparse
 
-from pedestal_analysis import console
+from pedestal import console
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

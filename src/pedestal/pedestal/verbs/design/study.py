@@ -12,8 +12,8 @@ import types
 import typing
 from collections.abc import Callable
 
+from pedestal import console
 from pedestal.verbs import arguments
-from pedestal_analysis import console
 from pedestal_common.parameters import did_you_mean
 
 if typing.TYPE_CHECKING:
@@ -51,7 +51,7 @@ def main(options: argparse.Namespace) -> int:
         print(f'pedestal: error: unknown study {options.name!r};{guess} there are '
               f'{", ".join(pedestal_studies.STUDY_NAMES)}', file=sys.stderr)
         return console.EXIT_WRONG_COMMAND
-    from pedestal_analysis.results import intervals
+    from pedestal_results import intervals
     from pedestal_studies.rigs import drawing
     kinds = ['png', options.vector] if options.vector else ['png']
     output = options.output or pathlib.Path('studies', options.name)
@@ -98,6 +98,6 @@ def _many_runs(options: argparse.Namespace, study: types.ModuleType,
         return {}
     if given['runs'] is not None and given['runs'] < 1:
         raise ValueError(f'--runs {options.runs}: must be at least 1')
-    from pedestal_analysis.trials import monte_carlo
+    from pedestal_workbench.trials import monte_carlo
     return {'runs': options.runs or study.DEFAULT_RUNS,
             'pool': stack.enter_context(monte_carlo.Pool(options.workers, options.scheduler))}

@@ -30,13 +30,15 @@ import sys
 import typing
 from collections.abc import Iterable, Sequence
 
+from pedestal import console
 from pedestal.verbs import arguments
-from pedestal_analysis import console
+from pedestal_common.parameters import option_of
 from pedestal_common.quantities import Row
+from pedestal_results import row_text
 
 if typing.TYPE_CHECKING:
-    from pedestal_analysis.trials.plan import Plan
-    from pedestal_analysis.trials.statistics import Requirement
+    from pedestal_workbench.trials.plan import Plan
+    from pedestal_workbench.trials.statistics import Requirement
 
 WORST_TRIAL_COUNT = 10  # number of the worst trials whose commands are printed
 BASE_SIDE = 'base'  # label of the side with the parameters of --param alone, beside labels of --side
@@ -90,14 +92,13 @@ def _check_together(options: argparse.Namespace) -> None:
         raise ValueError(f'--{"solve" if options.solve else "until"}: needs --{"until" if options.solve else "solve"}')
     for name in ('side', 'against', 'against_param', 'require', 'by'):
         if options.solve and getattr(options, name):
-            raise ValueError(f'{console.option_of(name)}: has no effect with --solve')
+            raise ValueError(f'{option_of(name)}: has no effect with --solve')
 
 
 def _compare(options: argparse.Namespace) -> int:
     """Run the trials of all sides. Return exit code 0."""
-    from pedestal_analysis.report import trials_page
-    from pedestal_analysis.results import results
-    from pedestal_analysis.trials import comparison, ensemble, monte_carlo, statistics
+    from pedestal_results import results
+    from pedestal_workbench.trials import comparison, ensemble, monte_carlo, statistics, trials_page
     plans, labels, files = _sides(options)
     known = _result_names(plans[0])
     required = [statistics.requirement(text, known) for text in options.require]
@@ -152,7 +153,7 @@ def _compare(options: argparse.Namespace) -> int:
     print(f'the worst trials by {ranking}:')
     values, whys = tables[0].column(ranking), tables[0].text(statistics.why_column(ranking))
     for i in shown.worst:
-        value = console.number(values[i] if math.isfinite(values[i]) else None)
+        value = row_text.number(values[i] if math.isfinite(values[i]) else None)
         print(f'{value:>10}  {plans[0].command(i)}' + (f'  # {whys[i]}' if whys[i] else ''))
     print(f'table {tables[0].file}, page {file}' + ('' if options.all else '; --all prints all results'))
     console.write_json(options.json, {'name': plans[0].name, 'rows': rows})
@@ -161,8 +162,8 @@ def _compare(options: argparse.Namespace) -> int:
 
 def _solve(options: argparse.Namespace) -> int:
     """Search for the parameter value that --solve and --until define. Return exit code 0."""
-    from pedestal_analysis.trials import monte_carlo, solve
-    from pedestal_analysis.trials.plan import plan
+    from pedestal_workbench.trials import monte_carlo, solve
+    from pedestal_workbench.trials.plan import plan
 
     def make_plan(more: Sequence[str]) -> 'Plan':
         return plan(options.scenario, options.runs or solve.DEFAULT_RUNS, options.vary, (*options.param, *more),
@@ -189,7 +190,7 @@ def _solve(options: argparse.Namespace) -> int:
 
 def _sides(options: argparse.Namespace) -> 'tuple[list[Plan], list[str], list[str]]':
     """Return (Plans, labels, names of the tables) of the trials and of all other sides. Raises ValueError."""
-    from pedestal_analysis.trials.plan import plan
+    from pedestal_workbench.trials.plan import plan
     first = plan(options.scenario, options.runs, options.vary, options.param, options.seed, options.duration,
                  options.sobol, options.params_file)
     plans, labels, files = [first], [BASE_SIDE if options.side else ''], ['trials']
@@ -214,7 +215,7 @@ def _sides(options: argparse.Namespace) -> 'tuple[list[Plan], list[str], list[st
 
 def _result_names(plan: 'Plan') -> list[str]:
     """Return the names of the results of the trials of a Plan, with the names of its beams."""
-    from pedestal_analysis.trials.ensemble import TRIAL_RESULTS
+    from pedestal_workbench.trials.ensemble import TRIAL_RESULTS
     return [f'{prefix}{result}' for prefix in plan.scenario(0).prefixes for result in TRIAL_RESULTS]
 
 
@@ -229,7 +230,7 @@ def _requirement_lines(rows: Iterable[Row], required: 'Iterable[Requirement]') -
                 left_out = ', '.join(f'{number} {word}' for word, number in row['left_out'].items())
                 without = f'; without the result: {left_out}' if left_out else ''
                 found.append(f'{row["case"]}: {one.text} in {count} of {row["runs"]} trials, {row["value"]:.3g} % '
-                             f'({console.interval(row)} %){without}')
+                             f'({row_text.interval(row)} %){without}')
     return found
 
 
@@ -240,5 +241,6 @@ def _sensitivity_lines(rows: Iterable[Row], ranking: str) -> list[str]:
     powers = {f'{ranking}/rank_correlation': 1.0, f'{ranking}/eta_squared': 0.5}
     found = [row for row in rows if row['metric'].partition('(')[0] in powers]
     several = len({row['case'] for row in found}) > 1
-    return [f'{row["case"]}: ' * several + f'{row["metric"]}: {console.number(row["value"])} ({console.interval(row)})'
+    return [f'{row["case"]}: ' * several
+            + f'{row["metric"]}: {row_text.number(row["value"])} ({row_text.interval(row)})'
             for row in sorted(found, key=lambda row: -abs(row['value'])**powers[row['metric'].partition('(')[0]])]

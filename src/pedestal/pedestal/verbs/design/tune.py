@@ -6,8 +6,8 @@ Give exactly one of --filter, --feedforward and --loops. --filter needs a record
 import argparse
 import pathlib
 
+from pedestal import console
 from pedestal.verbs import arguments
-from pedestal_analysis import console
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -42,7 +42,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(options: argparse.Namespace) -> int:
     """Tune, write the parameter file and print the comparison. Return exit code 0."""
-    from pedestal_analysis.tuning import loops, tune
+    from pedestal_workbench.tuning import loops, tune
     with console.progress_of_share() as progress:
         lines = loops.main(options, progress) if options.loops else tune.main(options, options.command, progress)
     print('\n'.join(lines))

@@ -41,7 +41,7 @@ def _tracking_data(options: argparse.Namespace) -> int:
     """Write the tracking data as a tracking data message (TDM). Return exit code 0."""
     import datetime
 
-    from pedestal_analysis.report import tdm
+    from pedestal_results import tdm
     if options.topics:
         raise ValueError('--topics: a tdm is made of fixed topics, the option is for csv and parquet')
     created = datetime.datetime.now(datetime.timezone.utc)

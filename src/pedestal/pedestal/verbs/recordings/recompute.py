@@ -19,8 +19,9 @@ noise, lag), and the noise of the command. The effect of a parameter on the poin
 import argparse
 import pathlib
 
+from pedestal import console
 from pedestal.verbs import arguments
-from pedestal_analysis import console
+from pedestal_common.parameters import option_of
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -62,17 +63,17 @@ def main(options: argparse.Namespace) -> int:
         for name in ('node', 'param', 'params_file', 'pacing', 'absolute', 'relative', 'ignore', 'allow_idle', 'live',
                      'explain', 'output'):
             if getattr(options, name):
-                raise ValueError(f'{console.option_of(name)}: has no effect with --iq')
-        from pedestal_analysis.reprocess import iq
+                raise ValueError(f'{option_of(name)}: has no effect with --iq')
+        from pedestal_workbench.again import iq
         lines, rows, well = iq.main(options)
         print('\n'.join(lines))
         console.write_json(options.json, {'name': 'recompute', 'rows': rows})
         return 0 if well else 1
-    from pedestal_analysis.reprocess import recompute_report
+    from pedestal_workbench.again import recompute_report
     lines, rows, well = recompute_report.main(options)
     print('\n'.join(lines))
     if options.explain:
-        from pedestal_analysis.reprocess import what_if
+        from pedestal_workbench.again import what_if
         console.explain(what_if.COMPARISON_RESULTS, {line.split()[0] for line in lines if line})
     console.write_json(options.json, {'name': 'recompute', 'rows': rows})
     return 0 if well else 1

@@ -39,7 +39,7 @@ def main(options: argparse.Namespace) -> int:
     """Replay and print the outcome. Return exit code 0. Raises KeyboardInterrupt if the replay was stopped."""
     if options.page is not None:
         return _on_the_page(options)
-    from pedestal_analysis.reprocess.replay import ReplayOptions, replay
+    from pedestal_workbench.again.replay import ReplayOptions, replay
     result = replay(options.bag, ReplayOptions(
         options.node, options.topics, None if options.lockstep else options.rate, options.start, options.duration,
         options.paused, DEFAULT_DEADLINE_S if options.deadline is None else options.deadline))
@@ -51,8 +51,8 @@ def main(options: argparse.Namespace) -> int:
 
 def _on_the_page(options: argparse.Namespace) -> int:
     """Show the recording on the operator's page until Ctrl-C. Return exit code 0."""
-    from pedestal_analysis.reprocess import replay, replay_page
     from pedestal_recording import bag
+    from pedestal_workbench.again import replay, replay_page
     if options.node or options.topics or options.lockstep or options.duration is not None or (
             options.deadline is not None):
         raise ValueError('--page: goes only with --start, --rate and --paused; other options are for a replay into a '

@@ -22,7 +22,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(options: argparse.Namespace) -> int:
     """Write the report and print its path. Return exit code 0."""
-    from pedestal_analysis.report import page
+    from pedestal_results.report import page
     if options.vector and not options.png:
         raise ValueError(f'--vector {options.vector}: needs --png DIR, the folder of the figures')
     report = page.write(options.bag, options.output, options.png, options.beam, options.vector, options.author,

@@ -6,8 +6,8 @@ differs.
 import argparse
 import pathlib
 
+from pedestal import console
 from pedestal.verbs import arguments
-from pedestal_analysis import console
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -18,10 +18,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(options: argparse.Namespace) -> int:
     """Repeat the run and print the comparison. Return the exit code, 1 if a message differs."""
-    from pedestal_analysis.reprocess import rerun
     from pedestal_bringup.graph import graph
     from pedestal_bringup.scenario.program import Plan
     from pedestal_recording import bag
+    from pedestal_workbench.again import rerun
     recording = bag.read(options.recording)
     chosen = rerun.scenario_of_recording(recording)
     path = graph.new_bag(options.bag, chosen.name)

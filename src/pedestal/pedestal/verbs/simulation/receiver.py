@@ -5,8 +5,8 @@ in a run of the scenario.
 """
 import argparse
 
+from pedestal import console
 from pedestal.verbs import arguments
-from pedestal_analysis import console
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

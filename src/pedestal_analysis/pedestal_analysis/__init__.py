@@ -1,1 +1,0 @@
-"""Analysis of recordings and scenarios: results, reports, reprocessing, trials, tuning."""

@@ -1,1 +1,0 @@
-"""Results of a recorded run: pointing, consistency of the filter, isolation from the ship, attitude."""

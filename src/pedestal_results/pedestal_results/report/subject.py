@@ -1,0 +1,117 @@
+"""Subject of a recording in words, for the head of its report: target, date, station, changed parameters."""
+import datetime
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from pedestal_common import parameters
+from pedestal_common.geometry import orbit
+from pedestal_common.geometry.geodesy import StationParameters
+from pedestal_common.graph import nodes
+from pedestal_common.quantities import Seconds
+from pedestal_recording.bag import Bag
+from pedestal_results import beam_direction
+from pedestal_results.report.run_data import RunData
+from tracking_receiver_sim.params import TargetParameters
+
+TARGET_DESCRIPTIONS: dict[str, Callable[[TargetParameters], str]] = {
+    'leo_pass': lambda target: (f'satellite {orbit.satellite(target.leo_pass).number}, from its '
+                                f'{"OMM" if target.leo_pass.omm else "TLE"}'),
+    'track_file': lambda target: f'track of the file {target.track_file.path.rpartition("/")[2]}',
+    'flyby': lambda target: (f'straight flight at {target.flyby.speed:g} m/s, {target.flyby.height:g} m above the '
+                             f'station, closest distance over ground {target.flyby.closest_distance:g} m'),
+    'sine': lambda target: f'sine of {target.angle.frequency:g} Hz in azimuth and elevation',
+    'step': lambda target: f'step at {target.angle.start:g} s',
+    'ramp': lambda target: f'constant rate from {target.angle.start:g} s on',
+}
+"""{kind of target: function that returns a description}."""
+
+STATION_TARGET_KINDS = ('leo_pass', 'track_file')  # kinds of target that depend on the position of the station
+
+
+MAX_VALUE_CHARACTERS = 80  # length of a shown parameter value, above which its middle is left out [characters]
+
+
+def date(bag: Bag) -> str:
+    """Return the date of a run as text: its first message in realtime, else the date of the file."""
+    if bag.start and bag.index.size:
+        return f'{_utc(bag.index.log.min() / 1e9)} UTC'
+    written = f'file of {_utc(bag.file.stat().st_mtime)} UTC'
+    return f'{written}; a lockstep recording states no date' if bag.metadata.get('pacing') == 'lockstep' else written
+
+
+def _utc(seconds: Seconds) -> str:
+    """Return a Unix time as UTC text."""
+    return f'{datetime.datetime.fromtimestamp(seconds, datetime.timezone.utc):%Y-%m-%d %H:%M:%S}'
+
+
+def changed_parameters(bag: Bag) -> list[list[str]]:
+    """Return rows [node.parameter, value, default, unit] of the recorded parameters that differ from the defaults."""
+    rows = []
+    for name, values in bag.configuration['parameters'].items():
+        if nodes.plain(name) not in nodes.NODE_NAMES:
+            continue
+        kind = nodes.row(name, bag.beams > 0, bag.servo).parameters_type()
+        defaults, units = parameters.defaults(kind), {key: field.metadata.get('unit', '')
+                                                      for key, field in parameters.flatten(kind)}
+        rows += [[f'{name}.{key}', _shown(value), _shown(defaults[key]), units[key]] for key, value in values.items()
+                 if key in defaults and value != defaults[key]]
+    return rows
+
+
+def _shown(value: object) -> str:
+    """Return a parameter value as text, without the middle of a long text."""
+    text = f'{value:.6g}' if isinstance(value, float) else str(value)
+    half = MAX_VALUE_CHARACTERS // 2
+    return text if len(text) <= MAX_VALUE_CHARACTERS else f'{text[:half]} ... {text[-half:]}'
+
+
+def place(station: StationParameters) -> str:
+    """Return the position of a station as text."""
+    return f'latitude {station.latitude_deg:g}, longitude {station.longitude_deg:g} deg, height {station.height:g} m'
+
+
+def rows(bag: Bag, data: RunData) -> list[list[str]]:
+    """Return rows [name, text] on a bag of one beam and its RunData, as far as the bag states them."""
+    models = [['pointing model', title] for title in beam_direction.titles(bag)]
+    beamwidth = [['beamwidth', f'{math.degrees(data.beamwidth):.4g} deg']] if math.isfinite(data.beamwidth) else []
+    beamwidth = [*models, *beamwidth]
+    values = bag.configuration['parameters'].get('tracking_receiver', {})
+    try:
+        target = parameters.build(TargetParameters, {name.removeprefix('target.'): value for name, value in
+                                                     values.items() if name.startswith('target.')})
+    except parameters.ParameterError:
+        values = {}
+    if not values:
+        return beamwidth
+    station = [['station', place(target.station)]] if target.kind in STATION_TARGET_KINDS else []
+    return [['target', TARGET_DESCRIPTIONS[target.kind](target)], *_sky(bag, data), *station, *beamwidth]
+
+
+def _sky(bag: Bag, data: RunData) -> list[list[str]]:
+    """Return rows [name, text] on the UTC at 0 s and on the highest elevation; [] for a target without a date."""
+    try:
+        begin = orbit.instant('stamp_0_utc', _begin(bag))
+    except orbit.TargetError:
+        return []
+    highest = []
+    if data.run is not None and np.isfinite(data.run.target_earth[:, 1]).any():
+        elevation = data.run.target_earth[:, 1]
+        top = int(np.nanargmax(elevation))
+        when = begin + datetime.timedelta(seconds=float(data.run.t[top]))
+        highest = [['highest', f'{math.degrees(elevation[top]):.1f} deg at {when:%Y-%m-%d %H:%M:%S} UTC, '
+                    f'{data.run.t[top]:.1f} s']]
+    return [['0 s is', f'{begin:%Y-%m-%d %H:%M:%S} UTC'], *highest]
+
+
+def _begin(bag: Bag) -> str:
+    """Return the text of the UTC at 0 s that the receiver states in its diagnostics, '' if it states none."""
+    if 'diagnostics' not in bag.topics or not bag.rows('diagnostics').size:
+        return ''
+    for _, _, _, array in bag.messages('diagnostics'):
+        for status in array.status:
+            for value in status.values:
+                if value.key == 'stamp_0_utc':
+                    return value.value
+    return ''

@@ -1,0 +1,1 @@
+"""Experiments on recordings and scenarios: recompute, rerun and replay, trials, tuning, calibration."""

@@ -1,0 +1,172 @@
+"""Fit of the terms of the pointing model to offsets: weighted least squares on the sky by SVD.
+
+The unknowns x solve A x = b. A row of A is the effect of the terms on one offset (terms.design), divided by the
+standard deviation of this offset; b holds the offsets, divided likewise. The two rows of a point are its
+cross-elevation and its elevation. With the singular values s of A, whose columns are scaled to length 1, U and V:
+
+    x = V (U' b / s)          estimate
+    C = V diag(1 / s^2) V'    covariance, times the variance of the residuals
+    H = U U'                  leverage: the influence of an offset on its own fitted value
+
+The residual of a point against the fit without this point is (I - H_i)^-1 r_i, where H_i is the 2 x 2 block of the
+point in H and r_i its residual. Their rms is the leave-one-out rms, the error to be expected in a new direction.
+"""
+import dataclasses
+import math
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from scipy.special import stdtrit
+
+from pedestal_common.quantities import Degrees, Floats, Ints, Pairs
+from pedestal_results.intervals import CONFIDENCE_LEVEL
+from pedestal_workbench.calibration import terms
+
+SMALLEST_SINGULAR_VALUE = 1e-8
+"""Ratio to the largest singular value below which terms have the same effect at all points [-]."""
+SHARED_PART = 0.1  # part of a term in a direction that the data do not determine, from which the term is named [-]
+STRONG_CORRELATION = 0.95  # correlation of two terms from which their values must not be trusted, only their sum [-]
+OUTLIER_SIGMAS = 4.5
+"""Size of a residual above which a point is an outlier [standard deviations]; 1 of 25 000 points without a fault."""
+MEDIAN_RAYLEIGH = math.sqrt(math.log(4.0))
+"""Median of the length of a vector of two normal numbers [standard deviations]."""
+
+
+class FitError(ValueError):
+    """Error of offsets that do not allow a fit. Its text is one line."""
+
+
+class Solved(NamedTuple):
+    """Singular value decomposition of A, whose columns are scaled to length 1."""
+    U: Floats           # (2 n, p)
+    s: Floats           # (p,)
+    V: Floats           # (p, p), transposed
+    lengths: Floats     # (p,) of the columns of A before
+
+
+@dataclasses.dataclass(frozen=True)
+class Fit:
+    """Fit of p terms to n offsets."""
+    form: str               # `linear`: first order in the terms, as in katpoint; `exact`: the law of the control unit
+    names: tuple[str, ...]  # of the p terms
+    values: Floats          # (p,) of the terms [deg, or - for a factor]
+    covariance: Floats      # (p, p) of the terms, from the noise of the offsets
+    of_dropped: Floats      # (p,) variance by the dropped terms, because their effect goes to the terms that are kept
+    interval: float         # half the width of the confidence interval of a term [standard deviations]
+    condition: float        # ratio of the largest to the smallest singular value, with columns of length 1 [-]
+    residuals: Pairs        # offsets minus model [deg]
+    left_out: Pairs         # the same against the fit without the point
+    scale: float            # standard deviation of the residuals per stated sigma [-], or [deg] without stated sigmas
+
+    @property
+    def sigma(self) -> Floats:
+        """Return the standard deviations (p,) of the terms."""
+        return np.sqrt(np.diag(self.covariance) + self.of_dropped)
+
+    @property
+    def correlation(self) -> Floats:
+        """Return the correlations (p, p) of the terms; 0 where a standard deviation is 0."""
+        sigma = np.sqrt(np.diag(self.covariance))
+        scale = np.outer(sigma, sigma)
+        return np.divide(self.covariance, scale, out=np.eye(len(sigma)), where=scale > 0.0)
+
+    def outliers(self, sigma: Pairs) -> Ints:
+        """Return the places of the points whose left-out residual exceeds OUTLIER_SIGMAS.
+
+        sigma: stated standard deviations [deg]. Their scale is taken from the median of the residuals, because an
+        outlier does not move the median.
+        """
+        size = np.hypot(*(self.left_out / sigma).T)
+        own = np.median(np.hypot(*(self.residuals / sigma).T)) / MEDIAN_RAYLEIGH
+        return np.flatnonzero(size > max(OUTLIER_SIGMAS * own, 1e-9))
+
+    def correlated(self) -> list[tuple[str, str, float]]:
+        """Return both names and the correlation of the pairs with a strong correlation, the strongest first."""
+        matrix = self.correlation
+        pairs = [(self.names[j], self.names[i], float(matrix[i, j]))
+                 for i in range(len(self.names)) for j in range(i) if abs(matrix[i, j]) > STRONG_CORRELATION]
+        return sorted(pairs, key=lambda pair: -abs(pair[2]))
+
+
+def linear(names: Sequence[str], directions: Pairs, values: Pairs, sigma: Pairs) -> Fit:
+    """Return the Fit of terms to offsets `values` at directions with standard deviations sigma, all [deg].
+
+    The model is first order in its terms. Raises FitError if the data cannot tell terms apart.
+    """
+    A = terms.design(names, directions)
+    x, solved = solve(names, A, values, sigma)
+    return fitted('linear', names, x, solved, values - A @ x, sigma)
+
+
+def solve(names: Sequence[str], A: Floats, values: Pairs, sigma: Pairs) -> tuple[Floats, Solved]:
+    """Return (x, Solved) of the weighted least squares. Raises FitError."""
+    rows = (A / sigma[:, :, None]).reshape(-1, len(names))
+    lengths = np.linalg.norm(rows, axis=0)
+    for name, length in zip(names, lengths):
+        if length == 0.0:
+            raise FitError(f'{name}: has no effect at any of the points')
+    U, s, V = np.linalg.svd(rows / lengths, full_matrices=False)
+    unknown = V[s < SMALLEST_SINGULAR_VALUE * s[0]]
+    if len(unknown):
+        shared = [name for name, part in zip(names, np.abs(unknown).max(0)) if part > SHARED_PART]
+        raise FitError(f'the offsets cannot tell these terms apart: {", ".join(shared)}; leave one of them out '
+                       '(--terms), or add points in other directions')
+    b = (values / sigma).reshape(-1)
+    return V.T @ (U.T @ b / s) / lengths, Solved(U, s, V, lengths)
+
+
+def fitted(form: str, names: Sequence[str], x: Floats, solved: Solved, residuals: Pairs, sigma: Pairs) -> Fit:
+    """Return the Fit of the terms x of `solve`; residuals, sigma [deg]."""
+    U, s, V, lengths = solved
+    n, p = len(residuals), len(names)
+    r = residuals / sigma
+    degrees = 2 * n - p
+    scale = math.sqrt(float((r * r).sum()) / degrees)
+    C = (V.T / s**2) @ V / np.outer(lengths, lengths)
+    blocks = U.reshape(n, 2, p)
+    kept = np.eye(2) - blocks @ blocks.transpose(0, 2, 1)
+    if np.linalg.det(kept).min() < SMALLEST_SINGULAR_VALUE:
+        place = int(np.argmin(np.linalg.det(kept)))
+        raise FitError(f'the offset number {place + 1} determines a term alone; add points near it, or correct its '
+                       'sigma if it is far below that of the other offsets')
+    left_out = np.linalg.solve(kept, r[:, :, None])[:, :, 0] * sigma
+    half = float(stdtrit(degrees, 0.5 * (1.0 + CONFIDENCE_LEVEL)))
+    return Fit(form, tuple(names), x, scale**2 * C, np.zeros(p), half, float(s[0] / s[-1]), residuals, left_out, scale)
+
+
+def without_doubtful(names: Sequence[str],
+                     fit: Callable[[Sequence[str]], Fit]) -> tuple[Fit, list[tuple[str, float, float]]]:
+    """Return (Fit, [(name, value, sigma)] of the dropped terms) after each term below its sigma is dropped.
+
+    The terms are dropped one after another, the most doubtful first, because each drop changes the other terms. A
+    dropped term is not 0, but smaller than its sigma. So the variance of a term that is kept is at least its variance
+    in the fit of all terms.
+    """
+    whole = found = fit(names)
+    dropped = []
+    while len(found.names) > 1:
+        doubt = found.sigma / np.maximum(np.abs(found.values), 1e-300)
+        worst = int(np.argmax(doubt))
+        if doubt[worst] <= 1.0:
+            break
+        dropped.append((found.names[worst], float(found.values[worst]), float(found.sigma[worst])))
+        found = fit(tuple(name for name in found.names if name != found.names[worst]))
+    with_all = dict(zip(whole.names, np.diag(whole.covariance)))
+    extra = [max(with_all[name] - own, 0.0) for name, own in zip(found.names, np.diag(found.covariance))]
+    return dataclasses.replace(found, of_dropped=np.array(extra)), dropped
+
+
+def unit_covariance(names: Sequence[str], directions: Pairs) -> Floats:
+    """Return the covariance (p, p) of terms that are fitted to offsets with a standard deviation of 1 deg."""
+    rows = terms.design(names, directions).reshape(-1, len(names))
+    return np.linalg.inv(rows.T @ rows)
+
+
+def model_error(names: Sequence[str], covariance: Floats, directions: Pairs) -> Degrees:
+    """Return the rms error of a model on the sky, of both axes together, over directions [deg].
+
+    covariance (p, p): of its terms.
+    """
+    A = terms.design(names, directions)
+    return math.sqrt(float(np.einsum('nip,pq,niq->', A, covariance, A)) / (2 * len(directions)))

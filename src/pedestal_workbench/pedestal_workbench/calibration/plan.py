@@ -1,0 +1,77 @@
+"""Plan of directions in which pointing offsets are measured: spread over the sky, within the travel of the axes."""
+import argparse
+import math
+
+import numpy as np
+
+from pedestal_bringup.scenario import scenario
+from pedestal_common.graph.topics import AXES
+from pedestal_common.quantities import Degrees, Pairs
+from pedestal_workbench.calibration import distribution, fit, terms
+
+MAX_POINTS = 500  # largest number of directions of a plan
+TRAVEL_RANGE_DEG = (-270.0, 270.0)  # travel of the azimuth axis without a scenario [deg]
+PLAN_ELEVATION_RANGE_DEG = (10.0, 80.0)
+"""Elevations of a plan [deg]. Below, the refraction changes from day to day; above, the azimuth has little effect."""
+EDGE_DEG = 2.0  # distance of the directions from the ends of the travel [deg]
+
+_GOLDEN_RATIO = 0.5 * (1.0 + 5.0**0.5)
+
+
+def directions(count: int, azimuths: tuple[Degrees, Degrees] = TRAVEL_RANGE_DEG,
+               elevations: tuple[Degrees, Degrees] = PLAN_ELEVATION_RANGE_DEG) -> Pairs:
+    """Return encoder directions [deg] in the order of a slew along the azimuth travel.
+
+    azimuths, elevations: travel of the axes. The directions are a lattice of the golden ratio over the azimuth travel
+    and the elevation. A travel of more than a turn is covered as a whole, so a part of the sky is measured in both
+    turns of the wrap. Raises ValueError.
+    """
+    if not distribution.MIN_POINTS <= count <= MAX_POINTS:
+        raise ValueError(f'--plan {count}: must be {distribution.MIN_POINTS} to {MAX_POINTS}')
+    low, high = azimuths[0] + EDGE_DEG, azimuths[1] - EDGE_DEG
+    lowest, highest = (float(np.clip(edge, elevations[0] + EDGE_DEG, elevations[1] - EDGE_DEG))
+                       for edge in PLAN_ELEVATION_RANGE_DEG)
+    if (high - low < 360.0 - distribution.MAX_AZIMUTH_GAP_DEG
+            or highest - lowest < distribution.MIN_ELEVATION_SPAN_DEG):
+        raise ValueError(f'--plan {count}: the travel, azimuth {azimuths[0]:.4g} to {azimuths[1]:.4g} deg and '
+                         f'elevation {elevations[0]:.4g} to {elevations[1]:.4g} deg, is too small for a model')
+    i = np.arange(count)
+    azimuth = low + (high - low) * (i + 0.5) / count
+    elevation = lowest + (highest - lowest) * np.mod((i + 0.5) * _GOLDEN_RATIO, 1.0)
+    return np.column_stack((azimuth, elevation))
+
+
+def noise_gain(planned: Pairs) -> float:
+    """Return the rms error of the default model on the sky, divided by the noise of one offset [-].
+
+    planned: directions of the offsets [deg]. The error is the mean over all azimuths and the elevations of a plan.
+    """
+    az, el = np.meshgrid(np.arange(0.0, 360.0, 10.0), np.linspace(*PLAN_ELEVATION_RANGE_DEG, 15))
+    sky = np.column_stack((az.ravel(), el.ravel()))
+    return fit.model_error(terms.DEFAULT_TERMS, fit.unit_covariance(terms.DEFAULT_TERMS, planned), sky)
+
+
+def travel(name: str) -> tuple[tuple[Degrees, Degrees], tuple[Degrees, Degrees]]:
+    """Return the lowest and highest azimuth and elevation of the drive of a scenario. Raises ValueError."""
+    drive = scenario.load(name).node_parameters('adu')
+    if not hasattr(drive, AXES[0]):
+        raise ValueError(f'--scenario {name}: must have a drive with motors')
+    azimuth, elevation = ((math.degrees(axis.limits.lower), math.degrees(axis.limits.upper))
+                          for axis in (getattr(drive, axis) for axis in AXES))
+    return azimuth, elevation
+
+
+def main(options: argparse.Namespace) -> list[str]:
+    """Plan for the options of the verb, write the file of --output and return the lines to print. Raises ValueError.
+
+    The lines are a CSV table, if no file is written.
+    """
+    limits = travel(options.scenario) if options.scenario else (TRAVEL_RANGE_DEG, (0.0, 90.0))
+    planned = directions(options.plan, *limits)
+    said = (f'{options.plan} directions, azimuth {planned[0, 0]:.1f} to {planned[-1, 0]:.1f} deg of the encoder; with '
+            f'the default terms the error of the model is {noise_gain(planned):.2f} times the noise of one offset')
+    table = ['az_deg,el_deg', *(f'{az:.3f},{el:.3f}' for az, el in planned)]
+    if not options.output:
+        return [f'# {said}', *table]
+    options.output.write_text('\n'.join((f'# {said}', *table)) + '\n')
+    return [said, f'written: {options.output}']

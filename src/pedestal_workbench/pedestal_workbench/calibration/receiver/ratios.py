@@ -1,0 +1,89 @@
+"""Complex ratios of difference and sum at the points of a recording, from the I/Q samples of its run.
+
+The samples go through the unit of the monopulse receiver, as in `pedestal recompute --iq`. In each step the unit
+integrates sum S and differences D. The ratio of a point is
+
+    sum of D conj(S) / (sum of |S|^2 - noise power)
+
+over the integrals of the point. The noise of the channels is independent, so it has no effect on the mean of the
+numerator. The noise power of the unit removes its effect on the denominator.
+"""
+import dataclasses
+
+import numpy as np
+
+from pedestal_common.graph.steps import NS_PER_SECOND
+from pedestal_common.quantities import Complexes, Nanoseconds, Pair, Pairs
+from pedestal_hardware.monopulse import sigmf
+from pedestal_hardware.monopulse.front_end import Status
+from pedestal_hardware.monopulse.params import MonopulseParameters
+from pedestal_hardware.monopulse.unit import MonopulseReceiver
+from pedestal_workbench.again import iq
+from pedestal_workbench.calibration.receiver import offsets
+
+SMALLEST_POWER_OVER_NOISE = 1e-3  # smallest power of the sum of a point, over its noise power, for a ratio [-]
+
+
+@dataclasses.dataclass(frozen=True)
+class Samples:
+    """I/Q samples of the run of a recording."""
+    file: sigmf.Recording
+    parameters: MonopulseParameters     # of the receiver
+    epoch: Nanoseconds      # UTC of time 0 of the recording
+
+
+class _Sums:
+    """Sums over the integrals of a point."""
+
+    def __init__(self) -> None:
+        self.products: Complexes = np.zeros(2, complex)     # of differences and conjugate sum
+        self.power = 0.0        # of the sum
+        self.noise = 0.0        # power of the noise of the sum
+        self.steps = 0
+        self.unlocked = 0       # number of steps without lock
+
+    def put(self, unit: MonopulseReceiver) -> None:
+        """Take the integrals of the last step of a unit."""
+        self.steps += 1
+        if unit.parts['outputs']['status'] != Status.LOCKED:
+            self.unlocked += 1
+            return
+        dumps = unit.memory.dumps
+        self.products += dumps[:, 0].conj() @ dumps[:, 1:]
+        self.power += np.vdot(dumps[:, 0], dumps[:, 0]).real
+        self.noise += len(dumps) * float(unit.parts['constants']['part'] * unit.parts['state']['noise'])
+
+
+def at_points(samples: Samples, spans: Pairs) -> Complexes:
+    """Return the ratios (n, 2) of the points with first and last times spans [s]: D_x / S, D_e / S.
+
+    Raises OffsetError for a point without samples or without lock.
+    """
+    unit = iq.unit_of(samples.parameters)
+    sums = [_Sums() for _ in spans]
+    ends: tuple[Nanoseconds, Nanoseconds] | None = None
+    for block in iq.steps(unit, samples.file, samples.epoch):
+        ends = ends[0] if ends else block.middle, block.middle
+        t = (block.middle - samples.epoch) / NS_PER_SECOND
+        k = int(np.searchsorted(spans[:, 0], t, side='right')) - 1
+        if k >= 0 and t <= spans[k, 1]:
+            sums[k].put(unit)
+    for found, span in zip(sums, spans):
+        _check(found, span, samples, ends)
+    return np.array([found.products / (found.power - found.noise) for found in sums])
+
+
+def _check(found: _Sums, span: Pair, samples: Samples, ends: tuple[Nanoseconds, Nanoseconds] | None) -> None:
+    """Raise OffsetError for the sums of a point without samples or lock. ends: UTC of the first and the last step of
+    the samples, None without a step."""
+    place, expected = f'{span[0]:.1f} to {span[1]:.1f} s', (span[1] - span[0]) / samples.parameters.period
+    if found.steps < (1.0 - offsets.MAX_MISSING_SHARE) * expected:
+        covered = ('holds no whole step' if ends is None else
+                   f'holds samples from {sigmf.text_of(ends[0])} to {sigmf.text_of(ends[1])}')
+        raise offsets.OffsetError(f'samples are missing at {place}: {samples.file.meta} {covered}, and time 0 of the '
+                                  f'recording is {sigmf.text_of(samples.epoch)}; both must be of the same run')
+    if found.unlocked > offsets.MAX_MISSING_SHARE * found.steps:
+        raise offsets.OffsetError(f'receiver not locked at {place}: {found.unlocked} of {found.steps} steps of '
+                                  f'{samples.file.meta} have no lock; each offset needs a locked receiver')
+    if found.power - found.noise < SMALLEST_POWER_OVER_NOISE * found.noise:
+        raise offsets.OffsetError(f'the sum channel of {samples.file.meta} holds only noise at {place}')

@@ -1,0 +1,112 @@
+"""Levels at offsets about a source, from a CSV file or from a recording.
+
+A file has the columns cross_elevation_deg, elevation_deg and level_db; or az_deg, el_deg and level_db, of which az_deg
+is an offset in azimuth. Its level is the total power, of source and system noise, in dB.
+
+In a recording the commands `offset` of the control unit move the antenna about the table that it follows. The level of
+the receiver is a C/N0 in dB-Hz: the power of the source alone over the noise power in 1 Hz.
+"""
+import csv
+import dataclasses
+import itertools
+import math
+import pathlib
+
+import numpy as np
+
+from pedestal_common.quantities import Degrees, Floats, Hertz, Pairs
+from pedestal_common.text_files import columns, csv_table
+from pedestal_recording.recording import Recording
+from pedestal_results import tracking
+from pedestal_workbench.calibration import scan
+
+OFFSET_RANGE_DEG, LEVEL_RANGE_DB = (-30.0, 30.0), (-300.0, 300.0)  # ranges of the offsets and of the levels in a file
+MAX_FOLLOWING_BEAMWIDTHS = 0.1  # largest following error of an antenna at rest [beamwidths]
+_OFFSETS = (columns.Quantity('elevation_deg', {'elevation': '', 'el': ''}, 'deg'),
+            columns.Quantity('cross_elevation_deg', {'cross elevation': '', 'xel': ''}, 'deg'),
+            columns.Quantity('az_deg', {'az': '', 'azimuth': ''}, 'deg'))
+_LEVEL = columns.Quantity('level_db', {'level': ''}, 'db')
+NOISE_KINDS = 'sun', 'moon'  # kinds of simulated targets that are sources of noise
+
+
+class LevelError(ValueError):
+    """Error of levels from which no beam can be computed. Its text is one line."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Levels:
+    """Levels at n offsets."""
+    offsets: Pairs      # cross-elevation and elevation of the beam from the source [deg]
+    power: Floats       # (n,) total power, or of a recording the power of the source over the noise power in 1 Hz [Hz]
+    of_source: bool     # True if the power is that of the source alone
+    errors: Pairs       # of the receiver [deg], NaN where there are none
+    bandwidth: Hertz    # noise bandwidth of the receiver that the recording states, NaN if unknown
+    diameter: Degrees   # of the source, as the recording states it, NaN if unknown
+    source: str         # name of the file or recording
+
+
+def read(path: pathlib.Path, elevation: Degrees | None = None) -> Levels:
+    """Return the levels of a CSV file. Raises TableError and LevelError.
+
+    elevation: of the source, with which an offset in azimuth becomes one in cross-elevation.
+    """
+    try:
+        table = csv_table.Table(path, csv_table.text(path))
+        up = table.column(_OFFSETS[0])
+        in_azimuth = table.column(_OFFSETS[1], required=False) is None
+        across = table.column(_OFFSETS[2 if in_azimuth else 1])
+        level = table.column(_LEVEL)
+        rows = [(table.number(across, row[across.name], *OFFSET_RANGE_DEG),
+                 table.number(up, row[up.name], *OFFSET_RANGE_DEG),
+                 table.number(level, row[level.name], *LEVEL_RANGE_DB)) for row in table]
+    except csv.Error as error:
+        raise csv_table.TableError(f'{path}: not a CSV text file: {error}') from None
+    if not rows:
+        raise LevelError('0 levels, must be at least 1')
+    x, y, level = np.array(rows).T
+    if in_azimuth:
+        if elevation is None:
+            raise LevelError('the offsets are in azimuth; --elevation must state the elevation of the source')
+        x = x * math.cos(math.radians(elevation))
+    elif elevation is not None:
+        raise LevelError('--elevation: has no effect, because the offsets are in cross-elevation')
+    return Levels(np.column_stack((x, y)), 10.0**(0.1 * level), False, np.full((x.size, 2), np.nan), math.nan,
+                  math.nan, str(path))
+
+
+def of_recording(bag: Recording, source: str) -> Levels:
+    """Return the levels of a recording of one beam; source: its name. Raises LevelError."""
+    if 'ship/imu/data' in bag.topics:
+        raise LevelError('the recording is of a ship; its offsets contain the attitude of the deck')
+    missing = [name for name in ('joint_states', 'tracking_receiver/angle_error', 'acu/reference')
+               if name not in bag.topics]
+    if missing:
+        raise LevelError(f'the recording holds no {" and no ".join(missing)}')
+    joints, axes = bag.table('joint_states'), ('azimuth.position', 'elevation.position')
+    t = joints['t']
+    angles = np.column_stack([joints[name] for name in axes])
+    following = tracking.on_grid(bag, t, 'acu/reference', axes) - angles
+    measured = tracking.of_equipment(bag, t, 'tracking_receiver/angle_error', ('x', 'y', 'z'))
+    following[:, 0] *= np.cos(angles[:, 1])     # on the sky, in cross-elevation
+    limit, found = MAX_FOLLOWING_BEAMWIDTHS * tracking.beamwidth(bag), []
+    for dwell in itertools.chain.from_iterable(scan.scans(bag, t, tracking.modes(bag, t))):
+        part = scan.at_rest(dwell)
+        if not (np.abs(following[part]).max() < limit and np.isfinite(measured[part, 2]).any()):
+            continue
+        place = dwell.azimuth * math.cos(np.mean(angles[part, 1])), dwell.elevation
+        off = np.array(place) - following[part].mean(0)
+        known = np.isfinite(measured[part, 0])
+        error = measured[part, :2][known].mean(0) if known.mean() > 0.9 else np.full(2, np.nan)
+        power = np.nanmean(10.0**(0.1 * measured[part, 2]))
+        found.append((*np.degrees(off), power, *np.degrees(error)))
+    if not found:
+        raise LevelError('no command `offset` in a mode that follows a table, with '
+                         f'{scan.MIN_DWELL_S:g} s at rest after it')
+    rows = np.array(found)
+    known = bag.configuration['parameters'].get('tracking_receiver', {})
+    # The level of a carrier has no noise bandwidth.
+    noise = known.get('target.kind') in NOISE_KINDS
+    bandwidth = float(known.get('target.noise_source.bandwidth', math.nan)) if noise else math.nan
+    disk = math.degrees(known.get('target.noise_source.diameter', math.nan)) if noise else 0.0
+    return Levels(rows[:, :2], rows[:, 2], True, rows[:, 3:], bandwidth,
+                  disk if 'target.kind' in known else math.nan, source)

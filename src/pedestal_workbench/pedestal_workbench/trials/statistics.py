@@ -1,0 +1,328 @@
+"""Statistics over trials: percentiles, rates and sensitivities of the results, each with its 95 % interval.
+
+percentile   Percentile of a result. The interval comes from order statistics (scipy.stats.quantile_test), and holds
+             for any distribution of the result.
+rate         Share of the trials for which a statement is true. The interval is that of Clopper and Pearson (Biometrika
+             26 (1934) 404).
+sensitivity  Dependence of a result on a varied parameter. For a parameter with numbers it is Spearman's rank
+             correlation r, from -1 to 1. Its interval is that of Bonett and Wright (Psychometrika 65 (2000) 23), for n
+             trials:
+
+                 tanh(artanh r -+ 1.96 sqrt((1 + r^2 / 2) / (n - 3)))
+
+             A parameter whose values are texts has no order. Its sensitivity is eta squared, from 0 to 1: the share of
+             the variance of the result's ranks that the texts explain (Tomczak, Tomczak, Trends in Sport Sciences 1
+             (2014) 19):
+
+                 (H - k + 1) / (n - k)
+
+             H is the statistic of Kruskal and Wallis, k the number of different texts, n the number of trials. The
+             interval is that of an analysis of variance of the ranks, by its noncentral F distribution (Steiger,
+             Psychological Methods 9 (2004) 164).
+"""
+import collections
+import math
+import re
+from collections.abc import Callable, Iterable
+from typing import NamedTuple
+
+import numpy as np
+from scipy import optimize, stats
+
+from pedestal_common.graph import nodes
+from pedestal_common.parameters import did_you_mean
+from pedestal_common.quantities import Bools, Estimate, Floats, Ints, Json, Row
+from pedestal_results import intervals, results, verdict
+from pedestal_workbench.trials.table import Table
+
+PERCENTILES = (1, 5, 25, 50, 75, 95, 99)  # reported percentiles [%]
+Z = float(stats.norm.ppf(0.5 + 0.5 * intervals.CONFIDENCE_LEVEL))
+"""Standard normal quantile of the two-sided confidence level: 1.96 for 95 % [-]."""
+
+
+WHY = 'why'
+"""Name of the column with the verdict on a trial that did not track, '' for a trial that tracked; one per beam."""
+
+
+class Question(NamedTuple):
+    """A statement that is true or false for each trial.
+
+    A trial without the result has the value NaN, for which `holds` is False.
+    """
+    name: str           # of the statement
+    result: str         # name of the result that decides
+    holds: Callable[[Floats], Bools]    # holds(values of the result (n,)) is True where the statement is true
+    sentence: str       # the statement
+
+
+def _meeting(target: str) -> Callable[[Floats], Bools]:
+    return lambda values: np.array([intervals.meets(value, target) for value in values])
+
+
+TRIAL_QUESTIONS = (
+    Question('locked', 'lock_time_s', np.isfinite, 'The receiver locked.'),
+    Question('tracked', 'evaluated_time_s', lambda time: time > 0.0, 'The run reached settled autotrack.'),
+    Question('never_lost', 'loss_s', lambda loss: loss == 0.0,
+             'After the first evaluated step the target was never further than half a beamwidth off.'),
+    Question('aligned', 'aligned_s', np.isfinite, 'The INS reported `aligned`.'),
+    *(Question(f'{result.name}_met', result.name,
+               _meeting(result.target),
+               f'{result.name} is {result.target}.')
+      for result in results.RESULTS if result.target and result.part not in ('run', 'supervised')),
+)
+
+
+class Requirement(NamedTuple):
+    """Criterion of the user for a result (--require)."""
+    text: str       # the criterion
+    result: str     # name of the result
+    target: str     # for intervals.meets
+
+
+_REQUIRED = re.compile(r'\s*(\S+)\s*(<=|>=|<|>)\s*(\S+)\s*')
+"""Pattern of the text of a Requirement: name of the result, sign, limit."""
+
+
+def check_result(option: str, name: str, known: Iterable[str]) -> None:
+    """Raise ValueError unless a name is in `known`, the names of the results, with or without the name of a beam.
+
+    option: option with its value, for the text of the error.
+    """
+    if name not in known and name not in map(nodes.plain, known):
+        raise ValueError(f'{option}: no trial has a result {name!r};{did_you_mean(name, known)} '
+                         '`pedestal run --all --explain` explains the results')
+
+
+def requirement(text: str, known: Iterable[str]) -> Requirement:
+    """Return the criterion of a text such as 'pointing_max_deg < 0.1'. Raises ValueError.
+
+    known: names of the results.
+    """
+    match = _REQUIRED.fullmatch(text)
+    usage = f"--require {text!r}: must be RESULT < LIMIT, with <, <=, > or >=, such as 'pointing_max_deg < 0.1'"
+    if not match:
+        raise ValueError(usage)
+    name, sign, limit = match.groups()
+    check_result(f'--require {text!r}', name, known)
+    if math.isnan(number(limit)):
+        raise ValueError(usage)
+    return Requirement(f'{name} {sign} {limit}', name, f'{sign} {limit}')
+
+
+def number(text: str) -> float:
+    """Return the number in a text, NaN if the text is no number."""
+    try:
+        return float(text)
+    except ValueError:
+        return math.nan
+
+
+def of_requirements(case: str, table: Table, requirements: Iterable[Requirement]) -> list[Row]:
+    """Return the rows of --json: the rate at which trials meet each of some criteria.
+
+    A trial without the result does not meet its criterion. Each row also has the fields of coverage_fields.
+    """
+    found = []
+    for required in requirements:
+        for name in table.results:
+            own, metric = case_of(case, name)
+            if required.result in (name, metric):
+                values = table.column(name)
+                met = [bool(math.isfinite(value) and intervals.meets(value, required.target)) for value in values]
+                found.append({**intervals.estimated(own, f'require({required.text})/rate', rate(sum(met), len(met)),
+                                                    '%', len(met)),
+                              **coverage_fields(table, name, np.isfinite(values))})
+    return found
+
+
+def percentile(values: Floats, share: float) -> Estimate:
+    """Return a percentile `share` [%] of values (n,), with its 95 % interval.
+
+    An end is NaN if n is too small for it.
+    """
+    interval = stats.quantile_test(values, p=share / 100.0).confidence_interval(intervals.CONFIDENCE_LEVEL)
+    return np.percentile(values, share), interval.low, interval.high
+
+
+def rate(count: int, n: int) -> Estimate:
+    """Return the share [%] of `count` out of n trials, with its 95 % interval."""
+    interval = stats.binomtest(count, n).proportion_ci(intervals.CONFIDENCE_LEVEL, method='exact')
+    return 100.0 * count / n, 100.0 * interval.low, 100.0 * interval.high
+
+
+def rank_correlation(x: Floats, y: Floats) -> Estimate:
+    """Return Spearman's rank correlation r of x and y (n,), with its 95 % interval.
+
+    All are NaN if x or y does not vary; the interval is NaN for n below four.
+    """
+    n = len(x)
+    if n < 2 or not (np.ptp(x) > 0.0 and np.ptp(y) > 0.0):
+        return math.nan, math.nan, math.nan
+    r = float(stats.spearmanr(x, y).statistic)
+    if n < 4:
+        return r, math.nan, math.nan
+    middle, half = math.atanh(min(max(r, -1.0 + 1e-12), 1.0 - 1e-12)), Z * math.sqrt((1.0 + 0.5 * r * r) / (n - 3))
+    return r, math.tanh(middle - half), math.tanh(middle + half)
+
+
+def eta_squared(x: Floats, y: Floats) -> Estimate:
+    """Return eta squared of the ranks of y (n,) over the categories x (n,), with its 95 % interval.
+
+    All are NaN if x or y does not vary, or if each trial has a category of its own; the interval is NaN if the
+    categories explain everything.
+    """
+    n, kinds = len(x), np.unique(x)
+    k = len(kinds)
+    if not 1 < k < n or not np.ptp(y) > 0.0:
+        return math.nan, math.nan, math.nan
+    h = float(stats.kruskal(*(y[x == kind] for kind in kinds)).statistic)
+    share = min(max((h - k + 1) / (n - k), 0.0), 1.0)
+    unexplained = 1.0 - h / (n - 1)
+    if unexplained < 1e-12:
+        return share, math.nan, math.nan
+    f = (1.0 - unexplained) / (k - 1) / (unexplained / (n - k))
+
+    def bound(probability: float) -> float:
+        """Return the eta squared for which the noncentral F distribution is below f with a probability."""
+        def excess(noncentrality: float) -> float:
+            return stats.ncf.cdf(f, k - 1, n - k, noncentrality) - probability
+        high = 1.0
+        if stats.f.cdf(f, k - 1, n - k) < probability:
+            return 0.0
+        while excess(high) > 0.0:
+            high *= 2.0
+        noncentrality = optimize.brentq(excess, 1e-9, high)
+        return noncentrality / (noncentrality + n)
+
+    return share, bound(0.5 + 0.5 * intervals.CONFIDENCE_LEVEL), bound(0.5 - 0.5 * intervals.CONFIDENCE_LEVEL)
+
+
+def unit(name: str) -> str:
+    """Return the unit of a result by its column in a table of trials, such as beam_2/loss_s."""
+    return results.RESULT_BY_NAME[nodes.plain(name)].unit
+
+
+def case_of(case: str, name: str) -> tuple[str, str]:
+    """Return (case, metric) of the rows for a column of a table; the case contains the beam, as in `pedestal run`."""
+    beam, plain = nodes.beam_of(name), nodes.plain(name)
+    return f'{case}/{beam}'.rstrip('/'), plain
+
+
+def coverage_fields(table: Table, name: str, known: Bools) -> dict[str, Json]:
+    """Return the fields `of` and `left_out` of a row of --json, which state how many trials have a result.
+
+    name: column of the result; known: mask (n,) of the trials with the result. `of` is the number of all trials.
+    `left_out` is {first word of the column `why`: number of trials}, for the trials without the result.
+    """
+    words = collections.Counter(why.partition(':')[0] or 'not measured'
+                                for why, is_known in zip(table.text(why_column(name)), known) if not is_known)
+    return {'of': known.size, 'left_out': dict(words.most_common())}
+
+
+def why_column(name: str) -> str:
+    """Return the name of the column WHY for the beam of a column of results."""
+    return f'{nodes.beam_of(name)}/{WHY}'.lstrip('/')
+
+
+def coverage(row: Row) -> str:
+    """Return the text of the number of trials behind a row, such as '23 of 24, 1 tripped'."""
+    if row.get('of', row['runs']) == row['runs']:
+        return str(row['runs'])
+    reasons = [f'{count} {word}' for word, count in row['left_out'].items()]
+    return ', '.join((f'{row["runs"]} of {row["of"]}', *reasons))
+
+
+def failures(table: Table) -> str:
+    """Return one line on the trials that failed, '' for none."""
+    words = [text.partition(':')[0] for name in table.texts for text in table.text(name)]
+    count = collections.Counter(word for word in words if word in verdict.FAILURE_WORDS)
+    listed = ', '.join(f'{number} {word}' for word, number in count.most_common())
+    return f'{sum(count.values())} of {len(words)} runs failed: {listed}; column `{WHY}` of the table' if count else ''
+
+
+def of_results(case: str, table: Table) -> list[Row]:
+    """Return the rows of mean, smallest value, percentiles and largest value of each result.
+
+    Each row also has the fields of coverage_fields.
+    """
+    found = []
+    for name in table.measured_results:
+        values = table.column(name)
+        known = np.isfinite(values)
+        fields = coverage_fields(table, name, known)
+        values = values[known]
+        own, metric = case_of(case, name)
+        if not values.size:
+            continue
+        estimates = {'mean': intervals.interval(values), 'min': (values.min(), math.nan, math.nan),
+                     **{f'p{share:02d}': percentile(values, share) for share in PERCENTILES},
+                     'max': (values.max(), math.nan, math.nan)}
+        found += [{**intervals.estimated(own, f'{metric}/{key}', estimate, unit(name), values.size), **fields}
+                  for key, estimate in estimates.items()]
+    return found
+
+
+def of_questions(case: str, table: Table) -> list[Row]:
+    """Return the rows of the rates of the statements TRIAL_QUESTIONS over all trials.
+
+    A statement is false for a trial without its result.
+    """
+    found = []
+    for name in table.measured_results:
+        own, metric = case_of(case, name)
+        for question in TRIAL_QUESTIONS:
+            if question.result == metric:
+                yes = question.holds(table.column(name))
+                found.append(intervals.estimated(own, f'{question.name}/rate', rate(int(np.sum(yes)), len(yes)), '%',
+                                                 len(yes)))
+    return found
+
+
+def of_sensitivity(case: str, table: Table) -> list[Row]:
+    """Return the rows of the sensitivity of each result to each varied parameter.
+
+    The sensitivity is eta_squared for a parameter of texts, else rank_correlation. A result that does not vary has no
+    row.
+    """
+    found = []
+    varied = {name: (eta_squared if table.categories(name) else rank_correlation, table.column(name))
+              for name in table.varied}
+    for name in table.measured_results:
+        own, metric = case_of(case, name)
+        values = table.column(name)
+        known = np.isfinite(values)
+        for parameter, (measure, given) in varied.items():
+            estimate = measure(given[known], values[known])
+            if math.isfinite(estimate[0]):
+                found.append(intervals.estimated(own, f'{metric}/{measure.__name__}({parameter})', estimate, '',
+                                                 int(known.sum())))
+    return found
+
+
+def larger_is_better(name: str) -> bool:
+    """Return True if a larger value of a result is better, by the sign of its target."""
+    return (results.RESULT_BY_NAME[nodes.plain(name)].target or '').startswith('>')
+
+
+def ranking(name: str, values: Floats) -> Ints:
+    """Return the indices of the values (n,) of a result, from the worst to the best; NaN is the worst."""
+    badness = -values if larger_is_better(name) else values
+    return np.argsort(-np.where(np.isfinite(badness), badness, math.inf), kind='stable')
+
+
+def ranked_by(table: Table, result: str | None = None) -> str:
+    """Return the column of the result that ranks the trials.
+
+    It is the column of `result`, even if all its values are NaN. With None it is the rms pointing error, or, if no
+    trial has measured that, the rms following error in azimuth. Raises ValueError if no trial has the result.
+    """
+    for name in (result,) if result else ('pointing_rms_deg', 'azimuth_following_rms_deg'):
+        for column in table.measured_results:
+            if name in (column, nodes.plain(column)) and (result or np.isfinite(table.column(column)).any()):
+                return column
+    known = table.measured_results
+    if not result:
+        raise ValueError('no trial ever tracked its target or followed a command: try a longer --duration, or choose '
+                         f'a result with --by: {", ".join(known)}')
+    raise ValueError(f'--by {result}: no trial has this result;{did_you_mean(result, known)} must be one '
+                     f'of {", ".join(known)}')

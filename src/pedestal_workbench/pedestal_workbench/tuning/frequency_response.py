@@ -1,0 +1,301 @@
+"""Frequency responses of the current, speed and position loops, measured on the simulated plant.
+
+`pedestal tune --loops` and the study of the loops use this module. A multisine (a sum of sines) is added inside a loop
+while the axis moves at a constant rate. At that rate the friction is constant, and the bias torque keeps the teeth in
+contact. E is the signal after the point of the addition, and -Y is the signal that returns to this point through the
+loop. At the frequencies of the sines the open loop is L = Y / E, and the closed loop is T = L / (1 + L). The method
+needs no model of a controller.
+
+    loop        added to                   period          E                        Y
+    current     current reference i_ref    100 us          i_ref - i_q              i_q
+    speed       rate command               0.5 ms          rate - mean speed / N    mean speed / N
+    position    command of ACU to drive    of the drive    rate to the drive        -(rate commanded by the ACU)
+
+    i_q          motor current that makes the torque [A]
+    rate         rate command after the addition [rad/s]
+    mean speed   mean speed of both motors from their encoders [rad/s]; N: gear ratio
+
+In a run, a period of the current loop has two steps of the simulated plant. With two steps, the swing of the motors in
+their meshes is damped too well. The margins of the speed loop are then up to 0.9 dB and 3 deg too good. Because of
+this error, the current and the speed loop are measured with SUB_STEP_COUNT steps.
+"""
+import dataclasses
+import math
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from typing import TypeAlias
+
+import numpy as np
+
+from adu_drive import axis, drive_unit
+from adu_drive.params import SPEED_LOOP_PERIOD_S, AduParameters, AxisParameters
+from pedestal_bringup.loop import closed_loop
+from pedestal_common.compiled import compiled
+from pedestal_common.graph.topics import AXES
+from pedestal_common.quantities import (
+    AnyRecord,
+    Complexes,
+    Floats,
+    Hertz,
+    Ints,
+    Json,
+    Pairs,
+    RadiansPerSecond,
+    Seconds,
+)
+from pedestal_workbench.trials.cases import Case
+
+MOTOR_FIELDS = ('motor_1', 'motor_2')  # names of both motors in the state of an axis
+SWEEP_START_ANGLES_RAD = (-2.0, 0.15)  # angles of azimuth and elevation at the beginning of a measurement [rad]
+
+SWEEP_RATES_RAD_S = (0.1, 0.03)
+"""Constant rates of azimuth and elevation during a measurement [rad/s].
+
+They are far above the multisine and the Stribeck rate of the friction, and a whole measurement stays inside the
+travel. A slow axis moves at RATE_SHARE of its largest rate. The multisine is at most PEAK_SHARE of the rate.
+"""
+
+RATE_SHARE, PEAK_SHARE = 1.0 / 3.0, 0.5
+"""RATE_SHARE: largest ratio of the rate of a measurement to the largest rate of the axis [-].
+
+PEAK_SHARE: largest ratio of the peak of the multisine to the rate of the measurement [-].
+"""
+
+SUB_STEP_COUNT = 10  # number of plant steps in a current period while the current and the speed loop are measured
+
+
+Margins: TypeAlias = dict[str, tuple[float, str]]  # {metric of a loop: (value, unit)}, see `margins`
+
+
+@dataclasses.dataclass(frozen=True)
+class Sweep:
+    """A multisine: the sum of sines that is added to a loop."""
+    period: Seconds     # time after which the sum repeats; each sine has a whole number of periods in it
+    lowest: Hertz       # lowest frequency
+    highest: Hertz      # highest frequency
+    points: int         # number of frequencies, logarithmically spaced
+    dropped: int        # number of periods for settling
+    kept: int           # number of measured periods
+    peak: float         # largest value of the sum, in the unit of the signal of the loop
+
+    def bins(self) -> Ints:
+        """Return the frequencies as integer multiples of 1 / period [-]."""
+        return np.unique(np.round(np.geomspace(self.lowest, self.highest, self.points) * self.period).astype(int))
+
+    def frequencies(self) -> Floats:
+        """Return the frequencies of the sines [Hz]: `points` of them, fewer if several round to one frequency."""
+        return self.bins() / self.period
+
+    def signal(self, step: Seconds) -> Floats:
+        """Return the whole record (n,) with one value per step.
+
+        All sines have equal amplitudes. The phases of Schroeder (IEEE Trans. Information Theory 16 (1970) 85) keep the
+        peak of the sum low.
+        """
+        n = round(self.period / step)
+        k = np.arange(len(self.bins()))
+        spectrum = np.zeros(n // 2 + 1, complex)
+        spectrum[self.bins()] = np.exp(-1j * math.pi * k * (k + 1) / len(k))
+        one = np.fft.irfft(spectrum, n)
+        return np.tile(self.peak / np.abs(one).max() * one, self.dropped + self.kept)
+
+
+CURRENT_SWEEP = Sweep(period=0.1, lowest=10.0, highest=4000.0, points=60, dropped=5, kept=5, peak=1.5)
+"""Sweep of the current loop; peak in A."""
+
+SPEED_SWEEP = Sweep(period=1.0, lowest=1.0, highest=900.0, points=120, dropped=2, kept=4, peak=0.015)
+"""Sweep of the speed loop; peak in rad/s at the load. It needs 6 Nm of a motor, less than the bias torque."""
+
+FLEXIBLE_SPEED_SWEEP = dataclasses.replace(SPEED_SWEEP, period=8.0, lowest=0.25, points=400, dropped=3, kept=2)
+"""Sweep of the speed loop of an axis with a declared structure, whose resonance is narrow and decays slowly."""
+
+POSITION_SWEEP = Sweep(period=8.0, lowest=0.25, highest=95.0, points=300, dropped=2, kept=3, peak=0.012)
+"""Sweep of the position loop, up to nearly half of its sampling rate 1 / 5 ms; peak in rad/s.
+
+The peak is half of the value at which the teeth lose contact with the bias torque of the paper, 5 Nm.
+"""
+
+
+@dataclasses.dataclass(frozen=True)
+class Response:
+    """Measured frequency response of a loop.
+
+    In a speed loop the lowest frequency of a crossover is that of the structure on a free axis. At the frequency of
+    the structure on locked motors the dish holds the axis. There |L| falls below 1 long before the crossover.
+    """
+    frequency: Floats       # (n,) [Hz]
+    open_loop: Complexes    # (n,) open loop L [-]
+    deviation: Floats       # (n,) standard deviation of L over the measured periods, divided by |L| [-]
+    lowest: Hertz = 0.0     # lowest frequency of a crossover
+
+    @property
+    def closed_loop(self) -> Complexes:
+        """Closed loop T = L / (1 + L) (n,) [-]."""
+        return self.open_loop / (1.0 + self.open_loop)
+
+
+def response(sweep: Sweep, sent: Floats, returned: Floats) -> Response:
+    """Return the response of a loop from the records (n,) of its signals E (`sent`) and Y (`returned`)."""
+    E, Y = (np.fft.rfft(x.reshape(sweep.dropped + sweep.kept, -1)[sweep.dropped:], axis=1)[:, sweep.bins()]
+            for x in (sent, returned))
+    with np.errstate(invalid='ignore'):  # a tripped drive returns no signal
+        L = Y.mean(axis=0) / E.mean(axis=0)
+        return Response(sweep.frequencies(), L, np.std(Y / E / L, axis=0) / math.sqrt(sweep.kept - 1))
+
+
+@compiled
+def _inner_loops(state: AnyRecord, constants: AnyRecord, substeps: int, rate: Floats, current: Floats, speed: Floats,
+                 wanted: Pairs, made: Pairs) -> None:
+    """Run one axis from rest, and fill the records of its signals.
+
+    substeps        number of plant steps in a period of the current loop
+    rate (n,)       rate command in each period of the speed loop [rad/s]
+    current (5 n,)  current that is added to the references i_ref of both motors, in each period of the current loop
+                    [A]
+    speed (n,)      filled: mean speed of the motors, at the load [rad/s]
+    wanted, made    filled: i_ref and i_q of both motors (5 n, 2) [A]
+    """
+    m1, m2, k1, k2 = state.motor_1, state.motor_2, constants.motor_1, constants.motor_2
+    axis.begin_period(state, constants, False)        # brakes off; the windings stay cold
+    for n in range(len(rate)):
+        # feed-forward torque, enable, powered, no brake
+        axis.speed_control(state, constants, rate[n], 0.0, 1, True, True)
+        speed[n] = constants.per_2N * (m1.measured + m2.measured)
+        i_1, i_2 = m1.i_ref, m2.i_ref
+        for k in range(n * axis.CURRENT_LOOP_STEP_COUNT, (n + 1) * axis.CURRENT_LOOP_STEP_COUNT):
+            m1.i_ref, m2.i_ref = i_1 + current[k], i_2 + current[k]
+            wanted[k, 0], wanted[k, 1], made[k, 0], made[k, 1] = m1.i_ref, m2.i_ref, m1.i_q, m2.i_q
+            axis.current_control(m1, k1)
+            axis.current_control(m2, k2)
+            for _ in range(substeps):
+                axis.plant_step(state, constants, 0.0)
+
+
+def _rate(index: int, *largest: RadiansPerSecond) -> RadiansPerSecond:
+    """Return the rate at which the axis `index` of AXES is measured; largest: its rate limits."""
+    return min(SWEEP_RATES_RAD_S[index], RATE_SHARE * min(largest))
+
+
+def _run_inner(drive: AduParameters, index: int, rate: Floats, current: Floats) -> tuple[Floats, Pairs, Pairs]:
+    """Return (speed (n,) [rad/s], i_ref, i_q (5 n, 2) [A]) of the axis `index` of AXES, see _inner_loops.
+
+    rate (n,): rate commands [rad/s]; current (5 n,): added to the current references [A].
+    """
+    drive = dataclasses.replace(drive, initial_azimuth=SWEEP_START_ANGLES_RAD[0],
+                                initial_elevation=SWEEP_START_ANGLES_RAD[1])
+    speed, wanted, made = np.zeros(len(rate)), np.zeros((len(current), 2)), np.zeros((len(current), 2))
+    [state], [constants] = drive_unit.initial_state(drive), drive_unit.constants(drive, SUB_STEP_COUNT)
+    _inner_loops(state[AXES[index]], constants[AXES[index]], constants['substeps'], rate, current, speed, wanted, made)
+    return speed, wanted, made
+
+
+def current(drive: AduParameters, sweep: Sweep = CURRENT_SWEEP) -> dict[str, Response]:
+    """Return {'current/MOTOR': response} of the current loops of both azimuth motors."""
+    added = sweep.signal(axis.CURRENT_LOOP_PERIOD_S)
+    rate = np.full(len(added) // axis.CURRENT_LOOP_STEP_COUNT, _rate(0, drive.azimuth.limits.rate))
+    _, wanted, made = _run_inner(drive, 0, rate, added)
+    return {f'current/{motor}': response(sweep, wanted[:, j] - made[:, j], made[:, j])
+            for j, motor in enumerate(MOTOR_FIELDS)}
+
+
+def speed(drive: AduParameters, sweep: Sweep = SPEED_SWEEP, axes: Iterable[str] = AXES) -> dict[str, Response]:
+    """Return {'speed/AXIS': response} of the speed loops of some axes."""
+    responses = {}
+    for i, name in ((AXES.index(name), name) for name in axes):
+        rate = _rate(i, getattr(drive, name).limits.rate)
+        command = rate + _at_most(sweep, rate).signal(SPEED_LOOP_PERIOD_S)
+        measured, _, _ = _run_inner(drive, i, command, np.zeros(len(command) * axis.CURRENT_LOOP_STEP_COUNT))
+        responses[f'speed/{name}'] = dataclasses.replace(response(sweep, command - measured, measured),
+                                                         lowest=free_frequency(getattr(drive, name)))
+    return responses
+
+
+def free_frequency(axis_parameters: AxisParameters) -> Hertz:
+    """Return the frequency of the structure on a free axis, 0 if no structure is declared."""
+    structure = axis_parameters.structure
+    return structure.frequency / math.sqrt(1.0 - structure.inertia_share) if structure.inertia_share > 0.0 else 0.0
+
+
+def _at_most(sweep: Sweep, *rates: RadiansPerSecond) -> Sweep:
+    """Return a sweep whose peak is limited for axes that move at `rates`."""
+    return dataclasses.replace(sweep, peak=min(sweep.peak, PEAK_SHARE * min(rates)))
+
+
+MOVING_CASE_PARAMETERS = {
+    'acu.tracker.handover': False, 'scenario.program.time_offset': 0.0, 'scenario.program.interval': 1.0,
+    'adu.initial_azimuth': SWEEP_START_ANGLES_RAD[0], 'adu.initial_elevation': SWEEP_START_ANGLES_RAD[1],
+    'tracking_receiver.target.kind': 'ramp',
+    'tracking_receiver.target.angle.azimuth': SWEEP_START_ANGLES_RAD[0],
+    'tracking_receiver.target.angle.elevation': SWEEP_START_ANGLES_RAD[1]}
+"""Changed parameters of a scenario for a program track of constant rates on both axes; `position` sets the rates."""
+
+
+def case(name: str, scenario: str, parameters: Mapping[str, Json]) -> Case:
+    """Return the case for the measurement of position loops: a scenario with changed parameters, at constant rates."""
+    return Case(name, scenario, {**MOVING_CASE_PARAMETERS, **parameters})
+
+
+def _moving(case: Case) -> tuple[Case, list[RadiansPerSecond]]:
+    """Return (case whose target moves at the rates of the measurement, these rates of both axes)."""
+    loaded = case.loaded()
+    drive, acu = (loaded.node_parameters(node) for node in ('adu', 'acu'))
+    rates = [_rate(i, getattr(drive, name).limits.rate, getattr(acu, name).limits.rate,
+                   getattr(acu, name).shaper.rate) for i, name in enumerate(AXES)]
+    moved = {f'tracking_receiver.target.angle.{name}_rate': rate for name, rate in zip(AXES, rates)}
+    return dataclasses.replace(case, parameters={**case.parameters, **moved}), rates
+
+
+def position(case: Case, axes: Collection[str] = AXES, sweep: Sweep = POSITION_SWEEP) -> dict[str, Response]:
+    """Return {'position/AXIS/CASE': response} of the position loops of a case of the function `case`."""
+    case, rates = _moving(case)
+    loaded = dataclasses.replace(case, duration=(sweep.dropped + sweep.kept) * sweep.period).loaded()
+    loop = closed_loop.Loop(loaded)
+    added = np.zeros((loop.steps, 2))
+    added[:-1] = _at_most(sweep, *rates).signal(loop.period_ns * 1e-9)[:, np.newaxis]
+    commanded = loop.run(added)['acu/rate_command']['velocity']
+    return {f'position/{name}/{case.name}': response(sweep, (commanded + added)[:-1, i], -commanded[:-1, i])
+            for i, name in enumerate(AXES) if name in axes}
+
+
+def _crossings(f: Floats, y: Floats, angle: Floats) -> tuple[Floats, Floats]:
+    """Return (frequencies [Hz], angles [rad]) at the zeros of y (n,), both interpolated linearly in log f.
+
+    The angle between two frequencies changes by less than half a turn.
+    """
+    i = np.flatnonzero(y[:-1] * y[1:] <= 0.0)
+    share = y[i] / (y[i] - y[i + 1])
+    change = np.angle(np.exp(1j * (angle[i + 1] - angle[i])))
+    return f[i] * (f[i + 1] / f[i]) ** share, angle[i] + share * change
+
+
+def without_gain_margin(names: Sequence[str]) -> list[str]:
+    """Return a line on the loops of these names, which have no gain margin; no line without a name."""
+    if not names:
+        return []
+    return [f'no gain margin of {", ".join(names)}: the open loop does not reach -180 deg in the measured band, so no '
+            'higher gain makes the loop unstable there']
+
+
+def margins(measured: Response) -> Margins:
+    """Return the metrics of a response; NaN if the measured band has no such frequency.
+
+    crossover_hz       first frequency from `lowest` on at which the open loop |L| falls below 1
+    phase_margin_deg   smallest phase shift, of either sign, that moves a point with |L| = 1 to -1
+    gain_margin_db     smallest gain that moves a point of L to -1
+    bandwidth_hz       first frequency at which the closed loop |T| falls below -3 dB
+    peak_db            largest |T|
+    """
+    f, L, T = measured.frequency, measured.open_loop, np.abs(measured.closed_loop)
+    gain, from_minus_one = np.log(np.abs(L)), np.angle(-L)
+    crossover, margin = _crossings(f, gain, from_minus_one)
+    crossover = crossover[crossover >= measured.lowest]
+    margin = np.abs(np.angle(np.exp(1j * margin)))
+    # Points of L on the negative real axis, by the logarithm of their gain; a gain above 1 (log above 0) is left out.
+    near = np.where(np.abs(from_minus_one) < 0.5 * math.pi, from_minus_one, np.nan)
+    _, at_minus = _crossings(f, near, gain)
+    at_minus = at_minus[at_minus < 0.0]
+    below = _crossings(f, np.log(T) - 0.5 * math.log(0.5), T)[0]
+    return {'bandwidth_hz': (below[0] if below.size else math.nan, 'Hz'),
+            'crossover_hz': (crossover[0] if crossover.size else math.nan, 'Hz'),
+            'gain_margin_db': (-20.0 / math.log(10.0) * at_minus.max() if at_minus.size else math.nan, 'dB'),
+            'phase_margin_deg': (math.degrees(margin.min()) if margin.size else math.nan, 'deg'),
+            'peak_db': (20.0 * math.log10(T.max()), 'dB')}

@@ -1,0 +1,519 @@
+"""`pedestal tune --loops`: design the gains of drive and control unit for the plant of a scenario.
+
+The plant of an axis is its motors, gears and load. Each axis is first designed as a rigid axis. The margins of its
+loops are then measured on the simulated plant, with its gears, lash, friction, structure, delays and sampling
+(frequency_response). A loop without the required margins is made slower until it has them. The design of a rigid axis:
+
+    J = J_m + J_L / (2 N^2)                     inertia that one motor moves, on its shaft [kg m2]
+    J_A = J_L + 2 J_m N^2                       inertia of the whole axis, at the load [kg m2]
+    K_p = w_s J,  K_i = K_p w_s / 5             gains of the speed loop, per motor [Nms/rad], [Nm/rad]
+    w_p = w_s / 8                               gain of the position loop (`feedforward.bandwidth`) [rad/s]
+    a = 3/4 (2 T_max N - T_load) / J_A          acceleration of the shaper [rad/s2]
+    j = 3/4 a w_s                               jerk of the shaper [rad/s3]
+    h0 = 3.5 / w_s                              filter step of the shaper [s]
+    T_b = 0.4 T_r                               bias torque of a motor [Nm]. It is full up to a motor torque of
+                                                0.47 T_r, and zero from 1.5 T_r on.
+
+    J_m, J_L   inertia of one motor, of the load [kg m2]
+    N          gear ratio from motor to load
+    w_s        crossover of the speed loop [rad/s]
+    T_max      torque limit of a motor [Nm]
+    T_r        rated torque of a motor [Nm]
+    T_load     sum of friction, unbalance and mean wind, at the load [Nm]
+
+The feed-forward takes J_A and the friction of the load. A required crossover of the position loop takes the place of
+w_s / 8. A quarter of the torque is a reserve for a heavier load.
+
+A declared structure (`adu.AXIS.structure`, inertia_share above 0) swings with the frequency f [Hz] on locked motors.
+The receiver sees this swing as a motion of the target, and the shaper must not excite it:
+
+    speed loop      J without the share of the dish, because the dish does not follow above f
+    position loop   w_p at most 2 pi f / 3
+    shaper          a bends the structure by a / (2 pi f)^2 [rad]. The bend is at most 0.8 mrad, and at most a tenth of
+                    the beamwidth. a needs at most half of the torque limit, up to which the bias torque keeps the
+                    teeth in contact. j = a f, so that the acceleration rises within one period of the swing and leaves
+                    no swing behind. h0 = 0.8 / f.
+    filter          of the default bank only the models ca whose bandwidth (q / r)^(1/3) is at most 2 pi f / 7, because
+                    a faster model would follow the swing. q: white jerk of the model [rad/s3/sqrt(Hz)], r: root
+                    density of the noise of the receiver [rad/sqrt(Hz)].
+
+Of the two designs the smaller value counts, of h0 the larger. The margins are then measured with the structure in the
+plant. They are measured again with the load inertia changed by 30 % and f by 20 %, within the ranges of these
+parameters. The smallest margins count.
+"""
+import argparse
+import dataclasses
+import math
+import pathlib
+import shlex
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from acu_tracker.estimation.params import FilterParameters, ImmParameters
+from adu_drive.params import SPEED_LOOP_PERIOD_S, AxisParameters
+from pedestal_bringup.scenario import scenario
+from pedestal_common import parameters
+from pedestal_common.graph.topics import AXES
+from pedestal_common.quantities import (
+    DecibelHertz,
+    Decibels,
+    Degrees,
+    Hertz,
+    Json,
+    KilogramMeters2,
+    NewtonMeters,
+    Radians,
+    RadiansPerSecond,
+    RadiansPerSecond2,
+    Seconds,
+)
+from pedestal_common.text_files import parameter_file
+from pedestal_recording import configuration
+from pedestal_workbench.trials.cases import Case
+from pedestal_workbench.tuning import frequency_response as frequency
+from pedestal_workbench.tuning.frequency_response import Margins
+
+DEFAULT_SPEED_CROSSOVER_HZ, CROSSOVER_RATIO = 28.0, 8.0
+"""Default crossover of the speed loop [Hz]; ratio of the crossovers of the speed loop and the position loop [-]."""
+
+TORQUE_SHARE, SHAPER_RATE_SHARE = 0.75, 0.94
+"""Acceleration and rate of the shaper, as shares of the acceleration and rate that the axis can reach [-]."""
+
+MAX_BEND_RAD, BEND_SHARE = 0.8e-3, 0.1
+"""Largest bend of a structure by the acceleration of the shaper [rad]; its largest ratio to the beamwidth [-]."""
+
+CLOSED_TEETH_SHARE = 0.5
+"""Share of the torque limit that the shaper uses on a flexible structure [-].
+
+Above this torque (`bias.out`) no bias torque keeps the teeth in contact.
+"""
+
+MODE_H0, MODE_RATIO, FILTER_RATIO = 0.8, 3.0, 7.0
+"""MODE_H0: h0 of the shaper times the frequency of the structure [-].
+
+MODE_RATIO, FILTER_RATIO: smallest ratios of the frequency of the structure to the crossover of the position loop and
+to the bandwidth of the target filter [-].
+"""
+
+PLANT_CORNERS = tuple((inertia, mode) for inertia in (0.7, 1.3) for mode in (0.8, 1.2))
+"""Factors (of the load inertia, of the frequency of the structure) with which the loops must also have their margins
+[-].
+"""
+
+WORST_SUFFIX = ', worst'
+"""Suffix of the name of a loop in the row of the table with its smallest margins in all PLANT_CORNERS."""
+
+NEAR_SHARE = 0.95  # share of a required crossover from which on a loop counts as fast enough [-]
+
+SLOWDOWN_FACTOR, MAX_SLOWDOWNS = 0.85, 12
+"""Factor of the crossover from one try to the next, slower one [-]; largest number of tried crossovers."""
+
+STILL_AIR_PARAMETERS = {'scenario.ship': False, 'scenario.program.source': 'target', 'acu.initial_mode': 'program',
+                        'adu.initially_enabled': True, 'adu.wind.azimuth': 0.0, 'adu.wind.elevation': 0.0,
+                        'adu.wind.gust.kind': 'none'}
+"""Changed parameters of a scenario for the measurement of a plant: ashore, in still air, on a program track."""
+
+
+class LoopError(ValueError):
+    """Error of loops that cannot be designed, or not be closed with the required margins. Its text is one line."""
+
+
+REQUIREMENT_OPTIONS = {'speed_bandwidth': 'speed', 'position_bandwidth': 'position', 'phase_margin': 'phase_margin',
+                       'gain_margin': 'gain_margin'}
+"""{option of the verb: field of LoopRequirements}."""
+
+
+@dataclasses.dataclass(frozen=True)
+class LoopRequirements:
+    """Required properties of the loops."""
+    speed: Hertz | None = None      # crossover of the speed loop; None: derived from the other loop, or the default
+    position: Hertz | None = None   # crossover of the position loop; None likewise
+    phase_margin: Degrees = 45.0    # smallest phase margin
+    gain_margin: Decibels = 6.0     # smallest gain margin
+
+    def __post_init__(self) -> None:
+        for name, low, high, unit in (('speed', 0.1, 500.0, 'Hz'), ('position', 0.01, 50.0, 'Hz'),
+                                      ('phase_margin', 20.0, 80.0, 'deg'), ('gain_margin', 3.0, 20.0, 'dB')):
+            value = getattr(self, name)
+            if value is not None and not low <= value <= high:
+                raise LoopError(f'{name} = {value:g} {unit}: must be {low:g} to {high:g}')
+
+
+@dataclasses.dataclass(frozen=True)
+class Plant:
+    """Plant of one axis for the design of its loops. Raises LoopError if the motors cannot move the axis."""
+    name: str       # of the axis
+    axis: AxisParameters
+    wind: NewtonMeters = 0.0        # mean wind torque at the load
+    beamwidth: Radians = math.inf   # half-power beamwidth of the antenna
+    noise: float = math.inf         # root density of the receiver's noise on the beam axis [rad/sqrt(Hz)]
+    bank: ImmParameters = FilterParameters().imm    # of the axis's filter
+
+    def __post_init__(self) -> None:
+        if self.acceleration <= 0.0:
+            raise LoopError(f'adu.{self.name}: the motors cannot move the axis: friction, unbalance and wind need '
+                            'more torque than both torque limits')
+
+    @property
+    def motor_inertia(self) -> KilogramMeters2:
+        """Inertia J_m of a motor, the mean of both."""
+        return 0.5 * (self.axis.motor_1.inertia + self.axis.motor_2.inertia)
+
+    @property
+    def ratio(self) -> float:
+        """Gear ratio N from motor to load [-]."""
+        return self.axis.gear_train.ratio
+
+    @property
+    def inertia(self) -> KilogramMeters2:
+        """Inertia J that one motor moves, on its shaft."""
+        return self.motor_inertia + self.axis.load.inertia / (2.0 * self.ratio**2)
+
+    @property
+    def mode(self) -> Hertz:
+        """Frequency f of the structure on locked motors, 0 if no structure is declared."""
+        structure = self.axis.structure
+        return structure.frequency if structure.inertia_share > 0.0 else 0.0
+
+    @property
+    def gear_inertia(self) -> KilogramMeters2:
+        """Inertia J without the share of the dish.
+
+        One motor moves this inertia above the frequency of the structure.
+        """
+        on_gear = (1.0 - self.axis.structure.inertia_share) * self.axis.load.inertia
+        return self.motor_inertia + on_gear / (2.0 * self.ratio**2)
+
+    @property
+    def whole_inertia(self) -> KilogramMeters2:
+        """Inertia J_A of load and motors, at the load."""
+        return 2.0 * self.inertia * self.ratio**2
+
+    @property
+    def acceleration(self) -> RadiansPerSecond2:
+        """Acceleration of the load by both torque limits, less friction, unbalance and wind."""
+        torque = (self.axis.motor_1.torque_limit + self.axis.motor_2.torque_limit) * self.ratio
+        return (torque - self.axis.friction.coulomb - abs(self.axis.load.unbalance) - abs(self.wind)
+                ) / self.whole_inertia
+
+
+def receiver_noise(beamwidth: Radians, slope: float, cn0_dbhz: DecibelHertz) -> float:
+    """Return the root density of the noise of a receiver's error on the beam axis [rad/sqrt(Hz)].
+
+    slope: monopulse slope [-].
+    """
+    return beamwidth / (slope * math.sqrt(2.0 * 10.0**(0.1 * cn0_dbhz)))
+
+
+def filter_gains(plant: Plant) -> dict[str, int]:
+    """Return {key of acu.AXIS: value} of the target filter: the number of models that do not follow the structure."""
+    if not plant.mode:
+        return {}
+    fastest = plant.noise * (2.0 * math.pi * plant.mode / FILTER_RATIO)**3
+    # Because an earlier design may have lowered the number of the scenario, the default number is the largest.
+    noises = plant.bank.ca.noise * plant.bank.rung_ratio**np.arange(ImmParameters().rungs)
+    return {'filter.imm.rungs': max(1, int(np.sum(noises <= fastest)))}
+
+
+def rate_slope(plant: Plant) -> RadiansPerSecond2:
+    """Return the largest slope of the rate command (`limits.acceleration`).
+
+    It is 1.3 times the acceleration of the shaper of a rigid axis.
+    """
+    return 1.3 * TORQUE_SHARE * plant.acceleration
+
+
+def drive_gains(plant: Plant, w_s: RadiansPerSecond) -> dict[str, float]:
+    """Return {key of adu.AXIS: value} of the drive for a crossover w_s of the speed loop."""
+    K_p, rated = w_s * plant.gear_inertia, plant.axis.thermal.rated_torque
+    return {'speed_loop.proportional': K_p, 'speed_loop.integral': K_p * w_s / 5.0,
+            'speed_loop.load_inertia': plant.axis.load.inertia, 'bias.torque': 0.4 * rated, 'bias.hold': 0.47 * rated,
+            'bias.out': 1.5 * rated, 'limits.deceleration': 0.5 * plant.acceleration}
+
+
+def position_crossover(plant: Plant, w_s: RadiansPerSecond) -> RadiansPerSecond:
+    """Return the crossover w_p of the position loop for a crossover w_s of the speed loop."""
+    w_p = w_s / CROSSOVER_RATIO
+    return min(w_p, 2.0 * math.pi * plant.mode / MODE_RATIO) if plant.mode else w_p
+
+
+def shaper_gains(plant: Plant, w_s: RadiansPerSecond) -> dict[str, float]:
+    """Return {key of acu.AXIS.shaper: value} for a crossover w_s of the speed loop."""
+    a, f = TORQUE_SHARE * plant.acceleration, plant.mode
+    if not f:
+        return {'acceleration': a, 'jerk': 0.75 * a * w_s, 'h0': 3.5 / w_s}
+    bend = min(MAX_BEND_RAD, BEND_SHARE * plant.beamwidth)
+    a = min(a, CLOSED_TEETH_SHARE * plant.acceleration, bend * (2.0 * math.pi * f) ** 2)
+    return {'acceleration': a, 'jerk': a * min(0.75 * w_s, f), 'h0': max(3.5 / w_s, MODE_H0 / f)}
+
+
+def control_gains(plant: Plant, w_s: RadiansPerSecond, w_p: RadiansPerSecond) -> dict[str, Json]:
+    """Return {key of acu.AXIS: value} of the control unit; w_s, w_p: crossovers of speed and position loop."""
+    shaper = {f'shaper.{key}': value for key, value in shaper_gains(plant, w_s).items()}
+    return {'controller': 'feedforward', 'feedforward.bandwidth': w_p, 'feedforward.inertia': plant.whole_inertia,
+            'feedforward.friction': plant.axis.friction.coulomb,
+            'shaper.rate': SHAPER_RATE_SHARE * plant.axis.limits.rate, **shaper, **filter_gains(plant),
+            'limits.rate': plant.axis.limits.rate, 'limits.acceleration': rate_slope(plant)}
+
+
+_AXIS_FIELDS = dict(parameters.flatten(AxisParameters))  # {key of adu.AXIS: dataclass field}
+
+
+def _allowed(key: str, value: float) -> float:
+    """Return the value of a parameter of adu.AXIS that is nearest to `value` in the range of the parameter."""
+    allowed = _AXIS_FIELDS[key].metadata
+    return min(max(value, allowed['low']), allowed['high'])
+
+
+def _rounded(gains: Mapping[str, Json]) -> dict[str, Json]:
+    return {key: float(f'{value:.4g}') if isinstance(value, float) else value for key, value in gains.items()}
+
+
+def smallest(every: Sequence[Margins]) -> Margins:
+    """Return the smallest value of each metric in several results; NaN if none has the metric."""
+    return {key: (np.fmin.reduce([margins[key][0] for margins in every]), unit) for key, (_, unit) in every[0].items()}
+
+
+def meets_margins(margins: Margins, required: LoopRequirements) -> bool:
+    """Return True if the margins of a loop meet the requirements.
+
+    A gain margin outside the measured band (NaN) meets its requirement. A loop whose gain is never above 1 has no
+    phase margin (NaN), and does not meet its requirement.
+    """
+    phase, gain = margins['phase_margin_deg'][0], margins['gain_margin_db'][0]
+    return phase >= required.phase_margin and not gain < required.gain_margin
+
+
+class LoopRow(NamedTuple):
+    """A row of the table of the loops."""
+    loop: str
+    axis: str
+    wanted: Hertz       # required crossover or bandwidth
+    margins: Margins
+
+
+class Loops:
+    """The loops of a scenario during their design.
+
+    source      name or path of the scenario
+    overrides   texts 'node.key=value' of changed parameters
+    plants      {axis: its plant}
+    gains       present gains, such as {'adu.azimuth.speed_loop.proportional': value}
+
+    Raises LoopError for a drive without motors.
+    """
+
+    def __init__(self, source: str, overrides: Iterable[str] = ()) -> None:
+        chosen = scenario.load(source, overrides)
+        if chosen.header.beam:
+            raise LoopError(f'scenario {chosen.name}: an electronic beam has no loops to tune')
+        self.source, self.overrides, self.name = source, tuple(overrides), chosen.name
+        drive = chosen.node_parameters('adu')
+        known = chosen.node_parameters('tracking_receiver')
+        noise = receiver_noise(known.antenna.beamwidth, known.antenna.slope, known.receiver.cn0_dbhz)
+        control = chosen.node_parameters('acu')
+        self.plants = {name: Plant(name, getattr(drive, name), getattr(drive.wind, name), known.antenna.beamwidth,
+                                   noise, getattr(control, name).filter.imm) for name in AXES}
+        self.gains: dict[str, Json] = {}
+
+    def set(self, node: str, name: str, gains: Mapping[str, Json]) -> None:
+        """Set gains {key: value} of a node for the axis `name`, rounded to four digits."""
+        self.gains |= {f'{node}.{name}.{key}': value for key, value in _rounded(gains).items()}
+
+    def designed(self, loop: str, name: str) -> RadiansPerSecond:
+        """Return the crossover for which the gains of a loop, speed or position, were designed."""
+        if loop == 'position':
+            return self.gains[f'acu.{name}.feedforward.bandwidth']
+        return self.gains[f'adu.{name}.speed_loop.proportional'] / self.plants[name].gear_inertia
+
+    def _case(self, corner: tuple[float, float] = (1.0, 1.0)) -> Case:
+        """Return the case of a measurement; corner: factors for axes with a structure, see PLANT_CORNERS."""
+        given = dict(text.split('=', 1) for text in self.overrides)
+        changed: dict[str, float] = {}
+        for name, plant in self.plants.items():
+            if plant.mode and corner != (1.0, 1.0):
+                changed |= {f'adu.{name}.load.inertia': _allowed('load.inertia', corner[0] * plant.axis.load.inertia),
+                            f'adu.{name}.structure.frequency': _allowed('structure.frequency', corner[1] * plant.mode)}
+        return frequency.case(self.name, self.source, {**given, **self.gains, **changed, **STILL_AIR_PARAMETERS})
+
+    def _sweep(self, axis: AxisParameters, sweep: frequency.Sweep, period: Seconds) -> frequency.Sweep:
+        """Return a sweep with limited peak and frequency; period: sampling period of the loop.
+
+        To keep the teeth in contact, the torque of the sweep stays below half of the bias torque. The highest
+        frequency stays below half of the sampling rate.
+        """
+        peak = 0.5 * axis.bias.torque / max(axis.speed_loop.proportional * axis.gear_train.ratio, 1e-9)
+        return dataclasses.replace(sweep, peak=min(sweep.peak, peak or sweep.peak),
+                                   highest=min(sweep.highest, 0.475 / period))
+
+    def response(self, loop: str, name: str, corner: tuple[float, float] = (1.0, 1.0)) -> frequency.Response | None:
+        """Return the response of a loop of the axis `name` with the present gains, None if the drive trips.
+
+        loop: 'current', 'speed' or 'position'; corner: factors of the plant, see PLANT_CORNERS. For the current loop
+        it is the response of the motor with the smaller phase margin.
+        """
+        case = self._case(corner)
+        drive = case.loaded().node_parameters('adu')
+        axis = getattr(drive, name)
+        if loop == 'current':
+            # frequency.current measures the azimuth, so this axis takes its place, with the travel of the azimuth.
+            travel = drive.azimuth.limits
+            limits = dataclasses.replace(axis.limits, lower=travel.lower, upper=travel.upper)
+            motors = frequency.current(dataclasses.replace(drive, azimuth=dataclasses.replace(axis, limits=limits)))
+            return min(motors.values(), key=lambda response: frequency.margins(response)['phase_margin_deg'][0])
+        if loop == 'speed':
+            sweep = frequency.FLEXIBLE_SPEED_SWEEP if self.plants[name].mode else frequency.SPEED_SWEEP
+            return frequency.speed(drive, self._sweep(axis, sweep, SPEED_LOOP_PERIOD_S), (name,))[f'speed/{name}']
+        sweep = self._sweep(axis, frequency.POSITION_SWEEP, drive.period)
+        found = frequency.position(case, (name,), sweep)[f'position/{name}/{self.name}']
+        # A tripped drive returns no signal.
+        return found if np.isfinite(found.open_loop).all() and found.open_loop.all() else None
+
+    def measured(self, loop: str, name: str, corner: tuple[float, float] = (1.0, 1.0)) -> Margins | None:
+        """Return the margins of `response`, None if the drive trips."""
+        found = self.response(loop, name, corner)
+        return frequency.margins(found) if found is not None else None
+
+    def close(self, loop: str, name: str, required: LoopRequirements, set_to: Callable[[RadiansPerSecond], None],
+              fastest: RadiansPerSecond) -> tuple[RadiansPerSecond, list[tuple[str, Margins]]]:
+        """Return (w, rows) of the fastest loop that meets the requirements; w: its crossover.
+
+        loop: 'speed' or 'position'; name: axis; set_to: function that sets the gains for a crossover; fastest: first
+        tried crossover.
+        rows: names of the loop and their margins. If a structure is declared, a second row has the smallest margins in
+        all PLANT_CORNERS. Raises LoopError if no tried loop meets the requirements.
+        """
+        for w in fastest * SLOWDOWN_FACTOR**np.arange(MAX_SLOWDOWNS):
+            set_to(w)
+            every: list[Margins] = []
+            for corner in ((1.0, 1.0), *(PLANT_CORNERS if self.plants[name].mode else ())):
+                margins = self.measured(loop, name, corner)
+                if not (margins and meets_margins(margins, required)):
+                    break
+                every.append(margins)
+            else:
+                return w, [(loop, every[0]), (f'{loop}{WORST_SUFFIX}', smallest(every))][:1 + (len(every) > 1)]
+        found = 'the drive trips'
+        if margins:
+            phase, gain = margins['phase_margin_deg'][0], margins['gain_margin_db'][0]
+            found = f'it has {phase:.3g} deg and {gain:.3g} dB'
+        raise LoopError(f'{self.name}, {name}: the {loop} loop cannot be closed with {required.phase_margin:g} deg '
+                        f'and {required.gain_margin:g} dB: at {w / (2.0 * math.pi):.3g} Hz {found}')
+
+
+def design(loops: Loops, axes: Sequence[str], required: LoopRequirements,
+           progress: Callable[[float, str], object]) -> list[LoopRow]:
+    """Design the loops of some axes for the requirements; the gains are then in the loops.
+
+    Return the rows of the table. progress(share of the work that is done, text) is called for each loop. Raises
+    LoopError.
+    """
+    speed_hz = required.speed or CROSSOVER_RATIO * (required.position or DEFAULT_SPEED_CROSSOVER_HZ / CROSSOVER_RATIO)
+    wanted_s = 2.0 * math.pi * speed_hz
+    rows, reached = [], {}
+    for name in AXES:  # both axes are designed first, because both move in a measurement
+        plant = loops.plants[name]
+        loops.set('adu', name, drive_gains(plant, wanted_s))
+        loops.set('acu', name, control_gains(plant, wanted_s, position_crossover(plant, wanted_s)))
+    for i, name in enumerate(axes):
+        plant = loops.plants[name]
+        progress(i / len(axes), f'{name}: current and speed loop')
+        current = plant.axis.current_loop.bandwidth
+        measured = loops.measured('current', name)
+        assert measured is not None     # only a measurement of the position loop runs a drive that can trip
+        rows.append(LoopRow('current', name, current, measured))
+
+        def set_speed(w: RadiansPerSecond, name: str = name, plant: Plant = plant) -> None:
+            loops.set('adu', name, drive_gains(plant, w))
+        reached[name], closed = loops.close('speed', name, required, set_speed, wanted_s)
+        rows += [LoopRow(loop, name, wanted_s / (2.0 * math.pi), margins) for loop, margins in closed]
+    for i, name in enumerate(axes):
+        progress((i + 0.5) / len(axes), f'{name}: position loop')
+        plant, w_s = loops.plants[name], reached[name]
+        w_p = (min(2.0 * math.pi * required.position, wanted_s / CROSSOVER_RATIO) if required.position
+               else position_crossover(plant, w_s))
+
+        def set_position(w: RadiansPerSecond, name: str = name, plant: Plant = plant,
+                         w_s: RadiansPerSecond = w_s) -> None:
+            loops.set('acu', name, control_gains(plant, w_s, w))
+        _, closed = loops.close('position', name, required, set_position, w_p)
+        wanted = required.position or w_p / (2.0 * math.pi)
+        rows += [LoopRow(loop, name, wanted, margins) for loop, margins in closed]
+    return rows
+
+
+def refuse_outside(loops: Loops) -> None:
+    """Raise ScenarioError if a gain is outside its range."""
+    scenario.load(loops.source, [*loops.overrides, *(scenario.override(*gain) for gain in loops.gains.items())])
+
+
+def table(rows: Iterable[LoopRow], required: LoopRequirements) -> list[str]:
+    """Return the table of the loops as lines of text, with measured and required values.
+
+    rows: as of `design`.
+    """
+    width = max(20, *(len(f'{name} {loop}') for loop, name, *_ in rows))
+    lines = [f'{"loop":{width}} {"required":>9} {"crossover":>10} {"bandwidth":>10} {"phase margin":>21} '
+             f'{"gain margin":>20}']
+    for loop, name, wanted, margins in rows:
+        values = {key: value for key, (value, _) in margins.items()}
+        limits = required.phase_margin, required.gain_margin
+        floor = [f'(>= {limit:g})' for limit in limits] if loop != 'current' else ('', '')
+        lines.append(f'{f"{name} {loop}":{width}} {wanted:6.3g} Hz {_text(values["crossover_hz"], "Hz", 10)} '
+                     f'{_text(values["bandwidth_hz"], "Hz", 10)} {_text(values["phase_margin_deg"], "deg", 13)} '
+                     f'{floor[0]:>7} {_text(values["gain_margin_db"], "dB", 12)} {floor[1]:>7}'.rstrip())
+    return lines
+
+
+def _text(value: float, unit: str, width: int) -> str:
+    return f'{f"{value:.3g} {unit}" if math.isfinite(value) else "none":>{width}}'
+
+
+def remarks(loops: Loops, rows: Sequence[LoopRow]) -> list[str]:
+    """Return lines on the rows of `design`: loops that are slower than required, with the reason, and loops without a
+    gain margin."""
+    lines = []
+    for loop, name, wanted, margins in rows:
+        got = margins['crossover_hz'][0]
+        if loop in ('speed', 'position') and got < NEAR_SHARE * wanted:
+            designed = loops.designed(loop, name) / (2.0 * math.pi)
+            speed = loops.designed('speed', name) / (2.0 * math.pi)
+            if designed > NEAR_SHARE * wanted:
+                reason = 'the gains are those of a rigid axis; gears, delays and friction make the loop slower'
+            elif loop == 'position' and designed > NEAR_SHARE * speed / CROSSOVER_RATIO:
+                reason = f'a position loop has at most 1/{CROSSOVER_RATIO:g} of the crossover of the speed loop'
+            else:
+                reason = 'a faster loop does not hold the required margins'
+            lines.append(f'{name} {loop} loop: {wanted:.3g} Hz required, {got:.3g} Hz reached: {reason}')
+    return [*lines, *frequency.without_gain_margin([f'{name} {loop}' for loop, name, _, margins in rows
+                                                    if math.isnan(margins['gain_margin_db'][0])])]
+
+
+def main(options: argparse.Namespace, progress: Callable[[float, str], object]) -> list[str]:
+    """Design the loops for the options of the verb, write the parameter file and return the lines to print.
+
+    progress: function, see `design`. Raises LoopError.
+    """
+    for name in ('filter', 'feedforward', 'runs', 'seed', 'duration'):
+        if not (getattr(options, name) is None or getattr(options, name) is False):
+            raise LoopError(f'--{name}: cannot be combined with --loops, which measures the plant')
+    required = LoopRequirements(**{field: getattr(options, name) for name, field in REQUIREMENT_OPTIONS.items()
+                                   if getattr(options, name) is not None})
+    axes = AXES if options.axis == 'both' else (options.axis,)
+    loops = Loops(options.source, options.param)
+    file = options.output or pathlib.Path(f'{loops.name}-loops.yaml')
+    if file.exists() or not file.parent.is_dir():
+        raise LoopError(f'--output {file}: must be a new file in a directory that exists')
+    rows = design(loops, axes, required, progress)
+    loops.gains = {key: value for key, value in loops.gains.items() if key.split('.')[1] in axes}
+    refuse_outside(loops)
+    lines = [*table(rows, required), *remarks(loops, rows)]
+    made = [f'made by: {options.command}', f'git {configuration.git_revision() or "unknown"}', *lines]
+    sections = {node: {key.removeprefix(f'{node}.'): value for key, value in loops.gains.items()
+                       if key.startswith(f'{node}.')} for node in ('adu', 'acu')}
+    file.write_text(''.join(f'# {line}\n' for line in made) + parameter_file.text(sections))
+    following = shlex.join(('pedestal', 'run', options.source, '--params-file', str(file)))
+    return [*lines, '', *(f'{name:44} {value}' for name, value in loops.gains.items()),
+            f'written: {file}  ({following})']
