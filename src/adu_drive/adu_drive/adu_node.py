@@ -28,11 +28,12 @@ class AduNode(Timekeeper):
         self.saved: state_file.PlantState | None = None
         super().__init__(module)
 
-    def prepare(self, unit: Adu) -> None:
+    def prepare(self, unit: shell.Unprepared) -> None:
         """Compile the laws, then resume the plant state in the state file."""
         super().prepare(unit)
         saved = state_file.read(self.parameters.state_file) if self.parameters.state_file else None
         if saved is not None:
+            assert isinstance(unit, Adu)
             unit.resume(saved)
             self.get_logger().info(f'resumes at azimuth {saved.azimuth:.6f}, elevation {saved.elevation:.6f} rad of '
                                    f'{self.parameters.state_file}')

@@ -9,7 +9,7 @@ import pedestal_common.entry  # noqa: F401
 # isort: split
 import sys
 
-from adu_drive.timekeeper_node import Timekeeper
+from adu_drive.timekeeper_node import Timekeeper, unit_of
 from pedestal_common.node import shell
 from pedestal_common.node.unit import Diagnosis
 
@@ -28,7 +28,7 @@ class BeamSteeringNode(Timekeeper):
                   if key != 'state']
         state = [pair for pair in worst.values if pair[0] == 'state']
         # The message names the command topic of the worst beam.
-        command = port.unit.COMMAND
+        command = unit_of(port).COMMAND
         return Diagnosis(worst.level, worst.message.replace(command, port.named(command)), values + state)
 
 

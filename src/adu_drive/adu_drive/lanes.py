@@ -160,8 +160,7 @@ def _word(context: BaseContext, builder: IRBuilder, pointer: Value, field: types
 
 
 class _Attributes(AttributeTemplate):
-    def generic_resolve(    # type: ignore[override]    # numba declares no method here
-            self, place: Lane | Lanes, attribute: str) -> types.Type | None:
+    def generic_resolve(self, place: Lane | Lanes, attribute: str) -> types.Type | None:
         """Return the type of an attribute; None for a number of all Lanes at once, which has no type."""
         if attribute in place.what.fields:
             member = _member(place, attribute)

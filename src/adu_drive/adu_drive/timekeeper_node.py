@@ -5,15 +5,16 @@ It is the base of `adu_node`, whose unit is one drive, and of `beam_steering_nod
 """
 import time
 from collections.abc import Callable, Mapping
-from typing import TypeAlias
+from typing import Protocol, cast
 
 from rclpy.executors import Executor
 
 from adu_drive.params import RunParameters
 from pedestal_common.graph.steps import NS_PER_SECOND
 from pedestal_common.node import unit_node
-from pedestal_common.node.unit import Diagnosis
+from pedestal_common.node.unit import Diagnosis, Unit
 from pedestal_common.quantities import Nanoseconds
+from pedestal_common.wire.records import Decoded
 
 ACKNOWLEDGE_INTERVAL_STEPS = 1000
 """Number of lockstep steps between two waits for the acknowledgement of all messages by all subscribers.
@@ -27,7 +28,19 @@ MAX_WAIT_S = 0.1
 MIN_RECEIVE_FRACTION = 0.25
 """Smallest share of a period for receiving messages in realtime, also for a drive that is late for its next step."""
 
-Received: TypeAlias = tuple[Nanoseconds, tuple[float, ...] | None]      # stamp and numbers of a message
+
+class DriveUnit(Unit, Protocol):
+    """Unit that a Timekeeper runs: a drive."""
+    COMMAND: str    # topic of its commands
+
+    @property
+    def rests(self) -> bool:
+        """True if the axes stand still without torque."""
+
+
+def unit_of(port: unit_node.Port) -> DriveUnit:
+    """Return the unit of a port of a Timekeeper."""
+    return cast(DriveUnit, port.unit)   # the modules of its subclasses name only drives
 
 
 class Timekeeper(unit_node.UnitNode):
@@ -60,7 +73,7 @@ class Timekeeper(unit_node.UnitNode):
         # {topic: age of its data at the step [s]} of the inputs of all units
         latencies = {port.named(name): latency for port in self.ports
                      for name, latency in port.unit.latencies.items()}
-        self.commands = [port.named(port.unit.COMMAND) for port in self.ports]
+        self.commands = [port.named(unit_of(port).COMMAND) for port in self.ports]
         if self.graph.lockstep:
             self.follow(self.unit.trigger, latencies)
             # The timer calls `start` once, as soon as the executor of the node runs.
@@ -76,7 +89,7 @@ class Timekeeper(unit_node.UnitNode):
         """Reset the numbers of steps, and the newest messages and stamps of commands."""
         self.k, self.made = (-1 if self.graph.lockstep else self.FIRST_STEP - 1), 0
         self.lost_steps = self.missed_steps = self.late_ticks = 0
-        self.newest: dict[str, Received] = {}
+        self.newest: dict[str, Decoded] = {}
         self.command_stamps: dict[str, Nanoseconds] = {}
         self.begun = self.last_step_time = time.monotonic_ns()
 
@@ -101,7 +114,7 @@ class Timekeeper(unit_node.UnitNode):
         assert self.steps
         self.steps.take(self.unit.trigger, 0, (0, ()))
 
-    def answer(self, stamp: Nanoseconds, values: Mapping[str, Received]) -> None:
+    def answer(self, stamp: Nanoseconds, values: Mapping[str, Decoded | None]) -> None:
         """Make the next step of lockstep; called when all nodes have answered the previous step, whose number is
         self.k.
 
@@ -118,7 +131,7 @@ class Timekeeper(unit_node.UnitNode):
         assert self.steps
         self.steps.take(self.unit.trigger, stamp + self.period_ns, (stamp + self.period_ns, ()))
 
-    def _make(self, stamp: Nanoseconds, values: Mapping[str, Received]) -> None:
+    def _make(self, stamp: Nanoseconds, values: Mapping[str, Decoded | None]) -> None:
         """Make the step number self.k with the messages of the previous step.
 
         values: {topic: message}.
@@ -184,9 +197,9 @@ class Timekeeper(unit_node.UnitNode):
         if self.last_step is not None and k >= self.last_step:
             self.finished = True
 
-    def _newest_receiver(self, name: str) -> Callable[[Received, object], None]:
+    def _newest_receiver(self, name: str) -> Callable[[Decoded, object], None]:
         """Return the callback of a topic in realtime, which keeps the newest message."""
-        def take(message: Received, _: object) -> None:
+        def take(message: Decoded, _: object) -> None:
             self.newest[name] = message
             if name in self.commands:
                 self.command_stamps[name] = message[0]
@@ -203,7 +216,7 @@ class Timekeeper(unit_node.UnitNode):
             self.stopping = True
             for port in self.ports:
                 port.unit.request('adu/disable')
-        return not all(port.unit.rests for port in self.ports)
+        return not all(unit_of(port).rests for port in self.ports)
 
     def end(self) -> None:
         """End lockstep after the answers to the last step, with the result of the run.

@@ -358,7 +358,7 @@ class Adu(Simulated):
         return Diagnosis(LEVEL_OK, 'following', values)
 
     @property
-    def urgent(self) -> tuple[int, ...]:
+    def urgent(self) -> tuple[object, ...]:
         """Values whose change is published at once: emergency stop, stale or invalid inputs, faults."""
         outputs, link = self.parts['outputs'], self.parts['link']
         return (outputs['emergency'], link['stale'], link['invalid'], outputs['azimuth']['faults'],

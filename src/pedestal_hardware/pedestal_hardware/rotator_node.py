@@ -11,9 +11,10 @@ import sys
 import time
 from collections.abc import Mapping, Sequence
 
-from adu_drive.timekeeper_node import Received, Timekeeper
+from adu_drive.timekeeper_node import Timekeeper
 from pedestal_common.node import shell
 from pedestal_common.quantities import Nanoseconds
+from pedestal_common.wire.records import Decoded
 from pedestal_hardware.rotator.line import Line
 from pedestal_hardware.rotator.protocols import PROTOCOLS
 from pedestal_hardware.rotator.unit import Rotator
@@ -37,7 +38,7 @@ class RotatorNode(Timekeeper):
         self.line.start()
         super().begin()
 
-    def _make(self, stamp: Nanoseconds, values: Mapping[str, Received]) -> None:
+    def _make(self, stamp: Nanoseconds, values: Mapping[str, Decoded | None]) -> None:
         """Make a step with the newest measurement, and send its set-point."""
         unit, line = self.unit, self.line
         assert line is not None

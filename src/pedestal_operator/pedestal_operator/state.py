@@ -5,13 +5,15 @@ level is '' (normal), 'warn' or 'bad'.
 """
 import math
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from pedestal_common.graph import topics
 from pedestal_common.graph.modes import MODE_ROWS
 from pedestal_common.node.unit import LEVEL_OK
 from pedestal_common.quantities import Json, Message
-from pedestal_operator.antenna import Antenna
+
+if TYPE_CHECKING:   # it imports the compiler, which the command line does not need
+    from pedestal_operator.antenna import Antenna
 
 BUTTON_MODES = tuple(row.name for row in MODE_ROWS if row.button)
 """Modes with a button or a key; `stop` has a separate button, `rate` is the jog, `slave` is for programs."""
@@ -69,7 +71,7 @@ class Shown(NamedTuple):
     level: str = ''     # '' (normal), 'warn' or 'bad'
 
 
-def rows(antenna: Antenna) -> list[Row]:
+def rows(antenna: 'Antenna') -> list[Row]:
     """Return the items of the present state."""
     actual, commanded = antenna.directions('joint_states'), antenna.directions('acu/reference')
     acu = antenna.diagnostics_of('acu')
@@ -85,7 +87,7 @@ def rows(antenna: Antenna) -> list[Row]:
     return found
 
 
-def _receiver(antenna: Antenna) -> tuple[tuple[str, float, str], ...]:
+def _receiver(antenna: 'Antenna') -> tuple[tuple[str, float, str], ...]:
     values: Sequence[float] = (math.nan,) * 3
     if antenna.present('tracking_receiver/angle_error'):
         values = antenna.numbers['tracking_receiver/angle_error']
@@ -94,13 +96,13 @@ def _receiver(antenna: Antenna) -> tuple[tuple[str, float, str], ...]:
             ('elevation_error', math.degrees(elevation), 'deg'), ('level', float(level), 'dB-Hz'))
 
 
-def node_reports(antenna: Antenna) -> list[tuple[str, str]]:
+def node_reports(antenna: 'Antenna') -> list[tuple[str, str]]:
     """Return [(node, text)] of the nodes whose diagnostics are not OK, and of silent nodes."""
     return [(name, 'silent' if not antenna.present(name) else status.message)
             for name, status in antenna.status.items() if not antenna.present(name) or status.level != LEVEL_OK]
 
 
-def header(antenna: Antenna) -> dict[str, Shown]:
+def header(antenna: 'Antenna') -> dict[str, Shown]:
     """Return {item: text} of mode, reason, drive, control, fallback and link.
 
     The mode of a silent control unit is unknown. The reason then states the last mode and its age.
@@ -118,7 +120,7 @@ def header(antenna: Antenna) -> dict[str, Shown]:
             'control': Shown('unknown', 'bad'), 'fallback': Shown('unknown', 'bad'), 'link': link}
 
 
-def _drive(antenna: Antenna, acu: Mapping[str, str]) -> Shown:
+def _drive(antenna: 'Antenna', acu: Mapping[str, str]) -> Shown:
     """Return the state of the drive. acu: diagnostics of the control unit. Their text comes first, because the
     control unit notices a silence of the drive first."""
     text = acu.get('drive') or (antenna.texts.get('adu/state') if antenna.present(antenna.name_of('adu')) else None)
@@ -132,7 +134,7 @@ def _drive(antenna: Antenna, acu: Mapping[str, str]) -> Shown:
     return Shown(text, '' if text == 'enabled' else 'warn')
 
 
-def _link(antenna: Antenna) -> Shown:
+def _link(antenna: 'Antenna') -> Shown:
     """Return the state of the link to the graph: live, or the first silent node."""
     if not antenna.present(antenna.name_of('acu')):
         return Shown('no ACU', 'bad')
@@ -145,12 +147,12 @@ def _link(antenna: Antenna) -> Shown:
     return Shown('live')
 
 
-def is_drive_silent(antenna: Antenna) -> bool:
+def is_drive_silent(antenna: 'Antenna') -> bool:
     """Return True if no angles arrive from the drive, or if the control unit reports its silence."""
     return antenna.diagnostics_of('acu').get('drive') == 'silent' or not antenna.present('joint_states')
 
 
-def axis_states(antenna: Antenna) -> list[Shown]:
+def axis_states(antenna: 'Antenna') -> list[Shown]:
     """Return the state of each axis: silent, limited, near a limit, stopped or moving."""
     acu = antenna.diagnostics_of('acu')
     return [_axis_state(is_drive_silent(antenna), acu.get(f'{axis} limited', ''), acu.get(f'{axis} limit_s', 'inf'),
@@ -167,7 +169,7 @@ def _axis_state(silent: bool, limited: str, limit_s: str, rate: float) -> Shown:
     return Shown('stopped' if abs(rate) < REST_RATE_DEG_S else 'moving')
 
 
-def refusals(antenna: Antenna, holds_control: bool, may_take: bool = False) -> dict[str, str]:
+def refusals(antenna: 'Antenna', holds_control: bool, may_take: bool = False) -> dict[str, str]:
     """Return {command: reason} of the OPERATOR_COMMANDS that the control unit would refuse now.
 
     holds_control: the client has control, or control is free; may_take: a supervisor takes control from others.
@@ -194,7 +196,7 @@ def alarm(status: Message) -> dict[str, Json]:
             'raised_s': float(values.get('raised_s', 'nan'))}
 
 
-def first_alarm(antenna: Antenna) -> dict[str, Json] | None:
+def first_alarm(antenna: 'Antenna') -> dict[str, Json] | None:
     """Return the alarm that the operator must look at first, None without alarms: the first unacknowledged one.
 
     The list on acu/alarms is in the order of priority and has the consequences of alarms after their causes.

@@ -10,7 +10,7 @@ import pedestal_common.entry  # noqa: F401
 import collections
 import sys
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from typing import TypeAlias
 
 from rclpy.qos import HistoryPolicy
@@ -19,6 +19,7 @@ from pedestal_common import parameters
 from pedestal_common.graph import nodes, topics
 from pedestal_common.graph.steps import NS_PER_SECOND, GraphError
 from pedestal_common.node import middleware, shell, subscriptions
+from pedestal_common.node.subscriptions import MessageInfo, Take
 from pedestal_common.node.unit import LEVEL_ERROR, LEVEL_OK, LEVEL_WARN, Diagnosis
 from pedestal_common.quantities import Nanoseconds, Seconds
 from pedestal_common.realtime.publisher_gate import (
@@ -58,9 +59,7 @@ order than that of their arrival.
 MAX_STAMP_DISTANCE_NS = 3600 * NS_PER_SECOND  # largest plausible distance of a stamp from the time of the drive [ns]
 
 
-_Info: TypeAlias = Mapping[str, int]    # message info of rclpy
-_Taker: TypeAlias = Callable[[bytes, _Info], object]    # of the CDR bytes of a message
-_Counter: TypeAlias = Callable[[bytes, _Info], bool]
+_Counter: TypeAlias = Callable[[bytes, MessageInfo], bool]
 
 
 class TopicPublishers:
@@ -81,7 +80,7 @@ class TopicPublishers:
         """Return True if more than one publisher was active shortly before a time of the steady clock."""
         return self._gate.streams.several(now)
 
-    def take(self, data: bytes, info: _Info) -> bool:
+    def take(self, data: bytes, info: MessageInfo) -> bool:
         """Return True for a message of the graph, False for a message of a foreign publisher; data: CDR bytes.
 
         A message is foreign if the gate rejects it as a message of another publisher, and two more conditions hold.
@@ -178,14 +177,14 @@ class RecorderNode(shell.Shell):
         for index, topic in self._last:
             self._record(index, topic)
 
-    def _receiver(self, index: int, topic: nodes.Link) -> _Taker:
+    def _receiver(self, index: int, topic: nodes.Link) -> Take:
         """Return the function take(data, info) that checks, counts and writes each message."""
         put = self._into_step(index, topic) if self.graph.lockstep else self._on_arrival(index, topic)
         count = self._lockstep_counter(index, topic) if self.graph.lockstep else self._realtime_counter(index, topic)
         checked = len(topic.writers) == 1 and (self.graph.lockstep or topic.rate not in topics.UNSTEPPED_RATES)
         received = self._received
 
-        def take(data: bytes, info: _Info) -> None:
+        def take(data: bytes, info: MessageInfo) -> None:
             received[index] += 1
             try:
                 if not checked or count(data, info):
@@ -206,11 +205,12 @@ class RecorderNode(shell.Shell):
                                             first=1 if topic.rate == 'step' and self.graph.members else None)
         readable = Readable(topic.name, topic.type, ours=True)
 
-        def count(data: bytes, info: _Info) -> bool:
+        def count(data: bytes, info: MessageInfo) -> bool:
             number = info['publication_sequence_number']
             if not numbers.is_next(number):
                 if numbers.shows_foreign() or readable.problem(data):
                     return False
+                assert numbers.next is not None     # else each number is the next
                 if number > numbers.next:
                     self._lost[topic.name] += number - numbers.next
                     self._bag.skip(index, number - numbers.next)
@@ -229,7 +229,7 @@ class RecorderNode(shell.Shell):
         """
         publishers = self._heard[topic.name] = TopicPublishers(self, topic)
 
-        def count(data: bytes, info: _Info) -> bool:
+        def count(data: bytes, info: MessageInfo) -> bool:
             before = publishers.lost
             ours = publishers.take(data, info)
             if publishers.lost > before:
@@ -266,7 +266,7 @@ class RecorderNode(shell.Shell):
             self._without_stamp += 1
             return ''
 
-    def _into_step(self, index: int, topic: nodes.Link) -> _Taker:
+    def _into_step(self, index: int, topic: nodes.Link) -> Take:
         """Return the function put(data, info) that passes a message of a topic to the StepOrder in lockstep."""
         order, stamp_in, slot = self._order, self._stamp_in, self._order.slot(topic.name)
 
@@ -278,7 +278,7 @@ class RecorderNode(shell.Shell):
                 order.take(slot, stamp, data)
             return stamp
 
-        def put_clock(data: bytes, info: _Info) -> None:
+        def put_clock(data: bytes, info: MessageInfo) -> None:
             self._tick(put(data, info))
 
         def put_event(data: bytes, _: object) -> None:
@@ -313,22 +313,22 @@ class RecorderNode(shell.Shell):
             self._without_stamp += 1
         return self._stamp
 
-    def _on_arrival(self, index: int, topic: nodes.Link) -> _Taker:
+    def _on_arrival(self, index: int, topic: nodes.Link) -> Take:
         """Return the function put(data, info) that writes a message of a topic at its arrival in realtime."""
         write, stamp_in, log_time = self._bag.write, self._stamp_in, self._log_time
         clock = PublisherGate(lambda data: (messages.stamp_of(data),) * 2, round(self.graph.future * NS_PER_SECOND))
 
-        def put(data: bytes, info: _Info) -> None:
+        def put(data: bytes, info: MessageInfo) -> None:
             write(index, log_time(stamp_in(data)), info['source_timestamp'], data)
 
-        def put_clock(data: bytes, info: _Info) -> None:
+        def put_clock(data: bytes, info: MessageInfo) -> None:
             self._tick(clock.take(data, info['publication_sequence_number'], info['source_timestamp'], *self.clock()))
             put(data, info)
 
-        def put_unstamped(data: bytes, info: _Info) -> None:
+        def put_unstamped(data: bytes, info: MessageInfo) -> None:
             write(index, self._stamp, info['source_timestamp'], data)
 
-        def put_diagnostics(data: bytes, info: _Info) -> None:
+        def put_diagnostics(data: bytes, info: MessageInfo) -> None:
             if self._sender(data) != self.name:
                 put(data, info)
 
@@ -341,6 +341,7 @@ class RecorderNode(shell.Shell):
         if stamp is None:
             return
         if self.graph.lockstep and stamp // NS_PER_SECOND > self._stamp // NS_PER_SECOND:
+            assert self.diagnostics
             self.diagnostics.publish(self._stamp)
         self._stamp = stamp
         if self._end is not None and stamp - self.epoch(stamp) >= self._end:

@@ -17,7 +17,7 @@ import numpy as np
 
 from pedestal_common.geometry import orbit
 from pedestal_common.graph import nodes
-from pedestal_common.quantities import Floats, Hertz, Pairs, Stamps
+from pedestal_common.quantities import Floats, Hertz, Pairs, Stamps, Texts
 from pedestal_recording import bag as bags
 from pedestal_recording import columns
 from pedestal_recording.export import atomic_file
@@ -45,7 +45,7 @@ TOPIC_COLUMNS = {'joint_states': ('azimuth.position', 'elevation.position'),
 
 class _Segment(NamedTuple):
     """Exported steps of a run, which stand in one segment of the message."""
-    times: list[str]    # of the UTC
+    times: Texts        # of the UTC
     angles: Pairs       # azimuth and elevation [deg]
     distance: Floats    # range [km], NaN if not measured
     cn0: Floats         # [dB-Hz]

@@ -16,6 +16,7 @@ from collections.abc import Mapping
 from pedestal_common.node import shell, unit_node
 from pedestal_common.node.unit import LEVEL_OK, LEVEL_WARN, Diagnosis
 from pedestal_common.parameters import ParameterError
+from pedestal_common.wire.records import Decoded
 from ship_motion_sim import nmea
 from ship_motion_sim.params import NmeaParameters, ShipMotionParameters
 from ship_motion_sim.ship_unit import ShipMotion
@@ -44,7 +45,7 @@ class ShipMotionNode(unit_node.UnitNode):
             raise ParameterError(f"nmea.host = '{equipment.host}': must be the name or IPv4 address of one host: "
                                  f'{error.strerror}') from None
 
-    def answer(self, stamp: Nanoseconds, values: Mapping[str, object]) -> None:
+    def answer(self, stamp: Nanoseconds, values: Mapping[str, Decoded | None]) -> None:
         """Publish the step at a stamp; then send the attitude if the next datagram is due."""
         super().answer(stamp, values)
         if self.parameters.nmea.port and stamp >= self.next_datagram_ns:

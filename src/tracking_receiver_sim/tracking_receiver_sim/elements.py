@@ -16,6 +16,7 @@ from pedestal_common.geometry.orbit import TargetError
 from pedestal_common.graph.steps import SECONDS_PER_DAY
 from pedestal_common.parameters import did_you_mean
 from pedestal_common.text_files import content, csv_table
+from pedestal_common.text_files.files import FilePath
 from tracking_receiver_sim.ephemeris import lines
 from tracking_receiver_sim.params import LeoPassParameters
 
@@ -58,7 +59,7 @@ class Satellite(NamedTuple):
         return name.strip().upper() in (self.name.upper(), number, self.number, self.designator)
 
 
-def read(path: str, name: str = '', when: datetime.datetime | None = None) -> Elements:
+def read(path: FilePath, name: str = '', when: datetime.datetime | None = None) -> Elements:
     """Return the elements of a satellite in a file. Raises TargetError.
 
     name: name, catalogue number or international designator; it may be empty for a file of one satellite. when: UTC.
@@ -107,7 +108,7 @@ def read(path: str, name: str = '', when: datetime.datetime | None = None) -> El
     return Elements(satellite.name, {key: getattr(values, key) for key in ('line_1', 'line_2', 'omm')}, remark)
 
 
-def _nearest(path: str, history: list[Satellite], when: datetime.datetime | None) -> tuple[Satellite, str]:
+def _nearest(path: FilePath, history: list[Satellite], when: datetime.datetime | None) -> tuple[Satellite, str]:
     """Return (the satellite of a history whose epoch is nearest to `when`, remark). Raises TargetError."""
     if len(history) == 1:
         return history[0], ''
@@ -121,7 +122,7 @@ def _nearest(path: str, history: list[Satellite], when: datetime.datetime | None
                         f'{history[i].line}, the nearest to {wanted:%Y-%m-%d %H:%M:%S}')
 
 
-def _epoch(path: str, satellite: Satellite) -> datetime.datetime:
+def _epoch(path: FilePath, satellite: Satellite) -> datetime.datetime:
     """Return the epoch, UTC. Raises TargetError."""
     if satellite.lines:
         text = satellite.lines[0][TLE_EPOCH_COLUMNS]
@@ -139,7 +140,7 @@ def _epoch(path: str, satellite: Satellite) -> datetime.datetime:
     return datetime.datetime(1970, 1, 1) + datetime.timedelta(seconds=SECONDS_PER_DAY * day + second)
 
 
-def _reader(beginning: str) -> Callable[[str], Iterator[Satellite]]:
+def _reader(beginning: str) -> Callable[[FilePath], Iterator[Satellite]]:
     """Return the reader of a file that begins with a text."""
     if beginning.startswith('<'):
         return _xml
@@ -154,7 +155,7 @@ def _reader(beginning: str) -> Callable[[str], Iterator[Satellite]]:
     return _csv if 'EPOCH' in names else _tles
 
 
-def _tles(path: str) -> Iterator[Satellite]:
+def _tles(path: FilePath) -> Iterator[Satellite]:
     """Yield the satellites of a file of TLEs, with or without a line of the name before each."""
     # first: (line number, text) of the line before; before: that of the line before `first`, which may hold a name.
     before, first = (0, ''), (0, '')
@@ -188,7 +189,7 @@ def _omm(line: int, fields: dict[str, str]) -> Satellite:
                      fields.get('OBJECT_ID', '').upper(), None, fields)
 
 
-def _kvn(path: str) -> Iterator[Satellite]:
+def _kvn(path: FilePath) -> Iterator[Satellite]:
     """Yield the satellites of OMMs in sequence; each begins with its CCSDS_OMM_VERS."""
     fields: dict[str, str] = {}
     begun = 0
@@ -207,16 +208,16 @@ def _kvn(path: str) -> Iterator[Satellite]:
         yield _omm(begun, fields)
 
 
-def _csv(path: str) -> Iterator[Satellite]:
+def _csv(path: FilePath) -> Iterator[Satellite]:
     """Yield the satellites of a CSV file with a row for each OMM."""
     with csv_table.opened(path) as reader:
         csv_table.require(reader, ('EPOCH', 'NORAD_CAT_ID'))
         for row in reader:
-            yield _omm(reader.line_num, {keyword: row[keyword].strip()[:MAX_VALUE_CHARS] for keyword in omm.KEYWORDS
-                                         if isinstance(row.get(keyword), str)})
+            yield _omm(reader.line_num, {keyword: cell.strip()[:MAX_VALUE_CHARS] for keyword in omm.KEYWORDS
+                                         if (cell := row.get(keyword)) is not None})
 
 
-def _json(path: str) -> Iterator[Satellite]:
+def _json(path: FilePath) -> Iterator[Satellite]:
     """Yield the satellites of a JSON array of objects, or of one object, decoded one by one."""
     text = csv_table.text(path)
     decoder, between = json.JSONDecoder(parse_int=str, parse_float=str), re.compile(r'[\s,\[\]]*')
@@ -247,7 +248,7 @@ def _json(path: str) -> Iterator[Satellite]:
         at = skipped(at)
 
 
-def _xml(path: str) -> Iterator[Satellite]:
+def _xml(path: FilePath) -> Iterator[Satellite]:
     """Yield the satellites of the segments of an OMM or NDM as XML; expat keeps no parsed data in memory."""
     # line: of the open segment.
     satellites: list[Satellite] = []
@@ -304,7 +305,7 @@ def _xml(path: str) -> Iterator[Satellite]:
         raise lines.wrong(path, 1, 1, f'not well-formed XML: {error}') from None
 
 
-def _omm_text(path: str, satellite: Satellite) -> str:
+def _omm_text(path: FilePath, satellite: Satellite) -> str:
     """Return the elements of a satellite of an OMM as JSON. Raises TargetError."""
     fields = dict(satellite.fields)
     try:

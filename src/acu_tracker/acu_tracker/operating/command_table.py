@@ -16,7 +16,7 @@ from acu_tracker.operating.authority import CONTROL_ROLES
 from acu_tracker.pointing.params import PointingParameters
 from pedestal_common.graph.modes import MODE_ROWS, MODES
 from pedestal_common.graph.topics import AXES
-from pedestal_common.parameters import ParameterError, flatten
+from pedestal_common.parameters import ParameterError, as_dict, flatten
 from pedestal_common.quantities import Radians, RadiansPerSecond, Value
 from pedestal_common.wire.commands import Argument, CommandDefinition
 
@@ -38,9 +38,11 @@ _MOTION_ARGUMENTS = (*_of_axes('rate of the angle', -10.0, 10.0, 'rad/s', 0.0, '
 _ELEMENT_ARGUMENTS = (*(Argument(f'line_{i}', f'line {i} of the TLE, _ for blanks', default='') for i in (1, 2)),
                       Argument('omm', 'OMM in JSON, instead of the lines', default=''))
 
+_MODEL_DEFAULTS = as_dict(PointingParameters())
 _MODEL_ARGUMENTS = tuple(
     Argument(name, field.metadata['doc'], field.metadata.get('low', -math.inf), field.metadata.get('high', math.inf),
-             field.metadata.get('unit', ''), default=field.default) for name, field in flatten(PointingParameters))
+             field.metadata.get('unit', ''), default=_MODEL_DEFAULTS[name])
+    for name, field in flatten(PointingParameters))
 
 MODE_ARGUMENTS = {
     'preset': (*_of_axes('deck angle; default: unchanged', -20.0, 20.0, 'rad', math.nan), *_MOTION_ARGUMENTS,

@@ -195,6 +195,7 @@ class Predictor:
 
     def _satellite_angles(self, times: Times) -> Pairs:
         """Return azimuth and true elevation [rad] of the satellite at stamps; raise TargetError."""
+        assert self._satellite is not None      # the caller has elements
         julian, fraction = self._julian(0.0)
         fractions = fraction + times / SECONDS_PER_DAY
         return _angles(orbit.seen(self._satellite, self.parameters.station, julian, fractions,

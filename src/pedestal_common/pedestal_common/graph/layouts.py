@@ -101,7 +101,7 @@ min_range to max_range must be discarded."""
 
 
 def no_data(type_name: str, numbers: Iterable[tuple[str, int, str]],
-            texts: Mapping[str, str]) -> list[tuple[list[str | None], list[tuple[int, str]], Absent]]:
+            texts: Mapping[str, str]) -> list[tuple[list[str], list[tuple[int, str]], Absent]]:
     """Return [(names of the columns of a field, [(first byte, dtype)] of the numbers of its mark, function absent)].
 
     numbers, texts: places in a message of the type, as in cdr.Places; absent: as in NoDataMark.
@@ -109,7 +109,8 @@ def no_data(type_name: str, numbers: Iterable[tuple[str, int, str]],
     places = {path: (start, dtype) for path, start, dtype in numbers}
     marks = NO_DATA_MARKS.get(type_name, ())
     patterns = {field.name: field.path for field in LAYOUTS.get(type_name, ())}
-    return [([column(type_name, path, texts) for path in places if re.fullmatch(patterns[mark.field], path)],
+    return [([name for path in places if re.fullmatch(patterns[mark.field], path)
+              and (name := column(type_name, path, texts)) is not None],
              [places[path] for path in mark.paths], mark.absent) for mark in marks]
 
 

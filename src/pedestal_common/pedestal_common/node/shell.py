@@ -162,6 +162,9 @@ class Shell(Node):
         def get_logger(self) -> RcutilsLogger:
             """Return the logger of the node; rclpy does not state its type."""
 
+        def destroy_node(self) -> None:
+            """Take the node from the graph; rclpy does not state the type."""
+
     def _place(self, name: str) -> tuple[str, str]:
         """Return (namespace of the graph, prefix of this node's beam in the graph), each with a '/' at its end. The
         prefix is '' for a node without a beam."""

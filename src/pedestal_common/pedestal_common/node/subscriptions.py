@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from pedestal_common.node.shell import Shell
 
 MessageInfo: TypeAlias = Mapping[str, int]      # of rclpy: numbers and times of a message
-Take: TypeAlias = Callable[[bytes, MessageInfo], None]      # callback of a subscription, for the CDR bytes
+Take: TypeAlias = Callable[[bytes, MessageInfo], object]      # callback of a subscription, for the CDR bytes
 _M = TypeVar('_M')      # a decoded message
 
 DROP_REPORT_NS = 2_000_000_000  # time for which the diagnostics report a dropped message [ns]

@@ -13,7 +13,7 @@ import pathlib
 import re
 import typing
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import BinaryIO, Literal, TextIO, overload
+from typing import BinaryIO, Literal, TextIO, TypeAlias, overload
 
 import numpy as np
 
@@ -21,6 +21,8 @@ from pedestal_common.quantities import Floats
 from pedestal_common.text_files import columns as _columns
 from pedestal_common.text_files import content, files
 from pedestal_common.text_files.files import FilePath
+
+Cells: TypeAlias = Mapping[str, str | None]    # of a row, by the name of the column; None if the row ends before it
 
 MAX_CSV_BYTES = 64_000_000  # largest size of a file [bytes]
 MAX_CSV_ROWS = 1_000_000  # largest number of rows of a file
@@ -161,7 +163,7 @@ class Table:
             elif len(bare) == len(first):
                 self.fieldnames, self._again = tuple(bare), first
 
-    def __iter__(self) -> Iterator[dict[str, str | None]]:
+    def __iter__(self) -> Iterator[Cells]:
         count = len(self.fieldnames)
         while (cells := self._again or self._cells()) is not None:
             self._again = None

@@ -10,17 +10,13 @@ Quaternions are (x, y, z, w), body -> earth. With the matrices as quaternions, a
     H    rotation about the vertical by the heading at which the device reports 0
 """
 import math
-from typing import TypeAlias
 
 import numpy as np
 
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry.quaternion import product
-from pedestal_common.quantities import Matrix3, Quaternion, Radians, Records, Vector3
+from pedestal_common.quantities import Matrix3, Quaternion, Radians, Records, Vector3, Xyz, Xyzw
 from pedestal_common.record import Record
-
-Numbers3: TypeAlias = tuple[float, float, float]             # a vector, without an array
-Numbers4: TypeAlias = tuple[float, float, float, float]      # a quaternion, without an array
 
 BODY_MATRICES = {'flu': np.eye(3), 'frd': np.diag((1.0, -1.0, -1.0)),
                  'rfu': np.array(((0.0, 1.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 0.0, 1.0)))}
@@ -78,13 +74,13 @@ def constants(earth: str, body: str, rate_body: str, mounting: tuple[Radians, Ra
 
 
 @compiled
-def attitude(frame: Frame, q: Quaternion) -> Numbers4:
+def attitude(frame: Frame, q: Quaternion) -> Xyzw:
     """Return the quaternion deck -> earth of the quaternion of a device."""
     return product(product(frame.left, q), frame.right)
 
 
 @compiled
-def on_deck(frame: Frame, v: Vector3) -> Numbers3:
+def on_deck(frame: Frame, v: Vector3) -> Xyz:
     """Return the components on the deck of a vector in the body frame of the rates."""
     return (frame.rate[0, 0] * v[0] + frame.rate[0, 1] * v[1] + frame.rate[0, 2] * v[2],
             frame.rate[1, 0] * v[0] + frame.rate[1, 1] * v[1] + frame.rate[1, 2] * v[2],
@@ -92,7 +88,7 @@ def on_deck(frame: Frame, v: Vector3) -> Numbers3:
 
 
 @compiled
-def rotation_vector(a: Quaternion | Numbers4, b: Quaternion) -> Numbers3:
+def rotation_vector(a: Quaternion | Xyzw, b: Quaternion) -> Xyz:
     """Return the rotation vector in the frame of the body by which it turned from the quaternion a to b."""
     x, y, z, w = product((-a[0], -a[1], -a[2], a[3]), b)
     if w < 0.0:
@@ -103,7 +99,7 @@ def rotation_vector(a: Quaternion | Numbers4, b: Quaternion) -> Numbers3:
 
 
 @compiled
-def turned(q: Quaternion | Numbers4, x: Radians, y: Radians, z: Radians) -> Numbers4:
+def turned(q: Quaternion | Xyzw, x: Radians, y: Radians, z: Radians) -> Xyzw:
     """Return the quaternion of a body that had the quaternion q and turned by a rotation vector in the frame of
     the body."""
     angle = math.sqrt(x * x + y * y + z * z)
@@ -112,7 +108,7 @@ def turned(q: Quaternion | Numbers4, x: Radians, y: Radians, z: Radians) -> Numb
 
 
 @compiled
-def of_angles(heading: Radians, pitch: Radians, roll: Radians) -> Numbers4:
+def of_angles(heading: Radians, pitch: Radians, roll: Radians) -> Xyzw:
     """Return the quaternion FLU -> ENU of a heading clockwise from north, a pitch with the bow up and a roll with the
     starboard side down: Rz(90 deg - heading) Ry(-pitch) Rx(roll)."""
     y, p, r = 0.5 * (0.5 * math.pi - heading), -0.5 * pitch, 0.5 * roll

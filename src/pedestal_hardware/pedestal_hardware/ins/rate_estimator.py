@@ -10,9 +10,9 @@ A constant acceleration causes no error. Source: Morrison, Introduction to Seque
 import math
 
 from pedestal_common.compiled import compiled
-from pedestal_common.quantities import Bit, Nanoseconds, Quaternion, RadiansPerSecond, Vector3
+from pedestal_common.quantities import Bit, Nanoseconds, Quaternion, RadiansPerSecond, Vector3, Xyz
 from pedestal_common.record import Record
-from pedestal_hardware.ins.frames import Numbers3, rotation_vector, turned
+from pedestal_hardware.ins.frames import rotation_vector, turned
 
 
 class Estimator(Record):
@@ -41,7 +41,7 @@ def restart(estimator: Estimator) -> None:
 
 @compiled
 def take(state: Estimator, stamp: Nanoseconds, q: Quaternion,
-         bandwidth: RadiansPerSecond) -> tuple[bool, Numbers3, bool]:
+         bandwidth: RadiansPerSecond) -> tuple[bool, Xyz, bool]:
     """Take a quaternion at a stamp that is newer than the last; bandwidth: of the filter.
 
     Return (True if the rate is settled, its components [rad/s], True for a sample that jumps and is not used).

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 import numpy as np
 
 from adu_drive.angle_drive import DRIVE_STATE_TOPIC, EMERGENCY_STOP_TEXT, ENABLED_TEXT, REFERENCE_TOPIC, AngleDrive
-from adu_drive.params import RunParameters
 from pedestal_common.compiled import compiled
 from pedestal_common.graph import nodes, topics
 from pedestal_common.graph.modes import MODES
@@ -21,6 +20,7 @@ from pedestal_hardware.rotator import set_point
 
 if TYPE_CHECKING:
     from pedestal_hardware.rotator.line import Measurement
+    from pedestal_hardware.rotator_params import RotatorParameters
 
 MODE_TOPIC, JOINT_STATES_TOPIC, CLOCK_TOPIC = 'acu/mode', 'joint_states', 'clock'
 
@@ -106,10 +106,11 @@ def laws(memory: Memory, stamps: Stamps, inputs: Records, outputs: Records) -> N
 
 class Rotator(AngleDrive):
     """A rotator, of a RotatorParameters."""
+    parameters: 'RotatorParameters'
     memory: Memory
     NODE, LAWS, STATE_TEXTS = nodes.ROTATOR_DRIVE, {Memory: (law, laws)}, STATE_TEXTS
 
-    def __init__(self, parameters: RunParameters, reads: Iterable[str]) -> None:
+    def __init__(self, parameters: 'RotatorParameters', reads: Iterable[str]) -> None:
         super().__init__(parameters, reads)
         p = self.parameters
         constants = set_point.Constants.zeros()

@@ -6,7 +6,7 @@ import math
 import queue
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -76,7 +76,7 @@ class ShownRecording(page_state.PageAntenna):
         """Return the age of the last message of a topic or node, infinite before the first."""
         return self.now - self._received.get(name, -math.inf)
 
-    def lines(self) -> list[dict[str, Json]]:
+    def lines(self) -> list[page_log.Line]:
         """Return the lines of the event log up to the position."""
         return [line for line in self.log.lines if line['t'] <= self.now][-page_log.MAX_LOG_LINES:]
 
@@ -107,7 +107,7 @@ class ShownRecording(page_state.PageAntenna):
                 self._received[name] = time_of / NS_PER_SECOND
 
     def _forget(self) -> None:
-        self.numbers: dict[str, tuple[float, ...]] = {}
+        self.numbers: dict[str, Sequence[float]] = {}
         self.texts: dict[str, str] = {}
         self.status: dict[str, Message] = {}
         self._received: dict[str, Seconds] = {}     # time of the last message of a topic or node
@@ -211,10 +211,11 @@ class Player:
     def _show(self, slowly: bool) -> None:
         """Send the state at the position to the pages; slowly: True to send the sections that change slowly too."""
         recording = self._recording
-        sections = {'now': page_state.now(recording), 'status': page_state.status_section(recording),
-                    'alarms': page_state.alarms(recording), 'log': recording.lines(),
-                    'replay': {'length': recording.length, 'position': recording.position, 'playing': self._playing,
-                               'rate': self._rate}}
+        sections: dict[str, object] = {
+            'now': page_state.now(recording), 'status': page_state.status_section(recording),
+            'alarms': page_state.alarms(recording), 'log': recording.lines(),
+            'replay': {'length': recording.length, 'position': recording.position, 'playing': self._playing,
+                       'rate': self._rate}}
         if slowly:
             past = page_sky.BeamHistory(page_state.CHART_SPAN_S)
             for frame in self._frames(SLOW_FRAME_PERIOD_S):

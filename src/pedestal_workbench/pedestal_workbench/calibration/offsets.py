@@ -14,7 +14,7 @@ import csv
 import datetime
 import pathlib
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -122,7 +122,7 @@ def _plain(table: csv_table.Table) -> Iterator[OffsetRow]:
     offset = [table.column(quantity) for quantity in _OFFSET]
     sigma = table.column(_SIGMA, required=False)
     for row in table:
-        def number(column: columns.Column, limits: tuple[float, float], row: Mapping[str, str] = row) -> float:
+        def number(column: columns.Column, limits: tuple[float, float], row: csv_table.Cells = row) -> float:
             return table.number(column, row[column.name], *limits)
         numbers = (number(sky[0], AZIMUTH_RANGE_DEG), number(sky[1], ELEVATION_RANGE_DEG),
                    number(offset[0], OFFSET_RANGE_DEG), number(offset[1], OFFSET_RANGE_DEG))
@@ -134,7 +134,7 @@ def _katpoint(table: csv_table.Table) -> Iterator[OffsetRow]:
     """Yield the rows of a file of katpoint's reduction scripts, which state offsets of the axes in degrees."""
     has_sigma = set(_KATPOINT_SIGMA_NAMES) <= set(table.fieldnames)
     for row in table:
-        def number(name: str, low: float, high: float, row: Mapping[str, str] = row) -> float:
+        def number(name: str, low: float, high: float, row: csv_table.Cells = row) -> float:
             return csv_table.number(table.path, table.line_num, name, row[name] or '', low, high)
         az, el = number('azimuth', *AZIMUTH_RANGE_DEG), number('elevation', *ELEVATION_RANGE_DEG)
         cosine = max(float(np.cos(np.radians(el))), MIN_COSINE)

@@ -148,6 +148,7 @@ def _table(path: str) -> dict[str, list[Json]]:
             if None in row or None in row.values():
                 raise csv_table.TableError(f'{path}: line {reader.line_num}: must have {len(columns)} cells')
             for column, cell in row.items():
+                assert cell is not None     # see above
                 columns[column].append(plain_yaml.parse(cell))
     if not columns or not all(columns.values()):
         raise csv_table.TableError(f'{path}: must have a header of NODE.KEY names and a row for each trial')

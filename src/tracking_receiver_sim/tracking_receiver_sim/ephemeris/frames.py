@@ -8,6 +8,7 @@ its built-in tables. They omit the polar motion (up to 0.3", 9 m on the ground).
 difference is some centimetres. For dates after the end of the tables of UT1, an orbit may be wrong by some metres.
 """
 import re
+from collections.abc import Callable
 
 import numpy as np
 
@@ -81,7 +82,8 @@ def _to_fixed(frame: str, time: Times) -> Floats:
     days = np.floor(time / SECONDS_PER_DAY)
     t = instant.timescale().tai_jd(instant.UNIX_EPOCH_JULIAN_DATE + days, (
         time - SECONDS_PER_DAY * days + instant.TAI_OFFSET_S) / SECONDS_PER_DAY)
-    from_icrf = {'EME2000': lambda: np.broadcast_to(ICRS_to_J2000[:, :, np.newaxis], (3, 3, len(time))),
-                 'TEME': lambda: TEME.rotation_at(t), 'TOD': lambda: true_equator_and_equinox_of_date.rotation_at(t)}
+    from_icrf: dict[str, Callable[[], Floats]] = {
+        'EME2000': lambda: np.broadcast_to(ICRS_to_J2000[:, :, np.newaxis], (3, 3, len(time))),
+        'TEME': lambda: TEME.rotation_at(t), 'TOD': lambda: true_equator_and_equinox_of_date.rotation_at(t)}
     fixed = itrs.rotation_at(t)
     return np.einsum('ikn,jkn->ijn', fixed, from_icrf[frame]()) if frame in from_icrf else fixed

@@ -12,6 +12,7 @@ from typing import TypeAlias
 
 from pedestal_common.quantities import Seconds
 from pedestal_common.text_files import csv_table
+from pedestal_common.text_files.files import FilePath
 from tracking_receiver_sim.track import instant as instants
 
 MAX_LINE_CHARS = 1024  # largest number of characters of a line; the CCSDS books allow 254
@@ -31,12 +32,12 @@ def begins_with(beginning: str, signature: str) -> bool:
     return first.startswith(signature)
 
 
-def wrong(path: str, line: int, column: int, problem: str) -> csv_table.TableError:
+def wrong(path: FilePath, line: int, column: int, problem: str) -> csv_table.TableError:
     """Return a TableError at a line and column of a file, both counted from 1."""
     return csv_table.TableError(f'{path}: line {line}, column {column}: {problem}')
 
 
-def read(path: str) -> Iterator[tuple[int, str]]:
+def read(path: FilePath) -> Iterator[tuple[int, str]]:
     """Yield (number, text) of each line of a text file that is not empty, see csv_table.text. Raises TableError, also
     for a line that is too long."""
     stream = io.StringIO(csv_table.text(path), newline=None)
@@ -51,7 +52,7 @@ def read(path: str) -> Iterator[tuple[int, str]]:
             yield number, text
 
 
-def numbers(path: str, line: int, text: str, limits: Limits) -> list[float]:
+def numbers(path: FilePath, line: int, text: str, limits: Limits) -> list[float]:
     """Return the numbers in the text of a line. Raises TableError.
 
     The function passes over further words.
@@ -76,7 +77,7 @@ def numbers(path: str, line: int, text: str, limits: Limits) -> list[float]:
     return values
 
 
-def instant(path: str, line: int, column: int, name: str, text: str) -> tuple[int, Seconds]:
+def instant(path: FilePath, line: int, column: int, name: str, text: str) -> tuple[int, Seconds]:
     """Return (days since 1970, seconds of the day) of a CCSDS time, YYYY-MM-DDThh:mm:ss or YYYY-DDDThh:mm:ss, in any
     time system. Raises TableError."""
     match = CCSDS_TIME_PATTERN.fullmatch(text)

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from pedestal_common.graph.steps import SECONDS_PER_DAY
 from pedestal_common.quantities import Seconds, Texts
 from pedestal_common.text_files import csv_table
+from pedestal_common.text_files.files import FilePath
 from tracking_receiver_sim.track import dates
 
 if TYPE_CHECKING:   # slow to import
@@ -65,7 +66,7 @@ def second_of_day(hours: int, minutes: int, seconds: Seconds) -> Seconds:
     return 3600.0 * hours + 60.0 * minutes + seconds
 
 
-def seconds(path: str, line: int, name: str, text: str | None) -> Seconds:
+def seconds(path: FilePath, line: int, name: str, text: str | None) -> Seconds:
     """Return the instant of a text. Raises TableError.
 
     The text is a date, see `dates` (without a zone: UTC), or a number of seconds since 1970 without leap seconds. A

@@ -9,7 +9,7 @@ The geometric altitude of ADS-B is above the ellipsoid. If a file has only the b
 instead, with a remark in the log. Rows of ADS-B logs without a position are passed over and counted.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from typing import NamedTuple
 
 from pedestal_common.quantities import Meters
@@ -113,7 +113,7 @@ def _layout(table: csv_table.Table) -> CsvLayout:
         (layout for layout in CSV_LAYOUTS[1:] if layout.adsb and layout.time.label in names), CSV_LAYOUTS[-1])
 
 
-def _position(table: csv_table.Table, row: Mapping[str, str], column: columns.Column) -> list[str]:
+def _position(table: csv_table.Table, row: csv_table.Cells, column: columns.Column) -> list[str]:
     """Return the texts of latitude and longitude in a cell of both. Raises TableError."""
     cell = row[column.name] or ''
     parts = [part.strip() for part in cell.split(',')]

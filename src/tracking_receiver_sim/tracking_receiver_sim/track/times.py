@@ -2,11 +2,12 @@
 
 A table may also have two columns: one of the date and one of the time of day, both UTC.
 """
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 from pedestal_common.graph.steps import SECONDS_PER_DAY
 from pedestal_common.quantities import Seconds
 from pedestal_common.text_files import columns, csv_table
+from pedestal_common.text_files.files import FilePath
 from tracking_receiver_sim.track import dates, instant
 
 TIME = columns.Quantity('time', {
@@ -58,7 +59,7 @@ class Times:
         """Name of the column, or names of the two columns."""
         return f'{self.date} and {self.column.name}' if self.date else self.column.name
 
-    def seconds(self, row: Mapping[str, str]) -> Seconds:
+    def seconds(self, row: csv_table.Cells) -> Seconds:
         """Return the time of a row: an instant if the times are dated, otherwise seconds from any origin.
 
         Raises TableError.
@@ -124,7 +125,7 @@ def _date(names: Sequence[str], wanted: columns.Quantity) -> str:
     return found[0] if len(found) == len(clocks) == 1 else ''
 
 
-def julian(path: str, line: int, name: str, text: str, modified: bool = False) -> Seconds:
+def julian(path: FilePath, line: int, name: str, text: str, modified: bool = False) -> Seconds:
     """Return the instant, see track.instant, of a Julian date, or a modified one, in days. Raises TableError."""
     zero = MODIFIED_JULIAN_DATE_ZERO if modified else 0.0
     low, high = JULIAN_DATE_LIMITS

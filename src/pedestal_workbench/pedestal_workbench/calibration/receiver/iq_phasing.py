@@ -18,6 +18,7 @@ from pedestal_bringup.loop import iq_run, memory_recording
 from pedestal_common.graph import nodes
 from pedestal_common.quantities import Complexes, Floats, Json, Pair, Pairs, Radians, Row
 from pedestal_hardware.monopulse import sigmf
+from pedestal_hardware.monopulse.iq_unit import SimulatedIq
 from pedestal_hardware.monopulse.params import THREE_CHANNELS, MonopulseParameters
 from pedestal_recording.recording import Recording
 from pedestal_results import tracking
@@ -164,6 +165,7 @@ def opened(options: argparse.Namespace, changes: Sequence[str]) -> tuple[Recordi
     changes: texts 'node.key=value' of a scenario. Its samples are those of `pedestal simulate receiver --output` with
     the same scenario and the same changes.
     """
+    bag: Recording
     if options.bag is not None:
         recording = recompute.FedRecording(options.bag)
         bag, source, epoch = recording.bag, str(options.bag), recording.bag.start
@@ -171,6 +173,7 @@ def opened(options: argparse.Namespace, changes: Sequence[str]) -> tuple[Recordi
     else:
         loop, chosen = iq_run.scenarios(options.scenario, changes)
         unit, source = chosen.unit(nodes.SIMULATED_IQ.name), loop.name
+        assert isinstance(unit, SimulatedIq)
         parameters = _of_three_channels(unit.parameters, source)
         bag, epoch = memory_recording.record(loop), iq_run.start_utc(unit)
     file = sigmf.Recording(options.iq, parameters.feed.channels, parameters.source.rate)
