@@ -450,8 +450,8 @@ class Station:
         def so_far():
             shutil.copytree(self.run.bag, copy, dirs_exist_ok=True)
             bag = bags.load(copy)
-            *_, (_, log_time, _, _) = bag.raw('joint_states')
-            return bag if log_time > now else None
+            times = [log_time for _, log_time, _, _ in bag.raw('joint_states')]
+            return bag if times and times[-1] > now else None
         raw = self.client.until(so_far).raw(topic)
         return [messages.deserialize(data, topics.TOPIC_BY_NAME[topic].type) for *_, data in raw]
 

@@ -59,6 +59,7 @@ def granted(connection, line):
 
 
 @pytest.mark.skipif(ROTCTL is None, reason='rotctl is not installed (libhamlib-utils)')
+@pytest.mark.every_case     # the recording of the last test contains each of these commands
 @pytest.mark.parametrize(('command', 'code', 'said'), (
     (('P', '20', '40'), 0, ''), (('p',), 0, None), (('P', '20', '200'), 2, 'Invalid parameter'), (('S',), 0, ''),
     (('M', 'CW', '50'), 0, ''), (('S',), 0, ''), (('K',), 0, ''), (('R', '1'), 0, ''), (('_',), 0, 'pedestal')))
