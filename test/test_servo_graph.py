@@ -6,7 +6,7 @@ import pytest
 
 from pedestal_analysis.trials.cases import Case
 from pedestal_recording import bag as bags
-from pedestal_studies.papers import servo
+from pedestal_studies.p000_ma import servo
 
 pytestmark = pytest.mark.thorough
 

@@ -20,7 +20,7 @@ from pedestal_common import parameters
 from pedestal_common.graph import nodes, topics
 from pedestal_common.injection.table import INJECTED_FAULTS
 from pedestal_studies.numbers import published
-from pedestal_studies.rigs.fault_expectations import FAULT_EXPECTATIONS
+from pedestal_studies.system.faults import FAULT_EXPECTATIONS
 
 GENERATED_PAGES = ('README.md', *(f'docs/{name}.md' for name in (
     'acquisition', 'budget', 'faults', 'graph', 'measured', 'operating', 'papers', 'parameters', 'studies', 'tools',

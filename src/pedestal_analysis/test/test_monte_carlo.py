@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from pedestal_analysis.trials import monte_carlo
-from pedestal_studies.papers import manoeuvre
+from pedestal_studies.p003_lin_wu_zhu import manoeuvre
 
 
 def test_batches_hold_every_run_once():

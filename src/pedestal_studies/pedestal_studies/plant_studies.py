@@ -20,9 +20,9 @@ from pedestal_analysis.results.intervals import row
 from pedestal_analysis.trials.cases import Case
 from pedestal_analysis.tuning import loops
 from pedestal_common.graph.topics import AXES
-from pedestal_studies.rigs import drawing, metrics
-from pedestal_studies.rigs.rows import Result
-from pedestal_studies.system import bode
+from pedestal_studies import drawing, metrics
+from pedestal_studies.p000_ma import bode
+from pedestal_studies.result import Result
 
 STEP_SIZE_RAD, SINE_AMPLITUDE_RAD, SINE_FREQUENCY_HZ, GUST_TORQUE_SHARE = 0.02, 0.02, 0.1, 0.2
 """Size of the step [rad]; amplitude [rad] and frequency [Hz] of the sine; torque of the gust over the largest torque

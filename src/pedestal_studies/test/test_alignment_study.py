@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from pedestal_studies.papers import alignment
+from pedestal_studies.p001_zhou_yang_qin import alignment
 from ship_motion_sim.navigation import navigator
 
 RUNS = 30

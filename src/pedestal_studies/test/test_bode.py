@@ -19,7 +19,7 @@ from pedestal_analysis.tuning import frequency_response as frequency
 from pedestal_analysis.tuning.data_sheet_format import DataSheet
 from pedestal_bringup.scenario import scenario
 from pedestal_common.parameters import as_dict, build
-from pedestal_studies.system import bode
+from pedestal_studies.p000_ma import bode
 
 CURRENT_PERIOD, SPEED_PERIOD = 1e-4, 5e-4
 RUN_STEP, FINE_STEP = 0.5 * CURRENT_PERIOD, CURRENT_PERIOD / frequency.SUB_STEP_COUNT

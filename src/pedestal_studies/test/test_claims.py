@@ -10,8 +10,9 @@ from acu_tracker.estimation.params import FilterParameters
 from adu_drive.params import AduParameters
 from pedestal_analysis.results.intervals import missed
 from pedestal_studies.numbers import claims, published
-from pedestal_studies.papers import alignment, backlash, servo
-from pedestal_studies.rigs import feedforward_loop as loop
+from pedestal_studies.p000_ma import backlash, servo
+from pedestal_studies.p001_zhou_yang_qin import alignment
+from pedestal_studies.p003_lin_wu_zhu import feedforward_loop as loop
 from ship_motion_sim import earth
 from ship_motion_sim.navigation import navigator
 

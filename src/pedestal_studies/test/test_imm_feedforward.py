@@ -12,10 +12,10 @@ from acu_tracker.estimation.filters import axis_filter
 from acu_tracker.estimation.params import FilterParameters
 from pedestal_analysis.results import intervals, tracking
 from pedestal_analysis.trials import monte_carlo
-from pedestal_studies.papers import feedforward_speed
-from pedestal_studies.papers import imm_feedforward as study
-from pedestal_studies.rigs import drawing
-from pedestal_studies.rigs import feedforward_loop as loop
+from pedestal_studies import drawing
+from pedestal_studies.p003_lin_wu_zhu import feedforward_loop as loop
+from pedestal_studies.p003_lin_wu_zhu import feedforward_speed
+from pedestal_studies.p003_lin_wu_zhu import imm_feedforward as study
 
 T, W, ZETA = loop.T, *loop.RATE_LOOP_CONSTANTS
 

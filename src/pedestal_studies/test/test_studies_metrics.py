@@ -8,8 +8,8 @@ from scipy import stats
 
 from pedestal_analysis.results import intervals, tracking
 from pedestal_analysis.trials import cases
-from pedestal_studies.papers import alignment
-from pedestal_studies.rigs import metrics
+from pedestal_studies import metrics
+from pedestal_studies.p001_zhou_yang_qin import alignment
 
 T = np.arange(0.0, 3.0, 1e-4)
 

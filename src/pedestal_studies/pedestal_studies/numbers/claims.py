@@ -6,7 +6,7 @@ verdicts side by side into docs/papers.md.
 """
 import typing
 
-from pedestal_studies.system.filter_families import FILTER_MEANINGS
+from pedestal_studies.p000_ma.filter_families import FILTER_MEANINGS
 
 
 class Claim(typing.NamedTuple):
@@ -151,7 +151,7 @@ PAPER_001_CLAIMS = (
 
 _STEP, _RAMP = 'step/alpha=0.1/T=10ms/{}', 'ramp/{}deg_s/T={}ms'
 PAPER_002_CLAIMS = (
-    Claim('figures 1, 2, 8: block diagrams', 'implemented: pedestal_studies/rigs/angle_loop.py'),
+    Claim('figures 1, 2, 8: block diagrams', 'implemented: pedestal_studies/p002_jia/angle_loop.py'),
     Claim('(2): bandwidth 8.4 Hz for n = 20, T = 1 ms',
           '1/((n - 1) T) is 8.38 Hz; the recursion has its -3 dB at 8.17 Hz', verdict='reproduced'),
     *_of('phased-array',
@@ -211,7 +211,7 @@ PAPER_002_CLAIMS = (
 
 PAPER_003_CLAIMS = (
     Claim('figures 1, 2, 5 to 7: block diagrams, test stand',
-          'implemented: pedestal_studies/rigs/feedforward_loop.py'),
+          'implemented: pedestal_studies/p003_lin_wu_zhu/feedforward_loop.py'),
     Claim('20 deg to and fro at 3.50 deg/s, which represents 30 m/s at 500 m',
           '3.50 deg/s as printed; 30 m/s at 500 m is 3.44 deg/s', verdict='reproduced'),
     Claim('(17): with c_1, c_2 no steady error at constant rate and at constant acceleration', 'steady miss without '

@@ -17,20 +17,14 @@ from pedestal_analysis import console
 from pedestal_analysis.results.intervals import missed
 from pedestal_analysis.trials import monte_carlo
 from pedestal_studies.numbers import claims
-from pedestal_studies.papers import (
-    alignment,
-    alignment_speed,
-    feedforward_speed,
-    imm_feedforward,
-    manoeuvre,
-    pareto,
-    phased_array,
-    rate_measurement,
-    telemetry_flight,
-)
-from pedestal_studies.rigs.feedforward_loop import REVERSAL_S_BY_AXIS
-from pedestal_studies.rigs.profiles import PROFILES
-from pedestal_studies.system import acquisition, budget, filter_families, filters
+from pedestal_studies.p000_ma import filter_families
+from pedestal_studies.p001_zhou_yang_qin import alignment, alignment_speed
+from pedestal_studies.p002_jia import phased_array
+from pedestal_studies.p003_lin_wu_zhu import feedforward_speed, imm_feedforward, manoeuvre, pareto
+from pedestal_studies.p003_lin_wu_zhu.feedforward_loop import REVERSAL_S_BY_AXIS
+from pedestal_studies.p004_li_chen_wang import rate_measurement, telemetry_flight
+from pedestal_studies.profiles import PROFILES
+from pedestal_studies.system import acquisition, budget, filters
 
 ROWS_FILE = 'docs/rows.json'  # file of the rows in a checkout
 

@@ -21,7 +21,7 @@ from pedestal_analysis.report.figures import FILTERED_COLOUR, new_panels
 from pedestal_analysis.results.intervals import CONFIDENCE_LEVEL, row
 from pedestal_analysis.trials import monte_carlo
 from pedestal_analysis.trials.cases import Case
-from pedestal_studies.rigs.rows import Result
+from pedestal_studies.result import Result
 
 DEFAULT_RUNS, FIRST_SEED = 100, 1  # runs of each case; seed of the first run
 BATCH_RUNS = 5  # runs that one worker makes at a time

@@ -25,7 +25,7 @@ from pedestal_bringup.loop import closed_loop
 from pedestal_bringup.scenario import scenario
 from pedestal_common.graph import topics
 from pedestal_common.parameters import defaults
-from pedestal_studies.rigs.rows import Result
+from pedestal_studies.result import Result
 
 SCENARIO_NAME = 'station_real'  # scenario of all runs, in which all terms are on
 DEFAULT_RUNS, FIRST_SEED = 30, 1  # runs of the random terms; seed of the first run

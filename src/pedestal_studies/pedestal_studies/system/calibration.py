@@ -32,7 +32,7 @@ from pedestal_analysis.trials import monte_carlo
 from pedestal_bringup.loop import closed_loop, memory_recording
 from pedestal_bringup.scenario import scenario
 from pedestal_bringup.scenario.program import Plan
-from pedestal_studies.rigs.rows import Result
+from pedestal_studies.result import Result
 
 SCENARIO_NAME, SCAN_SCENARIO_NAME = 'station_new', 'station_sun'  # scenario of the passes, and of the scans of the sun
 DEFAULT_RUNS, FIRST_SEED = 30, 1  # number of runs; seed of the first run

@@ -16,8 +16,8 @@ from pedestal_analysis.trials import monte_carlo
 from pedestal_analysis.trials.cases import Case
 from pedestal_bringup.loop import memory_recording
 from pedestal_common.graph.topics import AXES
-from pedestal_studies.rigs import drawing
-from pedestal_studies.rigs.rows import Result
+from pedestal_studies import drawing
+from pedestal_studies.result import Result
 
 DEFAULT_RUNS, FIRST_SEED = 100, 1  # runs of each case; seed of the first run
 BATCH_RUNS = 5  # runs that one worker makes at a time

@@ -1,6 +1,6 @@
 """Filters compared: angle and rate noise of every filter on four target motions, white and coloured noise.
 
-Cases are <profile>/<filter>/<noise>. A profile is a target motion of rigs/profiles.py, whose angle is measured at 100
+Cases are <profile>/<filter>/<noise>. A profile is a target motion of profiles.py, whose angle is measured at 100
 Hz. Every filter except UNTUNED_FILTERS is tuned for each profile and noise. The tuning minimises the angle rms over
 TUNING_RUNS records of other seeds (pedestal_analysis/tuning/parameter_search.py).
 
@@ -30,9 +30,9 @@ from pedestal_analysis.results.intervals import row
 from pedestal_analysis.trials import monte_carlo
 from pedestal_analysis.tuning import parameter_search
 from pedestal_common.parameters import build
-from pedestal_studies.rigs import drawing, ensemble, profiles
-from pedestal_studies.rigs.ensemble import Noise
-from pedestal_studies.rigs.rows import Result
+from pedestal_studies import drawing, ensemble, profiles
+from pedestal_studies.ensemble import Noise
+from pedestal_studies.result import Result
 
 DEFAULT_RUNS = 200  # runs of each case
 BATCH_RUNS = 25  # runs that one worker makes at a time

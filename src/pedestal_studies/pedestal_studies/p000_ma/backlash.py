@@ -24,9 +24,9 @@ from pedestal_analysis.results import tracking
 from pedestal_analysis.results.intervals import row
 from pedestal_analysis.trials import cases
 from pedestal_analysis.trials.cases import Case
-from pedestal_studies.papers import servo
-from pedestal_studies.rigs import drawing, metrics
-from pedestal_studies.rigs.rows import Result
+from pedestal_studies import drawing, metrics
+from pedestal_studies.p000_ma import servo
+from pedestal_studies.result import Result
 
 STANDSTILL_START_S = 2.0  # time after a step from which the standstill is evaluated [s]
 REVERSAL_AMPLITUDE_RAD = 0.05  # amplitude of the sine of the reversals [rad]

@@ -25,9 +25,10 @@ from pedestal_analysis.report.figures import (
 )
 from pedestal_analysis.results.intervals import row
 from pedestal_analysis.trials import monte_carlo
-from pedestal_studies.rigs import drawing, feedforward_loop
-from pedestal_studies.rigs.feedforward_loop import Source
-from pedestal_studies.rigs.rows import Result
+from pedestal_studies import drawing
+from pedestal_studies.p003_lin_wu_zhu import feedforward_loop
+from pedestal_studies.p003_lin_wu_zhu.feedforward_loop import Source
+from pedestal_studies.result import Result
 
 DEFAULT_RUNS = 50  # runs of each tuning, as many as in the paper
 LOOP_AXIS = 'azimuth'  # axis of all runs

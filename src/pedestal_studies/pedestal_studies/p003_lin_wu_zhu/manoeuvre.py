@@ -20,8 +20,9 @@ from pedestal_analysis.report.figures import (
 )
 from pedestal_analysis.results.intervals import row
 from pedestal_analysis.trials import monte_carlo
-from pedestal_studies.rigs import drawing, ensemble, feedforward_loop, profiles
-from pedestal_studies.rigs.rows import Result
+from pedestal_studies import drawing, ensemble, profiles
+from pedestal_studies.p003_lin_wu_zhu import feedforward_loop
+from pedestal_studies.result import Result
 
 DEFAULT_RUNS = 200  # runs of the motion; the paper has 50
 BATCH_RUNS, NOISE_SEED = 25, 1  # runs of one batch; seed of their noise

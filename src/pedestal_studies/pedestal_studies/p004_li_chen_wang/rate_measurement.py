@@ -37,9 +37,9 @@ from pedestal_analysis.results import tracking
 from pedestal_analysis.results.intervals import row
 from pedestal_analysis.trials import monte_carlo
 from pedestal_common.compiled import compiled
-from pedestal_studies.rigs import drawing, ensemble, profiles
-from pedestal_studies.rigs.ensemble import MEASUREMENT_PERIOD_S as T
-from pedestal_studies.rigs.rows import Result
+from pedestal_studies import drawing, ensemble, profiles
+from pedestal_studies.ensemble import MEASUREMENT_PERIOD_S as T
+from pedestal_studies.result import Result
 
 DEFAULT_RUNS = 40  # number of flybys
 ANGLE_SIGMA_RAD = math.radians(0.03)  # noise of a measured angle [rad]

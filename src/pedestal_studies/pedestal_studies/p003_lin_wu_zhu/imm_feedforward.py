@@ -2,7 +2,7 @@
 
 An IMM (interacting multiple model) filter mixes several Kalman filters by the probabilities of their models. The miss,
 a term of the paper, is the pointing error: the angle from the axis of the antenna to the target. The loop is that of
-rigs/feedforward_loop.py. Its target moves to and fro through 20 deg at 3.5 deg/s. Every T = 10 ms the loop gets a
+feedforward_loop.py. Its target moves to and fro through 20 deg at 3.5 deg/s. Every T = 10 ms the loop gets a
 measured miss, which is d = 40 ms old, and gives a command.
 
 Cases are AXIS/SOURCE. SOURCE is the source of the rate and acceleration that are fed forward:
@@ -39,8 +39,9 @@ from pedestal_analysis.results import tracking
 from pedestal_analysis.results.intervals import row
 from pedestal_analysis.trials import cases, monte_carlo
 from pedestal_common.parameters import as_dict
-from pedestal_studies.rigs import drawing, feedforward_loop, metrics, profiles
-from pedestal_studies.rigs.feedforward_loop import (
+from pedestal_studies import drawing, metrics, profiles
+from pedestal_studies.p003_lin_wu_zhu import feedforward_loop
+from pedestal_studies.p003_lin_wu_zhu.feedforward_loop import (
     METRIC_UNITS,
     MISS_SIGMA_RAD,
     NOISE_SEED,
@@ -53,7 +54,7 @@ from pedestal_studies.rigs.feedforward_loop import (
     imm,
     statistics,
 )
-from pedestal_studies.rigs.rows import Result
+from pedestal_studies.result import Result
 
 DEFAULT_RUNS = 50  # runs of each case, with independent noise
 

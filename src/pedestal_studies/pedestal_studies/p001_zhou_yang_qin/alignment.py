@@ -37,8 +37,8 @@ from pedestal_analysis.trials import monte_carlo
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry.line_of_sight import to_deck
 from pedestal_common.geometry.quaternion import product
-from pedestal_studies.rigs import drawing
-from pedestal_studies.rigs.rows import Result
+from pedestal_studies import drawing
+from pedestal_studies.result import Result
 from ship_motion_sim import imu
 from ship_motion_sim.navigation import navigator
 from ship_motion_sim.params import (

@@ -3,13 +3,13 @@
 The paper (introduction) names these five filters for the angle of a target and states that the Kalman filter has the
 better effect. It prints no number. Its Kalman filter is that of the 'current' statistical model.
 
-Cases are MOTION/FILTER/TUNING. The motions are those of rigs/profiles.py, measured at 100 Hz with white noise of 0.03
+Cases are MOTION/FILTER/TUNING. The motions are those of profiles.py, measured at 100 Hz with white noise of 0.03
 deg. MOTION all is the geometric mean over the motions. TUNING is own-tuning if the filter was tuned for this motion,
 and one-tuning if one tuning serves all motions. A tuning minimises the rms of the angle over records of other seeds.
 
 least_squares      polynomial of degree 1 or 2 over a window; tuned: degree and window
 alpha_beta, alpha_beta_gamma    constant gains; tuned: alpha
-wiener             Wiener filter over a window of 6 s (rigs/window_filter.py); tuned: model of the acceleration
+wiener             Wiener filter over a window of 6 s (window_filter.py); tuned: model of the acceleration
 kalman             Kalman filter current_statistical; tuned: alpha and a_max
 imm                default filter of the product, without tuning
 
@@ -25,8 +25,9 @@ from pedestal_analysis.results import tracking
 from pedestal_analysis.results.intervals import row
 from pedestal_analysis.trials import monte_carlo
 from pedestal_analysis.tuning import parameter_search
-from pedestal_studies.rigs import ensemble, profiles, window_filter
-from pedestal_studies.rigs.rows import Result
+from pedestal_studies import ensemble, profiles
+from pedestal_studies.p000_ma import window_filter
+from pedestal_studies.result import Result
 from pedestal_studies.system import filters
 
 DEFAULT_RUNS, BATCH_RUNS = 100, 25  # runs of each case; runs that one worker makes at a time

@@ -31,10 +31,10 @@ from pedestal_analysis.results import tracking
 from pedestal_analysis.results.intervals import row
 from pedestal_analysis.trials import monte_carlo
 from pedestal_common.graph.topics import AXES
-from pedestal_studies.papers.rate_measurement import ALPHA, ANGLE_SIGMA_RAD, differenced_rate, filtered
-from pedestal_studies.rigs import drawing, ensemble
-from pedestal_studies.rigs.ensemble import MEASUREMENT_PERIOD_S
-from pedestal_studies.rigs.rows import Result
+from pedestal_studies import drawing, ensemble
+from pedestal_studies.ensemble import MEASUREMENT_PERIOD_S
+from pedestal_studies.p004_li_chen_wang.rate_measurement import ALPHA, ANGLE_SIGMA_RAD, differenced_rate, filtered
+from pedestal_studies.result import Result
 
 DEFAULT_RUNS, NOISE_SEED = 40, 1  # number of flights; seed of their noise
 BATCH_RUNS = 5  # flights that one worker makes at a time

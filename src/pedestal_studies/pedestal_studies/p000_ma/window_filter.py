@@ -17,7 +17,7 @@ import numpy as np
 from scipy.linalg import solve, toeplitz
 from scipy.signal import fftconvolve
 
-from pedestal_studies.rigs.ensemble import MEASUREMENT_PERIOD_S as T
+from pedestal_studies.ensemble import MEASUREMENT_PERIOD_S as T
 
 
 def polynomial(n, degree):

@@ -23,11 +23,16 @@ from pedestal_analysis.report.figures import FILTERED_COLOUR, MOTOR_1_COLOUR, RA
 from pedestal_analysis.results import tracking
 from pedestal_analysis.results.intervals import row
 from pedestal_analysis.trials import monte_carlo
-from pedestal_studies.papers import imm_feedforward
-from pedestal_studies.rigs import drawing, feedforward_loop
-from pedestal_studies.rigs.feedforward_loop import METRIC_UNITS, MISS_DELAY_STEPS, REVERSAL_S_BY_AXIS, Source
-from pedestal_studies.rigs.profiles import S_MOTION_RATE_RAD_S
-from pedestal_studies.rigs.rows import Result
+from pedestal_studies import drawing
+from pedestal_studies.p003_lin_wu_zhu import feedforward_loop, imm_feedforward
+from pedestal_studies.p003_lin_wu_zhu.feedforward_loop import (
+    METRIC_UNITS,
+    MISS_DELAY_STEPS,
+    REVERSAL_S_BY_AXIS,
+    Source,
+)
+from pedestal_studies.profiles import S_MOTION_RATE_RAD_S
+from pedestal_studies.result import Result
 
 DEFAULT_RUNS, BATCH_RUNS = 50, 10  # runs of each case, with independent noise; runs that one worker makes at a time
 

@@ -13,8 +13,8 @@ from pedestal_analysis.report.figures import (
     TRUTH_COLOUR,
     new_panels,
 )
-from pedestal_studies.rigs import drawing
-from pedestal_studies.rigs.angle_loop import GRID_STEP_S
+from pedestal_studies import drawing
+from pedestal_studies.p002_jia.angle_loop import GRID_STEP_S
 
 LINE_COLOURS = (FILTERED_COLOUR, TRUTH_COLOUR, MOTOR_2_COLOUR, MOTOR_1_COLOUR, INK_COLOUR)
 SMOOTHING_TITLES = {'S0': 'S0, no smoothing', 'S1': 'S1, recursion', 'S2': 'S2, moving average'}

@@ -29,9 +29,9 @@ from pedestal_analysis.report.figures import (
 from pedestal_analysis.results.intervals import row
 from pedestal_analysis.tuning import frequency_response as frequency
 from pedestal_common.graph.topics import AXES
-from pedestal_studies.papers import servo
-from pedestal_studies.rigs import drawing
-from pedestal_studies.rigs.rows import Result
+from pedestal_studies import drawing
+from pedestal_studies.p000_ma import servo
+from pedestal_studies.result import Result
 
 
 def controller(name):

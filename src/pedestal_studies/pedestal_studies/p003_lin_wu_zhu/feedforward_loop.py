@@ -29,9 +29,9 @@ from acu_tracker.servo import feedforward
 from pedestal_analysis.results import tracking
 from pedestal_analysis.trials import monte_carlo
 from pedestal_common.compiled import compiled
-from pedestal_studies.rigs import ensemble, metrics, profiles
-from pedestal_studies.rigs.ensemble import MEASUREMENT_PERIOD_S as T
-from pedestal_studies.rigs.profiles import S_MOTION_RATE_RAD_S, S_MOTION_STROKE_RAD
+from pedestal_studies import ensemble, metrics, profiles
+from pedestal_studies.ensemble import MEASUREMENT_PERIOD_S as T
+from pedestal_studies.profiles import S_MOTION_RATE_RAD_S, S_MOTION_STROKE_RAD
 
 MISS_DELAY_STEPS = 4  # delay d of a miss, in T
 MISS_SIGMA_RAD = math.radians(0.02)  # noise of a miss [rad]

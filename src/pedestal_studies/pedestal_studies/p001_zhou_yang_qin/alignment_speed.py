@@ -20,10 +20,10 @@ from pedestal_analysis.report.figures import FILTERED_COLOUR, INK_COLOUR, new_pa
 from pedestal_analysis.results import tracking
 from pedestal_analysis.results.intervals import row
 from pedestal_analysis.trials import monte_carlo
-from pedestal_studies.papers import alignment
-from pedestal_studies.papers.alignment import EVALUATION_PERIOD_S, INS_PARAMETERS, LEVEL_COLUMNS
-from pedestal_studies.rigs import drawing, metrics
-from pedestal_studies.rigs.rows import Result
+from pedestal_studies import drawing, metrics
+from pedestal_studies.p001_zhou_yang_qin import alignment
+from pedestal_studies.p001_zhou_yang_qin.alignment import EVALUATION_PERIOD_S, INS_PARAMETERS, LEVEL_COLUMNS
+from pedestal_studies.result import Result
 
 DEFAULT_RUNS = 100  # runs of each case
 SPEEDS = (0.5, 1.0, 2.0, 4.0)  # factors K by which the times of the method are divided [-]; 1: the default parameters

@@ -31,8 +31,8 @@ from pedestal_analysis.results import tracking
 from pedestal_analysis.results.intervals import row
 from pedestal_analysis.trials import cases
 from pedestal_analysis.trials.cases import Case
-from pedestal_studies.rigs import drawing, metrics
-from pedestal_studies.rigs.rows import Result
+from pedestal_studies import drawing, metrics
+from pedestal_studies.result import Result
 
 STEP_SIZE_RAD = 0.174  # step of figure 5 [rad]
 SINE_AMPLITUDE_RAD = 0.87  # amplitude of figure 6 [rad]

@@ -2,7 +2,7 @@
 
 The array steers its beam electronically. The loop moves the beam after the target by the error that the receiver
 measures. alpha is the gain of the loop from the error to the angle [-], T the time between two updates. Cases run the
-loops of rigs/angle_loop.py; cases graph/... run the scenario phased_array_sway in the closed loop.
+loops of angle_loop.py; cases graph/... run the scenario phased_array_sway in the closed loop.
 
 S0, S1 and S2 are the kinds of smoothing in the receiver: none, the paper's recursion, and a moving average, with n =
 20 samples at 1 kHz. A case without S0, S1 or S2 in its name has S1.
@@ -23,8 +23,9 @@ from pedestal_analysis.results.intervals import row
 from pedestal_analysis.results.tracking import interval_start_error, rms
 from pedestal_analysis.trials import monte_carlo
 from pedestal_analysis.trials.cases import Case
-from pedestal_studies.rigs import phased_array_figures as figures
-from pedestal_studies.rigs.angle_loop import (
+from pedestal_studies.metrics import crossings, overshoot_percent, peak
+from pedestal_studies.p002_jia import figures as figures
+from pedestal_studies.p002_jia.angle_loop import (
     GRID_STEP_S,
     SMOOTHING_CODES,
     SMOOTHING_SAMPLES,
@@ -33,8 +34,7 @@ from pedestal_studies.rigs.angle_loop import (
     delay_limit,
     spectral_radius,
 )
-from pedestal_studies.rigs.metrics import crossings, overshoot_percent, peak
-from pedestal_studies.rigs.rows import Result
+from pedestal_studies.result import Result
 from tracking_receiver_sim import receiver
 from tracking_receiver_sim.params import ReceiverParameters
 
