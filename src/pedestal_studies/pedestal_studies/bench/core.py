@@ -1,7 +1,6 @@
 """Benchmark `pedestal bench core`: speed of the compiled laws of drive, closed loop and filters on this machine.
 
-The times are compared with targets, with one axis of the drive in scipy (solve_ivp_axis.py), and with the filters of
-filterpy.
+The times are compared with targets and with the filters of filterpy.
 """
 import math
 import time
@@ -15,7 +14,7 @@ from acu_tracker.estimation.filters import axis_filter, unscented
 from acu_tracker.estimation.filters.measurement import AxisMeasurement, AxisVariances, Estimate, Measurement
 from acu_tracker.estimation.params import FilterParameters, UkfParameters
 from acu_tracker.geometry.motion import AxisMotion, Motion
-from adu_drive import axis, drive_unit, lanes
+from adu_drive import drive_unit, lanes
 from adu_drive import unit as adu_unit
 from adu_drive.params import AduParameters
 from pedestal_analysis.results.results import row
@@ -24,15 +23,12 @@ from pedestal_bringup.loop import closed_loop, side_by_side
 from pedestal_bringup.scenario import scenario
 from pedestal_common.compiled import compiled
 from pedestal_common.parameters import build
-from pedestal_studies.bench import solve_ivp_axis
 from pedestal_studies.bench.table import best_of, show
 
 CORE_DURATION_S, TRIAL_DURATION_S = 20.0, 10.0  # simulated durations of the closed loop and of a trial [s]
 SHORT_RUN_STEPS, SHORT_RUN_COUNT = 40, 100
 """Drive steps of a run that is short enough to be rarely interrupted by other processes; number of these runs."""
 SUBSTEPS_PER_STEP = 2 * 100  # sub-steps of the plant in one drive step of 5 ms: 100 of each axis
-SOLVE_IVP_TICKS, SUBSTEPS_PER_TICK = 100, 2
-"""Periods of the current loop that scipy computes; sub-steps of the plant in one period."""
 
 
 @compiled
@@ -203,11 +199,6 @@ def run():
     loops = [closed_loop.Loop(loop) for _ in range(5)]
     factor = CORE_DURATION_S / best_of(lambda: loops.pop().run())
 
-    tick = axis.CURRENT_LOOP_PERIOD_S
-    scipy_time = best_of(lambda: solve_ivp_axis.run(AduParameters().azimuth, SOLVE_IVP_TICKS, tick, (5.0, 5.0)), 3)
-    scipy_substep = scipy_time / SOLVE_IVP_TICKS / SUBSTEPS_PER_TICK * 1e9
-    rows = [*drives, row('core', 'realtime_factor', factor, '', '>= 200'),
-            row('solve_ivp', 'substep_ns', scipy_substep, 'ns'),
-            row('solve_ivp', 'ratio', scipy_substep / drives[0]['value'], ''), *filter_rows()]
+    rows = [*drives, row('core', 'realtime_factor', factor, '', '>= 200'), *filter_rows()]
     show(f'compiled core, one core of {llvmlite.binding.get_host_cpu_name()}, numba {numba.__version__}', rows)
     return rows

@@ -1,7 +1,7 @@
 """The numbers of the documentation: rows of the studies, kept in docs/rows.json, and the tables made from these rows.
 
-`python -m pedestal_studies.numbers.published [STUDY ...]` (`make numbers`) runs all published studies, or the named
-studies only. The program writes the rows that the tables use. `make docs` writes the tables from these rows.
+`python -m tools.numbers.published [STUDY ...]` (`make numbers`) runs all published studies, or the named studies only.
+The program writes the rows that the tables use. `make docs` writes the tables from these rows.
 
 A row is a measured number with study, case, metric, value, unit, interval and target. A table is (heads of the
 columns, lines of cells).
@@ -12,11 +12,12 @@ import math
 import pathlib
 import sys
 
+from tools.numbers import claims
+
 import pedestal_studies
 from pedestal_analysis import console
 from pedestal_analysis.results.intervals import missed
 from pedestal_analysis.trials import monte_carlo
-from pedestal_studies.numbers import claims
 from pedestal_studies.p000_ma import filter_families
 from pedestal_studies.p001_zhou_yang_qin import alignment, alignment_speed
 from pedestal_studies.p002_jia import phased_array

@@ -1,13 +1,16 @@
 """Ring of bare rclpy nodes that pass the messages of the graph and compute nothing.
 
-The time of its lap is the lower bound of the lap time in `pedestal bench graph`. A lap is one step of the lockstep: a
-message of the drive leads to messages of the receiver and the control unit, and returns to the drive.
-`python -m pedestal_studies.bench.bare_ring ROLE STEPS` runs one node; ROLE is its name in RING_NODES. The role `adu`
-prints the lap time. Topics, types, QoS and executor are those of the graph. Each node makes its messages once, and
-rclpy itself publishes them.
+The time of its lap is the lower bound of the lap time in `pedestal bench graph` (docs/decisions/lockstep.md). A lap is
+one step of the lockstep: a message of the drive leads to messages of the receiver and the control unit, and returns to
+the drive. `python -m tools.bare_ring` compares the two times. `python -m tools.bare_ring ROLE STEPS` runs one node;
+ROLE is its name in RING_NODES. The role `adu` prints the lap time. Topics, types, QoS and executor are those of the
+graph. Each node makes its messages once, and rclpy itself publishes them.
 """
 import json
+import statistics
+import subprocess
 import sys
+import tempfile
 import time
 
 from rclpy.node import Node
@@ -19,6 +22,7 @@ RING_NODES = ('tracking_receiver', 'acu', 'adu', 'recorder')  # names of the nod
 TRIGGER_TOPICS = {'tracking_receiver': 'adu/truth', 'acu': 'tracking_receiver/angle_error', 'adu': 'acu/rate_command'}
 """{node: topic whose message triggers a lap of the node}."""
 WARM_UP_LAPS = 300  # number of laps before the measurement of the time starts
+RING_STEPS = 3000  # measured laps of a run, as many as steps of 5 ms in a run of `pedestal bench graph`
 
 
 def _filled(topic):
@@ -96,11 +100,46 @@ class Ring(Node):
             publisher.publish(message)
 
 
-def main(args=None) -> int:
-    """Run a ROLE for STEPS laps, from the command line; return the exit code."""
-    role, steps = (args or sys.argv[1:])[:2]
-    return shell.main(lambda: Ring(role, int(steps)), args=[])
+def lap(steps=RING_STEPS):
+    """Return the lap time [us] of the ring: as many processes as the graph and the same messages, without any work."""
+    processes = {role: subprocess.Popen([sys.executable, __file__, role, str(steps)], stdout=subprocess.PIPE,
+                                        stderr=subprocess.PIPE, text=True) for role in RING_NODES}
+    try:
+        output, error_text = processes['adu'].communicate(timeout=120.0)
+    except subprocess.TimeoutExpired:
+        raise RuntimeError('the bare ring did not finish within 120 s') from None
+    finally:
+        for process in processes.values():
+            process.kill()
+            process.wait()
+    if not output:
+        raise RuntimeError(f'the bare ring failed: {error_text.strip()}')
+    return json.loads(output.splitlines()[-1])['lap_us']
+
+
+def compare():
+    """Print the lap times of the graph and of the bare ring, and their ratio: medians of runs that alternate.
+
+    Other load of the machine affects runs that alternate alike.
+    """
+    from pedestal_studies.bench import lockstep  # A node of the ring does not need it.
+    bare, graph = [], []
+    with tempfile.TemporaryDirectory() as folder:
+        for number in range(lockstep.ROUND_COUNT):
+            bare.append(lap())
+            graph.append(lockstep.lap(folder, number)[0])
+    times = statistics.median(graph), statistics.median(bare)
+    print('a lap of the graph {:.0f} us, of the bare ring {:.0f} us: ratio {:.2f}'.format(*times, times[0] / times[1]))
+
+
+def main(args) -> int:
+    """Run a role for as many laps as the command line gives, or compare; return the exit code."""
+    if args:
+        role, steps = args
+        return shell.main(lambda: Ring(role, int(steps)), args=[])
+    compare()
+    return 0
 
 
 if __name__ == '__main__':
-    sys.exit(main())
+    sys.exit(main(sys.argv[1:]))

@@ -4,19 +4,19 @@ import pathlib
 
 import numpy as np
 import pytest
+from tools.numbers import claims, published
 
 from acu_tracker.estimation.filters import axis_filter
 from acu_tracker.estimation.params import FilterParameters
 from adu_drive.params import AduParameters
 from pedestal_analysis.results.intervals import missed
-from pedestal_studies.numbers import claims, published
 from pedestal_studies.p000_ma import backlash, servo
 from pedestal_studies.p001_zhou_yang_qin import alignment
 from pedestal_studies.p003_lin_wu_zhu import feedforward_loop as loop
 from ship_motion_sim import earth
 from ship_motion_sim.navigation import navigator
 
-ROOT = pathlib.Path(__file__).parents[3]
+ROOT = pathlib.Path(__file__).parents[1]
 LATITUDE = math.radians(alignment.SHIP_PARAMETERS.latitude_deg)
 
 
